@@ -1,0 +1,52 @@
+# One library per room, one test program per room.
+
+find_program(CLOTHFIT_CCACHE ccache)
+if(CLOTHFIT_CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
+  # Precompiled headers need ccache to be told what it may ignore.
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${CMAKE_COMMAND} -E env
+    CCACHE_SLOPPINESS=pch_defines,time_macros,include_file_mtime,include_file_ctime
+    ${CLOTHFIT_CCACHE})
+endif()
+
+add_library(clothfit_warnings INTERFACE)
+target_compile_options(clothfit_warnings INTERFACE
+  -Wall -Wextra -Wconversion -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual)
+if(CLOTHFIT_WARNINGS_AS_ERRORS)
+  target_compile_options(clothfit_warnings INTERFACE -Werror)
+endif()
+
+# clothfit_add_library(NAME SOURCES a.cpp ... [PUBLIC lib ...] [PRIVATE lib ...]
+#                      [PRECOMPILE <header> ...])
+# The single include root lets every include name its room: "model/step.h".
+function(clothfit_add_library name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;PUBLIC;PRIVATE;PRECOMPILE" ${ARGN})
+  add_library(clothfit_${name} STATIC ${ARG_SOURCES})
+  add_library(clothfit::${name} ALIAS clothfit_${name})
+  target_include_directories(clothfit_${name} PUBLIC
+    $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}> $<INSTALL_INTERFACE:include/clothfit>)
+  target_link_libraries(clothfit_${name}
+    PUBLIC ${ARG_PUBLIC}
+    PRIVATE ${ARG_PRIVATE} $<BUILD_INTERFACE:clothfit_warnings>)
+  if(ARG_PRECOMPILE)
+    target_precompile_headers(clothfit_${name} PRIVATE ${ARG_PRECOMPILE})
+  endif()
+endfunction()
+
+# clothfit_add_test(ROOM SOURCES a_test.cpp ... [LINK lib ...] [LABELS slow])
+# Builds and registers, so that no test is compiled but never run.
+function(clothfit_add_test room)
+  cmake_parse_arguments(ARG "" "NAME" "SOURCES;LINK;LABELS" ${ARGN})
+  if(NOT ARG_NAME)
+    set(ARG_NAME clothfit_${room}_tests)
+  endif()
+  add_executable(${ARG_NAME} ${ARG_SOURCES})
+  target_include_directories(${ARG_NAME} PRIVATE ${PROJECT_SOURCE_DIR})
+  target_link_libraries(${ARG_NAME} PRIVATE
+    clothfit::${room} ${ARG_LINK} GTest::gtest_main GTest::gmock clothfit_warnings)
+  target_precompile_headers(${ARG_NAME} PRIVATE <gmock/gmock.h> <gtest/gtest.h> <Eigen/Dense>)
+  target_compile_definitions(${ARG_NAME} PRIVATE
+    CLOTHFIT_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
+  gtest_discover_tests(${ARG_NAME}
+    DISCOVERY_TIMEOUT 60
+    PROPERTIES LABELS "${room};${ARG_LABELS}" TIMEOUT 600)
+endfunction()

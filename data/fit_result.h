@@ -1,0 +1,78 @@
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace clothfit {
+
+enum class ParameterState { fitted, fixed, undetermined };
+
+struct ParameterEstimate {
+  std::string name;
+  std::string unit;
+  double value = 0;
+  double sigma = 0;  ///< one standard deviation; 0 when fixed
+  ParameterState state = ParameterState::fitted;
+  std::string reason;  ///< why it is undetermined or fixed; empty when fitted
+};
+
+struct EffectEstimate {
+  std::string name;
+  std::vector<ParameterEstimate> parameters;
+};
+
+/// `rms` is over coordinates, `rms_distance` over points.
+struct ErrorSummary {
+  double rms = 0;
+  double rms_distance = 0;
+  int count = 0;  ///< points
+};
+
+/// rms over coordinates of the trivial predictors on the held-out frames.
+struct TrivialErrors {
+  double first_frame = 0;
+  double last_velocity = 0;
+  double rigid = 0;
+};
+
+/// Errors of one kind of observation: `unit` is "m" (3D tracks) or "px" (a camera's tracks).
+struct ObservationErrors {
+  std::string kind;  ///< "tracks3d" or the camera's name
+  std::string unit;
+  ErrorSummary fitted;
+  ErrorSummary held_out;  ///< count 0 when nothing was held out
+  double noise = 0;       ///< standard deviation per coordinate
+  TrivialErrors trivial;
+};
+
+/// What fit.json holds (format clothfit-fit/1).
+struct FitResult {
+  std::string recording;
+  std::string version;
+  std::string command;
+  unsigned long long seed = 0;
+  double seconds = 0;
+  int mesh_columns = 0;
+  int mesh_rows = 0;
+  std::string parameter_set;
+  std::string integrator;
+  int substeps = 0;  ///< time steps per frame at the last stage (largest frame interval)
+  double time_step_s = 0;
+  std::string start;
+  std::vector<ParameterEstimate> parameters;
+  std::vector<EffectEstimate> effects;
+  std::vector<ParameterEstimate> nuisance;  ///< measurement unknowns fitted along, with their prior
+  std::vector<ObservationErrors> errors;
+  int observations_used = 0;
+  std::map<std::string, int> observations_rejected;  ///< reason -> count
+};
+
+/// Writes fit.json; numbers that are not finite are a programming error.
+void write_fit_result(const FitResult& result, const std::filesystem::path& file);
+
+/// Reads it back; unknown keys are ignored, missing ones are an InputError.
+FitResult read_fit_result(const std::filesystem::path& file);
+
+}  // namespace clothfit

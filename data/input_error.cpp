@@ -1,0 +1,24 @@
+#include "data/input_error.h"
+
+namespace clothfit {
+namespace {
+
+std::string sentence(const std::string& where, const std::string& problem,
+                     const std::string& expected, const std::string& remedy) {
+  std::string text = where + ": " + problem;
+  if (!expected.empty()) text += "; " + expected;
+  if (!remedy.empty()) text += "; " + remedy;
+  return text;
+}
+
+}  // namespace
+
+InputError::InputError(const std::string& where, const std::string& problem,
+                       const std::string& expected, const std::string& remedy)
+    : std::runtime_error(sentence(where, problem, expected, remedy)) {}
+
+InputError::InputError(const std::string& file, int line, const std::string& problem,
+                       const std::string& expected, const std::string& remedy)
+    : InputError(file + ":" + std::to_string(line), problem, expected, remedy) {}
+
+}  // namespace clothfit

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <stdexcept>
+#include <string>
+
+namespace clothfit {
+
+/// A mistake in what the user gave, told so that the user can mend it:
+///
+///   cloth.yaml:12: mass = -0.02; a mass is in kilograms, > 0; weigh the dry cloth
+///
+/// The program ends with exit code 3 on it. Our own mistakes are assertions, and numbers that do
+/// not work out are reason codes; neither is an InputError.
+class InputError : public std::runtime_error {
+ public:
+  /// `where` is FILE, FILE:LINE or an option's name; `remedy` may be empty.
+  InputError(const std::string& where, const std::string& problem, const std::string& expected,
+             const std::string& remedy = "");
+  /// The same for line `line` (counted from 1) of `file`.
+  InputError(const std::string& file, int line, const std::string& problem,
+             const std::string& expected, const std::string& remedy = "");
+};
+
+}  // namespace clothfit

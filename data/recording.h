@@ -1,0 +1,135 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "data/markers.h"
+
+namespace clothfit {
+
+/// `by_area`: an edge vertex weighs half, a corner a quarter. `equal`: as in the founding paper.
+enum class MassDistribution { by_area, equal };
+
+struct ClothDescription {
+  double width_m = 0;             ///< along s; flat and unstretched; > 0
+  double height_m = 0;            ///< along t; > 0
+  std::optional<double> mass_kg;  ///< absent when it was not weighed
+  MassDistribution masses = MassDistribution::by_area;
+  int mesh_columns = 17;  ///< suggested mesh for a fit; >= 2
+  int mesh_rows = 17;     ///< >= 2
+};
+
+/// A printed calibration board; columns and rows count inner corners.
+struct BoardDescription {
+  int columns = 0;
+  int rows = 0;
+  double square_m = 0;
+};
+
+struct CalibrationStills {
+  std::filesystem::path images;  ///< folder
+  BoardDescription board;
+};
+
+/// Paths are absolute once read. A camera of a recording of tracks alone has no images; a camera
+/// without a file has stills to calibrate from.
+struct CameraEntry {
+  std::string name;
+  std::optional<std::filesystem::path> file;
+  std::optional<std::filesystem::path> images;  ///< folder of pictures, or a video file
+  std::optional<CalibrationStills> calibration;
+};
+
+enum class HeldMotion {
+  fixed,   ///< stays where it is in the start shape
+  path,    ///< known path, from a file
+  tracked  ///< follows its own measured track
+};
+enum class ClothEdge { top, bottom, left, right };  ///< top is t = 0, left is s = 0
+
+/// A prescribed point (`edge` empty) or edge of the cloth.
+struct HeldPoint {
+  Eigen::Vector2d at_m = Eigen::Vector2d::Zero();  ///< (s, t)
+  std::optional<ClothEdge> edge;
+  HeldMotion motion = HeldMotion::fixed;
+  std::optional<std::filesystem::path> file;  ///< for `path`
+};
+
+/// A known path of a held point: times rise, positions in world coordinates.
+struct HeldPath {
+  std::vector<double> time_s;
+  std::vector<Eigen::Vector3d> position_m;
+};
+
+enum class StartKind { at_rest, released_flat, unknown };
+
+/// An effect known to act. A parameter that is left out is fitted.
+struct DeclaredEffect {
+  std::string name;
+  std::map<std::string, std::vector<double>> parameters;
+};
+
+struct RigidBody {
+  std::string name;
+  std::filesystem::path file;
+  std::optional<double> clock_offset_s;  ///< absent when unknown
+  std::vector<Eigen::Vector2d> holds_m;  ///< (s, t) of the points it holds
+};
+
+struct Clouds {
+  std::string camera;
+  std::filesystem::path folder;
+};
+
+/// What recording.yaml says, checked, with markers, times and reference points read in.
+/// Tracks, cameras and pictures are read when they are needed. Paths are absolute.
+struct Recording {
+  std::filesystem::path folder;
+  std::string name;
+  std::string origin;
+  ClothDescription cloth;
+  std::filesystem::path markers_file;
+  MarkerSet markers;
+  std::optional<double> frame_rate_hz;              ///< constant rate, or
+  std::optional<std::filesystem::path> times_file;  ///< the file that
+  std::vector<double> times_s;                      ///< these were read from; rising
+  Eigen::Vector3d gravity_m_per_s2{0, 0, -9.81};
+  std::vector<CameraEntry> cameras;
+  std::optional<std::filesystem::path> tracks3d;
+  std::map<std::string, std::filesystem::path> tracks2d;  ///< camera name -> file
+  std::optional<std::filesystem::path> reference_file;
+  std::vector<ReferencePoint> reference;
+  std::vector<RigidBody> bodies;
+  std::optional<Clouds> clouds;
+  std::vector<HeldPoint> held;
+  StartKind start = StartKind::at_rest;
+  std::vector<DeclaredEffect> declared;
+  std::optional<int> held_out_from_frame;  ///< no fit and no decision uses frames from this one on
+
+  /// Time of a frame; frame 0 need not be at 0. `frame` must exist where a times file is given.
+  double frame_time_s(int frame) const;
+  const CameraEntry* find_camera(const std::string& camera_name) const;
+};
+
+/// Reads `folder`/recording.yaml and the small tables it names. Throws InputError.
+Recording read_recording(const std::filesystem::path& folder);
+
+/// Writes `folder`/recording.yaml. Files inside `folder` are named relative to it; others are named
+/// relative to it as well ("../..."), so that pictures are used where they lie.
+/// Does not copy any file.
+void write_recording(const Recording& recording, const std::filesystem::path& folder);
+
+/// Reads a held point's path (columns time,x,y,z). Throws InputError.
+HeldPath read_held_path(const std::filesystem::path& file);
+
+/// Text forms used in recording.yaml.
+std::string to_string(MarkerKind kind);
+std::string to_string(HeldMotion motion);
+std::string to_string(StartKind start);
+std::string to_string(ClothEdge edge);
+
+}  // namespace clothfit

@@ -1,0 +1,91 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "data/camera_parameters.h"
+#include "data/fit_result.h"
+#include "data/progress.h"
+#include "data/recording.h"
+#include "data/tracks.h"
+
+namespace clothfit {
+
+/// Everything a fit looks at, read in.
+struct FitInput {
+  Recording recording;
+  Tracks3d tracks3d;                         ///< empty when there are none
+  std::map<std::string, Tracks2d> tracks2d;  ///< camera name -> its tracks
+  std::vector<CameraParameters> cameras;     ///< those of tracks2d, with poses
+};
+
+/// Which observations a fit uses.
+enum class ObservationKind { automatic, tracks3d, tracks2d };
+
+struct FitOptions {
+  ObservationKind observations = ObservationKind::automatic;  ///< automatic: 3D where there are any
+  std::vector<std::string> effects;  ///< effects to fit beside those the recording declares
+  int mesh_columns = 0;              ///< 0: the recording's suggestion
+  int mesh_rows = 0;
+  unsigned long long seed = 1;
+  int population = 100;      ///< individuals of the evolutionary search [louchet1995]
+  int generations = 40;      ///< at most; the search stops earlier when it no longer gains
+  int refine_best = 3;       ///< individuals that go to refinement
+  double substep_scale = 1;  ///< > 1: smaller time steps than stability asks for
+  int threads = 0;           ///< 0: as many as the machine has
+  /// Parameters taken from an earlier fit: nothing is fitted, the recording is forecast from its
+  /// own first frame.
+  std::optional<FitResult> forecast;
+  void validate() const;  ///< throws InputError
+};
+
+enum class FitStop { converged, reached_limit, cancelled, diverged, no_observations };
+
+/// A fit with all that a report shows.
+struct FitReport {
+  FitStop stop = FitStop::converged;
+  std::string message;  ///< one line for a person
+  FitResult result;
+  bool usable() const { return stop == FitStop::converged || stop == FitStop::reached_limit; }
+
+  /// Correlations between the fitted parameters, in the order of `correlation_names`.
+  std::vector<std::string> correlation_names;
+  Eigen::MatrixXd correlation;
+
+  /// One entry per kind of observation, as in result.errors.
+  struct Residuals {
+    std::string kind;
+    std::string unit;
+    struct Row {
+      int frame = 0;
+      int marker = 0;
+      Eigen::VectorXd observed;   ///< 2 or 3 coordinates
+      Eigen::VectorXd predicted;  ///< the model's
+      double sigma = 0;
+      bool held_out = false;
+    };
+    std::vector<Row> rows;
+    /// rms over coordinates in each frame, of the model and of the trivial predictors
+    /// (the latter only where defined; NaN elsewhere). Index = frame.
+    std::vector<double> rms_by_frame;
+    std::vector<double> first_frame_by_frame;
+    std::vector<double> last_velocity_by_frame;
+    std::vector<double> rigid_by_frame;
+  };
+  std::vector<Residuals> residuals;
+
+  /// Best cost after each generation of the evolutionary search.
+  std::vector<double> search_cost;
+  /// One line per stage: what was done, with how many frames, substeps, evaluations, final cost.
+  std::vector<std::string> stages;
+};
+
+/// Identifies the simulator that moves like the recording: evolutionary search, then refinement
+/// with a growing horizon, then uncertainty and the error on held-out frames. Throws InputError
+/// for a recording that cannot be fitted as it stands.
+FitReport fit(const FitInput& input, const FitOptions& options, const ProgressCallback& progress);
+
+}  // namespace clothfit

@@ -1,0 +1,17 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <opencv2/core.hpp>
+#include <optional>
+#include <vector>
+
+#include "data/recording.h"
+
+namespace clothfit {
+
+/// Inner corners of a chessboard in a grey picture, row by row, refined to a fraction of a pixel;
+/// nothing when the whole board is not seen.
+std::optional<std::vector<Eigen::Vector2d>> find_chessboard(const cv::Mat& grey,
+                                                            const BoardDescription& board);
+
+}  // namespace clothfit
