@@ -26,6 +26,15 @@ inline Rigid3 inverse(const Rigid3& b_from_a) {
   return {back, -(back * b_from_a.translation_m)};
 }
 
+/// (exp(w), d): the transform that turns by the rotation vector (rad) and then shifts. Poses are
+/// perturbed with it on the left, b_from_a = turn_and_shift(w, d) * estimate, and covariances of
+/// poses are those of (w, d).
+Rigid3 turn_and_shift(const Eigen::Vector3d& rotation_vector_rad,
+                      const Eigen::Vector3d& translation_m);
+
+/// Inverse of exp: the rotation vector (rad), no longer than pi.
+Eigen::Vector3d rotation_vector(const Eigen::Quaterniond& rotation);
+
 /// The rigid transform that takes the columns of `a` closest to those of `b` (3 x N, N >= 3, not
 /// all on a line), in least squares weighted by `weight` (N; empty: all alike). Umeyama 1991
 /// without scale.
