@@ -1,0 +1,62 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/SparseCore>
+#include <span>
+
+namespace clothfit {
+
+/// How a cloth's surface runs between the vertices of its mesh.
+enum class SurfaceInterpolation {
+  bicubic,  ///< tensor product of natural cubic splines; error O(spacing^4) away from the edges
+  bilinear  ///< straight between neighbours; error O(spacing^2): 0.1 to 0.4 mm on a 17 x 17 cloth
+};
+
+/// The points of a cloth that are looked at, as weights on the vertices of a mesh:
+///
+///   x(s, t) = sum_i sum_j R_i(t) C_j(s) P[i, j]
+///
+/// where R_i and C_j are the cardinal functions of the one-dimensional interpolation along the rows
+/// (t) and columns (s) of evenly spaced vertices: 1 at their own vertex, 0 at all others. Of the
+/// natural cubic spline, that is the interpolating curve of least bending, straight at and beyond
+/// its ends [deboor1978]; with two vertices it is the straight line. The operator is
+/// linear in the vertices and knows nothing of their positions, so it is made once per mesh and
+/// list of points.
+///
+/// Vertex [i, j] (row i along t, column j along s) has index i * columns + j.
+struct Surface {
+  using Weights = Eigen::SparseMatrix<double, Eigen::RowMajor>;
+
+  int columns = 0;         ///< >= 2
+  int rows = 0;            ///< >= 2
+  Weights row_weights;     ///< points x rows, R_i(t) of each point, compressed
+  Weights column_weights;  ///< points x columns, C_j(s) of each point, compressed
+
+  int points() const { return static_cast<int>(row_weights.rows()); }
+  int vertices() const { return columns * rows; }
+
+  /// Positions of the points, 3 x points, from those of the vertices, 3 x vertices.
+  Eigen::Matrix3Xd evaluate(const Eigen::Matrix3Xd& positions) const;
+};
+
+/// Weights of `points` (2 x M: s in row 0, t in row 1, metres) on a mesh of `columns` x `rows`
+/// vertices over a cloth of `width_m` x `height_m`. Points lie on the cloth; up to a micrometre
+/// outside (what reading a marker file lets pass) counts as the edge. Weights below 1e-12 of the
+/// point's largest are left out: a point at a vertex has one, and far vertices of large meshes none
+/// (the weights fall by 0.27 from vertex to vertex).
+Surface make_surface(int columns, int rows, double width_m, double height_m,
+                     const Eigen::Matrix2Xd& points,
+                     SurfaceInterpolation interpolation = SurfaceInterpolation::bicubic);
+
+/// Interpolates `width` fields at once, their values stored side by side: vertex k's are
+/// [k * width, (k + 1) * width), point p's likewise. With `width` 3 that is a 3 x N matrix; with
+/// the number of lanes it is one coordinate of many simulations. Each field is summed in the same
+/// order whatever `width` is, so lanes and single runs agree to the last bit.
+void interpolate(const Surface& surface, int width, std::span<const double> vertex_values,
+                 std::span<double> point_values);
+
+/// The whole operator as one matrix, points x vertices: R_i(t) C_j(s) at [point, i * columns + j].
+/// For Jacobians: d x(point) / d P[i, j] is that entry times the identity.
+Surface::Weights vertex_weights(const Surface& surface);
+
+}  // namespace clothfit
