@@ -13,9 +13,14 @@
 namespace clothfit {
 
 struct TrackOptions {
-  double max_speed_px = 60;         ///< a marker further than this from its last place is doubted
-  double min_decision_margin = 20;  ///< weaker tag readings are rejected
-  void validate() const;            ///< throws InputError
+  /// px per frame, > 0: a tag that is further than this both from where it was before and from
+  /// where it is after is rejected. Higher values let wrongly read tags through.
+  double max_speed_px = 60;
+  /// Grey levels, >= 0: weaker readings of a tag's bits are rejected.
+  double min_decision_margin = 20;
+  /// 0 to 2: readings with more wrong bits are rejected.
+  int max_corrected_bits = 1;
+  void validate() const;  ///< throws InputError
 };
 
 /// The mean place of a fixed reference point over all frames that show it.
@@ -35,13 +40,16 @@ struct TrackResult {
   int frames = 0;
   int image_width = 0;
   int image_height = 0;
-  std::map<std::string, int> rejected;  ///< reason -> count
+  std::map<std::string, int> rejected;  ///< reason (vision/rejection.h) -> rows of `tracks`
   cv::Mat overlay;                      ///< one frame with its markers drawn, for the report
   int overlay_frame = 0;
 };
 
-/// Finds the cloth's tags in every picture of one camera. Throws InputError for pictures that
-/// cannot be read, are none, or differ in size, and when no tag of the family ever appears.
+/// Finds the cloth's tags in every picture of one camera: the markers and reference points that
+/// carry a tag and a corner. Pictures are worked on in parallel; the result does not depend on the
+/// number of threads. `progress` (may be empty) is called once per picture, in order, by one thread
+/// at a time but not always the same. Throws InputError for pictures that cannot be read, are none,
+/// or differ in size, for markers without tags, and when no tag of the cloth ever appears.
 TrackResult track(const Recording& recording, const CameraEntry& camera,
                   const TrackOptions& options, const ProgressCallback& progress);
 

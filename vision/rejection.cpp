@@ -1,0 +1,19 @@
+#include "vision/rejection.h"
+
+namespace clothfit {
+
+const std::vector<RejectionReason>& rejection_reasons() {
+  static const std::vector<RejectionReason> reasons = {
+      {rejection::kLowMargin, "the tag's bits were read with too little contrast"},
+      {rejection::kCorrectedBits, "too many of the tag's bits were read wrong to trust its number"},
+      {rejection::kTouchingBorder, "the corner lies at the border of the picture"},
+      {rejection::kTooOblique,
+       "the tag is seen so flat, or so folded, that its corners are not told"
+       " apart"},
+      {rejection::kDuplicateId, "the same tag was read twice in one picture"},
+      {rejection::kJump, "the tag is far from where it was before and from where it is after"},
+  };
+  return reasons;
+}
+
+}  // namespace clothfit

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace clothfit {
+
+/// A reason for which a detected point is kept out of every fit: `code` is what tracks files hold
+/// after `rejected:`.
+struct RejectionReason {
+  std::string code;
+  std::string meaning;  ///< one sentence for a person
+};
+
+/// Every reason that tracking gives, in the order in which they are tried.
+const std::vector<RejectionReason>& rejection_reasons();
+
+/// The codes, one name each.
+namespace rejection {
+inline constexpr const char* kLowMargin = "low_margin";
+inline constexpr const char* kCorrectedBits = "corrected_bits";
+inline constexpr const char* kTouchingBorder = "touching_border";
+inline constexpr const char* kTooOblique = "too_oblique";
+inline constexpr const char* kDuplicateId = "duplicate_id";
+inline constexpr const char* kJump = "jump";
+}  // namespace rejection
+
+}  // namespace clothfit

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <memory>
+#include <opencv2/core.hpp>
+#include <string>
+#include <vector>
+
+namespace clothfit {
+
+/// A tag as one picture shows it, in this program's conventions: pixel (0, 0) is the centre of the
+/// top left pixel; corners are those of the tag's border, 0 bottom left, 1 bottom right, 2 top
+/// right, 3 top left as the printed tag is seen upright.
+struct TagDetection {
+  int id = 0;
+  int corrected_bits = 0;      ///< bits of the code that were read wrong
+  double decision_margin = 0;  ///< mean distance of a bit's grey level from the threshold
+  std::array<Eigen::Vector2d, 4> corner_px{};
+  std::array<double, 4> sigma_px{};  ///< one standard deviation per coordinate
+};
+
+/// Names of all tag families that can be read, such as tag36h11; alphabetical.
+std::vector<std::string> tag_families();
+
+/// Reads the tags of one family in pictures. Not to be shared between threads: each has its own.
+class TagDetector {
+ public:
+  /// `max_corrected_bits` is at most 2; large families correct fewer, for the sake of memory.
+  /// Throws InputError for a family that is not known, listing those that are.
+  explicit TagDetector(const std::string& family, int max_corrected_bits = 2);
+  ~TagDetector();
+  TagDetector(TagDetector&&) noexcept;
+  TagDetector& operator=(TagDetector&&) noexcept;
+
+  /// Tags in an 8-bit grey picture, sorted by id, then by place.
+  std::vector<TagDetection> detect(const cv::Mat& grey);
+
+ private:
+  struct Library;
+  std::unique_ptr<Library> library_;
+};
+
+}  // namespace clothfit
