@@ -1,0 +1,369 @@
+#include "fit/evolutionary_strategy.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <cstdint>
+#include <numbers>
+#include <optional>
+#include <random>
+#include <sstream>
+#include <utility>
+
+#include "data/input_error.h"
+
+namespace clothfit {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+/// Six significant digits, whatever the size.
+std::string number(double value) {
+  std::ostringstream text;
+  text << value;
+  return text.str();
+}
+
+/// One round of splitmix64: neighbouring inputs give unrelated outputs.
+std::uint64_t splitmix64(std::uint64_t x) {
+  x += 0x9e3779b97f4a7c15u;
+  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
+  x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
+  return x ^ (x >> 31);
+}
+
+/// The random numbers of one new individual. The standard fixes what the engine returns but leaves
+/// the distributions to the library, so the mappings are written out here.
+class Draws {
+ public:
+  Draws(std::uint64_t seed, int generation, int place)
+      : engine_(splitmix64(splitmix64(splitmix64(seed) + static_cast<std::uint64_t>(generation)) +
+                           static_cast<std::uint64_t>(place))) {}
+
+  /// Uniform in [0, 1), on the grid of 2^-53.
+  double uniform() { return static_cast<double>(engine_() >> 11) * 0x1p-53; }
+
+  /// Uniform in 0 ... count - 1, to 2^-53.
+  int index(int count) { return static_cast<int>(uniform() * count); }
+
+  /// Standard normal (Box and Muller; the second number is not used).
+  double normal() {
+    const double radius = std::sqrt(-2 * std::log1p(-uniform()));
+    return radius * std::cos(2 * std::numbers::pi * uniform());
+  }
+
+ private:
+  std::mt19937_64 engine_;
+};
+
+/// Place of a value in its range, 0 at the lower end, 1 at the upper.
+double fraction_of_range(const SearchParameter& parameter, double value) {
+  if (!parameter.log_scale) return (value - parameter.lower) / (parameter.upper - parameter.lower);
+  return std::log(value / parameter.lower) / std::log(parameter.upper / parameter.lower);
+}
+
+double value_at(const SearchParameter& parameter, double fraction) {
+  const double value =
+      parameter.log_scale
+          ? parameter.lower * std::exp(fraction * std::log(parameter.upper / parameter.lower))
+          : parameter.lower + fraction * (parameter.upper - parameter.lower);
+  return std::clamp(value, parameter.lower, parameter.upper);
+}
+
+/// Folds the real line onto [0, 1] as between two mirrors.
+double reflect(double x) {
+  x = std::fmod(std::abs(x), 2.0);
+  return x > 1 ? 2 - x : x;
+}
+
+Individual random_individual(const std::vector<SearchParameter>& parameters, Draws& draws) {
+  Individual individual;
+  individual.values.resize(static_cast<Eigen::Index>(parameters.size()));
+  for (std::size_t p = 0; p < parameters.size(); ++p) {
+    individual.values(static_cast<Eigen::Index>(p)) = value_at(parameters[p], draws.uniform());
+  }
+  return individual;
+}
+
+Individual given_individual(const std::vector<SearchParameter>& parameters,
+                            const Eigen::VectorXd& values) {
+  assert(values.size() == static_cast<Eigen::Index>(parameters.size()));
+  Individual individual;
+  individual.values = values;
+  individual.origin = Origin::given;
+  for (std::size_t p = 0; p < parameters.size(); ++p) {
+    double& value = individual.values(static_cast<Eigen::Index>(p));
+    value = std::clamp(value, parameters[p].lower, parameters[p].upper);
+  }
+  return individual;
+}
+
+Individual mutated_individual(const std::vector<SearchParameter>& parameters,
+                              const EvolutionOptions& options,
+                              const std::vector<Individual>& ranked, Draws& draws) {
+  const int rank = draws.index(options.mutation_parent_count());
+  const int chosen = draws.index(static_cast<int>(parameters.size()));
+  const SearchParameter& parameter = parameters[static_cast<std::size_t>(chosen)];
+
+  Individual individual;
+  individual.values = ranked[static_cast<std::size_t>(rank)].values;
+  individual.origin = Origin::mutated;
+  individual.parent_ranks = {rank};
+  double& value = individual.values(chosen);
+  switch (options.mutation) {
+    case MutationLaw::redraw:
+      value = value_at(parameter, draws.uniform());
+      break;
+    case MutationLaw::gaussian:
+      value = value_at(parameter, reflect(fraction_of_range(parameter, value) +
+                                          options.mutation_step * draws.normal()));
+      break;
+  }
+  return individual;
+}
+
+Individual crossed_individual(int parameter_count, const EvolutionOptions& options,
+                              const std::vector<Individual>& ranked, Draws& draws) {
+  Individual individual;
+  individual.origin = Origin::crossed;
+  for (int k = 0; k < parameter_count; ++k) {
+    individual.parent_ranks.push_back(draws.index(options.kept_count()));
+  }
+  individual.values.resize(parameter_count);
+  for (int p = 0; p < parameter_count; ++p) {
+    const int parent =
+        individual.parent_ranks[static_cast<std::size_t>(draws.index(parameter_count))];
+    individual.values(p) = ranked[static_cast<std::size_t>(parent)].values(p);
+  }
+  return individual;
+}
+
+/// Asks for the costs of the individuals from `first_new` on, ranks all and notes the best.
+void evaluate_and_rank(const GenerationCost& cost, std::size_t first_new, EvolutionState& state) {
+  const std::size_t count = state.population.size() - first_new;
+  if (count > 0) {
+    Eigen::MatrixXd individuals(state.population.front().values.size(),
+                                static_cast<Eigen::Index>(count));
+    for (std::size_t k = 0; k < count; ++k) {
+      individuals.col(static_cast<Eigen::Index>(k)) = state.population[first_new + k].values;
+    }
+    const Eigen::VectorXd costs = cost(individuals);
+    assert(costs.size() == individuals.cols());
+    for (std::size_t k = 0; k < count; ++k) {
+      const double value = costs(static_cast<Eigen::Index>(k));
+      state.population[first_new + k].cost = std::isfinite(value) ? value : kInfinity;
+    }
+    state.evaluations += static_cast<long>(count);
+  }
+  std::stable_sort(state.population.begin(), state.population.end(),
+                   [](const Individual& a, const Individual& b) { return a.cost < b.cost; });
+  state.best_cost.push_back(state.population.front().cost);
+}
+
+void validate_parameters(const std::vector<SearchParameter>& parameters) {
+  if (parameters.empty()) {
+    throw InputError("search", "no parameter to search", "at least one");
+  }
+  for (const SearchParameter& parameter : parameters) {
+    const std::string range =
+        "range [" + number(parameter.lower) + ", " + number(parameter.upper) + "]";
+    if (!std::isfinite(parameter.lower) || !std::isfinite(parameter.upper) ||
+        !(parameter.lower < parameter.upper)) {
+      throw InputError(parameter.name, range, "a finite lower end below a finite upper end");
+    }
+    if (parameter.log_scale && !(parameter.lower > 0)) {
+      throw InputError(parameter.name, range, "a logarithmic scale needs a lower end above 0");
+    }
+  }
+}
+
+/// Share of itself by which the best cost fell over the last `window` generations.
+double relative_gain(const std::vector<double>& best_cost, int window) {
+  const double now = best_cost.back();
+  const double before = best_cost[best_cost.size() - 1 - static_cast<std::size_t>(window)];
+  if (!(now < before)) return 0;
+  if (!std::isfinite(before) || before == 0) return kInfinity;
+  return (before - now) / std::abs(before);
+}
+
+std::optional<EvolutionStop> stop_reason(const EvolutionOptions& options,
+                                         const EvolutionState& state) {
+  if (state.best_cost.back() <= options.cost_below) return EvolutionStop::cost_below;
+  if (options.least_gain > 0 && state.generations() > options.gain_window &&
+      relative_gain(state.best_cost, options.gain_window) < options.least_gain) {
+    return EvolutionStop::no_gain;
+  }
+  if (state.generations() >= options.generations) return EvolutionStop::reached_generations;
+  return std::nullopt;
+}
+
+std::string describe(EvolutionStop stop, const EvolutionOptions& options,
+                     const EvolutionState& state) {
+  std::string text;
+  switch (stop) {
+    case EvolutionStop::reached_generations:
+      text = "reached the last generation";
+      break;
+    case EvolutionStop::cost_below:
+      text = "the cost is as low as asked";
+      break;
+    case EvolutionStop::no_gain:
+      text = "no gain over " + std::to_string(options.gain_window) + " generations";
+      break;
+    case EvolutionStop::cancelled:
+      text = "cancelled";
+      break;
+  }
+  text += " (" + std::to_string(state.generations()) + " generations, " +
+          std::to_string(state.evaluations) + " evaluations)";
+  if (!std::isfinite(state.best_cost.back())) text += "; no individual has a finite cost";
+  return text;
+}
+
+int share_of(int population, double share) {
+  return static_cast<int>(std::lround(share * population));
+}
+
+}  // namespace
+
+int EvolutionOptions::kept_count() const {
+  return std::max(1, share_of(population, kept));
+}
+
+int EvolutionOptions::mutated_count() const {
+  return std::min(population - kept_count(), share_of(population, mutated));
+}
+
+int EvolutionOptions::mutation_parent_count() const {
+  return std::max(1, share_of(population, mutation_parents));
+}
+
+void EvolutionOptions::validate() const {
+  const auto say = [](const char* name, double value) {
+    return std::string(name) + " = " + number(value);
+  };
+  if (population < 2) {
+    throw InputError("population", "population = " + std::to_string(population),
+                     "at least 2 individuals", "the founding paper has 100");
+  }
+  if (generations < 1) {
+    throw InputError("generations", "generations = " + std::to_string(generations), "at least 1");
+  }
+  for (const auto& [name, share] :
+       {std::pair{"kept", kept}, {"mutated", mutated}, {"mutation_parents", mutation_parents}}) {
+    if (!(share >= 0 && share <= 1)) {
+      throw InputError(name, say(name, share), "a share of the population, 0 to 1");
+    }
+  }
+  if (kept + mutated > 1 + 1e-12 || kept_count() >= population) {
+    throw InputError("kept", say("kept", kept) + " and " + say("mutated", mutated),
+                     "together at most 1, and someone new in each generation");
+  }
+  if (!(mutation_step > 0) || !std::isfinite(mutation_step)) {
+    throw InputError("mutation_step", say("mutation_step", mutation_step),
+                     "a share of the range, > 0");
+  }
+  if (gain_window < 1) {
+    throw InputError("gain_window", "gain_window = " + std::to_string(gain_window),
+                     "at least 1 generation");
+  }
+  if (!(least_gain >= 0)) {
+    throw InputError("least_gain", say("least_gain", least_gain), "a share of the cost, >= 0");
+  }
+  if (std::isnan(cost_below)) throw InputError("cost_below", "not a number", "a cost");
+}
+
+bool EvolutionResult::usable() const {
+  return !state.population.empty() && std::isfinite(state.population.front().cost);
+}
+
+EvolutionState first_generation(const std::vector<SearchParameter>& parameters,
+                                const EvolutionOptions& options, const GenerationCost& cost,
+                                const std::vector<Eigen::VectorXd>& given) {
+  options.validate();
+  validate_parameters(parameters);
+  assert(static_cast<int>(given.size()) <= options.population);
+
+  EvolutionState state;
+  for (const Eigen::VectorXd& values : given) {
+    state.population.push_back(given_individual(parameters, values));
+  }
+  for (int place = static_cast<int>(given.size()); place < options.population; ++place) {
+    Draws draws(options.seed, 0, place);
+    state.population.push_back(random_individual(parameters, draws));
+  }
+  evaluate_and_rank(cost, 0, state);
+  return state;
+}
+
+EvolutionState next_generation(const std::vector<SearchParameter>& parameters,
+                               const EvolutionOptions& options, const GenerationCost& cost,
+                               const EvolutionState& state) {
+  const std::vector<Individual>& ranked = state.population;
+  assert(static_cast<int>(ranked.size()) == options.population);
+
+  EvolutionState next;
+  next.best_cost = state.best_cost;
+  next.evaluations = state.evaluations;
+  for (int rank = 0; rank < options.kept_count(); ++rank) {
+    Individual individual = ranked[static_cast<std::size_t>(rank)];
+    individual.origin = Origin::kept;
+    individual.parent_ranks = {rank};
+    next.population.push_back(std::move(individual));
+  }
+  const int crossed_from = options.kept_count() + options.mutated_count();
+  for (int place = options.kept_count(); place < options.population; ++place) {
+    Draws draws(options.seed, state.generations(), place);
+    next.population.push_back(
+        place < crossed_from
+            ? mutated_individual(parameters, options, ranked, draws)
+            : crossed_individual(static_cast<int>(parameters.size()), options, ranked, draws));
+  }
+  evaluate_and_rank(cost, static_cast<std::size_t>(options.kept_count()), next);
+  return next;
+}
+
+EvolutionResult resume_evolution(const std::vector<SearchParameter>& parameters,
+                                 const EvolutionOptions& options, const GenerationCost& cost,
+                                 EvolutionState state, const ProgressCallback& progress) {
+  options.validate();
+  validate_parameters(parameters);
+  assert(!state.population.empty());
+
+  const int new_each = options.population - options.kept_count();
+  const auto goes_on = [&] {
+    return !progress ||
+           progress(
+               {.stage = "search",
+                .done = static_cast<double>(state.evaluations),
+                .total = static_cast<double>(options.population +
+                                             static_cast<long>(options.generations - 1) * new_each),
+                .unit = "evaluations",
+                .note = "best cost " + number(state.best_cost.back())});
+  };
+
+  EvolutionResult result;
+  while (true) {
+    // A rule that already holds says more than the cancellation that came at the same moment.
+    const bool cancelled = !goes_on();
+    const std::optional<EvolutionStop> stop = stop_reason(options, state);
+    if (stop || cancelled) {
+      result.stop = stop.value_or(EvolutionStop::cancelled);
+      break;
+    }
+    state = next_generation(parameters, options, cost, state);
+  }
+  result.message = describe(result.stop, options, state);
+  result.state = std::move(state);
+  return result;
+}
+
+EvolutionResult evolve(const std::vector<SearchParameter>& parameters,
+                       const EvolutionOptions& options, const GenerationCost& cost,
+                       const ProgressCallback& progress,
+                       const std::vector<Eigen::VectorXd>& given) {
+  return resume_evolution(parameters, options, cost,
+                          first_generation(parameters, options, cost, given), progress);
+}
+
+}  // namespace clothfit
