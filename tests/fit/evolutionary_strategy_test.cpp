@@ -22,7 +22,7 @@ constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 std::vector<SearchParameter> unit_ranges(int count) {
   std::vector<SearchParameter> parameters;
-  for (int p = 0; p < count; ++p) parameters.push_back({.name = "p" + std::to_string(p)});
+  for (int p = 0; p < count; ++p) parameters.push_back({.name = std::to_string(p)});
   return parameters;
 }
 
@@ -296,7 +296,7 @@ TEST(EvolutionaryStrategy, FindsStiffnessesOnALogarithmicScaleThroughAnEllipsoid
   std::vector<SearchParameter> parameters;
   for (int p = 0; p < 4; ++p) {
     parameters.push_back(
-        {.name = "k" + std::to_string(p), .lower = 0.1, .upper = 1000, .log_scale = true});
+        {.name = std::to_string(p), .lower = 0.1, .upper = 1000, .log_scale = true});
   }
   const Eigen::Vector4d truth(40, 6, 0.5, 300);
   const GenerationCost ellipsoid = one_by_one([&](const Eigen::VectorXd& k) {
