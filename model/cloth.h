@@ -1,0 +1,51 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "model/effects/effect.h"
+#include "model/fabric.h"
+#include "model/mesh.h"
+
+namespace clothfit {
+
+/// A prescribed point of the cloth. It constrains the surface interpolated between the vertices
+/// (bilinear in its mesh cell) at its (s, t); at a vertex that is the vertex itself.
+struct HeldVertexWeights {
+  struct Weight {
+    int vertex = 0;
+    double weight = 0;
+  };
+  std::vector<Weight> weights;  ///< sum to 1
+  /// Where the point is at a time (world, m); empty: it stays where the start shape has it.
+  std::function<Eigen::Vector3d(double time_s)> motion;
+};
+
+/// The point of `mesh` at material coordinates (s, t), which must lie on the cloth.
+HeldVertexWeights held_at(const Mesh& mesh, double s_m, double t_m);
+
+/// What does not change between the simulations of one fit: mesh, masses, held points, effects.
+struct Cloth {
+  Mesh mesh;
+  SpringNet springs;
+  Eigen::VectorXd mass_kg;  ///< per vertex, > 0
+  std::vector<HeldVertexWeights> held;
+  std::vector<EffectDescription> effect_descriptions;
+  std::vector<std::shared_ptr<const Effect>> effects;  ///< in the order of the descriptions
+
+  /// A cloth of a mesh with its springs, without held points or effects.
+  static Cloth of(const Mesh& mesh, Eigen::VectorXd mass_kg);
+  void add_effect(const std::string& name, const std::string& where);
+};
+
+/// What may change between simulations.
+struct ParameterSet {
+  SpringParameters springs;
+  Eigen::Vector3d gravity_m_per_s2{0, 0, -9.81};
+  std::vector<std::vector<double>> effects;  ///< parameters of each effect of the cloth
+  Eigen::Matrix3Xd start_position_m;         ///< 3 x vertices, world; velocities start at zero
+};
+
+}  // namespace clothfit

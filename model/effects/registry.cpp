@@ -1,0 +1,34 @@
+#include "model/effects/registry.h"
+
+#include <algorithm>
+#include <array>
+
+#include "data/input_error.h"
+#include "model/effects/viscous_damping.h"
+
+namespace clothfit {
+namespace {
+
+// A visible table: self-registering statics would be dropped by the linker from a static library.
+constexpr std::array kEffects = {
+    // alphabetical
+    EffectEntry{"viscous_damping", viscous_damping::describe, viscous_damping::make},
+};
+
+}  // namespace
+
+std::span<const EffectEntry> effect_registry() {
+  return kEffects;
+}
+
+const EffectEntry& find_effect(const std::string& name, const std::string& where) {
+  const auto found =
+      std::ranges::find_if(kEffects, [&](const EffectEntry& entry) { return name == entry.name; });
+  if (found != kEffects.end()) return *found;
+  std::string known;
+  for (const EffectEntry& entry : kEffects)
+    known += (known.empty() ? "" : ", ") + std::string(entry.name);
+  throw InputError(where, "there is no effect '" + name + "'", "known effects: " + known);
+}
+
+}  // namespace clothfit

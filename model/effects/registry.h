@@ -1,0 +1,23 @@
+#pragma once
+
+#include <memory>
+#include <span>
+#include <string>
+
+#include "model/effects/effect.h"
+
+namespace clothfit {
+
+struct EffectEntry {
+  const char* name;
+  EffectDescription (*describe)();
+  std::unique_ptr<Effect> (*make)();
+};
+
+/// Every motion effect the program knows, in alphabetical order.
+std::span<const EffectEntry> effect_registry();
+
+/// The entry called `name`. Throws InputError at `where` that lists the known names.
+const EffectEntry& find_effect(const std::string& name, const std::string& where);
+
+}  // namespace clothfit

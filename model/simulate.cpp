@@ -1,0 +1,177 @@
+#include "model/simulate.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+
+#include "model/effects/viscous_damping.h"
+#include "model/step.h"
+
+namespace clothfit {
+namespace {
+
+/// A vertex further than this many cloth diagonals from where its lane started has diverged.
+constexpr double kSceneSize = 100;
+
+/// The parameter sets of one group of lanes; missing ones repeat the last, so that every lane
+/// computes something finite.
+std::vector<const ParameterSet*> fill_lanes(std::span<const ParameterSet> group) {
+  std::vector<const ParameterSet*> lanes(kLanes);
+  for (size_t l = 0; l < kLanes; ++l) lanes[l] = &group[std::min(l, group.size() - 1)];
+  return lanes;
+}
+
+LaneParameters lane_parameters(const Cloth& cloth, std::span<const ParameterSet* const> lanes) {
+  LaneParameters result;
+  result.effects.resize(cloth.effects.size());
+  for (size_t e = 0; e < cloth.effects.size(); ++e)
+    result.effects[e].resize(cloth.effect_descriptions[e].parameters.size());
+  for (int l = 0; l < kLanes; ++l) {
+    const ParameterSet& set = *lanes[static_cast<size_t>(l)];
+    for (size_t type = 0; type < kSpringTypes; ++type) {
+      result.springs.natural_length_m[type][l] = set.springs.natural_length_m[type];
+      result.springs.stiffness_n_per_m[type][l] = set.springs.stiffness_n_per_m[type];
+      result.springs.damping_ns_per_m[type][l] = set.springs.damping_ns_per_m[type];
+    }
+    result.gravity_x[l] = set.gravity_m_per_s2.x();
+    result.gravity_y[l] = set.gravity_m_per_s2.y();
+    result.gravity_z[l] = set.gravity_m_per_s2.z();
+    for (size_t e = 0; e < cloth.effects.size(); ++e)
+      for (size_t p = 0; p < result.effects[e].size(); ++p)
+        result.effects[e][p][l] = set.effects[e][p];
+  }
+  return result;
+}
+
+/// One group of lanes on its way through time.
+class LaneRun {
+ public:
+  LaneRun(const Cloth& cloth, std::span<const ParameterSet> group)
+      : cloth_(cloth),
+        held_(cloth),
+        parameters_(lane_parameters(cloth, fill_lanes(group))),
+        force_n_(LaneVectors::zero(cloth.mesh.vertex_count())) {
+    const int vertices = cloth.mesh.vertex_count();
+    state_ = {LaneVectors::zero(vertices), LaneVectors::zero(vertices)};
+    const auto lanes = fill_lanes(group);
+    for (int l = 0; l < kLanes; ++l)
+      state_.position_m.set_lane(l, lanes[static_cast<size_t>(l)]->start_position_m);
+    held_target_m_ = held_.locate(state_.position_m);
+  }
+
+  const LaneState& state() const { return state_; }
+
+  /// Advances from `from_s` to `to_s` in `steps` equal steps; held points that move are where they
+  /// are at the end of each step, or throughout at `held_at_s` when that is given.
+  void advance(double from_s, double to_s, int steps, const double* held_at_s = nullptr) {
+    const double h = (to_s - from_s) / steps;
+    for (int n = 0; n < steps; ++n) {
+      const double time_s = from_s + n * h;
+      aim_held_points(held_at_s != nullptr ? *held_at_s : from_s + (n + 1) * h);
+      step(cloth_, parameters_, held_, held_target_m_, time_s, h, state_, force_n_);
+    }
+  }
+
+ private:
+  void aim_held_points(double time_s) {
+    for (size_t h = 0; h < cloth_.held.size(); ++h) {
+      if (!cloth_.held[h].motion) continue;
+      const Eigen::Vector3d target = cloth_.held[h].motion(time_s);
+      const auto column = static_cast<Eigen::Index>(h);
+      held_target_m_.x.col(column).setConstant(target.x());
+      held_target_m_.y.col(column).setConstant(target.y());
+      held_target_m_.z.col(column).setConstant(target.z());
+    }
+  }
+
+  const Cloth& cloth_;
+  HeldPlacement held_;
+  LaneParameters parameters_;
+  LaneState state_;
+  LaneVectors force_n_;
+  LaneVectors held_target_m_;
+};
+
+bool left_the_scene(const Eigen::Matrix3Xd& now, const Eigen::Matrix3Xd& start, const Mesh& mesh) {
+  const double limit = kSceneSize * std::hypot(mesh.width_m, mesh.height_m);
+  return !((now - start).cwiseAbs().maxCoeff() < limit) || !now.allFinite();
+}
+
+/// Calls `run(group, first)` for every group of up to kLanes parameter sets.
+template <class Run>
+void for_lane_groups(std::span<const ParameterSet> parameters, const Run& run) {
+  const size_t groups = (parameters.size() + kLanes - 1) / kLanes;
+  tbb::parallel_for(size_t{0}, groups, [&](size_t g) {
+    const size_t first = g * kLanes;
+    run(parameters.subspan(first, std::min<size_t>(kLanes, parameters.size() - first)), first);
+  });
+}
+
+}  // namespace
+
+int Schedule::substeps(int frame) const {
+  const auto f = static_cast<size_t>(frame);
+  const double interval_s = frame_time_s[f] - frame_time_s[f - 1];
+  return std::max(1, static_cast<int>(std::ceil(interval_s / time_step_s - 1e-9)));
+}
+
+std::vector<SimulateResult> simulate(const Cloth& cloth, std::span<const ParameterSet> parameters,
+                                     const Schedule& schedule) {
+  assert(schedule.time_step_s > 0);
+  std::vector<SimulateResult> results(parameters.size());
+  const size_t frames = schedule.frame_time_s.size();
+  for_lane_groups(parameters, [&](std::span<const ParameterSet> group, size_t first) {
+    LaneRun run(cloth, group);
+    for (size_t l = 0; l < group.size(); ++l) results[first + l].position_m.reserve(frames);
+    for (size_t frame = 0; frame < frames; ++frame) {
+      if (frame > 0)
+        run.advance(schedule.frame_time_s[frame - 1], schedule.frame_time_s[frame],
+                    schedule.substeps(static_cast<int>(frame)));
+      bool any_alive = false;
+      for (size_t l = 0; l < group.size(); ++l) {
+        SimulateResult& result = results[first + l];
+        Eigen::Matrix3Xd now = run.state().position_m.lane(static_cast<int>(l));
+        if (result.usable() && left_the_scene(now, group[l].start_position_m, cloth.mesh)) {
+          result.reason = StopReason::diverged;
+          result.diverged_frame = static_cast<int>(frame);
+        }
+        if (!result.usable()) now.setConstant(NAN);
+        any_alive = any_alive || result.usable();
+        result.position_m.push_back(std::move(now));
+      }
+      if (any_alive) continue;
+      for (size_t l = 0; l < group.size(); ++l)
+        results[first + l].position_m.resize(frames, results[first + l].position_m.back());
+      break;
+    }
+  });
+  return results;
+}
+
+std::vector<Eigen::Matrix3Xd> relax(const Cloth& cloth, std::span<const ParameterSet> parameters,
+                                    double time_s, double time_step_s) {
+  constexpr double kPendulumTimes = 7;  // (1 + 7) exp(-7) is left of the distance: 0.7 %
+  const double gravity = parameters.front().gravity_m_per_s2.norm();
+  const double pendulum_rate = std::sqrt(std::max(gravity, 1e-3) / cloth.mesh.height_m);
+
+  Cloth heavy = cloth;
+  heavy.effect_descriptions.push_back(viscous_damping::describe());
+  heavy.effects.push_back(viscous_damping::make());
+  std::vector<ParameterSet> damped(parameters.begin(), parameters.end());
+  for (ParameterSet& set : damped) set.effects.push_back({2 * pendulum_rate});
+
+  const double duration_s = kPendulumTimes / pendulum_rate;
+  const int steps = std::max(1, static_cast<int>(std::ceil(duration_s / time_step_s)));
+  std::vector<Eigen::Matrix3Xd> shapes(parameters.size());
+  for_lane_groups(damped, [&](std::span<const ParameterSet> group, size_t first) {
+    LaneRun run(heavy, group);
+    run.advance(time_s, time_s + duration_s, steps, &time_s);
+    for (size_t l = 0; l < group.size(); ++l)
+      shapes[first + l] = run.state().position_m.lane(static_cast<int>(l));
+  });
+  return shapes;
+}
+
+}  // namespace clothfit

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "model/cloth.h"
+
+namespace clothfit {
+
+/// When positions are wanted and how finely time is cut between.
+struct Schedule {
+  std::vector<double> frame_time_s;  ///< rising; the first is the start
+  double time_step_s = 0;            ///< at most this; each frame interval is cut into equal steps
+
+  /// Equal steps in the interval that ends at frame `frame` >= 1.
+  int substeps(int frame) const;
+};
+
+enum class StopReason { reached_end, diverged };
+
+struct SimulateResult {
+  StopReason reason = StopReason::reached_end;
+  int diverged_frame = -1;  ///< first frame that is not finite or left the scene
+  /// Positions at every frame, 3 x vertices (world, m); from the diverged frame on NaN.
+  std::vector<Eigen::Matrix3Xd> position_m;
+  bool usable() const { return reason == StopReason::reached_end; }
+};
+
+/// Simulates every parameter set, kLanes at a time, groups of lanes in parallel. A result does not
+/// depend on the number of sets, their order or the number of threads.
+std::vector<SimulateResult> simulate(const Cloth& cloth, std::span<const ParameterSet> parameters,
+                                     const Schedule& schedule);
+
+/// The shape in which the cloth hangs still: the start positions relaxed under gravity with heavy
+/// viscous damping (critical for the pendulum of the cloth's height), held points where `motion`
+/// has them at `time_s`. A fixed number of steps, so that the shape depends smoothly on the
+/// parameters. What is left of the initial distance to equilibrium is below a percent.
+std::vector<Eigen::Matrix3Xd> relax(const Cloth& cloth, std::span<const ParameterSet> parameters,
+                                    double time_s, double time_step_s);
+
+}  // namespace clothfit
