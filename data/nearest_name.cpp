@@ -1,0 +1,52 @@
+#include "data/nearest_name.h"
+
+#include <algorithm>
+#include <numeric>
+
+namespace clothfit {
+namespace {
+
+/// Insertions, deletions and replacements that turn `a` into `b`.
+std::size_t edit_distance(const std::string& a, const std::string& b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), std::size_t{0});
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    std::size_t diagonal = row[0];
+    row[0] = i;
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      const std::size_t replaced = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
+      diagonal = row[j];
+      row[j] = std::min({replaced, row[j] + 1, row[j - 1] + 1});
+    }
+  }
+  return row[b.size()];
+}
+
+}  // namespace
+
+std::string known_names(const std::string& mistyped, const std::vector<std::string>& known) {
+  // Texts far longer than any name are not slips of a finger.
+  constexpr std::size_t kLongestName = 64;
+  std::string text;
+  std::size_t least = kLongestName;
+  const std::string* nearest = nullptr;
+  for (const std::string& name : known) {
+    if (mistyped.size() > kLongestName) break;
+    const std::size_t distance = edit_distance(mistyped, name);
+    const std::size_t allowed =
+        std::max<std::size_t>(1, std::max(mistyped.size(), name.size()) / 3);
+    if (distance <= allowed && distance < least) {
+      least = distance;
+      nearest = &name;
+    }
+  }
+  if (nearest != nullptr) text += "did you mean `" + *nearest + "`? ";
+  text += "known are ";
+  for (std::size_t i = 0; i < known.size(); ++i) {
+    if (i > 0) text += ", ";
+    text += "`" + known[i] + "`";
+  }
+  return text;
+}
+
+}  // namespace clothfit

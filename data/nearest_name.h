@@ -1,0 +1,15 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace clothfit {
+
+/// Says which names are known, the nearest to a mistyped one first where it is near enough:
+///
+///   did you mean `rows`? known are `columns`, `rows`
+///
+/// Near enough is a third of the letters, counted as single edits (Levenshtein 1966).
+std::string known_names(const std::string& mistyped, const std::vector<std::string>& known);
+
+}  // namespace clothfit

@@ -1,0 +1,17 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace clothfit {
+
+/// The number that the whole of `text` spells, correctly rounded and whatever the locale; nothing
+/// when it spells none, one that is not finite, or one that does not fit.
+std::optional<double> parse_number(std::string_view text);
+std::optional<int> parse_whole_number(std::string_view text);
+
+/// The shortest text that reads back as the same double.
+std::string number_text(double value);
+
+}  // namespace clothfit

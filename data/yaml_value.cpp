@@ -1,0 +1,176 @@
+#include "data/yaml_value.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "data/input_error.h"
+#include "data/nearest_name.h"
+#include "data/number_text.h"
+#include "data/text_file.h"
+
+namespace clothfit {
+namespace {
+
+/// yaml-cpp counts lines from 0 and marks some empty nodes with -1.
+int line_of(const YAML::Mark& mark, int otherwise) {
+  return mark.line >= 0 ? mark.line + 1 : otherwise;
+}
+
+std::string kind_of(const YAML::Node& node) {
+  if (node.IsMap()) return "a map";
+  if (node.IsSequence()) return "a list";
+  if (node.IsNull()) return "empty";
+  return fmt::format("`{}`", node.Scalar().substr(0, 60));
+}
+
+}  // namespace
+
+YamlValue::YamlValue(YAML::Node node, std::shared_ptr<const std::string> file, std::string name,
+                     int line)
+    : node_(std::move(node)), file_(std::move(file)), name_(std::move(name)), line_(line) {}
+
+void YamlValue::refuse(const std::string& problem, const std::string& expected,
+                       const std::string& remedy) const {
+  throw InputError(*file_, line_, problem, expected, remedy);
+}
+
+std::string YamlValue::shown() const {
+  if (!node_.IsScalar()) return name_ + " is " + kind_of(node_);
+  return name_ + " = " + node_.Scalar().substr(0, 60);
+}
+
+bool YamlValue::is_number() const {
+  return node_.IsScalar() && parse_number(node_.Scalar()).has_value();
+}
+
+std::string YamlValue::text() const {
+  if (!node_.IsScalar() || node_.Scalar().empty()) {
+    refuse(name_ + " is " + (node_.IsScalar() ? "empty" : kind_of(node_)), "text");
+  }
+  return node_.Scalar();
+}
+
+double YamlValue::number() const {
+  const std::optional<double> value =
+      node_.IsScalar() ? parse_number(node_.Scalar()) : std::nullopt;
+  if (!value) refuse(shown(), "a finite number");
+  return *value;
+}
+
+double YamlValue::positive_number() const {
+  const double value = number();
+  if (value <= 0) refuse(shown(), "a number > 0");
+  return value;
+}
+
+int YamlValue::whole_number(int least) const {
+  const std::optional<int> value =
+      node_.IsScalar() ? parse_whole_number(node_.Scalar()) : std::nullopt;
+  if (!value || *value < least) {
+    refuse(shown(), fmt::format("a whole number, {} or more", least));
+  }
+  return *value;
+}
+
+std::vector<double> YamlValue::numbers() const {
+  std::vector<double> result;
+  for (const YamlValue& item : items()) result.push_back(item.number());
+  return result;
+}
+
+std::vector<double> YamlValue::numbers_of(std::size_t count) const {
+  const std::string expected = fmt::format("a list of {} numbers", count);
+  if (!node_.IsSequence()) refuse(shown(), expected);
+  if (node_.size() != count) refuse(fmt::format("{} has {} items", name_, node_.size()), expected);
+  return numbers();
+}
+
+std::vector<YamlValue> YamlValue::items() const {
+  if (!node_.IsSequence()) refuse(shown(), "a list");
+  std::vector<YamlValue> items;
+  for (const YAML::Node& item : node_) {
+    items.emplace_back(item, file_, fmt::format("{}[{}]", name_, items.size()),
+                       line_of(item.Mark(), line_));
+  }
+  return items;
+}
+
+std::vector<std::pair<std::string, YamlValue>> YamlValue::entries() const {
+  if (!node_.IsMap()) refuse(shown(), "a map, `key: value`");
+  std::vector<std::pair<std::string, YamlValue>> entries;
+  for (const auto& entry : node_) {
+    const int line = line_of(entry.first.Mark(), line_);
+    if (!entry.first.IsScalar()) {
+      throw InputError(*file_, line, "a key is " + kind_of(entry.first), "a word before the colon");
+    }
+    const std::string& key = entry.first.Scalar();
+    for (const auto& [earlier_key, earlier] : entries) {
+      if (earlier_key == key) {
+        throw InputError(*file_, line,
+                         fmt::format("`{}` stands on line {} already", key, earlier.line()),
+                         "every key once", "remove one of the two");
+      }
+    }
+    // An empty value bears no place of its own worth pointing at: the key's line serves.
+    entries.emplace_back(
+        key, YamlValue(entry.second, file_, name_.empty() ? key : name_ + "." + key, line));
+  }
+  return entries;
+}
+
+YamlMap YamlValue::map(const std::vector<std::string>& known_keys) const {
+  std::vector<std::pair<std::string, YamlValue>> all = entries();
+  for (const auto& [key, value] : all) {
+    if (std::find(known_keys.begin(), known_keys.end(), key) == known_keys.end()) {
+      value.refuse(fmt::format("unknown key `{}`{}", key, name_.empty() ? "" : " in " + name_),
+                   known_names(key, known_keys));
+    }
+  }
+  return {*this, std::move(all)};
+}
+
+std::size_t YamlValue::place_of(const std::vector<std::string>& words) const {
+  const std::string word = text();
+  const auto found = std::find(words.begin(), words.end(), word);
+  if (found == words.end()) refuse(shown(), known_names(word, words));
+  return static_cast<std::size_t>(found - words.begin());
+}
+
+YamlMap::YamlMap(YamlValue whole, std::vector<std::pair<std::string, YamlValue>> entries)
+    : whole_(std::move(whole)), entries_(std::move(entries)) {}
+
+const YamlValue* YamlMap::find(const std::string& key) const {
+  for (const auto& [name, value] : entries_) {
+    if (name == key) return value.is_null() ? nullptr : &value;
+  }
+  return nullptr;
+}
+
+const YamlValue& YamlMap::at(const std::string& key) const {
+  for (const auto& [name, value] : entries_) {
+    if (name != key) continue;
+    if (value.is_null()) value.refuse(value.name() + " is empty", "a value");
+    return value;
+  }
+  const std::string within = whole_.name().empty() ? "" : " in " + whole_.name();
+  whole_.refuse("`" + key + "` is missing" + within, "a line `" + key + ": ...`");
+}
+
+YamlValue read_yaml(const std::filesystem::path& file) {
+  const auto name = std::make_shared<const std::string>(file.string());
+  const std::string text = read_text(file);
+  try {
+    const std::vector<YAML::Node> documents = YAML::LoadAll(text);
+    if (documents.size() != 1) {
+      throw InputError(*name, 1, fmt::format("{} YAML documents", documents.size()),
+                       "one, `key: value` line by line");
+    }
+    return {documents.front(), name, "", line_of(documents.front().Mark(), 1)};
+  } catch (const YAML::Exception& error) {
+    throw InputError(*name, line_of(error.mark, 1), "not YAML: " + error.msg,
+                     "`key: value` lines, indented by spaces", "quote text that holds `: ` or `#`");
+  }
+}
+
+}  // namespace clothfit

@@ -1,0 +1,97 @@
+#pragma once
+
+#include <yaml-cpp/yaml.h>
+
+#include <algorithm>
+#include <array>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace clothfit {
+
+class YamlMap;
+
+/// A value of a YAML file that knows where it stands and what it is called, so that whatever is
+/// wrong with it is refused with file, line and name. Inside data/ only.
+class YamlValue {
+ public:
+  YamlValue(YAML::Node node, std::shared_ptr<const std::string> file, std::string name, int line);
+
+  const std::string& file() const { return *file_; }
+  const std::string& name() const { return name_; }
+  int line() const { return line_; }
+  bool is_null() const { return node_.IsNull(); }
+  bool is_number() const;
+  bool is_list() const { return node_.IsSequence(); }
+
+  /// A scalar that is not empty.
+  std::string text() const;
+  double number() const;
+  double positive_number() const;
+  int whole_number(int least) const;
+  std::vector<double> numbers() const;
+  /// Exactly N numbers.
+  template <std::size_t N>
+  std::array<double, N> numbers() const;
+  std::vector<YamlValue> items() const;
+  /// A map of known keys.
+  YamlMap map(const std::vector<std::string>& known_keys) const;
+  /// A map whose keys are the user's names, in their order.
+  std::vector<std::pair<std::string, YamlValue>> entries() const;
+  /// One word of a list.
+  template <class Choice>
+  Choice one_of(const std::vector<std::pair<std::string, Choice>>& choices) const;
+
+  [[noreturn]] void refuse(const std::string& problem, const std::string& expected,
+                           const std::string& remedy = "") const;
+
+ private:
+  std::vector<double> numbers_of(std::size_t count) const;
+  std::size_t place_of(const std::vector<std::string>& words) const;
+  /// `NAME = value`, as an error message shows it.
+  std::string shown() const;
+
+  YAML::Node node_;
+  std::shared_ptr<const std::string> file_;
+  std::string name_;  ///< such as cloth.mesh.rows or held[1].at
+  int line_ = 1;
+};
+
+/// A YAML map whose keys are all known.
+class YamlMap {
+ public:
+  YamlMap(YamlValue whole, std::vector<std::pair<std::string, YamlValue>> entries);
+  /// Refuses a missing or empty value.
+  const YamlValue& at(const std::string& key) const;
+  /// Nothing when the value is missing or null.
+  const YamlValue* find(const std::string& key) const;
+  const YamlValue& whole() const { return whole_; }
+
+ private:
+  YamlValue whole_;
+  std::vector<std::pair<std::string, YamlValue>> entries_;
+};
+
+/// Reads a file of one YAML document. Throws InputError, for what YAML's own grammar refuses too.
+YamlValue read_yaml(const std::filesystem::path& file);
+
+template <std::size_t N>
+std::array<double, N> YamlValue::numbers() const {
+  const std::vector<double> all = numbers_of(N);
+  std::array<double, N> result{};
+  std::copy(all.begin(), all.end(), result.begin());
+  return result;
+}
+
+template <class Choice>
+Choice YamlValue::one_of(const std::vector<std::pair<std::string, Choice>>& choices) const {
+  std::vector<std::string> words;
+  for (const auto& [word, choice] : choices) words.push_back(word);
+  return choices[place_of(words)].second;
+}
+
+}  // namespace clothfit
