@@ -1,0 +1,271 @@
+#include "data/fit_result.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "data/input_error.h"
+#include "data/text_file.h"
+
+namespace clothfit {
+namespace {
+
+using Json = nlohmann::ordered_json;  // keys stay in the order of docs/formats.md
+
+constexpr const char* kFormat = "clothfit-fit/1";
+constexpr const char* kExpectedFile = "a file of format clothfit-fit/1";
+constexpr const char* kRemedy = "run `clothfit fit` again";
+
+std::string word_of(ParameterState state) {
+  switch (state) {
+    case ParameterState::fitted:
+      return "fitted";
+    case ParameterState::fixed:
+      return "fixed";
+    case ParameterState::undetermined:
+      return "undetermined";
+  }
+  assert(false && "every state has a word");
+  return {};
+}
+
+double finite(double value) {
+  assert(std::isfinite(value));
+  return value;
+}
+
+Json to_json(const ParameterEstimate& parameter) {
+  return {{"name", parameter.name},
+          {"unit", parameter.unit},
+          {"value", finite(parameter.value)},
+          {"sigma", finite(parameter.sigma)},
+          {"state", word_of(parameter.state)},
+          {"reason", parameter.reason}};
+}
+
+Json to_json(const std::vector<ParameterEstimate>& parameters) {
+  Json list = Json::array();
+  for (const ParameterEstimate& parameter : parameters) list.push_back(to_json(parameter));
+  return list;
+}
+
+Json to_json(const ErrorSummary& error) {
+  return {{"rms", finite(error.rms)},
+          {"rms_distance", finite(error.rms_distance)},
+          {"count", error.count}};
+}
+
+Json to_json(const ObservationErrors& errors) {
+  return {{"kind", errors.kind},
+          {"unit", errors.unit},
+          {"fitted", to_json(errors.fitted)},
+          {"held_out", to_json(errors.held_out)},
+          {"noise", finite(errors.noise)},
+          {"trivial",
+           {{"first_frame", finite(errors.trivial.first_frame)},
+            {"last_velocity", finite(errors.trivial.last_velocity)},
+            {"rigid", finite(errors.trivial.rigid)}}}};
+}
+
+/// A value of a JSON file that knows its place, such as /parameters/2/value.
+class JsonValue {
+ public:
+  JsonValue(const Json& json, const std::string& file, std::string place)
+      : json_(json), file_(file), place_(std::move(place)) {}
+
+  bool has(const std::string& key) const { return json_.is_object() && json_.contains(key); }
+  bool is_list() const { return json_.is_array(); }
+  JsonValue at(const std::string& key) const {
+    if (!json_.is_object()) refuse("is not an object", "an object");
+    if (!json_.contains(key)) {
+      throw InputError(file_, "`" + place_ + "/" + key + "` is missing", kExpectedFile, kRemedy);
+    }
+    return {json_.at(key), file_, place_ + "/" + key};
+  }
+  std::vector<JsonValue> items() const {
+    if (!json_.is_array()) refuse("is not a list", "a list");
+    std::vector<JsonValue> items;
+    for (const Json& item : json_) {
+      items.emplace_back(item, file_, fmt::format("{}/{}", place_, items.size()));
+    }
+    return items;
+  }
+  std::vector<std::string> keys() const {
+    if (!json_.is_object()) refuse("is not an object", "an object");
+    std::vector<std::string> keys;
+    for (const auto& [key, value] : json_.items()) keys.push_back(key);
+    return keys;
+  }
+  std::string text() const {
+    if (!json_.is_string()) refuse("is not text", "text");
+    return json_.get<std::string>();
+  }
+  std::string text_or_empty(const std::string& key) const {
+    return has(key) ? at(key).text() : std::string();
+  }
+  double number() const {
+    if (!json_.is_number()) refuse("is not a number", "a number");
+    return json_.get<double>();
+  }
+  int count() const {
+    const bool fits = json_.is_number_unsigned() &&
+                      json_.get<unsigned long long>() <=
+                          static_cast<unsigned long long>(std::numeric_limits<int>::max());
+    if (!fits) refuse("is not a count", "a whole number, 0 or more");
+    return json_.get<int>();
+  }
+  unsigned long long seed() const {
+    if (!json_.is_number_unsigned()) refuse("is not a seed", "a whole number, 0 or more");
+    return json_.get<unsigned long long>();
+  }
+  [[noreturn]] void refuse(const std::string& problem, const std::string& expected) const {
+    throw InputError(file_, "`" + (place_.empty() ? "/" : place_) + "` " + problem, expected);
+  }
+
+ private:
+  const Json& json_;
+  const std::string& file_;
+  std::string place_;
+};
+
+ParameterEstimate read_parameter(const JsonValue& json) {
+  ParameterEstimate parameter;
+  parameter.name = json.at("name").text();
+  parameter.unit = json.at("unit").text();
+  parameter.value = json.at("value").number();
+  parameter.sigma = json.at("sigma").number();
+  const JsonValue state = json.at("state");
+  const std::string word = state.text();
+  const std::vector<ParameterState> states = {ParameterState::fitted, ParameterState::fixed,
+                                              ParameterState::undetermined};
+  const auto found = std::find_if(states.begin(), states.end(),
+                                  [&](ParameterState s) { return word_of(s) == word; });
+  if (found == states.end()) {
+    state.refuse("is `" + word + "`", "`fitted`, `fixed` or `undetermined`");
+  }
+  parameter.state = *found;
+  parameter.reason = json.text_or_empty("reason");
+  return parameter;
+}
+
+std::vector<ParameterEstimate> read_parameters(const JsonValue& json) {
+  std::vector<ParameterEstimate> parameters;
+  for (const JsonValue& item : json.items()) parameters.push_back(read_parameter(item));
+  return parameters;
+}
+
+ErrorSummary read_error(const JsonValue& json) {
+  return {json.at("rms").number(), json.at("rms_distance").number(), json.at("count").count()};
+}
+
+ObservationErrors read_errors(const JsonValue& json) {
+  ObservationErrors errors;
+  errors.kind = json.text_or_empty("kind");
+  errors.unit = json.at("unit").text();
+  errors.fitted = read_error(json.at("fitted"));
+  errors.held_out = read_error(json.at("held_out"));
+  errors.noise = json.at("noise").number();
+  const JsonValue trivial = json.at("trivial");
+  errors.trivial.first_frame = trivial.at("first_frame").number();
+  errors.trivial.last_velocity = trivial.at("last_velocity").number();
+  errors.trivial.rigid = trivial.at("rigid").number();
+  return errors;
+}
+
+Json parse(const std::filesystem::path& file) {
+  const std::string text = read_text(file);
+  try {
+    return Json::parse(text);
+  } catch (const Json::parse_error& error) {
+    const auto stopped_at = static_cast<std::ptrdiff_t>(std::min(error.byte, text.size()));
+    const auto line = 1 + std::count(text.begin(), text.begin() + stopped_at, '\n');
+    throw InputError(file.string(), static_cast<int>(line), "not JSON", kExpectedFile, kRemedy);
+  } catch (const Json::exception&) {  // a number too large for any type
+    throw InputError(file.string(), "holds a number too large", kExpectedFile, kRemedy);
+  }
+}
+
+}  // namespace
+
+void write_fit_result(const FitResult& result, const std::filesystem::path& file) {
+  Json effects = Json::array();
+  for (const EffectEstimate& effect : result.effects) {
+    effects.push_back({{"name", effect.name}, {"parameters", to_json(effect.parameters)}});
+  }
+  Json errors = Json::array();
+  for (const ObservationErrors& kind : result.errors) errors.push_back(to_json(kind));
+  if (errors.size() == 1) errors = Json(errors.front());
+  Json rejected = Json::object();
+  for (const auto& [reason, count] : result.observations_rejected) rejected[reason] = count;
+
+  const Json json = {
+      {"format", kFormat},
+      {"recording", result.recording},
+      {"version", result.version},
+      {"command", result.command},
+      {"seed", result.seed},
+      {"seconds", finite(result.seconds)},
+      {"model",
+       {{"mesh", {{"columns", result.mesh_columns}, {"rows", result.mesh_rows}}},
+        {"parameter_set", result.parameter_set},
+        {"integrator", result.integrator},
+        {"substeps", result.substeps},
+        {"time_step_s", finite(result.time_step_s)},
+        {"start", result.start}}},
+      {"parameters", to_json(result.parameters)},
+      {"effects", effects},
+      {"nuisance", to_json(result.nuisance)},
+      {"errors", errors},
+      {"observations", {{"used", result.observations_used}, {"rejected", rejected}}}};
+  // A recording's name may hold bytes that are no UTF-8; JSON may not.
+  write_text(json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n", file);
+}
+
+FitResult read_fit_result(const std::filesystem::path& file) {
+  const Json parsed = parse(file);
+  const std::string name = file.string();
+  const JsonValue json(parsed, name, "");
+  const JsonValue format = json.at("format");
+  if (format.text() != kFormat) {
+    format.refuse("is `" + format.text() + "`", std::string("`") + kFormat + "`");
+  }
+
+  FitResult result;
+  result.recording = json.at("recording").text();
+  result.version = json.at("version").text();
+  result.command = json.at("command").text();
+  result.seed = json.at("seed").seed();
+  result.seconds = json.at("seconds").number();
+  const JsonValue model = json.at("model");
+  result.mesh_columns = model.at("mesh").at("columns").count();
+  result.mesh_rows = model.at("mesh").at("rows").count();
+  result.parameter_set = model.at("parameter_set").text();
+  result.integrator = model.at("integrator").text();
+  result.substeps = model.at("substeps").count();
+  if (model.has("time_step_s")) result.time_step_s = model.at("time_step_s").number();
+  result.start = model.at("start").text();
+  result.parameters = read_parameters(json.at("parameters"));
+  for (const JsonValue& effect : json.at("effects").items()) {
+    result.effects.push_back({effect.at("name").text(), read_parameters(effect.at("parameters"))});
+  }
+  if (json.has("nuisance")) result.nuisance = read_parameters(json.at("nuisance"));
+  const JsonValue errors = json.at("errors");
+  if (errors.is_list()) {
+    for (const JsonValue& kind : errors.items()) result.errors.push_back(read_errors(kind));
+  } else {
+    result.errors.push_back(read_errors(errors));
+  }
+  const JsonValue observations = json.at("observations");
+  result.observations_used = observations.at("used").count();
+  const JsonValue rejected = observations.at("rejected");
+  for (const std::string& reason : rejected.keys()) {
+    result.observations_rejected[reason] = rejected.at(reason).count();
+  }
+  return result;
+}
+
+}  // namespace clothfit

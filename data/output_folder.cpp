@@ -1,0 +1,166 @@
+#include "data/output_folder.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <signal.h>
+#include <stdio.h>
+#include <unistd.h>
+
+#include <cassert>
+#include <cerrno>
+#include <cstring>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "data/input_error.h"
+#include "data/number_text.h"
+#include "data/text_file.h"
+
+namespace clothfit {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kPublishedMark = ".clothfit";
+
+std::string partial_prefix(const fs::path& final_path) {
+  return fmt::format(".{}.partial-", final_path.filename().string());
+}
+
+/// Where a link points to when it is one: the folder is replaced, never the link.
+fs::path resolved(const fs::path& given) {
+  std::error_code error;
+  fs::path path = fs::weakly_canonical(given, error);
+  if (error) path = fs::absolute(given);
+  if (!path.has_filename()) path = path.parent_path();
+  return path;
+}
+
+void require_replaceable(const fs::path& final_path) {
+  std::error_code error;
+  const fs::file_status status = fs::symlink_status(final_path, error);
+  if (!fs::exists(status)) return;
+  if (!fs::is_directory(status)) {
+    throw InputError(final_path.string(), "exists and is not a folder", "a folder to write to",
+                     "choose another --out");
+  }
+  if (!fs::exists(final_path / kPublishedMark, error)) {
+    throw InputError(final_path.string(), "exists and was not written by clothfit",
+                     "a new folder or an older result",
+                     "choose another --out, or move that folder away");
+  }
+}
+
+/// Removes what runs that were killed left beside `final_path`. A folder that cannot be removed
+/// stands in nobody's way.
+void remove_stale(const fs::path& final_path) {
+  const std::string prefix = partial_prefix(final_path);
+  std::error_code error;
+  std::vector<fs::path> stale;
+  for (fs::directory_iterator entry(final_path.parent_path(), error), end; !error && entry != end;
+       entry.increment(error)) {
+    const std::string name = entry->path().filename().string();
+    if (!name.starts_with(prefix)) continue;
+    const std::optional<int> owner =
+        parse_whole_number(std::string_view(name).substr(prefix.size()));
+    // One of our own number was left by an earlier process that bore it.
+    if (!owner || *owner <= 0) continue;
+    const bool is_dead = kill(*owner, 0) != 0 && errno == ESRCH;
+    if (is_dead || *owner == getpid()) stale.push_back(entry->path());
+  }
+  for (const fs::path& folder : stale) fs::remove_all(folder, error);
+}
+
+[[noreturn]] void refuse(const fs::path& path, const std::string& what, int error_number) {
+  throw InputError(path.string(), what + ": " + std::strerror(error_number),
+                   "a writable folder with room on its disk", "choose another --out");
+}
+
+/// Forces a file or folder onto the disk.
+void sync(const fs::path& path, int flags) {
+  const int descriptor = open(path.c_str(), flags | O_CLOEXEC);
+  if (descriptor < 0) refuse(path, "cannot be opened", errno);
+  const int status = fsync(descriptor);
+  const int error_number = errno;
+  close(descriptor);
+  // Some file systems cannot sync a folder and say so.
+  if (status != 0 && error_number != EINVAL) refuse(path, "cannot be synced", error_number);
+}
+
+void sync_tree(const fs::path& folder) {
+  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder)) {
+    if (entry.is_symlink()) continue;
+    if (entry.is_regular_file()) sync(entry.path(), O_RDONLY);
+    if (entry.is_directory()) sync(entry.path(), O_RDONLY | O_DIRECTORY);
+  }
+  sync(folder, O_RDONLY | O_DIRECTORY);
+}
+
+/// Swaps two folders in one step, or in two where the file system knows no swap.
+bool exchange(const fs::path& a, const fs::path& b) {
+  if (renameat2(AT_FDCWD, a.c_str(), AT_FDCWD, b.c_str(), RENAME_EXCHANGE) == 0) return true;
+  if (errno != EINVAL && errno != ENOSYS) return false;
+  const fs::path aside =
+      b.parent_path() / fmt::format(".{}.replaced-{}", b.filename().string(), getpid());
+  if (rename(b.c_str(), aside.c_str()) != 0) return false;
+  if (rename(a.c_str(), b.c_str()) != 0) {
+    const int error_number = errno;
+    static_cast<void>(rename(aside.c_str(), b.c_str()));
+    errno = error_number;
+    return false;
+  }
+  return rename(aside.c_str(), a.c_str()) == 0;
+}
+
+/// Moves a folder to a place where nothing is.
+bool move_to_free(const fs::path& from, const fs::path& to) {
+  if (renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0) return true;
+  if (errno != EINVAL && errno != ENOSYS) return false;
+  return rename(from.c_str(), to.c_str()) == 0;
+}
+
+}  // namespace
+
+OutputFolder::OutputFolder(fs::path final_path) : final_path_(resolved(final_path)) {
+  const fs::path parent = final_path_.parent_path();
+  std::error_code error;
+  if (!fs::is_directory(parent, error)) {
+    throw InputError(final_path.string(), "the folder " + parent.string() + " does not exist",
+                     "an existing folder to write into", "create it");
+  }
+  require_replaceable(final_path_);
+  remove_stale(final_path_);
+  work_path_ = parent / fmt::format("{}{}", partial_prefix(final_path_), getpid());
+  if (!fs::create_directory(work_path_, error)) {
+    refuse(work_path_, "cannot be created", error ? error.value() : EEXIST);
+  }
+}
+
+OutputFolder::~OutputFolder() {
+  if (published_) return;
+  std::error_code error;
+  fs::remove_all(work_path_, error);
+}
+
+void OutputFolder::publish() {
+  assert(!published_);
+  write_text("Written by clothfit; a later run with the same --out replaces this folder.\n",
+             work_path_ / kPublishedMark);
+  try {
+    sync_tree(work_path_);
+  } catch (const fs::filesystem_error& error) {
+    refuse(work_path_, "cannot be synced", error.code().value());
+  }
+  require_replaceable(final_path_);
+  std::error_code error;
+  const bool replaces = fs::exists(fs::symlink_status(final_path_, error));
+  const bool moved =
+      replaces ? exchange(work_path_, final_path_) : move_to_free(work_path_, final_path_);
+  if (!moved) refuse(final_path_, "cannot be put in place", errno);
+  published_ = true;
+  sync(final_path_.parent_path(), O_RDONLY | O_DIRECTORY);
+  if (replaces) fs::remove_all(work_path_, error);
+}
+
+}  // namespace clothfit
