@@ -1,0 +1,572 @@
+#include "calib/world_placement.h"
+
+#include <ceres/ceres.h>
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cmath>
+#include <limits>
+#include <list>
+#include <map>
+#include <optional>
+
+#include "calib/pose_block.h"
+#include "calib/pose_start.h"
+#include "calib/projection.h"
+#include "calib/robust_scale.h"
+
+namespace clothfit {
+namespace {
+
+/// The camera with its numbers in the order that project() takes.
+struct FixedCamera {
+  CameraModel model;
+  std::array<double, kMaxIntrinsics> intrinsics;
+  int distortion_count;
+
+  explicit FixedCamera(const CameraParameters& camera)
+      : model(camera.model),
+        intrinsics(intrinsics_of(camera)),
+        distortion_count(static_cast<int>(camera.distortion.size())) {}
+
+  /// (projected - observed) / sigma; false behind the camera.
+  template <class Real>
+  bool residual(const Eigen::Matrix<Real, 3, 1>& in_camera, const PlacedPixel& observed,
+                Real* out) const {
+    if (!(in_camera[2] > Real(0.0))) return false;
+    std::array<Real, kMaxIntrinsics> numbers;
+    for (std::size_t i = 0; i < numbers.size(); ++i) numbers[i] = Real(intrinsics[i]);
+    const Eigen::Matrix<Real, 2, 1> pixel =
+        project<Real>(model, numbers.data(), distortion_count, in_camera);
+    out[0] = (pixel[0] - observed.pixel_px.x()) / observed.sigma_px;
+    out[1] = (pixel[1] - observed.pixel_px.y()) / observed.sigma_px;
+    return true;
+  }
+};
+
+/// Pixel of a point whose place is taken as exact; unknown is the camera's pose.
+struct PixelOfExactPoint {
+  const FixedCamera* camera;
+  const PlacedPixel* observed;
+  template <class Real>
+  bool operator()(const Real* camera_from_world, Real* out) const {
+    const Eigen::Matrix<Real, 3, 1> point = observed->point_m.cast<Real>();
+    return camera->residual<Real>(transform(camera_from_world, point), *observed, out);
+  }
+};
+
+ceres::Solver::Options solver_options() {
+  ceres::Solver::Options options;
+  options.linear_solver_type = ceres::DENSE_QR;
+  options.max_num_iterations = 100;
+  options.function_tolerance = 1e-14;
+  options.parameter_tolerance = 1e-13;
+  options.gradient_tolerance = 1e-13;
+  options.logging_type = ceres::SILENT;
+  return options;
+}
+
+/// Residuals of points taken as exact, in sigmas; infinite behind the camera.
+std::vector<Eigen::Vector2d> standardised_residuals(const FixedCamera& camera,
+                                                    const std::vector<PlacedPixel>& pixels,
+                                                    const Rigid3& camera_from_world) {
+  std::vector<Eigen::Vector2d> residuals;
+  for (const auto& pixel : pixels) {
+    Eigen::Vector2d residual;
+    if (!camera.residual<double>(camera_from_world * pixel.point_m, pixel, residual.data())) {
+      residual.setConstant(std::numeric_limits<double>::infinity());
+    }
+    residuals.push_back(residual);
+  }
+  return residuals;
+}
+
+double robust_spread(const std::vector<Eigen::Vector2d>& residuals) {
+  std::vector<double> coordinates;
+  for (const auto& residual : residuals) {
+    coordinates.push_back(residual.x());
+    coordinates.push_back(residual.y());
+  }
+  return robust_sigma(std::move(coordinates));
+}
+
+/// Moves `camera_from_world` to the least squares of the pixels marked `used`; `cauchy_scale` 0
+/// stands for no robust loss.
+bool refine_pose(const FixedCamera& camera, const std::vector<PlacedPixel>& pixels,
+                 const std::vector<char>& used, double cauchy_scale, Rigid3& camera_from_world) {
+  PoseBlock block = to_block(camera_from_world);
+  ceres::Problem problem;
+  problem.AddParameterBlock(block.data(), 7, new PoseManifold);
+  for (std::size_t i = 0; i < pixels.size(); ++i) {
+    if (!used[i]) continue;
+    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<PixelOfExactPoint, 2, 7>(
+                                 new PixelOfExactPoint{&camera, &pixels[i]}),
+                             cauchy_scale > 0 ? new ceres::CauchyLoss(cauchy_scale) : nullptr,
+                             block.data());
+  }
+  ceres::Solver::Summary summary;
+  ceres::Solve(solver_options(), &problem, &summary);
+  camera_from_world = from_block(block);
+  return summary.IsSolutionUsable();
+}
+
+/// A pose refined with gross errors held off, and the robust spread it leaves (in sigmas).
+struct RobustPose {
+  Rigid3 camera_from_world;
+  double spread = std::numeric_limits<double>::infinity();
+  double cost = std::numeric_limits<double>::infinity();
+};
+
+RobustPose refine_pose_robustly(const FixedCamera& camera, const std::vector<PlacedPixel>& pixels,
+                                const Rigid3& start) {
+  constexpr int kRounds = 6;
+  const std::vector<char> all(pixels.size(), 1);
+  RobustPose result{.camera_from_world = start};
+  result.spread = robust_spread(standardised_residuals(camera, pixels, start));
+  for (int round = 0; round < kRounds && std::isfinite(result.spread); ++round) {
+    const double before = result.spread;
+    if (!refine_pose(camera, pixels, all, 2 * before, result.camera_from_world)) return result;
+    result.spread = robust_spread(standardised_residuals(camera, pixels, result.camera_from_world));
+    if (result.spread > 0.9 * before) break;
+  }
+  result.cost = 0;
+  for (const auto& residual : standardised_residuals(camera, pixels, result.camera_from_world)) {
+    result.cost += std::log1p(residual.squaredNorm());
+  }
+  return result;
+}
+
+/// Where the rays through the pixels meet the plane z = 1 in front of the camera; nothing where a
+/// pixel has no ray.
+std::optional<std::vector<Eigen::Vector2d>> on_image_plane(const CameraParameters& camera,
+                                                           const std::vector<PlacedPixel>& pixels) {
+  std::vector<Eigen::Vector2d> image;
+  for (const auto& pixel : pixels) {
+    const auto direction = unproject(camera, pixel.pixel_px);
+    if (!direction || !(direction->z() > 0)) return std::nullopt;
+    image.emplace_back(direction->hnormalized());
+  }
+  return image;
+}
+
+bool is_finite(const std::vector<PlacedPixel>& pixels) {
+  return std::all_of(pixels.begin(), pixels.end(), [](const PlacedPixel& pixel) {
+    return pixel.point_m.allFinite() && pixel.pixel_px.allFinite() && pixel.sigma_px > 0;
+  });
+}
+
+// ---- The world from reference points ----
+
+/// The four corners of one tag, in the order round the square that the survey shows.
+struct Square {
+  std::array<std::size_t, 4> corners{};  ///< indices into the reference points
+  Rigid3 world_from_square;              ///< origin in the middle, sides along x and y
+  double side_m = 0;
+  double misfit2_m2 = 0;  ///< sum of squared distances of the survey from the best square
+  std::size_t side = 0;   ///< index of the side it shares with other squares
+};
+
+/// Corner `k` of a square of side 1.
+Eigen::Vector3d unit_corner(std::size_t k) {
+  static const std::array<Eigen::Vector3d, 4> corners{
+      Eigen::Vector3d(-0.5, -0.5, 0), Eigen::Vector3d(0.5, -0.5, 0), Eigen::Vector3d(0.5, 0.5, 0),
+      Eigen::Vector3d(-0.5, 0.5, 0)};
+  return corners[k];
+}
+
+/// The best square through four surveyed points, in whatever order they come.
+Square fit_square(const std::vector<PlacedPixel>& reference,
+                  const std::array<std::size_t, 4>& points) {
+  Square best;
+  best.misfit2_m2 = std::numeric_limits<double>::infinity();
+  constexpr std::array<std::array<std::size_t, 4>, 3> kRounds{
+      {{0, 1, 2, 3}, {0, 1, 3, 2}, {0, 2, 1, 3}}};
+  for (const auto& round : kRounds) {
+    Square square;
+    Eigen::Matrix3Xd unit(3, 4), surveyed(3, 4);
+    for (std::size_t k = 0; k < 4; ++k) {
+      square.corners[k] = points[round[k]];
+      unit.col(static_cast<Eigen::Index>(k)) = unit_corner(k);
+      surveyed.col(static_cast<Eigen::Index>(k)) = reference[square.corners[k]].point_m;
+    }
+    // Turning and scaling separate: the best scale for the best rotation is a projection.
+    square.world_from_square = fit_rigid(unit, surveyed);
+    const Eigen::Matrix3Xd turned = square.world_from_square.rotation.toRotationMatrix() * unit;
+    const Eigen::Matrix3Xd centred = surveyed.colwise() - surveyed.rowwise().mean();
+    square.side_m = turned.cwiseProduct(centred).sum() / turned.squaredNorm();
+    square.misfit2_m2 = (centred - square.side_m * turned).squaredNorm();
+    if (square.misfit2_m2 < best.misfit2_m2) best = square;
+  }
+  return best;
+}
+
+/// The squares among the reference points, with sides that agree shared.
+std::vector<Square> find_squares(const std::vector<PlacedPixel>& reference,
+                                 std::vector<double>& sides_m) {
+  constexpr double kLargestMisfit = 0.15;  // of the side, rms per corner: not a square
+  std::map<int, std::vector<std::size_t>> groups;
+  for (std::size_t i = 0; i < reference.size(); ++i) {
+    if (reference[i].group >= 0) groups[reference[i].group].push_back(i);
+  }
+  std::vector<Square> squares;
+  for (const auto& [group, points] : groups) {
+    if (points.size() != 4) continue;
+    const Square square = fit_square(reference, {points[0], points[1], points[2], points[3]});
+    if (square.side_m > 0 && std::sqrt(square.misfit2_m2 / 4) < kLargestMisfit * square.side_m) {
+      squares.push_back(square);
+    }
+  }
+  // 12 coordinates less 7 of the square; the side of one square has the survey's sigma / sqrt 2.
+  double misfit2_m2 = 0;
+  for (const auto& square : squares) misfit2_m2 += square.misfit2_m2;
+  const double survey_sigma_m =
+      std::sqrt(misfit2_m2 / std::max(5.0 * static_cast<double>(squares.size()), 1.0));
+  const double gap_m = 4 * survey_sigma_m + 1e-6;
+  std::vector<Square*> by_side;
+  for (auto& square : squares) by_side.push_back(&square);
+  std::sort(by_side.begin(), by_side.end(),
+            [](const Square* a, const Square* b) { return a->side_m < b->side_m; });
+  std::vector<double> members;
+  for (std::size_t i = 0; i < by_side.size(); ++i) {
+    if (i == 0 || by_side[i]->side_m - by_side[i - 1]->side_m > gap_m) {
+      sides_m.push_back(0);
+      members.push_back(0);
+    }
+    by_side[i]->side = sides_m.size() - 1;
+    members.back() += 1;
+    sides_m.back() += (by_side[i]->side_m - sides_m.back()) / members.back();
+  }
+  return squares;
+}
+
+struct PixelOfPoint {
+  const FixedCamera* camera;
+  const PlacedPixel* observed;
+  template <class Real>
+  bool operator()(const Real* camera_from_world, const Real* place, Real* out) const {
+    const Eigen::Matrix<Real, 3, 1> point(place[0], place[1], place[2]);
+    return camera->residual<Real>(transform(camera_from_world, point), *observed, out);
+  }
+};
+
+struct SurveyOfPoint {
+  const PlacedPixel* surveyed;
+  double sigma_m;
+  template <class Real>
+  bool operator()(const Real* place, Real* out) const {
+    for (int i = 0; i < 3; ++i) out[i] = (place[i] - surveyed->point_m[i]) / sigma_m;
+    return true;
+  }
+};
+
+template <class Real>
+Eigen::Matrix<Real, 3, 1> square_corner(std::size_t k, const Real* world_from_square,
+                                        const Real* side_m) {
+  const Eigen::Matrix<Real, 3, 1> corner = unit_corner(k).cast<Real>() * side_m[0];
+  return transform(world_from_square, corner);
+}
+
+struct PixelOfSquare {
+  const FixedCamera* camera;
+  const PlacedPixel* observed;
+  std::size_t corner;
+  template <class Real>
+  bool operator()(const Real* camera_from_world, const Real* world_from_square, const Real* side_m,
+                  Real* out) const {
+    return camera->residual<Real>(
+        transform(camera_from_world, square_corner(corner, world_from_square, side_m)), *observed,
+        out);
+  }
+};
+
+struct SurveyOfSquare {
+  const PlacedPixel* surveyed;
+  double sigma_m;
+  std::size_t corner;
+  template <class Real>
+  bool operator()(const Real* world_from_square, const Real* side_m, Real* out) const {
+    const Eigen::Matrix<Real, 3, 1> place = square_corner(corner, world_from_square, side_m);
+    for (int i = 0; i < 3; ++i) out[i] = (place[i] - surveyed->point_m[i]) / sigma_m;
+    return true;
+  }
+};
+
+/// All unknowns of the placement.
+struct WorldUnknowns {
+  PoseBlock camera_from_world{};
+  std::vector<Square> squares;
+  std::vector<PoseBlock> world_from_square;
+  std::vector<double> sides_m;
+  std::vector<std::size_t> single;             ///< points that belong to no square
+  std::vector<std::array<double, 3>> place_m;  ///< of the single points
+};
+
+/// What one solve leaves: residuals in sigmas, pixels first, and the inverse normal equations.
+struct WorldSolve {
+  bool usable = false;
+  double survey_sum = 0;         ///< of squared standardised survey residuals
+  double survey_redundancy = 0;  ///< survey coordinates less those that the unknowns use up
+  Eigen::Matrix<double, 6, 6> covariance;
+};
+
+WorldSolve solve_world(const FixedCamera& camera, const std::vector<PlacedPixel>& reference,
+                       double survey_sigma_m, WorldUnknowns& unknowns) {
+  ceres::Problem problem;
+  double* pose = unknowns.camera_from_world.data();
+  problem.AddParameterBlock(pose, 7, new PoseManifold);
+  std::vector<ceres::ResidualBlockId> pixels, surveys;
+  for (std::size_t s = 0; s < unknowns.squares.size(); ++s) {
+    double* square = unknowns.world_from_square[s].data();
+    double* side = &unknowns.sides_m[unknowns.squares[s].side];
+    problem.AddParameterBlock(square, 7, new PoseManifold);
+    for (std::size_t k = 0; k < 4; ++k) {
+      const PlacedPixel* point = &reference[unknowns.squares[s].corners[k]];
+      pixels.push_back(
+          problem.AddResidualBlock(new ceres::AutoDiffCostFunction<PixelOfSquare, 2, 7, 7, 1>(
+                                       new PixelOfSquare{&camera, point, k}),
+                                   nullptr, pose, square, side));
+      surveys.push_back(
+          problem.AddResidualBlock(new ceres::AutoDiffCostFunction<SurveyOfSquare, 3, 7, 1>(
+                                       new SurveyOfSquare{point, survey_sigma_m, k}),
+                                   nullptr, square, side));
+    }
+  }
+  for (std::size_t i = 0; i < unknowns.single.size(); ++i) {
+    const PlacedPixel* point = &reference[unknowns.single[i]];
+    double* place = unknowns.place_m[i].data();
+    pixels.push_back(problem.AddResidualBlock(
+        new ceres::AutoDiffCostFunction<PixelOfPoint, 2, 7, 3>(new PixelOfPoint{&camera, point}),
+        nullptr, pose, place));
+    surveys.push_back(problem.AddResidualBlock(new ceres::AutoDiffCostFunction<SurveyOfPoint, 3, 3>(
+                                                   new SurveyOfPoint{point, survey_sigma_m}),
+                                               nullptr, place));
+  }
+
+  WorldSolve result;
+  ceres::Solver::Summary summary;
+  ceres::Solve(solver_options(), &problem, &summary);
+  if (!summary.IsSolutionUsable()) return result;
+
+  // The camera's pose was added first, so its tangent holds the first six columns.
+  ceres::Problem::EvaluateOptions evaluate;
+  evaluate.residual_blocks = pixels;
+  evaluate.residual_blocks.insert(evaluate.residual_blocks.end(), surveys.begin(), surveys.end());
+  problem.GetParameterBlocks(&evaluate.parameter_blocks);
+  const auto first =
+      std::find(evaluate.parameter_blocks.begin(), evaluate.parameter_blocks.end(), pose);
+  std::iter_swap(evaluate.parameter_blocks.begin(), first);
+  std::vector<double> residuals;
+  ceres::CRSMatrix sparse;
+  if (!problem.Evaluate(evaluate, nullptr, &residuals, nullptr, &sparse)) return result;
+  Eigen::MatrixXd jacobian = Eigen::MatrixXd::Zero(sparse.num_rows, sparse.num_cols);
+  for (int row = 0; row < sparse.num_rows; ++row) {
+    const auto begin = static_cast<std::size_t>(sparse.rows[static_cast<std::size_t>(row)]);
+    const auto end = static_cast<std::size_t>(sparse.rows[static_cast<std::size_t>(row) + 1]);
+    for (std::size_t at = begin; at < end; ++at) jacobian(row, sparse.cols[at]) = sparse.values[at];
+  }
+
+  // Columns are scaled to length 1: metres and radians, pixels and millimetres stay comparable.
+  const Eigen::VectorXd scale = jacobian.colwise().norm().cwiseInverse();
+  if (!scale.allFinite()) return result;
+  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(jacobian * scale.asDiagonal());
+  if (qr.rank() < jacobian.cols()) return result;
+  const Eigen::Index n = jacobian.cols();
+  const Eigen::MatrixXd thin_q = qr.householderQ() * Eigen::MatrixXd::Identity(jacobian.rows(), n);
+  const Eigen::MatrixXd inverse_r =
+      qr.matrixR().topLeftCorner(n, n).triangularView<Eigen::Upper>().solve(
+          Eigen::MatrixXd::Identity(n, n));
+  const Eigen::MatrixXd root = scale.asDiagonal() * (qr.colsPermutation() * inverse_r);
+  result.covariance = (root * root.transpose()).topLeftCorner<6, 6>();
+
+  const auto survey_rows = static_cast<Eigen::Index>(3 * surveys.size());
+  const Eigen::Map<const Eigen::VectorXd> all(residuals.data(),
+                                              static_cast<Eigen::Index>(residuals.size()));
+  result.survey_sum = all.tail(survey_rows).squaredNorm();
+  result.survey_redundancy =
+      static_cast<double>(survey_rows) - thin_q.bottomRows(survey_rows).squaredNorm();
+  result.usable = true;
+  return result;
+}
+
+/// Camera poses that the surveyed places allow, taken as exact, best first found by robust cost.
+std::optional<Rigid3> start_world(const CameraParameters& parameters, const FixedCamera& camera,
+                                  const std::vector<PlacedPixel>& reference) {
+  const auto image = on_image_plane(parameters, reference);
+  if (!image) return std::nullopt;
+  Eigen::Matrix3Xd points(3, static_cast<Eigen::Index>(reference.size()));
+  std::vector<Eigen::Vector3d> in_world_m;
+  for (std::size_t i = 0; i < reference.size(); ++i) {
+    points.col(static_cast<Eigen::Index>(i)) = reference[i].point_m;
+    in_world_m.push_back(reference[i].point_m);
+  }
+  std::vector<Rigid3> candidates;
+  if (const auto pose = point_pose(in_world_m, *image)) candidates.push_back(*pose);
+
+  // Points in nearly one plane look nearly the same under two poses: both are tried.
+  const Eigen::Vector3d middle = points.rowwise().mean();
+  const Eigen::JacobiSVD<Eigen::Matrix3Xd> svd(points.colwise() - middle, Eigen::ComputeFullU);
+  if (svd.singularValues()[1] < 1e-3 * svd.singularValues()[0]) return std::nullopt;  // on a line
+  Eigen::Matrix3d axes = svd.matrixU();
+  if (axes.determinant() < 0) axes.col(2) *= -1;
+  const Rigid3 world_from_plane{Eigen::Quaterniond(axes), middle};
+  std::vector<Eigen::Vector2d> on_plane_m;
+  for (const auto& point : in_world_m) {
+    on_plane_m.emplace_back((inverse(world_from_plane) * point).head<2>());
+  }
+  for (const auto& camera_from_plane : plane_poses(on_plane_m, *image)) {
+    candidates.push_back(camera_from_plane * inverse(world_from_plane));
+  }
+
+  std::optional<RobustPose> best;
+  for (const auto& candidate : candidates) {
+    const RobustPose refined = refine_pose_robustly(camera, reference, candidate);
+    if (!best || refined.spread < best->spread) best = refined;
+  }
+  if (!best || !std::isfinite(best->spread)) return std::nullopt;
+  return best->camera_from_world;
+}
+
+}  // namespace
+
+SheetPoseResult place_sheet(const CameraParameters& parameters,
+                            const std::vector<PlacedPixel>& sheet) {
+  SheetPoseResult result;
+  if (sheet.size() < 4) {
+    result.message = fmt::format("the sheet shows {} points; 4 or more place it", sheet.size());
+    return result;
+  }
+  if (!is_finite(sheet)) {
+    result.message = "a point of the sheet is not a number, or its sigma is not > 0";
+    return result;
+  }
+  const FixedCamera camera(parameters);
+  const auto image = on_image_plane(parameters, sheet);
+  if (!image) {
+    result.message = "the camera's distortion sends no ray to some pixel of the sheet";
+    return result;
+  }
+  std::vector<Eigen::Vector2d> on_plane_m;
+  for (const auto& point : sheet) on_plane_m.emplace_back(point.point_m.head<2>());
+  const double tolerance = 0.01 * std::hypot(parameters.image_width, parameters.image_height) /
+                           parameters.focal_px.maxCoeff();
+  RobustPose best;
+  for (const auto& candidate : plane_poses(on_plane_m, *image, tolerance)) {
+    const RobustPose refined = refine_pose_robustly(camera, sheet, candidate);
+    if (refined.cost < best.cost) best = refined;
+  }
+  if (!std::isfinite(best.cost)) {
+    result.message = "no pose of a flat sheet explains its points; are they on one line?";
+    return result;
+  }
+
+  constexpr double kOutlierSpreads = 5;
+  const auto residuals = standardised_residuals(camera, sheet, best.camera_from_world);
+  std::vector<char> used;
+  for (const auto& residual : residuals) {
+    used.push_back(residual.norm() <= kOutlierSpreads * best.spread ? 1 : 0);
+  }
+  const auto good = std::count(used.begin(), used.end(), char{1});
+  result.camera_from_sheet = best.camera_from_world;
+  if (good < 4 || !refine_pose(camera, sheet, used, 0, result.camera_from_sheet)) {
+    result.message = "the sheet's points agree on no pose";
+    return result;
+  }
+  double sum_px2 = 0;
+  const auto final_residuals = standardised_residuals(camera, sheet, result.camera_from_sheet);
+  for (std::size_t i = 0; i < sheet.size(); ++i) {
+    if (used[i]) sum_px2 += (sheet[i].sigma_px * final_residuals[i]).squaredNorm();
+  }
+  result.rms_px = std::sqrt(sum_px2 / (2 * static_cast<double>(good)));
+  result.usable = std::isfinite(result.rms_px);
+  result.message = fmt::format("{} of {} points, rms {:.3f} px", good, sheet.size(), result.rms_px);
+  return result;
+}
+
+WorldPlacementResult place_world(const CameraParameters& parameters,
+                                 const std::vector<PlacedPixel>& reference,
+                                 const std::vector<PlacedPixel>& sheet) {
+  constexpr double kFirstGuessM = 1e-3;
+  constexpr double kSmallestSurveySigmaM = 1e-6;
+  constexpr int kVarianceRounds = 30;
+
+  WorldPlacementResult result;
+  result.covariance.setZero();
+  if (reference.size() < 4) {
+    result.message =
+        fmt::format("{} reference points are seen; 4 or more place the camera", reference.size());
+    return result;
+  }
+  if (!is_finite(reference)) {
+    result.message = "a reference point is not a number, or its sigma is not > 0";
+    return result;
+  }
+  const FixedCamera camera(parameters);
+  const auto start = start_world(parameters, camera, reference);
+  if (!start) {
+    result.message = "the reference points do not place the camera; are they on one line?";
+    return result;
+  }
+
+  WorldUnknowns unknowns;
+  unknowns.camera_from_world = to_block(*start);
+  unknowns.squares = find_squares(reference, unknowns.sides_m);
+  std::vector<char> in_square(reference.size(), 0);
+  for (const auto& square : unknowns.squares) {
+    unknowns.world_from_square.push_back(to_block(square.world_from_square));
+    for (const std::size_t corner : square.corners) in_square[corner] = 1;
+  }
+  for (std::size_t i = 0; i < reference.size(); ++i) {
+    if (in_square[i]) continue;
+    const auto& point = reference[i].point_m;
+    unknowns.single.push_back(i);
+    unknowns.place_m.push_back({point.x(), point.y(), point.z()});
+  }
+
+  double survey_sigma_m = kFirstGuessM;
+  WorldSolve solve;
+  for (int round = 0; round < kVarianceRounds; ++round) {
+    solve = solve_world(camera, reference, survey_sigma_m, unknowns);
+    if (!solve.usable || !(solve.survey_redundancy > 0)) break;
+    const double factor = std::sqrt(solve.survey_sum / solve.survey_redundancy);
+    const double next_m = std::max(survey_sigma_m * factor, kSmallestSurveySigmaM);
+    const bool settled = std::abs(next_m - survey_sigma_m) < 1e-3 * survey_sigma_m;
+    survey_sigma_m = next_m;
+    if (settled) break;
+  }
+  if (!solve.usable) {
+    result.message = "the reference points leave the camera's pose undetermined";
+    return result;
+  }
+  result.camera_from_world = from_block(unknowns.camera_from_world);
+  result.covariance = solve.covariance;
+  result.reference_survey_sigma_m = survey_sigma_m;
+  double sum_px2 = 0;
+  const auto residuals = standardised_residuals(camera, reference, result.camera_from_world);
+  for (std::size_t i = 0; i < reference.size(); ++i) {
+    sum_px2 += (reference[i].sigma_px * residuals[i]).squaredNorm();
+  }
+  result.reference_rms_px = std::sqrt(sum_px2 / (2 * static_cast<double>(reference.size())));
+  result.usable = std::isfinite(result.reference_rms_px) && result.covariance.allFinite();
+  const double tilt_mrad = 1e3 * std::sqrt(result.covariance(0, 0));
+  result.message = fmt::format(
+      "{} reference points, survey sigma {:.2f} mm, {:.2f} px; camera tilt sigma {:.1f} mrad",
+      reference.size(), 1e3 * survey_sigma_m, result.reference_rms_px, tilt_mrad);
+
+  if (result.usable && !sheet.empty()) {
+    const SheetPoseResult placed = place_sheet(parameters, sheet);
+    if (placed.usable) {
+      result.has_sheet = true;
+      result.sheet_rms_px = placed.rms_px;
+      result.world_from_sheet = inverse(result.camera_from_world) * placed.camera_from_sheet;
+      result.message += "; sheet: " + placed.message;
+    } else {
+      result.message += "; no sheet: " + placed.message;
+    }
+  }
+  return result;
+}
+
+}  // namespace clothfit
