@@ -1,0 +1,13 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+namespace clothfit {
+
+/// Folder of a recording that comes with the program: beside the installed program (in
+/// ../share/clothfit/recordings) or in the source tree it was built from. Throws InputError when
+/// it is at neither place.
+std::filesystem::path bundled_recording(const std::string& name);
+
+}  // namespace clothfit

@@ -1,0 +1,18 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace clothfit {
+
+/// Writes a result table: a header line, then the rows. Cells with a comma, quote or line break are
+/// quoted as RFC 4180 has it. Throws InputError where the file cannot be written.
+void write_csv_table(const std::vector<std::string>& header,
+                     const std::vector<std::vector<std::string>>& rows,
+                     const std::filesystem::path& file);
+
+/// Writes `text` as it is. Throws InputError where the file cannot be written.
+void write_text_file(const std::string& text, const std::filesystem::path& file);
+
+}  // namespace clothfit

@@ -1,0 +1,196 @@
+#include "apps/fit_verb.h"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <chrono>
+#include <cstdio>
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include "apps/csv_table.h"
+#include "apps/exit_code.h"
+#include "apps/interrupt.h"
+#include "apps/progress_line.h"
+#include "apps/recording_copy.h"
+#include "apps/report/background_picture.h"
+#include "apps/report/fit_page.h"
+#include "apps/report/fit_tables.h"
+#include "apps/report/summary.h"
+#include "apps/steps.h"
+#include "apps/text_table.h"
+#include "apps/verb.h"
+#include "apps/version.h"
+#include "data/input_error.h"
+#include "data/output_folder.h"
+
+namespace clothfit {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct FitFlags {
+  std::string observations = "automatic";
+  std::string mesh;
+  fs::path forecast;
+};
+
+struct MeshSize {
+  int columns = 0;
+  int rows = 0;
+};
+
+/// "17x17": columns and rows. Nothing where the text is not a mesh.
+std::optional<MeshSize> parse_mesh(const std::string& text) {
+  MeshSize mesh;
+  int end = 0;
+  const int fields = std::sscanf(text.c_str(), "%dx%d%n", &mesh.columns, &mesh.rows, &end);
+  const bool whole = fields == 2 && text.c_str()[end] == '\0';
+  if (!whole || mesh.columns < 2 || mesh.rows < 2) return std::nullopt;
+  return mesh;
+}
+
+std::string check_mesh(const std::string& text) {
+  if (parse_mesh(text)) return "";
+  return "'" + text + "' is not a mesh, such as 17x17 (each at least 2)";
+}
+
+ObservationKind parse_observations(const std::string& text) {
+  if (text == "tracks3d") return ObservationKind::tracks3d;
+  if (text == "tracks2d") return ObservationKind::tracks2d;
+  return ObservationKind::automatic;
+}
+
+/// What fit.json keeps of the command line: the options that shape the result, in fixed order.
+std::string command_text(const FitVerbOptions& options, const FitFlags& flags) {
+  const FitOptions defaults;
+  std::string text = "clothfit fit " + options.recording.string();
+  for (const std::string& effect : options.fit.effects) text += " --effect " + effect;
+  if (flags.observations != "automatic") text += " --observations " + flags.observations;
+  if (!flags.mesh.empty()) text += " --mesh " + flags.mesh;
+  if (!flags.forecast.empty()) text += " --forecast " + flags.forecast.string();
+  const auto add = [&](const char* flag, const auto& value, const auto& default_value) {
+    if (value != default_value) text += fmt::format(" {} {}", flag, value);
+  };
+  add("--seed", options.fit.seed, defaults.seed);
+  add("--population", options.fit.population, defaults.population);
+  add("--generations", options.fit.generations, defaults.generations);
+  add("--refine-best", options.fit.refine_best, defaults.refine_best);
+  add("--substep-scale", options.fit.substep_scale, defaults.substep_scale);
+  return text;
+}
+
+void write_results(const FitReport& report, const Recording& recording, const fs::path& folder) {
+  write_fit_result(report.result, folder / "fit.json");
+  const Table parameters = parameter_table(report.result);
+  const Table errors = error_table(report.result);
+  const Table residuals = residual_table(report, recording);
+  write_csv_table(parameters.header, parameters.rows, folder / "parameters.csv");
+  write_csv_table(errors.header, errors.rows, folder / "errors.csv");
+  write_csv_table(residuals.header, residuals.rows, folder / "residuals.csv");
+
+  const std::vector<BackgroundPicture> pictures = background_pictures(report, recording);
+  write_text_file(fit_page_html(report, recording, pictures), folder / "report.html");
+  const std::string overlay = overlay_svg(report, recording, pictures);
+  if (!overlay.empty()) write_text_file(overlay, folder / "overlay.svg");
+}
+
+void print_result(const FitReport& report, const fs::path& folder) {
+  const Table parameters = short_parameter_table(report.result);
+  const Table errors = short_error_table(report.result);
+  fmt::print("\n{}\n", text_table(parameters.header, parameters.rows));
+  fmt::print("Errors (rms per coordinate):\n\n{}\n", text_table(errors.header, errors.rows));
+  fmt::print("{}.\n\nReport: {}\n", summarise(report).verdict, shown_path(folder / "report.html"));
+}
+
+}  // namespace
+
+int run_fit(const FitVerbOptions& options) {
+  const auto begin = std::chrono::steady_clock::now();
+  options.fit.validate();
+  const Recording given = read_recording(recording_folder(options.recording));
+
+  OutputFolder out(out_folder(options.out, result_name(given) + ".fit"));
+  Recording recording;
+  FitReport report;
+  {
+    ProgressLine line;
+    const ProgressCallback progress = watch(line);
+    recording =
+        complete_recording(given, options.fit.observations, {}, out.path() / "steps", progress);
+    const FitInput input = read_fit_input(recording, options.fit.observations);
+    report = fit(input, options.fit, progress);
+  }
+  if (report.stop == FitStop::cancelled || interrupted()) throw Cancelled();
+  if (!report.usable()) throw NoResult("no fit: " + report.message);
+
+  report.result.version = program_version();
+  report.result.command = options.command;
+  report.result.seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  write_results(report, recording, out.path());
+  if (interrupted()) throw Cancelled();
+  out.publish();
+  print_result(report, out.final_path());
+  return kExitGood;
+}
+
+void add_fit_verb(CLI::App& program, VerbAction& action) {
+  const auto options = std::make_shared<FitVerbOptions>();
+  const auto flags = std::make_shared<FitFlags>();
+  CLI::App* verb = program.add_subcommand(
+      "fit", "Identify the cloth's parameters, with their uncertainty and the held-out error");
+  verb->add_option("recording", options->recording, "Folder of the recording")
+      ->required()
+      ->type_name("RECORDING");
+  verb->add_option("--effect", options->fit.effects,
+                   "Effect to fit beside those the recording declares; may be repeated")
+      ->type_name("NAME");
+  verb->add_option("--observations", flags->observations,
+                   "What to fit to: 3D tracks where there are any, unless told otherwise")
+      ->check(CLI::IsMember({"automatic", "tracks3d", "tracks2d"}))
+      ->capture_default_str();
+  verb->add_option("--mesh", flags->mesh, "Columns and rows of the mesh (default: the recording's)")
+      ->type_name("CxR")
+      ->check(check_mesh);
+  verb->add_option("--seed", options->fit.seed,
+                   "Seed of the search; the same one gives the same "
+                   "result")
+      ->capture_default_str();
+  verb->add_option("--forecast", flags->forecast,
+                   "Take the parameters of this fit.json, fit nothing, forecast the recording from "
+                   "its own first frame")
+      ->type_name("FIT.json");
+  verb->add_option("--population", options->fit.population, "Individuals of the search")
+      ->capture_default_str();
+  verb->add_option("--generations", options->fit.generations, "Generations of the search, at most")
+      ->capture_default_str();
+  verb->add_option("--refine-best", options->fit.refine_best, "Individuals that go to refinement")
+      ->capture_default_str();
+  verb->add_option("--substep-scale", options->fit.substep_scale,
+                   "Above 1: smaller time steps than stability asks for")
+      ->capture_default_str();
+  verb->add_option("--threads", options->fit.threads, "Threads; 0 for as many as the machine has")
+      ->capture_default_str();
+  add_out_option(*verb, options->out, "NAME.fit");
+  verb->footer(
+      "Examples:\n"
+      "  clothfit fit data/recordings/tags_onecam\n"
+      "  clothfit fit data/recordings/swing_breeze --effect viscous_damping --seed 7\n"
+      "  clothfit fit OTHER_RECORDING --forecast swing_plain.fit/fit.json");
+  verb->callback([options, flags, &action] {
+    action = [options, flags] {
+      options->fit.observations = parse_observations(flags->observations);
+      if (const auto mesh = parse_mesh(flags->mesh)) {
+        options->fit.mesh_columns = mesh->columns;
+        options->fit.mesh_rows = mesh->rows;
+      }
+      if (!flags->forecast.empty()) options->fit.forecast = read_fit_result(flags->forecast);
+      options->command = command_text(*options, *flags);
+      return run_fit(*options);
+    };
+  });
+}
+
+}  // namespace clothfit

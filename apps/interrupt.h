@@ -1,0 +1,12 @@
+#pragma once
+
+namespace clothfit {
+
+/// From here on Ctrl-C (SIGINT) and SIGTERM set a flag instead of killing the program, so that the
+/// call at work can end cleanly; the second one kills.
+void catch_interrupts();
+
+/// Whether one arrived. Progress callbacks return the opposite.
+bool interrupted();
+
+}  // namespace clothfit

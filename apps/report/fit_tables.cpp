@@ -1,0 +1,156 @@
+#include "apps/report/fit_tables.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+
+#include "apps/report/number_text.h"
+
+namespace clothfit {
+namespace {
+
+/// Calls visit(group, parameter) for the base model, each effect and the nuisance parameters.
+template <class Visit>
+void for_each_parameter(const FitResult& result, const Visit& visit) {
+  for (const ParameterEstimate& parameter : result.parameters) visit("base", parameter);
+  for (const EffectEstimate& effect : result.effects) {
+    for (const ParameterEstimate& parameter : effect.parameters) visit(effect.name, parameter);
+  }
+  for (const ParameterEstimate& parameter : result.nuisance) visit("measurement", parameter);
+}
+
+std::string relative_text(const ParameterEstimate& parameter) {
+  const bool meaningful = parameter.state != ParameterState::fixed && parameter.value != 0;
+  if (!meaningful) return "";
+  return significant(100 * parameter.sigma / std::abs(parameter.value), 2) + "%";
+}
+
+}  // namespace
+
+std::string to_string(ParameterState state) {
+  switch (state) {
+    case ParameterState::fitted:
+      return "fitted";
+    case ParameterState::fixed:
+      return "fixed";
+    case ParameterState::undetermined:
+      return "undetermined";
+  }
+  return "";
+}
+
+std::string to_string(FitStop stop) {
+  switch (stop) {
+    case FitStop::converged:
+      return "converged";
+    case FitStop::reached_limit:
+      return "reached a limit of the search";
+    case FitStop::cancelled:
+      return "cancelled";
+    case FitStop::diverged:
+      return "diverged";
+    case FitStop::no_observations:
+      return "no observations";
+  }
+  return "";
+}
+
+ShownUnit shown_unit(const std::string& unit) {
+  if (unit == "m") return {1000, "mm"};
+  return {1, unit};
+}
+
+std::string kind_title(const std::string& kind, const std::string& unit) {
+  return fmt::format("{}, {}", kind, shown_unit(unit).name);
+}
+
+Table parameter_table(const FitResult& result) {
+  Table table{{"group", "name", "unit", "value", "sigma", "state", "reason"}, {}};
+  for_each_parameter(result, [&](const std::string& group, const ParameterEstimate& parameter) {
+    table.rows.push_back({group, parameter.name, parameter.unit, exact_text(parameter.value),
+                          exact_text(parameter.sigma), to_string(parameter.state),
+                          parameter.reason});
+  });
+  return table;
+}
+
+Table short_parameter_table(const FitResult& result) {
+  Table table{{"parameter", "value", "sigma", "relative", "unit", "state"}, {}};
+  for_each_parameter(result, [&](const std::string& group, const ParameterEstimate& parameter) {
+    const std::string name = group == "base" ? parameter.name : group + ": " + parameter.name;
+    const bool fixed = parameter.state == ParameterState::fixed;
+    std::string state = to_string(parameter.state);
+    if (!parameter.reason.empty()) state += ": " + parameter.reason;
+    table.rows.push_back({name, value_text(parameter.value, parameter.sigma),
+                          fixed ? "" : significant(parameter.sigma, 2), relative_text(parameter),
+                          parameter.unit, state});
+  });
+  return table;
+}
+
+Table error_table(const FitResult& result) {
+  Table table{
+      {"kind", "unit", "fitted_rms", "fitted_rms_distance", "fitted_count", "held_out_rms",
+       "held_out_rms_distance", "held_out_count", "noise", "first_frame", "last_velocity", "rigid"},
+      {}};
+  for (const ObservationErrors& errors : result.errors) {
+    const bool judged = errors.held_out.count > 0;
+    const auto held = [&](double value) { return judged ? exact_text(value) : ""; };
+    table.rows.push_back({errors.kind, errors.unit, exact_text(errors.fitted.rms),
+                          exact_text(errors.fitted.rms_distance),
+                          std::to_string(errors.fitted.count), held(errors.held_out.rms),
+                          held(errors.held_out.rms_distance), std::to_string(errors.held_out.count),
+                          exact_text(errors.noise), held(errors.trivial.first_frame),
+                          held(errors.trivial.last_velocity), held(errors.trivial.rigid)});
+  }
+  return table;
+}
+
+Table short_error_table(const FitResult& result) {
+  Table table{{"observations", "fitted frames", "held-out frames", "noise", "stays as in frame 0",
+               "moves on", "moves rigidly"},
+              {}};
+  for (const ObservationErrors& errors : result.errors) {
+    const double factor = shown_unit(errors.unit).factor;
+    const bool judged = errors.held_out.count > 0;
+    const auto shown = [&](double value) { return significant(value * factor, 3); };
+    const auto held = [&](double value) { return judged ? shown(value) : std::string("-"); };
+    table.rows.push_back({kind_title(errors.kind, errors.unit), shown(errors.fitted.rms),
+                          held(errors.held_out.rms), shown(errors.noise),
+                          held(errors.trivial.first_frame), held(errors.trivial.last_velocity),
+                          held(errors.trivial.rigid)});
+  }
+  return table;
+}
+
+Table residual_table(const FitReport& report, const Recording& recording) {
+  Table table{{"kind", "frame", "marker", "held_out", "observed_1", "observed_2", "observed_3",
+               "predicted_1", "predicted_2", "predicted_3", "sigma"},
+              {}};
+  for (const FitReport::Residuals& residuals : report.residuals) {
+    for (const FitReport::Residuals::Row& row : residuals.rows) {
+      std::array<std::string, 3> observed;
+      std::array<std::string, 3> predicted;
+      for (Eigen::Index c = 0; c < std::min<Eigen::Index>(3, row.observed.size()); ++c) {
+        observed[static_cast<std::size_t>(c)] = exact_text(row.observed[c]);
+        predicted[static_cast<std::size_t>(c)] = exact_text(row.predicted[c]);
+      }
+      const Marker& marker = recording.markers.markers[static_cast<std::size_t>(row.marker)];
+      table.rows.push_back({residuals.kind, std::to_string(row.frame), marker.name,
+                            row.held_out ? "1" : "0", observed[0], observed[1], observed[2],
+                            predicted[0], predicted[1], predicted[2], exact_text(row.sigma)});
+    }
+  }
+  return table;
+}
+
+Table rejection_table(const FitResult& result) {
+  Table table{{"reason", "observations"}, {}};
+  for (const auto& [reason, count] : result.observations_rejected) {
+    table.rows.push_back({reason, std::to_string(count)});
+  }
+  return table;
+}
+
+}  // namespace clothfit

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "data/recording.h"
+#include "fit/fit.h"
+
+namespace clothfit {
+
+struct Table {
+  std::vector<std::string> header;
+  std::vector<std::vector<std::string>> rows;
+};
+
+/// Text forms used in reports and CSV files.
+std::string to_string(ParameterState state);
+std::string to_string(FitStop stop);
+
+/// Every parameter with all its digits, effects' and nuisance parameters included (CSV).
+Table parameter_table(const FitResult& result);
+/// The same rounded by sigma, for people.
+Table short_parameter_table(const FitResult& result);
+
+/// One row per kind of observation with all digits (CSV).
+Table error_table(const FitResult& result);
+/// The same for people: 3D errors in mm.
+Table short_error_table(const FitResult& result);
+
+/// One row per observation: observed, predicted, sigma (CSV).
+Table residual_table(const FitReport& report, const Recording& recording);
+
+/// Rejected observations by reason.
+Table rejection_table(const FitResult& result);
+
+/// Factor and unit in which errors of a kind are shown: metres as millimetres.
+struct ShownUnit {
+  double factor = 1;
+  std::string name;
+};
+ShownUnit shown_unit(const std::string& unit);
+
+/// "front, px" or "tracks3d, mm"
+std::string kind_title(const std::string& kind, const std::string& unit);
+
+}  // namespace clothfit

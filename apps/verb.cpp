@@ -1,0 +1,28 @@
+#include "apps/verb.h"
+
+namespace clothfit {
+
+namespace fs = std::filesystem;
+
+void add_out_option(CLI::App& verb, std::filesystem::path& out, const std::string& default_name) {
+  verb.add_option("--out", out, "Folder for the results (default: " + default_name + ")")
+      ->type_name("DIR");
+}
+
+std::filesystem::path out_folder(const std::filesystem::path& asked,
+                                 const std::string& default_name) {
+  return asked.empty() ? fs::path(default_name) : asked;
+}
+
+std::string shown_path(const std::filesystem::path& path) {
+  const fs::path whole = fs::absolute(path).lexically_normal();
+  const fs::path relative = whole.lexically_relative(fs::current_path());
+  const bool below = !relative.empty() && *relative.begin() != "..";
+  return (below ? relative : whole).string();
+}
+
+std::filesystem::path recording_folder(const std::filesystem::path& typed) {
+  return typed.filename() == "recording.yaml" ? fs::absolute(typed).parent_path() : typed;
+}
+
+}  // namespace clothfit

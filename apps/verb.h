@@ -1,0 +1,34 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <functional>
+#include <string>
+
+namespace clothfit {
+
+/// What the chosen verb does; returns an exit code.
+using VerbAction = std::function<int()>;
+
+/// Each adds its verb to the command line. Parsing sets `action` to the one that was chosen, bound
+/// to its options.
+void add_calibrate_verb(CLI::App& program, VerbAction& action);
+void add_track_verb(CLI::App& program, VerbAction& action);
+void add_fit_verb(CLI::App& program, VerbAction& action);
+void add_demo_verb(CLI::App& program, VerbAction& action);
+
+/// Binds --out, whose default is `default_name` in the current directory.
+void add_out_option(CLI::App& verb, std::filesystem::path& out, const std::string& default_name);
+
+/// The folder that was asked for, or `default_name` in the current directory.
+std::filesystem::path out_folder(const std::filesystem::path& asked,
+                                 const std::string& default_name);
+
+/// Path of a result as the user can type it: relative to the current directory where that is
+/// shorter.
+std::string shown_path(const std::filesystem::path& path);
+
+/// The recording's folder from what was typed: the folder, or its recording.yaml.
+std::filesystem::path recording_folder(const std::filesystem::path& typed);
+
+}  // namespace clothfit

@@ -1,0 +1,8 @@
+#pragma once
+
+namespace clothfit {
+
+/// "0.1.0", as the build has it.
+const char* program_version();
+
+}  // namespace clothfit
