@@ -63,26 +63,38 @@ class LaneRun {
 
   const LaneState& state() const { return state_; }
 
-  /// Advances from `from_s` to `to_s` in `steps` equal steps; held points that move are where they
-  /// are at the end of each step, or throughout at `held_at_s` when that is given.
-  void advance(double from_s, double to_s, int steps, const double* held_at_s = nullptr) {
+  /// Advances from `from_s` to `to_s` in `steps` equal steps, held points where they are at the end
+  /// of each step.
+  void advance(double from_s, double to_s, int steps) {
     const double h = (to_s - from_s) / steps;
     for (int n = 0; n < steps; ++n) {
-      const double time_s = from_s + n * h;
-      aim_held_points(held_at_s != nullptr ? *held_at_s : from_s + (n + 1) * h);
-      step(cloth_, parameters_, held_, held_target_m_, time_s, h, state_, force_n_);
+      aim_held_points(from_s + (n + 1) * h, 1);
+      step(cloth_, parameters_, held_, held_target_m_, from_s + n * h, h, state_, force_n_);
+    }
+  }
+
+  /// Lets `steps` steps pass while time stands still at `time_s`. Held points glide from where they
+  /// are to where they belong over the first fifth: a jump would hit the cloth like a hammer.
+  void settle(double time_s, double time_step_s, int steps) {
+    const LaneVectors from = held_target_m_;
+    for (int n = 0; n < steps; ++n) {
+      held_target_m_ = from;
+      aim_held_points(time_s, std::min(1.0, 5.0 * (n + 1) / steps));
+      step(cloth_, parameters_, held_, held_target_m_, time_s, time_step_s, state_, force_n_);
     }
   }
 
  private:
-  void aim_held_points(double time_s) {
+  /// Moves the targets of held points that have a motion the share `share` of the way to it.
+  void aim_held_points(double time_s, double share) {
     for (size_t h = 0; h < cloth_.held.size(); ++h) {
       if (!cloth_.held[h].motion) continue;
       const Eigen::Vector3d target = cloth_.held[h].motion(time_s);
       const auto column = static_cast<Eigen::Index>(h);
-      held_target_m_.x.col(column).setConstant(target.x());
-      held_target_m_.y.col(column).setConstant(target.y());
-      held_target_m_.z.col(column).setConstant(target.z());
+      const auto move = [share](auto place, double goal) { place += share * (goal - place); };
+      move(held_target_m_.x.col(column), target.x());
+      move(held_target_m_.y.col(column), target.y());
+      move(held_target_m_.z.col(column), target.z());
     }
   }
 
@@ -167,7 +179,7 @@ std::vector<Eigen::Matrix3Xd> relax(const Cloth& cloth, std::span<const Paramete
   std::vector<Eigen::Matrix3Xd> shapes(parameters.size());
   for_lane_groups(damped, [&](std::span<const ParameterSet> group, size_t first) {
     LaneRun run(heavy, group);
-    run.advance(time_s, time_s + duration_s, steps, &time_s);
+    run.settle(time_s, duration_s / steps, steps);
     for (size_t l = 0; l < group.size(); ++l)
       shapes[first + l] = run.state().position_m.lane(static_cast<int>(l));
   });

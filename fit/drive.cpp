@@ -1,0 +1,109 @@
+#include "fit/drive.h"
+
+#include <cmath>
+#include <memory>
+
+#include "data/input_error.h"
+#include "fit/smoothing_spline.h"
+
+namespace clothfit {
+namespace {
+
+/// A marker this close to a held point is that point: both are written in decimals.
+constexpr double kSamePlaceM = 1e-6;
+
+std::string place_text(const Eigen::Vector2d& at_m) {
+  return "(" + std::to_string(at_m.x()) + ", " + std::to_string(at_m.y()) + ")";
+}
+
+std::function<Eigen::Vector3d(double)> follow(SmoothingSpline spline) {
+  const auto shared = std::make_shared<const SmoothingSpline>(std::move(spline));
+  return [shared](double time_s) { return Eigen::Vector3d(shared->position(time_s)); };
+}
+
+std::function<Eigen::Vector3d(double)> follow_path(const HeldPath& path) {
+  Eigen::MatrixXd samples(3, static_cast<Eigen::Index>(path.position_m.size()));
+  for (size_t n = 0; n < path.position_m.size(); ++n)
+    samples.col(static_cast<Eigen::Index>(n)) = path.position_m[n];
+  // A known path is not noisy: the spline goes through every sample.
+  return follow(
+      fit_smoothing_spline(path.time_s, samples, {}, {.smoothing = 1e-30, .robust = false}));
+}
+
+SmoothingSpline smooth_track(const Recording& recording, int marker, const Tracks3d& tracks,
+                             const std::vector<double>& frame_time_s) {
+  std::vector<double> time_s;
+  std::vector<Eigen::Vector3d> places;
+  std::vector<double> sigma;
+  bool all_stated = true;
+  for (const Position3d& row : tracks) {
+    if (row.marker != marker) continue;
+    time_s.push_back(frame_time_s[static_cast<size_t>(row.frame)]);
+    places.push_back(row.position_m);
+    sigma.push_back(row.sigma_m);
+    all_stated = all_stated && row.sigma_m > 0;
+  }
+  const std::string& name = recording.markers.markers[static_cast<size_t>(marker)].name;
+  if (places.size() < 3)
+    throw InputError((recording.folder / "recording.yaml").string(),
+                     "held point with motion: tracked has only " + std::to_string(places.size()) +
+                         " 3D positions of its marker " + name,
+                     "at least 3 rows of that marker in tracks3d",
+                     "use motion: fixed or path, or track the held point");
+  Eigen::MatrixXd samples(3, static_cast<Eigen::Index>(places.size()));
+  for (size_t n = 0; n < places.size(); ++n) samples.col(static_cast<Eigen::Index>(n)) = places[n];
+  if (!all_stated) sigma.clear();
+  return fit_smoothing_spline(time_s, samples, sigma);
+}
+
+int marker_at(const Recording& recording, const Eigen::Vector2d& at_m) {
+  const auto& markers = recording.markers.markers;
+  for (size_t m = 0; m < markers.size(); ++m)
+    if (std::hypot(markers[m].s_m - at_m.x(), markers[m].t_m - at_m.y()) < kSamePlaceM)
+      return static_cast<int>(m);
+  throw InputError(
+      (recording.folder / "recording.yaml").string(),
+      "no marker lies at the held point " + place_text(at_m) + ", whose motion is tracked",
+      "a marker at its (s, t) in the markers file",
+      "use motion: fixed or path, or name a place that carries a marker");
+}
+
+void hold_edge(const HeldPoint& edge, const Mesh& mesh, Drive& drive) {
+  const bool along_s = edge.edge == ClothEdge::top || edge.edge == ClothEdge::bottom;
+  const int count = along_s ? mesh.columns : mesh.rows;
+  for (int n = 0; n < count; ++n) {
+    int i = n, j = n;
+    if (along_s) {
+      i = edge.edge == ClothEdge::top ? 0 : mesh.rows - 1;
+    } else {
+      j = edge.edge == ClothEdge::left ? 0 : mesh.columns - 1;
+    }
+    drive.held.push_back({.weights = {{mesh.vertex(i, j), 1.0}}, .motion = {}});
+  }
+}
+
+}  // namespace
+
+Drive make_drive(const Recording& recording, const Mesh& mesh, const Tracks3d& tracks,
+                 const std::vector<double>& frame_time_s) {
+  Drive drive;
+  for (const HeldPoint& point : recording.held) {
+    if (point.edge) {
+      hold_edge(point, mesh, drive);
+      continue;
+    }
+    HeldVertexWeights held = held_at(mesh, point.at_m.x(), point.at_m.y());
+    if (point.motion == HeldMotion::path) {
+      held.motion = follow_path(read_held_path(*point.file));
+    } else if (point.motion == HeldMotion::tracked) {
+      const int marker = marker_at(recording, point.at_m);
+      SmoothingSpline spline = smooth_track(recording, marker, tracks, frame_time_s);
+      drive.driving_markers.push_back(marker);
+      held.motion = follow(std::move(spline));
+    }
+    drive.held.push_back(std::move(held));
+  }
+  return drive;
+}
+
+}  // namespace clothfit

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <vector>
+
+#include "data/recording.h"
+#include "data/tracks.h"
+#include "model/cloth.h"
+
+namespace clothfit {
+
+/// The prescribed points of a recording's cloth on a mesh, with their motion.
+struct Drive {
+  std::vector<HeldVertexWeights> held;
+  std::vector<int> driving_markers;  ///< markers whose own track drives a held point
+};
+
+/// Held points with their motion: `fixed` ones stay where the start shape has them, `path` ones
+/// follow their file, `tracked` ones a smoothing spline through their marker's 3D track (held-out
+/// frames included: the drive is an input, not a prediction). Throws InputError for a tracked point
+/// without a marker or without a 3D track.
+Drive make_drive(const Recording& recording, const Mesh& mesh, const Tracks3d& tracks,
+                 const std::vector<double>& frame_time_s);
+
+}  // namespace clothfit

@@ -1,0 +1,361 @@
+#include "fit/fit.h"
+
+#include <fmt/format.h>
+#include <tbb/global_control.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "data/input_error.h"
+#include "fit/evolutionary_strategy.h"
+#include "fit/problem.h"
+#include "fit/refine.h"
+#include "fit/report_residuals.h"
+#include "fit/uncertainty.h"
+#include "model/stability.h"
+
+namespace clothfit {
+namespace {
+
+/// The search runs on a mesh of half the resolution: about a tenth of the cost of a run, and good
+/// enough to find the basin.
+constexpr int kCoarsening = 2;
+constexpr int kSmallestMesh = 5;
+
+/// Share of the fitted frames that the search looks at, and those of the refinement's stages:
+/// whole trajectories of folding cloth diverge from a start that is only roughly right.
+constexpr double kSearchShare = 0.4;
+constexpr double kHorizonShares[] = {0.3, 0.6, 1.0};
+constexpr int kFewestFrames = 8;
+
+/// Spring-steps that a search may cost; its time step is cut no finer than that.
+constexpr double kSearchSpringSteps = 6e9;
+
+/// A log-parameter less certain than this (a factor of e^0.7 = 2 either way) is undetermined.
+constexpr double kUndeterminedLogSigma = 0.7;
+
+int horizon_frames(const FitProblem& problem, double share) {
+  const int wanted = static_cast<int>(std::lround(share * problem.first_held_out));
+  return std::clamp(wanted, std::min(kFewestFrames, problem.first_held_out),
+                    problem.first_held_out);
+}
+
+int coarse(int count) {
+  return std::max(std::min(count, kSmallestMesh), (count - 1) / kCoarsening + 1);
+}
+
+/// The time step of a search: stable at the upper corner of the ranges if the budget allows; else
+/// as fine as the budget allows, and individuals that would need a finer one rank last.
+double search_time_step_s(const FitProblem& problem, const FitOptions& options, int frames) {
+  Eigen::VectorXd corner = problem.space.start();
+  for (int p = 0; p < problem.space.size(); ++p)
+    if (problem.space.parameters[static_cast<size_t>(p)].role != ParameterRole::nuisance)
+      corner[p] = problem.space.parameters[static_cast<size_t>(p)].upper;
+  const double stable_s = stable_time_step_s(problem.cloth, parameter_set(problem, corner));
+  size_t springs = 0;
+  for (const auto& type : problem.cloth.springs) springs += type.size();
+  const double simulated_s =
+      problem.frame_time_s[static_cast<size_t>(frames - 1)] - problem.frame_time_s.front();
+  const double simulations = 0.5 * options.population * (options.generations + 1);
+  const double affordable_s =
+      simulated_s * static_cast<double>(springs) * simulations / kSearchSpringSteps;
+  return std::max(stable_s, affordable_s);
+}
+
+struct Search {
+  std::vector<Eigen::VectorXd> best;  ///< values, best first
+  bool cancelled = false;
+};
+
+/// The evolutionary strategy over everything but nuisance parameters, on a coarse mesh and a short
+/// window.
+Search search(const FitInput& input, const FitOptions& options, const FitProblem& fine,
+              const ProgressCallback& progress, FitReport& report) {
+  const FitProblem problem =
+      make_problem(input, options, coarse(fine.cloth.mesh.columns), coarse(fine.cloth.mesh.rows));
+  const int frames = horizon_frames(problem, kSearchShare);
+  const Objective objective(problem, frames, search_time_step_s(problem, options, frames));
+
+  std::vector<SearchParameter> ranges;
+  std::vector<int> searched;
+  for (int p = 0; p < problem.space.size(); ++p) {
+    const FitParameter& parameter = problem.space.parameters[static_cast<size_t>(p)];
+    if (parameter.role == ParameterRole::nuisance) continue;
+    searched.push_back(p);
+    ranges.push_back({.name = parameter.name,
+                      .lower = parameter.lower,
+                      .upper = parameter.upper,
+                      .log_scale = parameter.scale == ParameterScale::logarithmic});
+  }
+  const auto all_values = [&](const Eigen::VectorXd& individual) {
+    Eigen::VectorXd values = problem.space.start();
+    for (size_t n = 0; n < searched.size(); ++n)
+      values[searched[n]] = individual[static_cast<Eigen::Index>(n)];
+    return values;
+  };
+  const GenerationCost cost = [&](const Eigen::MatrixXd& individuals) {
+    std::vector<Eigen::VectorXd> values;
+    for (Eigen::Index n = 0; n < individuals.cols(); ++n)
+      values.push_back(all_values(individuals.col(n)));
+    const std::vector<Eigen::VectorXd> residuals = objective.residuals(values);
+    Eigen::VectorXd costs(individuals.cols());
+    for (Eigen::Index n = 0; n < individuals.cols(); ++n)
+      costs[n] = objective.mean_length(residuals[static_cast<size_t>(n)]);
+    return costs;
+  };
+  const EvolutionOptions evolution{.population = options.population,
+                                   .generations = options.generations,
+                                   .gain_window = 15,
+                                   .least_gain = 1e-2,
+                                   .seed = options.seed};
+  const EvolutionResult result = evolve(ranges, evolution, cost, progress);
+
+  Search found;
+  found.cancelled = result.stop == EvolutionStop::cancelled;
+  report.search_cost = result.state.best_cost;
+  report.stages.push_back(fmt::format(
+      "evolutionary search: {} generations, {} simulations, mesh {} x {}, {} frames, time step "
+      "{:.3g} s, mean error {:.3g} sigma; {}",
+      result.state.generations(), result.state.evaluations, problem.cloth.mesh.columns,
+      problem.cloth.mesh.rows, frames, objective.time_step_s(), result.best().cost,
+      result.message));
+  if (!result.usable()) return found;
+  // The best few that differ: a population near its end holds many copies of one individual.
+  constexpr double kDifferent = 0.2;
+  for (const Individual& individual : result.state.population) {
+    if (!std::isfinite(individual.cost)) break;
+    const Eigen::VectorXd values = all_values(individual.values);
+    const bool is_new = std::ranges::all_of(found.best, [&](const Eigen::VectorXd& other) {
+      return (problem.space.coordinates(values) - problem.space.coordinates(other))
+                 .cwiseAbs()
+                 .maxCoeff() > kDifferent;
+    });
+    if (is_new) found.best.push_back(values);
+    if (static_cast<int>(found.best.size()) == options.refine_best) break;
+  }
+  return found;
+}
+
+struct Refinement {
+  RefineResult best;
+  bool cancelled = false;
+};
+
+/// Each candidate over growing horizons; only the best one goes on to the whole window.
+Refinement refine_candidates(const FitProblem& problem, const FitOptions& options,
+                             std::vector<Eigen::VectorXd> candidates,
+                             const ProgressCallback& progress, FitReport& report) {
+  Refinement refinement;
+  const RefineOptions refine_options{.substep_scale = options.substep_scale};
+  for (const double share : kHorizonShares) {
+    const int frames = horizon_frames(problem, share);
+    std::vector<RefineResult> results;
+    for (const Eigen::VectorXd& candidate : candidates) {
+      RefineResult result = refine(problem, frames, candidate, refine_options, progress);
+      report.stages.push_back(fmt::format(
+          "refinement over {} frames: {} iterations, {} simulations, time step {:.3g} s, residuals "
+          "of {:.2f} sigma; {}",
+          frames, result.solver_iterations, result.simulations, result.time_step_s,
+          result.robust_scale, result.message));
+      if (result.cancelled) {
+        refinement.cancelled = true;
+        return refinement;
+      }
+      if (result.usable) results.push_back(std::move(result));
+    }
+    std::ranges::stable_sort(results, {}, &RefineResult::cost);
+    if (results.empty()) return refinement;
+    refinement.best = results.front();
+    candidates.clear();
+    for (const RefineResult& result : results) candidates.push_back(result.values);
+    // Candidates that ended in the same optimum are one.
+    constexpr double kSame = 0.02;
+    std::vector<Eigen::VectorXd> distinct;
+    for (const Eigen::VectorXd& candidate : candidates) {
+      const bool is_new = std::ranges::all_of(distinct, [&](const Eigen::VectorXd& other) {
+        return (problem.space.coordinates(candidate) - problem.space.coordinates(other))
+                   .cwiseAbs()
+                   .maxCoeff() > kSame;
+      });
+      if (is_new) distinct.push_back(candidate);
+    }
+    candidates = std::move(distinct);
+    if (share >= kHorizonShares[1]) candidates.resize(1);
+  }
+  return refinement;
+}
+
+ParameterEstimate estimate(const FitParameter& parameter, const std::string& name, double value,
+                           double sigma) {
+  ParameterEstimate result{.name = name, .unit = parameter.unit, .value = value, .sigma = sigma};
+  const bool logarithmic = parameter.scale == ParameterScale::logarithmic;
+  const double edge = logarithmic ? 1e-3 * value : 1e-6 * (parameter.upper - parameter.lower);
+  const double relative = sigma / value;
+  if (logarithmic && !(relative < kUndeterminedLogSigma)) {
+    result.state = ParameterState::undetermined;
+    result.reason = fmt::format("the motion hardly depends on it (sigma {:.0f} % of the value)",
+                                100 * std::min(relative, 1e4));
+    result.sigma = std::min(sigma, 1e4 * value);
+  } else if (value - parameter.lower < edge || parameter.upper - value < edge) {
+    const bool at_neutral =
+        parameter.role == ParameterRole::effect && value - parameter.lower < edge;
+    if (!at_neutral) {
+      result.state = ParameterState::undetermined;
+      result.reason = fmt::format("it ended at the {} end of its range",
+                                  value - parameter.lower < edge ? "lower" : "upper");
+    }
+  }
+  return result;
+}
+
+ParameterEstimate constant(const std::string& name, const std::string& unit, double value,
+                           const std::string& reason) {
+  return {.name = name,
+          .unit = unit,
+          .value = value,
+          .sigma = 0,
+          .state = ParameterState::fixed,
+          .reason = reason};
+}
+
+/// The parameter tables of the result from the fitted values.
+void fill_parameters(const FitProblem& problem, const FitOptions& options,
+                     const Eigen::VectorXd& values, const Eigen::VectorXd& sigma,
+                     FitResult& result) {
+  const double area_m2 = problem.cloth.mesh.width_m * problem.cloth.mesh.height_m;
+  ParameterEstimate density =
+      constant("areal_density", "kg/m2", problem.cloth_mass_kg / area_m2, "weighed");
+  if (problem.mass_assumed) {
+    density.state = ParameterState::undetermined;
+    density.reason =
+        "the cloth was not weighed and nothing but gravity loads it: only ratios to mass are "
+        "determined; stiffness refers to this assumed value";
+  }
+  result.parameters.push_back(density);
+
+  for (int p = 0; p < problem.space.size(); ++p) {
+    const FitParameter& parameter = problem.space.parameters[static_cast<size_t>(p)];
+    if (parameter.role == ParameterRole::effect) continue;
+    auto& list = parameter.role == ParameterRole::fabric ? result.parameters : result.nuisance;
+    list.push_back(estimate(parameter, parameter.name, values[p], sigma[p]));
+  }
+  if (options.forecast) {
+    for (const ParameterEstimate& known : options.forecast->parameters)
+      if (known.name != "areal_density")
+        result.parameters.push_back(constant(known.name, known.unit, known.value, "given"));
+  }
+  for (size_t e = 0; e < problem.effects.size(); ++e) {
+    const EffectDescription& description = problem.cloth.effect_descriptions[e];
+    EffectEstimate effect{.name = description.name, .parameters = {}};
+    for (size_t p = 0; p < description.parameters.size(); ++p) {
+      const Binding& binding = problem.effects[e][p];
+      const EffectParameter& parameter = description.parameters[p];
+      effect.parameters.push_back(
+          binding.parameter >= 0
+              ? estimate(problem.space.parameters[static_cast<size_t>(binding.parameter)],
+                         parameter.name, values[binding.parameter], sigma[binding.parameter])
+              : constant(parameter.name, parameter.unit, binding.constant, "declared"));
+    }
+    result.effects.push_back(std::move(effect));
+  }
+}
+
+FitReport stopped(FitReport report, FitStop stop, const std::string& message) {
+  report.stop = stop;
+  report.message = message;
+  return report;
+}
+
+}  // namespace
+
+void FitOptions::validate() const {
+  const auto require = [](bool good, const std::string& name, const std::string& expected) {
+    if (!good) throw InputError("--" + name, "is out of range", expected);
+  };
+  require(mesh_columns == 0 || mesh_columns >= 2, "mesh", "at least 2 columns");
+  require(mesh_rows == 0 || mesh_rows >= 2, "mesh", "at least 2 rows");
+  require(population >= 4, "population", "at least 4 individuals");
+  require(generations >= 1, "generations", "at least 1");
+  require(refine_best >= 1, "refine-best", "at least 1");
+  require(substep_scale > 0 && std::isfinite(substep_scale), "substep-scale", "a number > 0");
+  require(threads >= 0, "threads", "0 (all) or more");
+}
+
+FitReport fit(const FitInput& input, const FitOptions& options, const ProgressCallback& progress) {
+  options.validate();
+  const auto began = std::chrono::steady_clock::now();
+  const tbb::global_control threads(
+      tbb::global_control::max_allowed_parallelism,
+      options.threads > 0
+          ? static_cast<size_t>(options.threads)
+          : tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
+
+  const ClothDescription& description = input.recording.cloth;
+  const FitProblem problem = make_problem(
+      input, options, options.mesh_columns > 0 ? options.mesh_columns : description.mesh_columns,
+      options.mesh_rows > 0 ? options.mesh_rows : description.mesh_rows);
+  FitReport report;
+  FitResult& result = report.result;
+  result.recording = input.recording.name;
+  result.seed = options.seed;
+  result.mesh_columns = problem.cloth.mesh.columns;
+  result.mesh_rows = problem.cloth.mesh.rows;
+  result.parameter_set = "fabric";
+  result.integrator = "euler";
+  result.start = to_string(problem.start);
+  result.observations_rejected = problem.rejected;
+
+  Eigen::VectorXd values = problem.space.start();
+  Eigen::VectorXd sigma = Eigen::VectorXd::Zero(problem.space.size());
+  if (!options.forecast) {
+    const Search found = search(input, options, problem, progress, report);
+    if (found.cancelled) return stopped(std::move(report), FitStop::cancelled, "cancelled");
+    if (found.best.empty())
+      return stopped(std::move(report), FitStop::diverged,
+                     "no individual of the search could be simulated to the end of its window");
+    const Refinement refinement = refine_candidates(problem, options, found.best, progress, report);
+    if (refinement.cancelled) return stopped(std::move(report), FitStop::cancelled, "cancelled");
+    if (!refinement.best.usable)
+      return stopped(std::move(report), FitStop::diverged,
+                     "no refinement worked out: " + report.stages.back());
+    values = refinement.best.values;
+    result.time_step_s = refinement.best.time_step_s;
+    report.stop = refinement.best.converged ? FitStop::converged : FitStop::reached_limit;
+    report.message = refinement.best.message;
+    const Objective objective(problem, problem.first_held_out, result.time_step_s);
+    const Uncertainty uncertainty = estimate_uncertainty(problem, objective, values);
+    if (!uncertainty.usable)
+      return stopped(std::move(report), FitStop::diverged,
+                     "the derivatives at the optimum could not be computed");
+    sigma = uncertainty.sigma;
+    report.correlation = uncertainty.correlation;
+    for (const FitParameter& parameter : problem.space.parameters)
+      report.correlation_names.push_back(parameter.name);
+    report.stages.push_back(
+        fmt::format("chi-square per degree of freedom {:.3g}", uncertainty.chi_square_per_dof));
+  } else {
+    const RefineOptions defaults;
+    result.time_step_s = stable_time_step_s(problem.cloth, parameter_set(problem, values)) /
+                         (defaults.stability_margin * options.substep_scale);
+    report.stages.push_back("forecast: nothing fitted");
+  }
+
+  const auto trajectories = run_model(problem, {values}, problem.frames(), result.time_step_s);
+  if (trajectories.front().empty())
+    return stopped(std::move(report), FitStop::diverged,
+                   "the model diverged when it was run on through all frames");
+  double longest_frame_s = 0;
+  for (size_t f = 1; f < problem.frame_time_s.size(); ++f)
+    longest_frame_s =
+        std::max(longest_frame_s, problem.frame_time_s[f] - problem.frame_time_s[f - 1]);
+  result.substeps = static_cast<int>(std::ceil(longest_frame_s / result.time_step_s - 1e-9));
+  fill_parameters(problem, options, values, sigma, result);
+  fill_residuals(problem, input, trajectories.front(), report);
+  for (const ObservationSet& set : problem.observations)
+    result.observations_used += static_cast<int>(set.rows.size());
+  result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+  return report;
+}
+
+}  // namespace clothfit

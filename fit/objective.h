@@ -1,0 +1,50 @@
+#pragma once
+
+#include <vector>
+
+#include "fit/problem.h"
+
+namespace clothfit {
+
+/// The trajectory cost: what a free run from the start leaves of the observations in the first
+/// `frames` frames, each coordinate divided by its sigma.
+class Objective {
+ public:
+  /// `time_step_s` stays the same for all parameter vectors: a cost that cut time anew for each of
+  /// them would jump.
+  Objective(const FitProblem& problem, int frames, double time_step_s);
+
+  /// Where the residuals of one observation lie.
+  struct Block {
+    int set = 0;
+    int row = 0;
+    int offset = 0;
+    int dimension = 0;
+  };
+  const std::vector<Block>& blocks() const { return blocks_; }
+  int residual_count() const { return residual_count_; }
+  int frames() const { return frames_; }
+  double time_step_s() const { return time_step_s_; }
+
+  /// Whitened residuals for each parameter vector; empty where there are none because the run
+  /// diverged, its step would not be stable, or a point fell behind a camera.
+  std::vector<Eigen::VectorXd> residuals(const std::vector<Eigen::VectorXd>& values) const;
+
+  /// Residuals at `values` and their derivative by the space's coordinates, by central differences
+  /// (all perturbed runs side by side in lanes). False where there are none.
+  bool linearise(const Eigen::VectorXd& values, Eigen::VectorXd& residual,
+                 Eigen::MatrixXd& residual_by_coordinate) const;
+
+  /// Mean length of the residual of an observation: a robust cost for the evolutionary search.
+  /// Infinite where there are no residuals.
+  double mean_length(const Eigen::VectorXd& residual) const;
+
+ private:
+  const FitProblem& problem_;
+  int frames_;
+  double time_step_s_;
+  std::vector<Block> blocks_;
+  int residual_count_ = 0;
+};
+
+}  // namespace clothfit

@@ -1,0 +1,109 @@
+#include "fit/observations.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "calib/projection.h"
+#include "data/input_error.h"
+#include "fit/noise.h"
+
+namespace clothfit {
+namespace {
+
+/// Gives rows without a sigma the noise that the tracks themselves show. Cameras keep their rate,
+/// trackers that answer when they are done do not: where no run of frames is even enough, uneven
+/// ones have to do.
+void estimate_missing_sigma(ObservationSet& set, const std::vector<double>& frame_time_s,
+                            int marker_count) {
+  if (std::ranges::all_of(set.rows, [](const Observation& row) { return row.sigma > 0; })) return;
+  const auto frames = static_cast<Eigen::Index>(frame_time_s.size());
+  std::vector<Eigen::MatrixXd> tracks(
+      static_cast<size_t>(marker_count),
+      Eigen::MatrixXd::Constant(set.dimension, frames, std::numeric_limits<double>::quiet_NaN()));
+  for (const Observation& row : set.rows)
+    tracks[static_cast<size_t>(row.marker)].col(row.frame) = row.observed.head(set.dimension);
+  constexpr int kFewest = 100;
+  NoiseEstimate estimate;
+  for (const double tolerance : {0.05, 0.2, 0.5}) {
+    estimate = estimate_noise(frame_time_s, tracks, {.interval_tolerance = tolerance});
+    if (estimate.differences >= kFewest) break;
+  }
+  if (!(estimate.sigma > 0))
+    throw InputError(set.kind, "the tracks state no sigma and are too short to estimate it from",
+                     "at least four consecutive frames of one marker, or a sigma column");
+  for (Observation& row : set.rows)
+    if (!(row.sigma > 0)) row.sigma = estimate.sigma;
+}
+
+void finish(ObservationSet& set) {
+  std::ranges::sort(set.rows, [](const Observation& a, const Observation& b) {
+    return std::pair(a.frame, a.marker) < std::pair(b.frame, b.marker);
+  });
+  double sum = 0;
+  for (const Observation& row : set.rows) sum += row.sigma * row.sigma;
+  set.noise = set.rows.empty() ? 0 : std::sqrt(sum / static_cast<double>(set.rows.size()));
+}
+
+}  // namespace
+
+std::optional<Eigen::Vector3d> ObservationSet::predict(const Eigen::Vector3d& position_m) const {
+  if (!camera) return position_m;
+  const auto pixel = project(*camera, camera_from_world(*camera) * position_m);
+  if (!pixel) return std::nullopt;
+  return Eigen::Vector3d(pixel->x(), pixel->y(), 0.0);
+}
+
+ObservationSet observations_3d(const Tracks3d& tracks, const std::vector<double>& frame_time_s,
+                               int marker_count, const std::vector<int>& excluded,
+                               std::map<std::string, int>& rejected) {
+  ObservationSet set{.kind = "tracks3d", .unit = "m", .dimension = 3, .camera = {}, .rows = {}};
+  for (const Position3d& row : tracks) {
+    if (std::ranges::find(excluded, row.marker) != excluded.end()) {
+      ++rejected["drives_a_held_point"];
+      continue;
+    }
+    set.rows.push_back({row.frame, row.marker, row.position_m, row.sigma_m});
+  }
+  estimate_missing_sigma(set, frame_time_s, marker_count);
+  finish(set);
+  return set;
+}
+
+ObservationSet observations_2d(const Tracks2d& tracks, const CameraParameters& camera,
+                               const std::vector<double>& frame_time_s, int marker_count,
+                               const std::vector<int>& excluded,
+                               std::map<std::string, int>& rejected) {
+  ObservationSet set{
+      .kind = camera.name, .unit = "px", .dimension = 2, .camera = camera, .rows = {}};
+  for (const Position2d& row : tracks) {
+    if (!row.rejected.empty()) {
+      ++rejected[row.rejected];
+    } else if (std::ranges::find(excluded, row.marker) != excluded.end()) {
+      ++rejected["drives_a_held_point"];
+    } else {
+      set.rows.push_back(
+          {row.frame, row.marker, {row.position_px.x(), row.position_px.y(), 0.0}, row.sigma_px});
+    }
+  }
+  estimate_missing_sigma(set, frame_time_s, marker_count);
+  finish(set);
+  return set;
+}
+
+std::vector<Eigen::Matrix3Xd> marker_positions(
+    const Surface::Weights& vertex_weights, const std::vector<Eigen::Matrix3Xd>& mesh_positions) {
+  // All frames in one product: vertices x 3 F, a frame's x, y, z in neighbouring columns.
+  using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  const auto frames = static_cast<Eigen::Index>(mesh_positions.size());
+  RowMajor vertices(vertex_weights.cols(), 3 * frames);
+  for (Eigen::Index f = 0; f < frames; ++f)
+    vertices.middleCols(3 * f, 3) = mesh_positions[static_cast<size_t>(f)].transpose();
+  const RowMajor markers = vertex_weights * vertices;
+  std::vector<Eigen::Matrix3Xd> result(mesh_positions.size());
+  for (Eigen::Index f = 0; f < frames; ++f)
+    result[static_cast<size_t>(f)] = markers.middleCols(3 * f, 3).transpose();
+  return result;
+}
+
+}  // namespace clothfit

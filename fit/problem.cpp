@@ -1,0 +1,334 @@
+#include "fit/problem.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+
+#include "calib/projection.h"
+#include "data/input_error.h"
+#include "fit/sheet_placement.h"
+#include "model/effects/registry.h"
+#include "model/simulate.h"
+#include "model/stability.h"
+
+namespace clothfit {
+namespace {
+
+/// Stands in for the mass of a cloth that was not weighed: a light woven fabric.
+constexpr double kAssumedDensityKgPerM2 = 0.1;
+
+/// Frames pooled to place the sheet of a cloth at rest: single ones are often bad detections.
+constexpr int kRestFrames = 5;
+
+std::string recording_file(const Recording& recording) {
+  return (recording.folder / "recording.yaml").string();
+}
+
+int frame_count(const FitInput& input) {
+  int last = -1;
+  for (const Position3d& row : input.tracks3d) last = std::max(last, row.frame);
+  for (const auto& [camera, tracks] : input.tracks2d)
+    for (const Position2d& row : tracks) last = std::max(last, row.frame);
+  return last + 1;
+}
+
+bool use_3d(const FitInput& input, const FitOptions& options) {
+  if (options.observations == ObservationKind::automatic) return !input.tracks3d.empty();
+  return options.observations == ObservationKind::tracks3d;
+}
+
+Eigen::Matrix2Xd marker_places(const MarkerSet& markers) {
+  Eigen::Matrix2Xd places(2, static_cast<Eigen::Index>(markers.markers.size()));
+  for (size_t m = 0; m < markers.markers.size(); ++m)
+    places.col(static_cast<Eigen::Index>(m)) << markers.markers[m].s_m, markers.markers[m].t_m;
+  return places;
+}
+
+void add_observations(const FitInput& input, const FitOptions& options, FitProblem& problem) {
+  const Recording& recording = input.recording;
+  const auto markers = static_cast<int>(recording.markers.markers.size());
+  if (use_3d(input, options)) {
+    problem.observations.push_back(observations_3d(input.tracks3d, problem.frame_time_s, markers,
+                                                   problem.driving_markers, problem.rejected));
+  } else {
+    for (const CameraParameters& camera : input.cameras) {
+      const auto tracks = input.tracks2d.find(camera.name);
+      if (tracks == input.tracks2d.end()) continue;
+      if (!camera.camera_from_world)
+        throw InputError("camera " + camera.name, "has no camera_from_world",
+                         "a fit needs to know where each camera stands",
+                         "give the recording reference points, or the pose in the camera file");
+      problem.observations.push_back(observations_2d(tracks->second, camera, problem.frame_time_s,
+                                                     markers, problem.driving_markers,
+                                                     problem.rejected));
+    }
+  }
+  std::erase_if(problem.observations, [](const ObservationSet& set) { return set.rows.empty(); });
+  if (problem.observations.empty())
+    throw InputError(recording_file(recording), "there is nothing to fit",
+                     "tracks3d or tracks2d with at least one good row",
+                     "look at the status column of the tracks");
+}
+
+void add_masses(const Recording& recording, const Mesh& mesh, FitProblem& problem) {
+  const ClothDescription& cloth = recording.cloth;
+  problem.mass_assumed = !cloth.mass_kg.has_value();
+  problem.cloth_mass_kg =
+      cloth.mass_kg.value_or(kAssumedDensityKgPerM2 * cloth.width_m * cloth.height_m);
+  const Mesh reference{cloth.mesh_columns, cloth.mesh_rows, cloth.width_m, cloth.height_m};
+  problem.cloth = Cloth::of(mesh, cloth.masses == MassDistribution::equal
+                                      ? masses_equal(mesh, reference, problem.cloth_mass_kg)
+                                      : masses_by_area(mesh, problem.cloth_mass_kg));
+}
+
+/// Ranges of the search, from what the cloth must carry: a spring beside a held corner bears about
+/// half the weight F. Tension stiffness lies between F / a (twice as long) and 100 F / a (1 %
+/// longer), for the recording's own spacing a; shear and flexion reach far below.
+void add_fabric(const Recording& recording, const FitOptions& options, FitProblem& problem) {
+  const ClothDescription& cloth = recording.cloth;
+  const double spacing_m =
+      0.5 * (cloth.width_m / (cloth.mesh_columns - 1) + cloth.height_m / (cloth.mesh_rows - 1));
+  const double gravity = std::max(problem.gravity_m_per_s2.norm(), 1.0);
+  const double unit = 0.5 * problem.cloth_mass_kg * gravity / spacing_m;
+
+  const auto bind = [&](const std::string& name, const std::string& text_unit, double lower,
+                        double upper) {
+    Binding binding;
+    if (options.forecast) {
+      const auto& known = options.forecast->parameters;
+      const auto found = std::ranges::find(known, name, &ParameterEstimate::name);
+      if (found == known.end())
+        throw InputError("--forecast", "the fit holds no parameter '" + name + "'",
+                         "a fit.json of the parameter set fabric");
+      binding.constant = found->value;
+      return binding;
+    }
+    binding.parameter = problem.space.size();
+    problem.space.parameters.push_back({.name = name,
+                                        .unit = text_unit,
+                                        .role = ParameterRole::fabric,
+                                        .scale = ParameterScale::logarithmic,
+                                        .lower = lower,
+                                        .upper = upper,
+                                        .start = std::sqrt(lower * upper)});
+    return binding;
+  };
+  FabricBindings& fabric = problem.fabric;
+  fabric.tension_warp = bind("tension_warp", "N/m", unit, 100 * unit);
+  fabric.tension_weft = bind("tension_weft", "N/m", unit, 100 * unit);
+  fabric.shear = bind("shear", "N/m", 0.02 * unit, 50 * unit);
+  fabric.flexion_warp = bind("flexion_warp", "N/m", 0.01 * unit, 25 * unit);
+  fabric.flexion_weft = bind("flexion_weft", "N/m", 0.01 * unit, 25 * unit);
+  fabric.damping_warp = bind("damping_warp", "s", 1e-5, 2e-2);
+  fabric.damping_weft = bind("damping_weft", "s", 1e-5, 2e-2);
+}
+
+/// Adds an effect to the cloth and binds its parameters: to `given` values, else to the fit.
+void add_effect(const std::string& name, const std::string& where,
+                const std::map<std::string, std::vector<double>>& given, FitProblem& problem) {
+  problem.cloth.add_effect(name, where);
+  const EffectDescription& description = problem.cloth.effect_descriptions.back();
+  std::vector<Binding> bindings;
+  for (const EffectParameter& parameter : description.parameters) {
+    Binding binding;
+    const auto value = given.find(parameter.name);
+    if (value != given.end()) {
+      if (value->second.size() != 1)
+        throw InputError(where, name + "." + parameter.name + " is not one number",
+                         "one number in " + parameter.unit);
+      binding.constant = value->second.front();
+    } else {
+      binding.parameter = problem.space.size();
+      problem.space.parameters.push_back({.name = name + "." + parameter.name,
+                                          .unit = parameter.unit,
+                                          .role = ParameterRole::effect,
+                                          .scale = parameter.scale,
+                                          .lower = parameter.lower,
+                                          .upper = parameter.upper,
+                                          .start = parameter.neutral + parameter.typical,
+                                          .typical = parameter.typical});
+    }
+    bindings.push_back(binding);
+  }
+  for (const auto& [key, numbers] : given) {
+    if (std::ranges::find(description.parameters, key, &EffectParameter::name) ==
+        description.parameters.end())
+      throw InputError(where, "effect " + name + " has no parameter '" + key + "'",
+                       "its first parameter is " + description.parameters.front().name);
+  }
+  problem.effects.push_back(std::move(bindings));
+}
+
+void add_effects(const Recording& recording, const FitOptions& options, FitProblem& problem) {
+  std::vector<std::string> present;
+  const auto absent = [&](const std::string& name) {
+    return std::ranges::find(present, name) == present.end();
+  };
+  if (options.forecast) {
+    for (const EffectEstimate& effect : options.forecast->effects) {
+      std::map<std::string, std::vector<double>> given;
+      for (const ParameterEstimate& parameter : effect.parameters)
+        given[parameter.name] = {parameter.value};
+      add_effect(effect.name, "--forecast", given, problem);
+      present.push_back(effect.name);
+    }
+  }
+  for (const DeclaredEffect& effect : recording.declared) {
+    if (!absent(effect.name)) continue;
+    add_effect(effect.name, recording_file(recording), effect.parameters, problem);
+    present.push_back(effect.name);
+  }
+  for (const std::string& name : options.effects) {
+    if (!absent(name)) continue;
+    add_effect(name, "--effect", {}, problem);
+    present.push_back(name);
+  }
+}
+
+/// Two level directions, and when a camera's pose was estimated, gravity's direction as an unknown
+/// with the prior that this estimate amounts to. Only gravity's direction in the camera's axes
+/// matters to a cloth that is placed by what the camera sees; all else of the pose moves the scene
+/// as a whole. With true camera_from_world = exp(w) * estimate, gravity seen through the estimate
+/// is turned by R' w in the world (R the estimated rotation).
+void add_gravity_direction(FitProblem& problem) {
+  const Eigen::Vector3d down = problem.gravity_m_per_s2.stableNormalized();
+  const Eigen::Vector3d away =
+      std::abs(down.x()) < 0.9 ? Eigen::Vector3d::UnitX() : Eigen::Vector3d::UnitY();
+  problem.level_axes.col(0) = (away - away.dot(down) * down).normalized();
+  problem.level_axes.col(1) = problem.level_axes.col(0).cross(down);
+
+  const ObservationSet& first = problem.observations.front();
+  if (!first.camera || !first.camera->camera_from_world->covariance) return;
+  const Eigen::Matrix3d rotation = first.camera->camera_from_world->rotation.toRotationMatrix();
+  const Eigen::Matrix<double, 2, 3> level = problem.level_axes.transpose() * rotation.transpose();
+  const Eigen::Matrix2d covariance =
+      level * first.camera->camera_from_world->covariance->topLeftCorner<3, 3>() *
+      level.transpose();
+  GaussianPrior prior{.indices = {}, .mean = Eigen::Vector2d::Zero(), .sqrt_information = {}};
+  prior.sqrt_information = covariance.inverse().llt().matrixU();
+  constexpr double kTypicalTilt = 1e-3;
+  for (const char* name : {"world_tilt_a", "world_tilt_b"}) {
+    prior.indices.push_back(problem.space.size());
+    problem.tilt.push_back({.parameter = problem.space.size(), .constant = 0});
+    problem.space.parameters.push_back({.name = name,
+                                        .unit = "rad",
+                                        .role = ParameterRole::nuisance,
+                                        .scale = ParameterScale::linear,
+                                        .lower = -0.2,
+                                        .upper = 0.2,
+                                        .start = 0,
+                                        .typical = kTypicalTilt});
+  }
+  problem.priors.push_back(std::move(prior));
+}
+
+void place_sheet_of(const Recording& recording, FitProblem& problem) {
+  if (recording.start == StartKind::unknown)
+    throw InputError(recording_file(recording), "start: unknown cannot be fitted by this version",
+                     "released_flat or at_rest",
+                     "cut the recording so that it begins with the cloth at rest");
+  const Eigen::Matrix2Xd places = marker_places(recording.markers);
+  const int frames = recording.start == StartKind::at_rest ? kRestFrames : 1;
+  const auto world_from_sheet = place_flat_sheet(problem.observations, places, frames);
+  if (!world_from_sheet)
+    throw InputError(recording_file(recording),
+                     frames == 1 ? "frame 0 shows too few markers to place the sheet"
+                                 : "the first frames show too few markers to place the sheet",
+                     "at least four markers that do not lie on a line",
+                     "cut the recording so that it begins with a frame that shows them");
+  const Eigen::Matrix3Xd flat = flat_positions(problem.cloth.mesh);
+  problem.placed_sheet_m.resize(3, flat.cols());
+  for (Eigen::Index v = 0; v < flat.cols(); ++v)
+    problem.placed_sheet_m.col(v) = *world_from_sheet * Eigen::Vector3d(flat.col(v));
+}
+
+}  // namespace
+
+FitProblem make_problem(const FitInput& input, const FitOptions& options, int mesh_columns,
+                        int mesh_rows) {
+  const Recording& recording = input.recording;
+  FitProblem problem;
+  problem.start = recording.start;
+  problem.gravity_m_per_s2 = recording.gravity_m_per_s2;
+  const int frames = frame_count(input);
+  for (int f = 0; f < frames; ++f) problem.frame_time_s.push_back(recording.frame_time_s(f));
+  problem.first_held_out = std::min(recording.held_out_from_frame.value_or(frames), frames);
+  if (problem.first_held_out < 2 && !options.forecast)
+    throw InputError(recording_file(recording),
+                     std::to_string(problem.first_held_out) + " frames are left to fit",
+                     "at least two frames before held_out.from_frame");
+
+  const Mesh mesh{mesh_columns, mesh_rows, recording.cloth.width_m, recording.cloth.height_m};
+  add_masses(recording, mesh, problem);
+  Drive drive = make_drive(recording, mesh, input.tracks3d, problem.frame_time_s);
+  problem.cloth.held = std::move(drive.held);
+  problem.driving_markers = std::move(drive.driving_markers);
+  add_observations(input, options, problem);
+  problem.vertex_weights = vertex_weights(make_surface(
+      mesh.columns, mesh.rows, mesh.width_m, mesh.height_m, marker_places(recording.markers)));
+  place_sheet_of(recording, problem);
+  add_fabric(recording, options, problem);
+  add_effects(recording, options, problem);
+  add_gravity_direction(problem);
+  return problem;
+}
+
+ParameterSet parameter_set(const FitProblem& problem, const Eigen::VectorXd& values) {
+  const FabricBindings& f = problem.fabric;
+  const Fabric fabric{.tension_warp_n_per_m = f.tension_warp.value(values),
+                      .tension_weft_n_per_m = f.tension_weft.value(values),
+                      .shear_n_per_m = f.shear.value(values),
+                      .flexion_warp_n_per_m = f.flexion_warp.value(values),
+                      .flexion_weft_n_per_m = f.flexion_weft.value(values),
+                      .damping_warp_s = f.damping_warp.value(values),
+                      .damping_weft_s = f.damping_weft.value(values)};
+  ParameterSet set;
+  set.springs = spring_parameters(fabric, problem.cloth.mesh);
+  set.gravity_m_per_s2 = problem.gravity_m_per_s2;
+  if (!problem.tilt.empty()) {
+    const Eigen::Vector3d turn =
+        problem.level_axes *
+        Eigen::Vector2d(problem.tilt[0].value(values), problem.tilt[1].value(values));
+    if (turn.norm() > 0)
+      set.gravity_m_per_s2 =
+          Eigen::AngleAxisd(turn.norm(), turn.normalized()) * problem.gravity_m_per_s2;
+  }
+  for (const std::vector<Binding>& effect : problem.effects) {
+    std::vector<double> numbers;
+    for (const Binding& binding : effect) numbers.push_back(binding.value(values));
+    set.effects.push_back(std::move(numbers));
+  }
+  set.start_position_m = problem.placed_sheet_m;
+  return set;
+}
+
+std::vector<std::vector<Eigen::Matrix3Xd>> run_model(const FitProblem& problem,
+                                                     const std::vector<Eigen::VectorXd>& values,
+                                                     int frames, double time_step_s) {
+  std::vector<ParameterSet> sets;
+  std::vector<size_t> owner;
+  for (size_t n = 0; n < values.size(); ++n) {
+    ParameterSet set = parameter_set(problem, values[n]);
+    if (stable_time_step_s(problem.cloth, set) < time_step_s) continue;
+    sets.push_back(std::move(set));
+    owner.push_back(n);
+  }
+  std::vector<std::vector<Eigen::Matrix3Xd>> trajectories(values.size());
+  if (sets.empty()) return trajectories;
+  if (problem.start == StartKind::at_rest) {
+    std::vector<Eigen::Matrix3Xd> shapes =
+        relax(problem.cloth, sets, problem.frame_time_s.front(), time_step_s);
+    for (size_t n = 0; n < sets.size(); ++n) sets[n].start_position_m = std::move(shapes[n]);
+  }
+  const Schedule schedule{
+      .frame_time_s = {problem.frame_time_s.begin(), problem.frame_time_s.begin() + frames},
+      .time_step_s = time_step_s};
+  std::vector<SimulateResult> results = simulate(problem.cloth, sets, schedule);
+  for (size_t n = 0; n < results.size(); ++n)
+    if (results[n].usable()) trajectories[owner[n]] = std::move(results[n].position_m);
+  return trajectories;
+}
+
+}  // namespace clothfit

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "fit/drive.h"
+#include "fit/fit.h"
+#include "fit/observations.h"
+#include "fit/parameter_space.h"
+#include "model/cloth.h"
+#include "model/surface.h"
+
+namespace clothfit {
+
+/// Parameters of the set `fabric`, in the order of the model's struct.
+struct FabricBindings {
+  Binding tension_warp, tension_weft, shear, flexion_warp, flexion_weft, damping_warp, damping_weft;
+};
+
+/// A recording made ready to be fitted on one mesh: everything that stays the same while parameters
+/// change.
+struct FitProblem {
+  Cloth cloth;
+  double cloth_mass_kg = 0;  ///< weighed, or assumed
+  bool mass_assumed = false;
+  StartKind start = StartKind::at_rest;
+  Eigen::Matrix3Xd placed_sheet_m;  ///< the flat sheet on the first frame's markers, 3 x vertices
+  Eigen::Vector3d gravity_m_per_s2;
+  std::vector<double> frame_time_s;  ///< of frames 0 .. last observed
+  int first_held_out = 0;            ///< = number of frames when nothing is held out
+  std::vector<ObservationSet> observations;
+  std::map<std::string, int> rejected;  ///< observations left out, by reason
+  Surface::Weights vertex_weights;      ///< markers x vertices
+  std::vector<int> driving_markers;
+
+  ParameterSpace space;
+  FabricBindings fabric;
+  std::vector<std::vector<Binding>> effects;  ///< [effect of the cloth][parameter]
+  std::vector<Binding> tilt;                  ///< rotation of gravity about two level axes; or none
+  Eigen::Matrix<double, 3, 2> level_axes;
+  std::vector<GaussianPrior> priors;
+
+  int frames() const { return static_cast<int>(frame_time_s.size()); }
+};
+
+/// Reads a problem out of the input. `mesh_columns` x `mesh_rows` is the mesh of the fit.
+/// Throws InputError for a recording that cannot be fitted as it stands.
+FitProblem make_problem(const FitInput& input, const FitOptions& options, int mesh_columns,
+                        int mesh_rows);
+
+/// The model's numbers for values of the parameters. The start shape is the placed sheet.
+ParameterSet parameter_set(const FitProblem& problem, const Eigen::VectorXd& values);
+
+/// Simulated mesh positions in frames [0, frames) for each parameter vector; empty where the run
+/// diverged or the time step would not be stable. A start at rest is relaxed first.
+std::vector<std::vector<Eigen::Matrix3Xd>> run_model(const FitProblem& problem,
+                                                     const std::vector<Eigen::VectorXd>& values,
+                                                     int frames, double time_step_s);
+
+}  // namespace clothfit

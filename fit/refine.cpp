@@ -1,0 +1,237 @@
+#include "fit/refine.h"
+
+#include <ceres/ceres.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "model/stability.h"
+
+namespace clothfit {
+namespace {
+
+/// The residuals and their Jacobian at the point that Ceres looks at, simulated once for all
+/// blocks.
+class SharedEvaluation final : public ceres::EvaluationCallback {
+ public:
+  SharedEvaluation(const FitProblem& problem, const Objective& objective,
+                   Eigen::VectorXd& coordinates)
+      : problem_(problem), objective_(objective), coordinates_(coordinates) {}
+
+  void PrepareForEvaluation(bool evaluate_jacobians, bool new_evaluation_point) override {
+    if (!new_evaluation_point && (has_jacobian_ || !evaluate_jacobians)) return;
+    const Eigen::VectorXd values = problem_.space.values(coordinates_);
+    if (evaluate_jacobians) {
+      usable_ = objective_.linearise(values, residual_, jacobian_);
+      simulations_ += 1 + 2 * problem_.space.size();
+    } else {
+      residual_ = objective_.residuals({values}).front();
+      usable_ = residual_.size() == objective_.residual_count();
+      ++simulations_;
+    }
+    has_jacobian_ = evaluate_jacobians;
+  }
+
+  bool usable() const { return usable_; }
+  const Eigen::VectorXd& residual() const { return residual_; }
+  const Eigen::MatrixXd& jacobian() const { return jacobian_; }
+  int simulations() const { return simulations_; }
+
+ private:
+  const FitProblem& problem_;
+  const Objective& objective_;
+  const Eigen::VectorXd& coordinates_;
+  bool usable_ = false;
+  bool has_jacobian_ = false;
+  int simulations_ = 0;
+  Eigen::VectorXd residual_;
+  Eigen::MatrixXd jacobian_;
+};
+
+/// One observation's part of the shared evaluation.
+class ObservationCost final : public ceres::CostFunction {
+ public:
+  ObservationCost(const SharedEvaluation& shared, const Objective::Block& block, int parameters)
+      : shared_(shared), block_(block) {
+    set_num_residuals(block.dimension);
+    mutable_parameter_block_sizes()->push_back(parameters);
+  }
+
+  bool Evaluate(double const* const*, double* residuals, double** jacobians) const override {
+    if (!shared_.usable()) return false;
+    Eigen::Map<Eigen::VectorXd>(residuals, block_.dimension) =
+        shared_.residual().segment(block_.offset, block_.dimension);
+    if (jacobians != nullptr && jacobians[0] != nullptr) {
+      using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+      Eigen::Map<RowMajor>(jacobians[0], block_.dimension, shared_.jacobian().cols()) =
+          shared_.jacobian().middleRows(block_.offset, block_.dimension);
+    }
+    return true;
+  }
+
+ private:
+  const SharedEvaluation& shared_;
+  Objective::Block block_;
+};
+
+class PriorCost final : public ceres::CostFunction {
+ public:
+  PriorCost(const ParameterSpace& space, const GaussianPrior& prior)
+      : space_(space), prior_(prior) {
+    set_num_residuals(static_cast<int>(prior.mean.size()));
+    mutable_parameter_block_sizes()->push_back(space.size());
+  }
+
+  bool Evaluate(double const* const* parameters, double* residuals,
+                double** jacobians) const override {
+    const Eigen::VectorXd values =
+        space_.values(Eigen::Map<const Eigen::VectorXd>(parameters[0], space_.size()));
+    Eigen::Map<Eigen::VectorXd>(residuals, num_residuals()) = prior_.residual(values);
+    if (jacobians != nullptr && jacobians[0] != nullptr) {
+      using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+      Eigen::Map<RowMajor> jacobian(jacobians[0], num_residuals(), space_.size());
+      jacobian.setZero();
+      const Eigen::VectorXd slope = space_.value_by_coordinate(values);
+      for (size_t n = 0; n < prior_.indices.size(); ++n)
+        jacobian.col(prior_.indices[n]) =
+            prior_.sqrt_information.col(static_cast<Eigen::Index>(n)) * slope[prior_.indices[n]];
+    }
+    return true;
+  }
+
+ private:
+  const ParameterSpace& space_;
+  const GaussianPrior& prior_;
+};
+
+class Reporter final : public ceres::IterationCallback {
+ public:
+  Reporter(const ProgressCallback& progress, Progress progress_now)
+      : progress_(progress), now_(std::move(progress_now)) {}
+  ceres::CallbackReturnType operator()(const ceres::IterationSummary& summary) override {
+    now_.done = summary.iteration;
+    now_.note = "cost " + std::to_string(summary.cost);
+    if (progress_ && !progress_(now_)) return ceres::SOLVER_ABORT;
+    return ceres::SOLVER_CONTINUE;
+  }
+
+ private:
+  const ProgressCallback& progress_;
+  Progress now_;
+};
+
+struct Round {
+  ceres::Solver::Summary summary;
+  Eigen::VectorXd values;
+  int simulations = 0;
+};
+
+Round solve(const FitProblem& problem, const Objective& objective, const Eigen::VectorXd& start,
+            double huber_threshold, int iterations, const ProgressCallback& progress) {
+  const ParameterSpace& space = problem.space;
+  Eigen::VectorXd coordinates = space.coordinates(start);
+  SharedEvaluation shared(problem, objective, coordinates);
+
+  ceres::Problem::Options problem_options;
+  problem_options.evaluation_callback = &shared;
+  problem_options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  ceres::Problem least_squares(problem_options);
+  ceres::HuberLoss loss(huber_threshold);
+  double* const block = coordinates.data();
+  least_squares.AddParameterBlock(block, space.size());
+  for (const Objective::Block& rows : objective.blocks())
+    least_squares.AddResidualBlock(new ObservationCost(shared, rows, space.size()), &loss, block);
+  for (const GaussianPrior& prior : problem.priors)
+    least_squares.AddResidualBlock(new PriorCost(space, prior), nullptr, block);
+  Eigen::VectorXd lower(space.size()), upper(space.size());
+  for (int p = 0; p < space.size(); ++p) {
+    lower[p] = space.parameters[static_cast<size_t>(p)].lower;
+    upper[p] = space.parameters[static_cast<size_t>(p)].upper;
+  }
+  lower = space.coordinates(lower);
+  upper = space.coordinates(upper);
+  for (int p = 0; p < space.size(); ++p) {
+    coordinates[p] = std::clamp(coordinates[p], lower[p], upper[p]);
+    least_squares.SetParameterLowerBound(block, p, lower[p]);
+    least_squares.SetParameterUpperBound(block, p, upper[p]);
+  }
+
+  ceres::Solver::Options options;
+  options.linear_solver_type = ceres::DENSE_NORMAL_CHOLESKY;
+  options.logging_type = ceres::SILENT;
+  options.max_num_iterations = iterations;
+  options.function_tolerance = 1e-7;
+  options.parameter_tolerance = 1e-6;
+  options.initial_trust_region_radius = 1e2;
+  Reporter reporter(progress,
+                    {.stage = "refining over " + std::to_string(objective.frames()) + " frames",
+                     .done = 0,
+                     .total = static_cast<double>(iterations),
+                     .unit = "iterations",
+                     .note = {}});
+  options.callbacks.push_back(&reporter);
+  Round round;
+  ceres::Solve(options, &least_squares, &round.summary);
+  round.values = space.values(coordinates);
+  round.simulations = shared.simulations();
+  return round;
+}
+
+}  // namespace
+
+double robust_scale(const Eigen::VectorXd& residual) {
+  std::vector<double> sizes(static_cast<size_t>(residual.size()));
+  for (Eigen::Index n = 0; n < residual.size(); ++n)
+    sizes[static_cast<size_t>(n)] = std::abs(residual[n]);
+  if (sizes.empty()) return 1;
+  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
+  std::ranges::nth_element(sizes, middle);
+  return std::max(1.0, 1.4826 * *middle);
+}
+
+RefineResult refine(const FitProblem& problem, int frames, const Eigen::VectorXd& start,
+                    const RefineOptions& options, const ProgressCallback& progress) {
+  RefineResult result;
+  result.values = start;
+  for (int n = 0; n < options.rounds; ++n) {
+    const double stable_s =
+        stable_time_step_s(problem.cloth, parameter_set(problem, result.values));
+    result.time_step_s = stable_s / (options.stability_margin * options.substep_scale);
+    const Objective objective(problem, frames, result.time_step_s);
+    const Eigen::VectorXd before = objective.residuals({result.values}).front();
+    ++result.simulations;
+    if (before.size() == 0) {
+      result.message = "the simulation from the starting values did not work out";
+      return result;
+    }
+    result.robust_scale = robust_scale(before);
+    const Round round = solve(problem, objective, result.values, kHuberScales * result.robust_scale,
+                              options.iterations, progress);
+    result.simulations += round.simulations;
+    result.solver_iterations += static_cast<int>(round.summary.iterations.size());
+    result.message = round.summary.message;
+    if (round.summary.termination_type == ceres::USER_FAILURE) {
+      result.cancelled = true;
+      return result;
+    }
+    if (!round.summary.IsSolutionUsable()) return result;
+    result.usable = true;
+    const double moved =
+        (problem.space.coordinates(round.values) - problem.space.coordinates(result.values))
+            .cwiseAbs()
+            .maxCoeff();
+    result.values = round.values;
+    result.cost = round.summary.final_cost / objective.residual_count();
+    result.converged = round.summary.termination_type == ceres::CONVERGENCE;
+    // Done when neither the step limit nor the loss's scale had a say in where the round ended.
+    const double room = stable_time_step_s(problem.cloth, parameter_set(problem, result.values)) /
+                        result.time_step_s;
+    const Eigen::VectorXd after = objective.residuals({result.values}).front();
+    const double scale_now = after.size() > 0 ? robust_scale(after) : result.robust_scale;
+    const bool same_scale = scale_now > 0.8 * result.robust_scale;
+    if (room > 1.05 && result.converged && (same_scale || moved < 1e-3)) break;
+  }
+  return result;
+}
+
+}  // namespace clothfit

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <string>
+
+#include "fit/objective.h"
+
+namespace clothfit {
+
+struct RefineOptions {
+  int iterations = 25;            ///< of one Ceres solve
+  int rounds = 6;                 ///< solves, each with a time step chosen anew
+  double stability_margin = 1.5;  ///< stiffness and damping may grow this much before a new round
+  double substep_scale = 1;
+};
+
+struct RefineResult {
+  bool usable = false;
+  bool cancelled = false;
+  bool converged = false;
+  Eigen::VectorXd values;
+  double cost = 0;          ///< robust cost per residual
+  double robust_scale = 1;  ///< residuals beyond three times this were weighed down (Huber)
+  double time_step_s = 0;
+  int solver_iterations = 0;
+  int simulations = 0;
+  std::string message;
+};
+
+/// Least squares over the first `frames` frames with Ceres, from `start`: trajectory residuals of
+/// every observation under a Huber loss whose scale is the residuals' own at the start of each
+/// round, and the problem's priors. The time step of a round is fixed; a parameter vector for which
+/// it would not be stable is refused like any failed step, and when the optimum leans on that limit
+/// another round follows with a smaller one.
+RefineResult refine(const FitProblem& problem, int frames, const Eigen::VectorXd& start,
+                    const RefineOptions& options, const ProgressCallback& progress);
+
+/// Huber's threshold in units of the residuals' robust scale.
+inline constexpr double kHuberScales = 3;
+
+/// 1.4826 times the median absolute value, at least 1: the size of whitened residuals.
+double robust_scale(const Eigen::VectorXd& residual);
+
+}  // namespace clothfit
