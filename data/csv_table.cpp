@@ -70,7 +70,7 @@ CsvTable::CsvTable(const std::filesystem::path& file, std::vector<CsvColumn> col
         if (column == columns_.end()) {
           std::vector<std::string> names;
           for (const CsvColumn& c : columns_) names.push_back(c.name);
-          throw InputError(file_, line, "unknown column " + shown(header[field]), expected_header(),
+          throw InputError(file_, line, "unknown column " + shown(header[field]),
                            known_names(std::string(header[field]), names));
         }
         int& place = place_[static_cast<std::size_t>(column - columns_.begin())];
@@ -146,9 +146,9 @@ std::string CsvTable::name(int row, int column) const {
   const bool printable = std::none_of(field.begin(), field.end(), [](char c) {
     return static_cast<unsigned char>(c) < ' ' || c == 127;
   });
-  if (field.empty() || !printable) {
+  if (field.empty() || field.front() == '#' || !printable) {
     refuse(row, columns_[static_cast<std::size_t>(column)].name + " = " + shown(field),
-           "a name of printable characters without a comma");
+           "a name of printable characters without a comma, the first of them no `#`");
   }
   return std::string(field);
 }

@@ -35,7 +35,7 @@ class CsvTable {
   double rising_number(int row, int column) const;
   /// A whole number, `least` or more.
   int whole_number(int row, int column, int least) const;
-  /// A name: not empty, nothing that cannot be printed.
+  /// A name: not empty, nothing that cannot be printed, no `#` in front (a comment would read so).
   std::string name(int row, int column) const;
 
   /// Refuses a row.

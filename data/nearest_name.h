@@ -9,7 +9,8 @@ namespace clothfit {
 ///
 ///   did you mean `rows`? known are `columns`, `rows`
 ///
-/// Near enough is a third of the letters, counted as single edits (Levenshtein 1966).
+/// Near enough is a third of the letters, counted as slips: a letter too many, too few or wrong, or
+/// two neighbours swapped [damerau1964].
 std::string known_names(const std::string& mistyped, const std::vector<std::string>& known);
 
 }  // namespace clothfit

@@ -31,8 +31,8 @@ std::string partial_prefix(const fs::path& final_path) {
 /// Where a link points to when it is one: the folder is replaced, never the link.
 fs::path resolved(const fs::path& given) {
   std::error_code error;
-  fs::path path = fs::weakly_canonical(given, error);
-  if (error) path = fs::absolute(given);
+  fs::path path = fs::weakly_canonical(fs::absolute(given), error);
+  if (error) path = fs::absolute(given).lexically_normal();
   if (!path.has_filename()) path = path.parent_path();
   return path;
 }
@@ -122,7 +122,9 @@ bool move_to_free(const fs::path& from, const fs::path& to) {
 
 }  // namespace
 
-OutputFolder::OutputFolder(fs::path final_path) : final_path_(resolved(final_path)) {
+OutputFolder::OutputFolder(fs::path final_path) {
+  if (final_path.empty()) throw InputError("--out", "is empty", "the name of a folder");
+  final_path_ = resolved(final_path);
   const fs::path parent = final_path_.parent_path();
   std::error_code error;
   if (!fs::is_directory(parent, error)) {

@@ -4,10 +4,10 @@
 
 #include <algorithm>
 #include <cassert>
-#include <limits>
 
 #include "data/csv_table.h"
 #include "data/input_error.h"
+#include "data/nearest_name.h"
 #include "data/recording_words.h"
 #include "data/yaml_value.h"
 
@@ -21,9 +21,9 @@ class RecordingFiles {
  public:
   explicit RecordingFiles(std::filesystem::path given_folder)
       : given_folder_(std::move(given_folder)),
-        folder_(std::filesystem::weakly_canonical(given_folder_)) {}
+        folder_(std::filesystem::weakly_canonical(std::filesystem::absolute(given_folder_))) {}
 
-  const std::filesystem::path& folder() const { return folder_; }
+  const std::filesystem::path& root() const { return folder_; }
   std::filesystem::path shown(const YamlValue& value) const { return given_folder_ / value.text(); }
 
   std::filesystem::path file(const YamlValue& value) const {
@@ -61,6 +61,19 @@ class RecordingFiles {
   std::filesystem::path folder_;
 };
 
+/// A name that also names files, such as cameras/NAME.yaml or NAME.fit.
+std::string read_file_name(const YamlValue& value) {
+  const std::string name = value.text();
+  const bool printable = std::none_of(name.begin(), name.end(), [](char c) {
+    return static_cast<unsigned char>(c) < ' ' || c == 127 || c == '/';
+  });
+  if (!printable || name.front() == '.') {
+    value.refuse(value.name() + " cannot name a file",
+                 "printable characters without a slash, the first of them no dot");
+  }
+  return name;
+}
+
 ClothDescription read_cloth(const YamlValue& value) {
   const YamlMap map = value.map({"size", "mass", "masses", "mesh"});
   ClothDescription cloth;
@@ -85,17 +98,8 @@ ClothDescription read_cloth(const YamlValue& value) {
   }
   if (const YamlValue* mesh = map.find("mesh")) {
     const YamlMap sizes = mesh->map({"columns", "rows"});
-    const auto nodes = [&sizes](const std::string& key) {
-      const YamlValue& count = sizes.at(key);
-      const int number = count.whole_number(std::numeric_limits<int>::min());
-      if (number < 2) {
-        count.refuse(fmt::format("a cloth of {} {}", number, key), "a mesh of 2 x 2 nodes or more",
-                     "17 is a good start");
-      }
-      return number;
-    };
-    cloth.mesh_columns = nodes("columns");
-    cloth.mesh_rows = nodes("rows");
+    cloth.mesh_columns = sizes.at("columns").whole_number(2);
+    cloth.mesh_rows = sizes.at("rows").whole_number(2);
   }
   return cloth;
 }
@@ -171,11 +175,7 @@ std::vector<CameraEntry> read_cameras(const YamlValue& value, const RecordingFil
     const YamlMap map = item.map({"name", "file", "images", "calibration"});
     CameraEntry camera;
     const YamlValue& name = map.at("name");
-    camera.name = name.text();
-    if (camera.name.find('/') != std::string::npos) {
-      name.refuse("camera name `" + camera.name + "` holds a slash",
-                  "a name that can name a file, such as cameras/NAME.yaml");
-    }
+    camera.name = read_file_name(name);
     for (const CameraEntry& earlier : cameras) {
       if (earlier.name == camera.name) {
         name.refuse("a second camera `" + camera.name + "`", "a name of its own for every camera");
@@ -195,13 +195,11 @@ std::vector<CameraEntry> read_cameras(const YamlValue& value, const RecordingFil
 
 void require_camera(const Recording& recording, const YamlValue& where, const std::string& name) {
   if (recording.find_camera(name) != nullptr) return;
-  std::string known;
-  for (const CameraEntry& camera : recording.cameras) {
-    known += (known.empty() ? "" : ", ") + ("`" + camera.name + "`");
-  }
-  where.refuse("there is no camera `" + name + "`",
-               known.empty() ? "a camera listed under `cameras`, which is empty"
-                             : "one of the cameras: " + known);
+  std::vector<std::string> known;
+  for (const CameraEntry& camera : recording.cameras) known.push_back(camera.name);
+  where.refuse(
+      "there is no camera `" + name + "`",
+      known.empty() ? "a camera listed under `cameras`, which is empty" : known_names(name, known));
 }
 
 void read_observations(const YamlValue& value, const RecordingFiles& files, Recording& recording) {
@@ -244,8 +242,8 @@ std::vector<RigidBody> read_bodies(const YamlValue& value, const RecordingFiles&
     if (const YamlValue* offset = map.find("clock_offset")) {
       if (offset->is_number()) {
         body.clock_offset_s = offset->number();
-      } else {
-        offset->one_of<int>({{"unknown", 0}});
+      } else if (!offset->is_word("unknown")) {
+        offset->refuse(offset->name() + " is neither", "a number of seconds, or `unknown`");
       }
     }
     if (const YamlValue* holds = map.find("holds")) {
@@ -336,7 +334,13 @@ std::filesystem::path find_recording_file(const std::filesystem::path& given) {
 
 double Recording::frame_time_s(int frame) const {
   if (frame_rate_hz) return frame / *frame_rate_hz;
-  assert(frame >= 0 && frame < static_cast<int>(times_s.size()));
+  assert(frame >= 0);
+  if (frame >= static_cast<int>(times_s.size())) {
+    throw InputError(times_file ? times_file->string() : name,
+                     fmt::format("there is no time for frame {}", frame),
+                     "a time for every frame that the tracks name",
+                     fmt::format("the last one is frame {}", times_s.size() - 1));
+  }
   return times_s[static_cast<std::size_t>(frame)];
 }
 
@@ -356,8 +360,8 @@ Recording read_recording(const std::filesystem::path& folder) {
   map.at("format").one_of<int>({{"clothfit-recording/1", 0}});
 
   Recording recording;
-  recording.folder = files.folder();
-  recording.name = map.at("name").text();
+  recording.folder = files.root();
+  recording.name = read_file_name(map.at("name"));
   if (const YamlValue* origin = map.find("origin")) recording.origin = origin->text();
   recording.cloth = read_cloth(map.at("cloth"));
   read_marker_set(map.at("markers"), files, recording);

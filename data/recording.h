@@ -110,7 +110,8 @@ struct Recording {
   std::vector<DeclaredEffect> declared;
   std::optional<int> held_out_from_frame;  ///< no fit and no decision uses frames from this one on
 
-  /// Time of a frame; frame 0 need not be at 0. `frame` must exist where a times file is given.
+  /// Time of a frame; frame 0 need not be at 0. Throws InputError where the times file ends before
+  /// this frame: the tracks then name one that was never timed.
   double frame_time_s(int frame) const;
   const CameraEntry* find_camera(const std::string& camera_name) const;
 };

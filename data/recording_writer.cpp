@@ -26,7 +26,7 @@ std::array<double, 2> numbers(const Eigen::Vector2d& v) {
 class RelativePaths {
  public:
   explicit RelativePaths(const std::filesystem::path& folder)
-      : folder_(std::filesystem::weakly_canonical(folder)) {}
+      : folder_(std::filesystem::weakly_canonical(std::filesystem::absolute(folder))) {}
   std::string operator()(const std::filesystem::path& path) const {
     return std::filesystem::weakly_canonical(path).lexically_relative(folder_).generic_string();
   }

@@ -44,6 +44,10 @@ bool YamlValue::is_number() const {
   return node_.IsScalar() && parse_number(node_.Scalar()).has_value();
 }
 
+bool YamlValue::is_word(const std::string& word) const {
+  return node_.IsScalar() && node_.Scalar() == word;
+}
+
 std::string YamlValue::text() const {
   if (!node_.IsScalar() || node_.Scalar().empty()) {
     refuse(name_ + " is " + (node_.IsScalar() ? "empty" : kind_of(node_)), "text");
@@ -163,8 +167,11 @@ YamlValue read_yaml(const std::filesystem::path& file) {
   try {
     const std::vector<YAML::Node> documents = YAML::LoadAll(text);
     if (documents.size() != 1) {
-      throw InputError(*name, 1, fmt::format("{} YAML documents", documents.size()),
-                       "one, `key: value` line by line");
+      throw InputError(*name, 1,
+                       documents.empty()
+                           ? "the file is empty"
+                           : fmt::format("{} YAML documents in one file", documents.size()),
+                       "one document, `key: value` line by line");
     }
     return {documents.front(), name, "", line_of(documents.front().Mark(), 1)};
   } catch (const YAML::Exception& error) {

@@ -26,6 +26,7 @@ class YamlValue {
   int line() const { return line_; }
   bool is_null() const { return node_.IsNull(); }
   bool is_number() const;
+  bool is_word(const std::string& word) const;
   bool is_list() const { return node_.IsSequence(); }
 
   /// A scalar that is not empty.

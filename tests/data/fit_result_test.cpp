@@ -1,0 +1,183 @@
+// fit.json. Whether its numbers are true is the matter of tests/fit/.
+
+#include "data/fit_result.h"
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "tests/data/expect_refused.h"
+
+namespace clothfit {
+namespace {
+
+FitResult sample_result() {
+  FitResult result;
+  result.recording = "swing_plain";
+  result.version = "0.1.0";
+  result.command = "fit . --seed 7";
+  result.seed = 18446744073709551615ull;
+  result.seconds = 12.3;
+  result.mesh_columns = 17;
+  result.mesh_rows = 9;
+  result.parameter_set = "fabric";
+  result.integrator = "euler";
+  result.substeps = 8;
+  result.time_step_s = 1.0 / 480;
+  result.start = "released_flat";
+  result.parameters = {
+      {"tension_warp", "N/m", 41.2, 0.6, ParameterState::fitted, ""},
+      {"areal_density", "kg/m2", 0.2, 0, ParameterState::fixed, "weighed"},
+      {"flexion_weft", "N/m", 0.1 + 0.2, 5, ParameterState::undetermined, "hidden by \"noise\""}};
+  result.effects = {{"wind", {{"q_x", "Pa", 0.25, 0.01, ParameterState::fitted, ""}}}};
+  result.nuisance = {{"tilt_x", "rad", 1e-4, 1e-5, ParameterState::fitted, ""}};
+  result.errors = {{"front", "px", {0.3, 0.42, 1000}, {0.5, 0.7, 400}, 0.29, {21, 30, 25}}};
+  result.observations_used = 1400;
+  result.observations_rejected = {{"blurred", 3}, {"too far", 1}};
+  return result;
+}
+
+void expect_same(const std::vector<ParameterEstimate>& a, const std::vector<ParameterEstimate>& b) {
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    EXPECT_EQ(a[i].name, b[i].name);
+    EXPECT_EQ(a[i].unit, b[i].unit);
+    EXPECT_EQ(a[i].value, b[i].value);
+    EXPECT_EQ(a[i].sigma, b[i].sigma);
+    EXPECT_EQ(a[i].state, b[i].state);
+    EXPECT_EQ(a[i].reason, b[i].reason);
+  }
+}
+
+void expect_same(const ErrorSummary& a, const ErrorSummary& b) {
+  EXPECT_EQ(a.rms, b.rms);
+  EXPECT_EQ(a.rms_distance, b.rms_distance);
+  EXPECT_EQ(a.count, b.count);
+}
+
+void expect_same(const FitResult& a, const FitResult& b) {
+  EXPECT_EQ(a.recording, b.recording);
+  EXPECT_EQ(a.version, b.version);
+  EXPECT_EQ(a.command, b.command);
+  EXPECT_EQ(a.seed, b.seed);
+  EXPECT_EQ(a.seconds, b.seconds);
+  EXPECT_EQ(a.mesh_columns, b.mesh_columns);
+  EXPECT_EQ(a.mesh_rows, b.mesh_rows);
+  EXPECT_EQ(a.parameter_set, b.parameter_set);
+  EXPECT_EQ(a.integrator, b.integrator);
+  EXPECT_EQ(a.substeps, b.substeps);
+  EXPECT_EQ(a.time_step_s, b.time_step_s);
+  EXPECT_EQ(a.start, b.start);
+  expect_same(a.parameters, b.parameters);
+  ASSERT_EQ(a.effects.size(), b.effects.size());
+  for (std::size_t i = 0; i < a.effects.size(); ++i) {
+    EXPECT_EQ(a.effects[i].name, b.effects[i].name);
+    expect_same(a.effects[i].parameters, b.effects[i].parameters);
+  }
+  expect_same(a.nuisance, b.nuisance);
+  ASSERT_EQ(a.errors.size(), b.errors.size());
+  for (std::size_t i = 0; i < a.errors.size(); ++i) {
+    EXPECT_EQ(a.errors[i].kind, b.errors[i].kind);
+    EXPECT_EQ(a.errors[i].unit, b.errors[i].unit);
+    expect_same(a.errors[i].fitted, b.errors[i].fitted);
+    expect_same(a.errors[i].held_out, b.errors[i].held_out);
+    EXPECT_EQ(a.errors[i].noise, b.errors[i].noise);
+    EXPECT_EQ(a.errors[i].trivial.first_frame, b.errors[i].trivial.first_frame);
+    EXPECT_EQ(a.errors[i].trivial.last_velocity, b.errors[i].trivial.last_velocity);
+    EXPECT_EQ(a.errors[i].trivial.rigid, b.errors[i].trivial.rigid);
+  }
+  EXPECT_EQ(a.observations_used, b.observations_used);
+  EXPECT_EQ(a.observations_rejected, b.observations_rejected);
+}
+
+TEST(FitJson, ReadsBackToTheLastBit) {
+  const TemporaryFolder folder;
+  const FitResult one_kind = sample_result();
+  FitResult two_kinds = one_kind;
+  two_kinds.errors.push_back({"side", "px", {0.4, 0.6, 10}, {}, 0.3, {}});
+  FitResult no_kind = one_kind;
+  no_kind.errors.clear();
+  for (const FitResult& result : {one_kind, two_kinds, no_kind}) {
+    SCOPED_TRACE(result.errors.size());
+
+    write_fit_result(result, folder / "fit.json");
+
+    expect_same(read_fit_result(folder / "fit.json"), result);
+  }
+}
+
+TEST(FitJson, HasTheKeysOfTheFormat) {
+  const TemporaryFolder folder;
+  write_fit_result(sample_result(), folder / "fit.json");
+
+  const auto json = nlohmann::ordered_json::parse(std::ifstream(folder / "fit.json"));
+
+  std::vector<std::string> keys;
+  for (const auto& [key, value] : json.items()) keys.push_back(key);
+  EXPECT_THAT(keys, testing::ElementsAre("format", "recording", "version", "command", "seed",
+                                         "seconds", "model", "parameters", "effects", "nuisance",
+                                         "errors", "observations"));
+  EXPECT_EQ(json["format"], "clothfit-fit/1");
+  EXPECT_EQ(json["model"]["mesh"]["rows"], 9);
+  EXPECT_EQ(json["model"]["time_step_s"], 1.0 / 480);
+  EXPECT_EQ(json["parameters"][2]["state"], "undetermined");
+  EXPECT_EQ(json["effects"][0]["parameters"][0]["name"], "q_x");
+  ASSERT_TRUE(json["errors"].is_object());  // one kind; several make a list
+  EXPECT_EQ(json["errors"]["kind"], "front");
+  EXPECT_EQ(json["errors"]["held_out"]["rms_distance"], 0.7);
+  EXPECT_EQ(json["errors"]["trivial"]["last_velocity"], 30);
+  EXPECT_EQ(json["observations"]["rejected"]["too far"], 1);
+}
+
+TEST(FitJson, MayHoldMoreThanThisVersionKnows) {
+  const TemporaryFolder folder;
+  write_fit_result(sample_result(), folder / "fit.json");
+  auto json = nlohmann::json::parse(std::ifstream(folder / "fit.json"));
+  json["new"] = {1, 2};
+  json["model"]["new"] = nullptr;
+  json["parameters"][0].erase("reason");
+  json.erase("nuisance");
+  json["errors"].erase("kind");
+
+  const FitResult result = read_fit_result(folder.write("fit.json", json.dump()));
+
+  EXPECT_EQ(result.parameters.size(), 3u);
+  EXPECT_EQ(result.errors[0].unit, "px");
+}
+
+TEST(FitJson, IsRefusedWhereAValueIsMissingOrOfAnotherKind) {
+  const TemporaryFolder folder;
+  write_fit_result(sample_result(), folder / "fit.json");
+  const auto json = nlohmann::json::parse(std::ifstream(folder / "fit.json"));
+  const auto expect = [&](const std::string& message, const auto& change) {
+    nlohmann::json changed = json;
+    change(changed);
+    const auto file = folder.write("fit.json", changed.dump());
+    expect_refused(folder, message, [&] { read_fit_result(file); });
+  };
+
+  expect("fit.json: `/format` is `clothfit-fit/2`",
+         [](auto& j) { j["format"] = "clothfit-fit/2"; });
+  expect("fit.json: `/model/mesh` is missing", [](auto& j) { j["model"].erase("mesh"); });
+  expect("fit.json: `/parameters/1/value` is missing",
+         [](auto& j) { j["parameters"][1].erase("value"); });
+  expect("fit.json: `/parameters/1/value` is not a number",
+         [](auto& j) { j["parameters"][1]["value"] = nullptr; });
+  expect("fit.json: `/parameters/0/state` is `free`",
+         [](auto& j) { j["parameters"][0]["state"] = "free"; });
+  expect("fit.json: `/parameters` is not a list", [](auto& j) { j["parameters"] = 1; });
+  expect("fit.json: `/model` is not an object", [](auto& j) { j["model"] = 1; });
+  expect("fit.json: `/seed` is not a seed", [](auto& j) { j["seed"] = -1; });
+  expect("fit.json: `/observations/used` is not a count",
+         [](auto& j) { j["observations"]["used"] = 3e10; });
+  expect("fit.json: `/` is not an object", [](auto& j) { j = 1; });
+  expect_refused(folder, "cut.json:3: not JSON", [&] {
+    read_fit_result(folder.write("cut.json", "{\n \"format\": \"clothfit-fit/1\",\n \"a\": }\n"));
+  });
+  expect_refused(folder, "large.json: holds a number too large",
+                 [&] { read_fit_result(folder.write("large.json", "{\"a\": 1e999}")); });
+  expect_refused(folder, "none.json: there is no such file",
+                 [&] { read_fit_result(folder / "none.json"); });
+}
+
+}  // namespace
+}  // namespace clothfit
