@@ -14,9 +14,11 @@
 
 #include <algorithm>
 #include <cassert>
+#include <map>
 #include <tuple>
 
 #include "data/input_error.h"
+#include "vision/tag_refine.h"
 
 namespace clothfit {
 namespace {
@@ -60,6 +62,32 @@ int affordable_corrected_bits(const apriltag_family_t& family) {
   return codes * (1 + bits) <= kMaxEntries ? 1 : 0;
 }
 
+/// What AprilTag's pixel coordinates have too much: it counts from the outer corner of the top left
+/// pixel, we from that pixel's centre. Its corners already come in our order.
+const Eigen::Vector2d kHalfPixel(0.5, 0.5);
+
+/// The library's homography with pixels in our convention.
+Eigen::Matrix3d pixel_from_tag(const matd_t& homography) {
+  using RowMajor = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+  Eigen::Matrix3d shift = Eigen::Matrix3d::Identity();
+  shift.topRightCorner<2, 1>() = -kHalfPixel;
+  return shift * Eigen::Map<const RowMajor>(homography.data);
+}
+
+TagPattern printed_pattern(apriltag_family_t* family, int id) {
+  const std::unique_ptr<image_u8_t, void (*)(image_u8_t*)> image(apriltag_to_image(family, id),
+                                                                 image_u8_destroy);
+  TagPattern pattern{
+      .border_cells = family->width_at_border, .total_cells = family->total_width, .white = {}};
+  assert(image->width == pattern.total_cells && image->height == pattern.total_cells);
+  for (int row = 0; row < image->height; ++row) {
+    for (int column = 0; column < image->width; ++column) {
+      pattern.white.push_back(image->buf[row * image->stride + column] > 127 ? 1.0F : 0.0F);
+    }
+  }
+  return pattern;
+}
+
 }  // namespace
 
 std::vector<std::string> tag_families() {
@@ -73,9 +101,16 @@ struct TagDetector::Library {
       : family(kind.create(), kind.destroy),
         detector(apriltag_detector_create(), apriltag_detector_destroy) {}
 
+  const TagPattern& pattern(int id) {
+    const auto known = patterns.find(id);
+    if (known != patterns.end()) return known->second;
+    return patterns.emplace(id, printed_pattern(family.get(), id)).first->second;
+  }
+
   // The detector is destroyed first: it holds a pointer into the family.
   std::unique_ptr<apriltag_family_t, void (*)(apriltag_family_t*)> family;
   std::unique_ptr<apriltag_detector_t, void (*)(apriltag_detector_t*)> detector;
+  std::map<int, TagPattern> patterns;  ///< of the tags seen so far
 };
 
 TagDetector::TagDetector(const std::string& family, int max_corrected_bits)
@@ -109,11 +144,15 @@ std::vector<TagDetection> TagDetector::detect(const cv::Mat& grey) {
     detection.corrected_bits = raw->hamming;
     detection.decision_margin = raw->decision_margin;
     for (std::size_t c = 0; c < 4; ++c) {
-      // The one place where AprilTag's convention turns into ours: its corners already come as
-      // bottom left, bottom right, top right, top left, but it counts pixels from the outer corner
-      // of the top left pixel, not from that pixel's centre.
-      detection.corner_px[c] = Eigen::Vector2d(raw->p[c][0] - 0.5, raw->p[c][1] - 0.5);
-      detection.sigma_px[c] = 0.15;
+      detection.corner_px[c] = Eigen::Vector2d(raw->p[c][0], raw->p[c][1]) - kHalfPixel;
+    }
+    const RefinedTag refined =
+        refine_tag(grey, library_->pattern(raw->id), pixel_from_tag(*raw->H));
+    detection.explained = refined.explained;
+    detection.refined = refined.usable;
+    if (refined.usable) {
+      detection.corner_px = refined.corner_px;
+      detection.sigma_px = refined.sigma_px;
     }
     detections.push_back(detection);
   }

@@ -17,7 +17,9 @@ struct TagDetection {
   int corrected_bits = 0;      ///< bits of the code that were read wrong
   double decision_margin = 0;  ///< mean distance of a bit's grey level from the threshold
   std::array<Eigen::Vector2d, 4> corner_px{};
-  std::array<double, 4> sigma_px{};  ///< one standard deviation per coordinate
+  std::array<double, 4> sigma_px{};  ///< one standard deviation per coordinate; 0 if not `refined`
+  bool refined = false;              ///< corners are placed by the whole pattern (tag_refine.h)
+  double explained = 0;  ///< share of the tag's pixels that its pattern explains; about 0.9 is all
 };
 
 /// Names of all tag families that can be read, such as tag36h11; alphabetical.

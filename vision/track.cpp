@@ -97,12 +97,18 @@ void judge_alone(Reading& reading, const TrackOptions& options, const cv::Size& 
   if (tag.decision_margin < options.min_decision_margin) reading.reject(rejection::kLowMargin);
   if (tag.corrected_bits > options.max_corrected_bits) reading.reject(rejection::kCorrectedBits);
   if (nearly_degenerate(tag.corner_px)) reading.reject(rejection::kTooOblique);
+  if (!tag.refined || tag.explained < options.min_explained) {
+    reading.reject(rejection::kPatternMismatch);
+  }
   constexpr double kBorder = 2;  // px; what an edge's blur reaches
   for (std::size_t c = 0; c < 4; ++c) {
     const Eigen::Vector2d& corner = tag.corner_px[c];
     const bool inside = corner.x() >= kBorder && corner.x() <= size.width - 1 - kBorder &&
                         corner.y() >= kBorder && corner.y() <= size.height - 1 - kBorder;
     if (!inside && reading.rejected[c].empty()) reading.rejected[c] = rejection::kTouchingBorder;
+    if (tag.sigma_px[c] > options.max_sigma_px && reading.rejected[c].empty()) {
+      reading.rejected[c] = rejection::kUncertain;
+    }
   }
 }
 
@@ -371,6 +377,12 @@ void TrackOptions::validate() const {
   if (!(min_decision_margin >= 0)) {
     throw InputError("min_decision_margin", fmt::format("{}", min_decision_margin),
                      "grey levels, >= 0");
+  }
+  if (!(min_explained >= 0 && min_explained <= 1)) {
+    throw InputError("min_explained", fmt::format("{}", min_explained), "a share, 0 to 1");
+  }
+  if (!(max_sigma_px > 0)) {
+    throw InputError("max_sigma_px", fmt::format("{}", max_sigma_px), "pixels, > 0");
   }
   if (max_corrected_bits < 0 || max_corrected_bits > 2) {
     throw InputError("max_corrected_bits", fmt::format("{}", max_corrected_bits), "0, 1 or 2");

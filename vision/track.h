@@ -18,6 +18,11 @@ struct TrackOptions {
   double max_speed_px = 60;
   /// Grey levels, >= 0: weaker readings of a tag's bits are rejected.
   double min_decision_margin = 20;
+  /// 0 to 1: a tag of whose pixels the printed pattern explains less is rejected; a clean one has
+  /// 0.9.
+  double min_explained = 0.7;
+  /// px, > 0: corners that are placed worse are rejected.
+  double max_sigma_px = 1;
   /// 0 to 2: readings with more wrong bits are rejected.
   int max_corrected_bits = 1;
   void validate() const;  ///< throws InputError

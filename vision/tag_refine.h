@@ -1,0 +1,49 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <opencv2/core.hpp>
+#include <vector>
+
+namespace clothfit {
+
+/// A tag as it is printed, in square cells. Tag coordinates (x, y) are those of AprilTag's
+/// homography: the border spans [-1, 1], x to the right and y down on the upright tag.
+struct TagPattern {
+  int border_cells = 0;      ///< across the border
+  int total_cells = 0;       ///< across everything printed; total_cells^2 entries in `white`
+  std::vector<float> white;  ///< 1 white, 0 black; row by row from the top left
+
+  double cell() const { return 2.0 / border_cells; }
+};
+
+/// A tag's four corners as the whole printed pattern places them.
+struct RefinedTag {
+  bool usable = false;  ///< false: the pattern does not explain the picture; corners are then unset
+  std::array<Eigen::Vector2d, 4> corner_px{};  ///< order and pixels as in TagDetection
+  std::array<double, 4> sigma_px{};            ///< one standard deviation per coordinate
+  /// Mean robust weight of the pixels; about 0.9 where the pattern and noise explain all of them.
+  double explained = 0;
+};
+
+/// Places a printed tag on a picture: least squares on the grey levels of every pixel that shows
+/// the tag, over a smoothly bent map. Fitting straight lines to the border instead is biased where
+/// cloth bends, and uses a fraction of the edges that a tag has.
+///
+///   grey(p) = a(q) + c(q) T(q'),   q = homography^-1(p),   q' = q + d(q)
+///
+/// T is the pattern, blurred by a Gaussian whose widths along the tag's two axes are estimated
+/// along (optics, pixel size and motion); a and c are linear (light); d holds all polynomials up to
+/// degree 3 with a normal prior: place, size and shear nearly free, the higher degrees small. Noise
+/// grows with the slope of the picture, as ragged edges make it; both parts are estimated. Pixels
+/// that the pattern does not explain (something in front, a fold) lose their weight (Cauchy loss),
+/// so that a hidden corner is placed by the rest of the tag, with the sigma this deserves.
+///
+/// Sigma is the posterior's, and what the next degree of bending may add by the size of the last.
+///
+/// `pixel_from_tag` maps tag coordinates to pixels (pixel (0, 0) is the centre of the top left one)
+/// and must be right to a third of a cell.
+RefinedTag refine_tag(const cv::Mat& grey, const TagPattern& pattern,
+                      const Eigen::Matrix3d& pixel_from_tag);
+
+}  // namespace clothfit
