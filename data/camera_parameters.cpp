@@ -4,7 +4,9 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
 #include <cassert>
+#include <cmath>
 
 #include "data/input_error.h"
 #include "data/text_file.h"

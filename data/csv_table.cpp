@@ -1,11 +1,14 @@
 #include "data/csv_table.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cassert>
 
 #include "data/input_error.h"
 #include "data/nearest_name.h"
 #include "data/number_text.h"
+#include "data/shown_text.h"
 #include "data/text_file.h"
 
 namespace clothfit {
@@ -28,14 +31,8 @@ std::size_t split(std::string_view line, std::vector<std::string_view>& fields) 
   }
 }
 
-/// What an error message shows of a field, however long it is or whatever it holds.
-std::string shown(std::string_view text) {
-  constexpr std::size_t kShown = 40;
-  std::string start(text.substr(0, kShown));
-  for (char& c : start) {
-    if (static_cast<unsigned char>(c) < ' ' || c == 127) c = '?';
-  }
-  return "`" + start + (text.size() > kShown ? "...`" : "`");
+std::string shown(std::string_view field) {
+  return fmt::format("`{}`", shown_text(field));
 }
 
 std::string column_list(const std::vector<CsvColumn>& columns) {

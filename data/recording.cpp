@@ -9,6 +9,7 @@
 #include "data/input_error.h"
 #include "data/nearest_name.h"
 #include "data/recording_words.h"
+#include "data/shown_text.h"
 #include "data/yaml_value.h"
 
 namespace clothfit {
@@ -46,15 +47,15 @@ class RecordingFiles {
   }
   static void require(const YamlValue& value, bool found, const std::string& expected) {
     if (found) return;
-    value.refuse(fmt::format("{} = {}: there is no such {}", value.name(), value.text(),
+    value.refuse(fmt::format("{} = {}: there is no such {}", value.name(), shown_text(value.text()),
                              expected.substr(expected.find(' ') + 1)),
                  expected + ", named relative to the recording's folder", "check the path");
   }
   std::filesystem::path absolute(const YamlValue& value) const {
-    std::error_code error;
-    const std::filesystem::path path = folder_ / value.text();
-    const std::filesystem::path canonical = std::filesystem::weakly_canonical(path, error);
-    return error ? path : canonical;
+    std::filesystem::path path = (folder_ / value.text()).lexically_normal();
+    if (!path.has_filename()) path = path.parent_path();  // a slash at the end
+    // A link keeps its own name: `.csv.gz` and `.mp4` say what the file holds.
+    return std::filesystem::weakly_canonical(path.parent_path()) / path.filename();
   }
 
   std::filesystem::path given_folder_;
@@ -198,7 +199,7 @@ void require_camera(const Recording& recording, const YamlValue& where, const st
   std::vector<std::string> known;
   for (const CameraEntry& camera : recording.cameras) known.push_back(camera.name);
   where.refuse(
-      "there is no camera `" + name + "`",
+      "there is no camera `" + shown_text(name) + "`",
       known.empty() ? "a camera listed under `cameras`, which is empty" : known_names(name, known));
 }
 

@@ -28,7 +28,9 @@ class RelativePaths {
   explicit RelativePaths(const std::filesystem::path& folder)
       : folder_(std::filesystem::weakly_canonical(std::filesystem::absolute(folder))) {}
   std::string operator()(const std::filesystem::path& path) const {
-    return std::filesystem::weakly_canonical(path).lexically_relative(folder_).generic_string();
+    const std::filesystem::path whole = std::filesystem::absolute(path).lexically_normal();
+    const std::filesystem::path parent = std::filesystem::weakly_canonical(whole.parent_path());
+    return (parent / whole.filename()).lexically_relative(folder_).generic_string();
   }
 
  private:

@@ -1,12 +1,15 @@
 #include "data/yaml_value.h"
 
 #include <fmt/format.h>
+#include <yaml-cpp/eventhandler.h>
 
 #include <algorithm>
+#include <sstream>
 
 #include "data/input_error.h"
 #include "data/nearest_name.h"
 #include "data/number_text.h"
+#include "data/shown_text.h"
 #include "data/text_file.h"
 
 namespace clothfit {
@@ -21,7 +24,49 @@ std::string kind_of(const YAML::Node& node) {
   if (node.IsMap()) return "a map";
   if (node.IsSequence()) return "a list";
   if (node.IsNull()) return "empty";
-  return fmt::format("`{}`", node.Scalar().substr(0, 60));
+  return fmt::format("`{}`", shown_text(node.Scalar()));
+}
+
+/// Follows a document only to see where it ends.
+class LastLine : public YAML::EventHandler {
+ public:
+  int line() const { return line_; }
+
+  void OnDocumentStart(const YAML::Mark& mark) override { see(mark); }
+  void OnDocumentEnd() override {}
+  void OnNull(const YAML::Mark& mark, YAML::anchor_t) override { see(mark); }
+  void OnAlias(const YAML::Mark& mark, YAML::anchor_t) override { see(mark); }
+  void OnScalar(const YAML::Mark& mark, const std::string&, YAML::anchor_t,
+                const std::string&) override {
+    see(mark);
+  }
+  void OnSequenceStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t,
+                       YAML::EmitterStyle::value) override {
+    see(mark);
+  }
+  void OnSequenceEnd() override {}
+  void OnMapStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t,
+                  YAML::EmitterStyle::value) override {
+    see(mark);
+  }
+  void OnMapEnd() override {}
+
+ private:
+  void see(const YAML::Mark& mark) { line_ = std::max(line_, line_of(mark, 1)); }
+  int line_ = 1;
+};
+
+/// Refuses text behind the first document; returns the last line of the document's content.
+int require_one_document(const std::string& text, const std::string& file) {
+  std::istringstream stream(text);
+  YAML::Parser parser(stream);
+  LastLine last;
+  parser.HandleNextDocument(last);
+  if (parser) {
+    throw InputError(file, last.line(), "the YAML document ends here but the file goes on",
+                     "one document, `key: value` line by line", "remove what does not belong");
+  }
+  return last.line();
 }
 
 }  // namespace
@@ -37,7 +82,7 @@ void YamlValue::refuse(const std::string& problem, const std::string& expected,
 
 std::string YamlValue::shown() const {
   if (!node_.IsScalar()) return name_ + " is " + kind_of(node_);
-  return name_ + " = " + node_.Scalar().substr(0, 60);
+  return name_ + " = " + shown_text(node_.Scalar());
 }
 
 bool YamlValue::is_number() const {
@@ -111,9 +156,10 @@ std::vector<std::pair<std::string, YamlValue>> YamlValue::entries() const {
     const std::string& key = entry.first.Scalar();
     for (const auto& [earlier_key, earlier] : entries) {
       if (earlier_key == key) {
-        throw InputError(*file_, line,
-                         fmt::format("`{}` stands on line {} already", key, earlier.line()),
-                         "every key once", "remove one of the two");
+        throw InputError(
+            *file_, line,
+            fmt::format("`{}` stands on line {} already", shown_text(key), earlier.line()),
+            "every key once", "remove one of the two");
       }
     }
     // An empty value bears no place of its own worth pointing at: the key's line serves.
@@ -127,8 +173,9 @@ YamlMap YamlValue::map(const std::vector<std::string>& known_keys) const {
   std::vector<std::pair<std::string, YamlValue>> all = entries();
   for (const auto& [key, value] : all) {
     if (std::find(known_keys.begin(), known_keys.end(), key) == known_keys.end()) {
-      value.refuse(fmt::format("unknown key `{}`{}", key, name_.empty() ? "" : " in " + name_),
-                   known_names(key, known_keys));
+      value.refuse(
+          fmt::format("unknown key `{}`{}", shown_text(key), name_.empty() ? "" : " in " + name_),
+          known_names(key, known_keys));
     }
   }
   return {*this, std::move(all)};
@@ -165,15 +212,14 @@ YamlValue read_yaml(const std::filesystem::path& file) {
   const auto name = std::make_shared<const std::string>(file.string());
   const std::string text = read_text(file);
   try {
-    const std::vector<YAML::Node> documents = YAML::LoadAll(text);
-    if (documents.size() != 1) {
-      throw InputError(*name, 1,
-                       documents.empty()
-                           ? "the file is empty"
-                           : fmt::format("{} YAML documents in one file", documents.size()),
-                       "one document, `key: value` line by line");
+    // YAML::LoadAll never returns on some damaged files (yaml-cpp 0.7 stands still at a stray
+    // comma), and YAML::Load drops whatever follows the first document without a word.
+    const int last_line = require_one_document(text, *name);
+    const YAML::Node root = YAML::Load(text);
+    if (root.IsNull()) {
+      throw InputError(*name, last_line, "holds no keys", "`key: value`, line by line");
     }
-    return {documents.front(), name, "", line_of(documents.front().Mark(), 1)};
+    return {root, name, "", line_of(root.Mark(), 1)};
   } catch (const YAML::Exception& error) {
     throw InputError(*name, line_of(error.mark, 1), "not YAML: " + error.msg,
                      "`key: value` lines, indented by spaces", "quote text that holds `: ` or `#`");

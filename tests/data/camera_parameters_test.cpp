@@ -165,8 +165,10 @@ TEST(CameraFile, IsRefusedWithFileAndLine) {
        "c.yaml:8: camera_from_world.covariance has a negative variance"},
       {"0.01", "-0.01", "c.yaml:9: readout_time = -0.01; seconds"},
       {"readout_time: 0.01", "name: side", "c.yaml:9: `name` stands on line 2 already"},
+      {"format:", ",format:", "c.yaml:1: the YAML document ends here but the file goes on"},
       {"readout_time: 0.01", "readout_time: [0.01", "c.yaml:10: not YAML: "},
-      {"readout_time: 0.01", "readout_time: 0.01\n---\nname: other", "c.yaml:1: 2 YAML documents"},
+      {"readout_time: 0.01", "readout_time: 0.01\n---\nname: other",
+       "c.yaml:9: the YAML document ends here but"},
   };
   const TemporaryFolder folder;
   for (const Case& test : cases) {
@@ -175,7 +177,7 @@ TEST(CameraFile, IsRefusedWithFileAndLine) {
   }
   for (const std::string text : {"", "# nothing\n"}) {
     const auto file = folder.write("c.yaml", text);
-    expect_refused(folder, "c.yaml:1: the file is empty", [&] { read_camera(file); });
+    expect_refused(folder, "c.yaml:1: holds no keys", [&] { read_camera(file); });
   }
   expect_refused(folder, "c.yaml:1:  is a list",
                  [&] { read_camera(folder.write("c.yaml", "- format: clothfit-camera/1\n")); });

@@ -3,6 +3,7 @@
 
 #include "data/recording.h"
 
+#include "data/tracks.h"
 #include "tests/data/expect_refused.h"
 #include "tests/data/full_recording.h"
 
@@ -175,6 +176,21 @@ TEST(Recording, MayHaveWindowsLineEndsAndAByteOrderMark) {
   expect_same(read_recording(folder.path()), plain);
 }
 
+TEST(Recording, KeepsTheNamesOfLinkedFiles) {
+  const TemporaryFolder folder;
+  write_full_recording(folder);
+  std::filesystem::rename(folder / "tracks2d/front.csv.gz", folder / "store");
+  std::filesystem::create_symlink("../store", folder / "tracks2d/front.csv.gz");
+  folder.write("recording.yaml",
+               replaced(kFullRecording, "frames/front}", "frames/../frames/front/}"));
+
+  const Recording recording = read_recording(folder.path());
+
+  EXPECT_EQ(recording.tracks2d.at("front"), folder / "tracks2d/front.csv.gz");
+  EXPECT_EQ(recording.find_camera("front")->images, folder / "frames/front");
+  EXPECT_EQ(read_tracks2d(recording.tracks2d.at("front"), recording.markers).size(), 1u);
+}
+
 TEST(Recording, ReadsBackAsWritten) {
   const TemporaryFolder folder;
   write_full_recording(folder);
@@ -259,6 +275,7 @@ TEST(Recording, IsRefusedWithFileAndLine) {
       {"name: full", "name: [full]", ":2: name is a list; text"},
       {"name: full", "name: ''", ":2: name is empty; text"},
       {"name: full", "name: a/b", ":2: name cannot name a file"},
+      {"name: full", "\"na\\nme\": full", ":2: unknown key `na?me`; did you mean `name`?"},
       {"name: full", "name: ..", ":2: name cannot name a file"},
       {"name: full", "name: full\nname: again", ":3: `name` stands on line 2 already"},
       {"[0.40, 0.30]", "[0.40, 0]", ":5: cloth.size = [0.4, 0]; [width, height] in metres"},
