@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
 
 #include "data/input_error.h"
 #include "fit/evolutionary_strategy.h"
@@ -18,8 +19,8 @@
 namespace clothfit {
 namespace {
 
-/// The search runs on a mesh of half the resolution: about a tenth of the cost of a run, and good
-/// enough to find the basin.
+/// The search runs on a mesh of half the resolution: a run costs a sixteenth (a quarter of the
+/// springs, and a quarter of the steps where damping limits them), and the basin is the same.
 constexpr int kCoarsening = 2;
 constexpr int kSmallestMesh = 5;
 
@@ -30,7 +31,11 @@ constexpr double kHorizonShares[] = {0.3, 0.6, 1.0};
 constexpr int kFewestFrames = 8;
 
 /// Spring-steps that a search may cost; its time step is cut no finer than that.
-constexpr double kSearchSpringSteps = 6e9;
+constexpr double kSearchSpringSteps = 1.2e9;
+
+/// The last stage is solved to rounding of the reported digits; those before only lead there.
+constexpr double kRoughGain = 1e-4;
+constexpr double kFinalGain = 1e-7;
 
 /// A log-parameter less certain than this (a factor of e^0.7 = 2 either way) is undetermined.
 constexpr double kUndeterminedLogSigma = 0.7;
@@ -70,10 +75,8 @@ struct Search {
 
 /// The evolutionary strategy over everything but nuisance parameters, on a coarse mesh and a short
 /// window.
-Search search(const FitInput& input, const FitOptions& options, const FitProblem& fine,
+Search search(const FitProblem& problem, const FitOptions& options,
               const ProgressCallback& progress, FitReport& report) {
-  const FitProblem problem =
-      make_problem(input, options, coarse(fine.cloth.mesh.columns), coarse(fine.cloth.mesh.rows));
   const int frames = horizon_frames(problem, kSearchShare);
   const Objective objective(problem, frames, search_time_step_s(problem, options, frames));
 
@@ -137,53 +140,43 @@ Search search(const FitInput& input, const FitOptions& options, const FitProblem
   return found;
 }
 
-struct Refinement {
-  RefineResult best;
-  bool cancelled = false;
-};
+/// One refinement, with its line in the report.
+RefineResult refine_stage(const FitProblem& problem, const FitOptions& options, double share,
+                          const Eigen::VectorXd& start, const ProgressCallback& progress,
+                          FitReport& report) {
+  const bool last = share == 1.0;
+  const RefineOptions refine_options{.rounds = last ? 6 : 2,
+                                     .least_gain = last ? kFinalGain : kRoughGain,
+                                     .substep_scale = options.substep_scale};
+  const int frames = horizon_frames(problem, share);
+  RefineResult result = refine(problem, frames, start, refine_options, progress);
+  report.stages.push_back(fmt::format(
+      "refinement on {} x {} over {} frames: {} iterations, {} simulations, time step {:.3g} s, "
+      "residuals of {:.2f} sigma; {}",
+      problem.cloth.mesh.columns, problem.cloth.mesh.rows, frames, result.solver_iterations,
+      result.simulations, result.time_step_s, result.robust_scale, result.message));
+  return result;
+}
 
-/// Each candidate over growing horizons; only the best one goes on to the whole window.
-Refinement refine_candidates(const FitProblem& problem, const FitOptions& options,
-                             std::vector<Eigen::VectorXd> candidates,
-                             const ProgressCallback& progress, FitReport& report) {
-  Refinement refinement;
-  const RefineOptions refine_options{.substep_scale = options.substep_scale};
-  for (const double share : kHorizonShares) {
-    const int frames = horizon_frames(problem, share);
-    std::vector<RefineResult> results;
-    for (const Eigen::VectorXd& candidate : candidates) {
-      RefineResult result = refine(problem, frames, candidate, refine_options, progress);
-      report.stages.push_back(fmt::format(
-          "refinement over {} frames: {} iterations, {} simulations, time step {:.3g} s, residuals "
-          "of {:.2f} sigma; {}",
-          frames, result.solver_iterations, result.simulations, result.time_step_s,
-          result.robust_scale, result.message));
-      if (result.cancelled) {
-        refinement.cancelled = true;
-        return refinement;
-      }
-      if (result.usable) results.push_back(std::move(result));
-    }
-    std::ranges::stable_sort(results, {}, &RefineResult::cost);
-    if (results.empty()) return refinement;
-    refinement.best = results.front();
-    candidates.clear();
-    for (const RefineResult& result : results) candidates.push_back(result.values);
-    // Candidates that ended in the same optimum are one.
-    constexpr double kSame = 0.02;
-    std::vector<Eigen::VectorXd> distinct;
-    for (const Eigen::VectorXd& candidate : candidates) {
-      const bool is_new = std::ranges::all_of(distinct, [&](const Eigen::VectorXd& other) {
-        return (problem.space.coordinates(candidate) - problem.space.coordinates(other))
-                   .cwiseAbs()
-                   .maxCoeff() > kSame;
-      });
-      if (is_new) distinct.push_back(candidate);
-    }
-    candidates = std::move(distinct);
-    if (share >= kHorizonShares[1]) candidates.resize(1);
+/// The best few individuals on the coarse mesh over a short horizon; the best of them on the fit's
+/// own mesh over growing ones.
+RefineResult refine_best(const FitProblem& coarse_problem, const FitProblem& problem,
+                         const FitOptions& options, const std::vector<Eigen::VectorXd>& candidates,
+                         const ProgressCallback& progress, FitReport& report) {
+  RefineResult best;
+  best.values = candidates.front();
+  best.cost = std::numeric_limits<double>::infinity();
+  for (const Eigen::VectorXd& candidate : candidates) {
+    RefineResult result =
+        refine_stage(coarse_problem, options, kSearchShare, candidate, progress, report);
+    if (result.cancelled) return result;
+    if (result.usable && result.cost < best.cost) best = std::move(result);
   }
-  return refinement;
+  for (const double share : kHorizonShares) {
+    best = refine_stage(problem, options, share, best.values, progress, report);
+    if (best.cancelled || !best.usable) return best;
+  }
+  return best;
 }
 
 ParameterEstimate estimate(const FitParameter& parameter, const std::string& name, double value,
@@ -309,20 +302,23 @@ FitReport fit(const FitInput& input, const FitOptions& options, const ProgressCa
   Eigen::VectorXd values = problem.space.start();
   Eigen::VectorXd sigma = Eigen::VectorXd::Zero(problem.space.size());
   if (!options.forecast) {
-    const Search found = search(input, options, problem, progress, report);
+    const FitProblem coarse_problem =
+        make_problem(input, options, coarse(result.mesh_columns), coarse(result.mesh_rows));
+    const Search found = search(coarse_problem, options, progress, report);
     if (found.cancelled) return stopped(std::move(report), FitStop::cancelled, "cancelled");
     if (found.best.empty())
       return stopped(std::move(report), FitStop::diverged,
                      "no individual of the search could be simulated to the end of its window");
-    const Refinement refinement = refine_candidates(problem, options, found.best, progress, report);
-    if (refinement.cancelled) return stopped(std::move(report), FitStop::cancelled, "cancelled");
-    if (!refinement.best.usable)
+    const RefineResult refined =
+        refine_best(coarse_problem, problem, options, found.best, progress, report);
+    if (refined.cancelled) return stopped(std::move(report), FitStop::cancelled, "cancelled");
+    if (!refined.usable)
       return stopped(std::move(report), FitStop::diverged,
                      "no refinement worked out: " + report.stages.back());
-    values = refinement.best.values;
-    result.time_step_s = refinement.best.time_step_s;
-    report.stop = refinement.best.converged ? FitStop::converged : FitStop::reached_limit;
-    report.message = refinement.best.message;
+    values = refined.values;
+    result.time_step_s = refined.time_step_s;
+    report.stop = refined.converged ? FitStop::converged : FitStop::reached_limit;
+    report.message = refined.message;
     const Objective objective(problem, problem.first_held_out, result.time_step_s);
     const Uncertainty uncertainty = estimate_uncertainty(problem, objective, values);
     if (!uncertainty.usable)
@@ -351,7 +347,7 @@ FitReport fit(const FitInput& input, const FitOptions& options, const ProgressCa
         std::max(longest_frame_s, problem.frame_time_s[f] - problem.frame_time_s[f - 1]);
   result.substeps = static_cast<int>(std::ceil(longest_frame_s / result.time_step_s - 1e-9));
   fill_parameters(problem, options, values, sigma, result);
-  fill_residuals(problem, input, trajectories.front(), report);
+  fill_residuals(problem, trajectories.front(), report);
   for (const ObservationSet& set : problem.observations)
     result.observations_used += static_cast<int>(set.rows.size());
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();

@@ -17,12 +17,8 @@ namespace {
 void estimate_missing_sigma(ObservationSet& set, const std::vector<double>& frame_time_s,
                             int marker_count) {
   if (std::ranges::all_of(set.rows, [](const Observation& row) { return row.sigma > 0; })) return;
-  const auto frames = static_cast<Eigen::Index>(frame_time_s.size());
-  std::vector<Eigen::MatrixXd> tracks(
-      static_cast<size_t>(marker_count),
-      Eigen::MatrixXd::Constant(set.dimension, frames, std::numeric_limits<double>::quiet_NaN()));
-  for (const Observation& row : set.rows)
-    tracks[static_cast<size_t>(row.marker)].col(row.frame) = row.observed.head(set.dimension);
+  const std::vector<Eigen::MatrixXd> tracks =
+      marker_tracks(set, marker_count, static_cast<int>(frame_time_s.size()));
   constexpr int kFewest = 100;
   NoiseEstimate estimate;
   for (const double tolerance : {0.05, 0.2, 0.5}) {
@@ -89,6 +85,16 @@ ObservationSet observations_2d(const Tracks2d& tracks, const CameraParameters& c
   estimate_missing_sigma(set, frame_time_s, marker_count);
   finish(set);
   return set;
+}
+
+std::vector<Eigen::MatrixXd> marker_tracks(const ObservationSet& set, int marker_count,
+                                           int frames) {
+  std::vector<Eigen::MatrixXd> tracks(
+      static_cast<size_t>(marker_count),
+      Eigen::MatrixXd::Constant(set.dimension, frames, std::numeric_limits<double>::quiet_NaN()));
+  for (const Observation& row : set.rows)
+    tracks[static_cast<size_t>(row.marker)].col(row.frame) = row.observed.head(set.dimension);
+  return tracks;
 }
 
 std::vector<Eigen::Matrix3Xd> marker_positions(

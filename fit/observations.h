@@ -44,6 +44,9 @@ ObservationSet observations_2d(const Tracks2d& tracks, const CameraParameters& c
                                const std::vector<int>& excluded,
                                std::map<std::string, int>& rejected);
 
+/// The set as a matrix per marker, coordinates x frames, NaN where it was not observed.
+std::vector<Eigen::MatrixXd> marker_tracks(const ObservationSet& set, int marker_count, int frames);
+
 /// Positions of the markers in every frame, from those of the mesh: one 3 x markers matrix a frame.
 std::vector<Eigen::Matrix3Xd> marker_positions(const Surface::Weights& vertex_weights,
                                                const std::vector<Eigen::Matrix3Xd>& mesh_positions);

@@ -127,7 +127,8 @@ struct Round {
 };
 
 Round solve(const FitProblem& problem, const Objective& objective, const Eigen::VectorXd& start,
-            double huber_threshold, int iterations, const ProgressCallback& progress) {
+            double huber_threshold, const RefineOptions& refine_options,
+            const ProgressCallback& progress) {
   const ParameterSpace& space = problem.space;
   Eigen::VectorXd coordinates = space.coordinates(start);
   SharedEvaluation shared(problem, objective, coordinates);
@@ -159,14 +160,14 @@ Round solve(const FitProblem& problem, const Objective& objective, const Eigen::
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::DENSE_NORMAL_CHOLESKY;
   options.logging_type = ceres::SILENT;
-  options.max_num_iterations = iterations;
-  options.function_tolerance = 1e-7;
+  options.max_num_iterations = refine_options.iterations;
+  options.function_tolerance = refine_options.least_gain;
   options.parameter_tolerance = 1e-6;
   options.initial_trust_region_radius = 1e2;
   Reporter reporter(progress,
                     {.stage = "refining over " + std::to_string(objective.frames()) + " frames",
                      .done = 0,
-                     .total = static_cast<double>(iterations),
+                     .total = static_cast<double>(refine_options.iterations),
                      .unit = "iterations",
                      .note = {}});
   options.callbacks.push_back(&reporter);
@@ -206,7 +207,7 @@ RefineResult refine(const FitProblem& problem, int frames, const Eigen::VectorXd
     }
     result.robust_scale = robust_scale(before);
     const Round round = solve(problem, objective, result.values, kHuberScales * result.robust_scale,
-                              options.iterations, progress);
+                              options, progress);
     result.simulations += round.simulations;
     result.solver_iterations += static_cast<int>(round.summary.iterations.size());
     result.message = round.summary.message;

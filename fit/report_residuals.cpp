@@ -3,6 +3,8 @@
 #include <cmath>
 #include <limits>
 
+#include "fit/trivial_predictors.h"
+
 namespace clothfit {
 namespace {
 
@@ -24,10 +26,59 @@ struct Accumulator {
   }
 };
 
+/// Where the observer of a set sees the held points in every frame: as they are driven, or, when
+/// they do not move, where the placed sheet has them.
+std::vector<Eigen::MatrixXd> held_tracks(const FitProblem& problem, const ObservationSet& set) {
+  std::vector<Eigen::MatrixXd> tracks;
+  for (const HeldVertexWeights& held : problem.cloth.held) {
+    Eigen::Vector3d start = Eigen::Vector3d::Zero();
+    for (const auto& [vertex, weight] : held.weights)
+      start += weight * problem.placed_sheet_m.col(vertex);
+    Eigen::MatrixXd track(set.dimension, problem.frames());
+    for (int f = 0; f < problem.frames(); ++f) {
+      const double time_s = problem.frame_time_s[static_cast<size_t>(f)];
+      const auto seen = set.predict(held.motion ? held.motion(time_s) : start);
+      if (seen) {
+        track.col(f) = seen->head(set.dimension);
+      } else {
+        track.col(f).setConstant(std::numeric_limits<double>::quiet_NaN());
+      }
+    }
+    tracks.push_back(std::move(track));
+  }
+  return tracks;
+}
+
+/// A cloth that nothing holds does not move rigidly with anything: it stays.
+Eigen::MatrixXd held_displacement(const FitProblem& problem, const ObservationSet& set) {
+  if (problem.cloth.held.empty()) return Eigen::MatrixXd::Zero(set.dimension, problem.frames());
+  return mean_displacement(held_tracks(problem, set));
+}
+
+/// Fills the trivial predictors' part. Where nothing is held out their errors stay 0.
+void add_trivial_predictors(const FitProblem& problem, const ObservationSet& set,
+                            FitReport::Residuals& residuals, TrivialErrors& errors) {
+  const std::vector<Eigen::MatrixXd> tracks =
+      marker_tracks(set, static_cast<int>(problem.vertex_weights.rows()), problem.frames());
+  const int from = std::max(1, problem.first_held_out);
+  const TrivialPrediction first = predict_first_frame(tracks, from);
+  const TrivialPrediction velocity = predict_last_velocity(problem.frame_time_s, tracks, from);
+  const TrivialPrediction rigid = predict_rigid(tracks, held_displacement(problem, set), from);
+  residuals.first_frame_by_frame = first.rms_by_frame;
+  residuals.last_velocity_by_frame = velocity.rms_by_frame;
+  residuals.rigid_by_frame = rigid.rms_by_frame;
+  const auto held_out_rms = [](const TrivialPrediction& prediction) {
+    return prediction.held_out_count > 0 ? prediction.held_out_rms : 0.0;
+  };
+  errors = {.first_frame = held_out_rms(first),
+            .last_velocity = held_out_rms(velocity),
+            .rigid = held_out_rms(rigid)};
+}
+
 }  // namespace
 
-void fill_residuals(const FitProblem& problem, const FitInput& input,
-                    const std::vector<Eigen::Matrix3Xd>& mesh_positions, FitReport& report) {
+void fill_residuals(const FitProblem& problem, const std::vector<Eigen::Matrix3Xd>& mesh_positions,
+                    FitReport& report) {
   const auto markers = marker_positions(problem.vertex_weights, mesh_positions);
   const auto frames = static_cast<size_t>(problem.frames());
   for (const ObservationSet& set : problem.observations) {
@@ -56,7 +107,7 @@ void fill_residuals(const FitProblem& problem, const FitInput& input,
                              .fitted = fitted.summary(),
                              .held_out = held_out.summary(),
                              .noise = set.noise};
-    (void)input;
+    add_trivial_predictors(problem, set, residuals, errors.trivial);
     report.residuals.push_back(std::move(residuals));
     report.result.errors.push_back(std::move(errors));
   }

@@ -6,7 +6,7 @@ namespace clothfit {
 
 /// What the model leaves of the observations, beside what the trivial predictors leave: fills
 /// `report.residuals` and `report.result.errors`. `mesh_positions` is the free run over all frames.
-void fill_residuals(const FitProblem& problem, const FitInput& input,
-                    const std::vector<Eigen::Matrix3Xd>& mesh_positions, FitReport& report);
+void fill_residuals(const FitProblem& problem, const std::vector<Eigen::Matrix3Xd>& mesh_positions,
+                    FitReport& report);
 
 }  // namespace clothfit
