@@ -33,6 +33,7 @@ struct Estimate {
   std::array<double, kMaxIntrinsics> intrinsics{};
   std::vector<PoseBlock> camera_from_board;  ///< one per view
   std::vector<std::vector<char>> used;       ///< per view and corner
+  double corner_sigma_px = 0.1;              ///< weighs the corners against RationalPrior
 
   int intrinsics_count() const { return 4 + distortion_count; }
 };
@@ -84,6 +85,19 @@ ceres::CostFunction* make_reprojection(const Estimate& estimate, const Eigen::Ve
   }
 }
 
+/// Draws the denominator's coefficients of brown_conrady with 8 towards 0. Lenses with little
+/// distortion leave them undetermined, and then the ratio runs off to where a zero and a pole
+/// nearly cancel inside the picture.
+struct RationalPrior {
+  static constexpr double kSigma = 1;
+  double weight_px;
+  template <class Real>
+  bool operator()(const Real* intrinsics, Real* residual_px) const {
+    for (int i = 0; i < 3; ++i) residual_px[i] = intrinsics[9 + i] * (weight_px / kSigma);
+    return true;
+  }
+};
+
 /// Adds every used corner; `cauchy_scale_px` 0 stands for plain least squares. The problem points
 /// into `estimate`.
 void build_problem(const Observations& observations, double cauchy_scale_px, Estimate& estimate,
@@ -101,6 +115,11 @@ void build_problem(const Observations& observations, double cauchy_scale_px, Est
           estimate.intrinsics.data(), pose);
     }
     if (any) problem.SetManifold(pose, new PoseManifold);
+  }
+  if (estimate.distortion_count == 8 && problem.NumResidualBlocks() > 0) {
+    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<RationalPrior, 3, 12>(
+                                 new RationalPrior{estimate.corner_sigma_px}),
+                             nullptr, estimate.intrinsics.data());
   }
 }
 
@@ -299,19 +318,11 @@ bool refine_robustly(const Observations& observations, Estimate& estimate) {
   constexpr double kCauchySigmas = 2;  // loses 5 % of efficiency on normal errors; no bias
   double sigma_px = robust_sigma_px(observations, estimate);
   bool turned_round = false;
-  // The ratio of polynomials has valleys where a zero and a pole nearly cancel inside the picture;
-  // from the best plain series it does not go there.
-  const int distortion_count = estimate.distortion_count;
-  if (distortion_count == 8) {
-    estimate.distortion_count = 5;
-    if (!refine(observations, kCauchySigmas * sigma_px, estimate)) return false;
-    estimate.distortion_count = distortion_count;
-    sigma_px = robust_sigma_px(observations, estimate);
-  }
   for (int round = 0; round < kRounds; ++round) {
     if (!refine(observations, kCauchySigmas * sigma_px, estimate)) return false;
     const double before_px = sigma_px;
     sigma_px = robust_sigma_px(observations, estimate);
+    estimate.corner_sigma_px = sigma_px;
     if (sigma_px < 0.9 * before_px) continue;
     if (turned_round || !turn_views_round(observations, sigma_px, estimate)) return true;
     turned_round = true;
@@ -386,6 +397,26 @@ double largest_tilt_rad(const Estimate& estimate) {
     }
   }
   return largest;
+}
+
+/// Whether each used corner's pixel leads back to where the corner was: not so where the distortion
+/// folds the picture over itself.
+bool is_one_to_one(const Observations& observations, const Estimate& estimate) {
+  const CameraParameters camera = to_camera(observations, estimate);
+  for (std::size_t view = 0; view < observations.seen.size(); ++view) {
+    const Rigid3 camera_from_board = from_block(estimate.camera_from_board[view]);
+    for (std::size_t corner = 0; corner < observations.on_board_m.size(); ++corner) {
+      if (!estimate.used[view][corner]) continue;
+      const Eigen::Vector2d& on_board = observations.on_board_m[corner];
+      const Eigen::Vector3d in_camera =
+          camera_from_board * Eigen::Vector3d(on_board.x(), on_board.y(), 0);
+      const auto pixel = project(camera, in_camera);
+      if (!pixel) return false;
+      const auto direction = unproject(camera, *pixel);
+      if (!direction || (*direction - in_camera.normalized()).norm() > 1e-6) return false;
+    }
+  }
+  return true;
 }
 
 /// What is wrong with the observations as given; empty when nothing is.
@@ -520,6 +551,12 @@ CalibrateResult calibrate(const BoardDescription& board, const std::vector<Board
     result.message =
         fmt::format("the views leave the focal length undetermined ({:.0f} px, sigma {:.1f} %); {}",
                     result.camera.focal_px.x(), 100 * relative_sigma, kTiltAdvice);
+    return result;
+  }
+  if (!is_one_to_one(observations, estimate)) {
+    result.message =
+        "the distortion that fits best folds the picture over itself; use fewer coefficients, or "
+        "more views that reach into the corners of the picture";
     return result;
   }
   result.usable = true;

@@ -50,7 +50,16 @@ struct CalibrateResult {
 };
 
 /// Intrinsics from views of one flat board: closed-form start from OpenCV [zhang2000], refined in
-/// Ceres over intrinsics and one pose per view. Never throws for numbers that do not work out.
+/// Ceres over intrinsics and one pose per view, with a Cauchy loss first, then by least squares on
+/// the corners that lie within `outlier_sigmas`; a view with less than half of its corners good is
+/// left out. Sigmas are those of the inverse normal equations times the residuals' variance per
+/// degree of freedom. The denominator of brown_conrady with 8 coefficients (k4 k5 k6) is drawn to 0
+/// with a sigma of 1, because lenses with little distortion leave it undetermined.
+///
+/// Not usable, with a message for a person: fewer than 3 views or a view with another number of
+/// corners than the board; boards so nearly parallel that the focal length stays open (sigma above
+/// 2 %); a distortion that folds the picture over itself. Throws InputError for options that
+/// validate() refuses, and nothing else.
 CalibrateResult calibrate(const BoardDescription& board, const std::vector<BoardView>& views,
                           int image_width, int image_height, const CalibrateOptions& options);
 

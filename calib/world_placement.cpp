@@ -6,17 +6,15 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <array>
-#include <cassert>
 #include <cmath>
 #include <limits>
-#include <list>
-#include <map>
 #include <optional>
 
 #include "calib/pose_block.h"
 #include "calib/pose_start.h"
 #include "calib/projection.h"
 #include "calib/robust_scale.h"
+#include "calib/tag_squares.h"
 
 namespace clothfit {
 namespace {
@@ -160,88 +158,6 @@ bool is_finite(const std::vector<PlacedPixel>& pixels) {
 
 // ---- The world from reference points ----
 
-/// The four corners of one tag, in the order round the square that the survey shows.
-struct Square {
-  std::array<std::size_t, 4> corners{};  ///< indices into the reference points
-  Rigid3 world_from_square;              ///< origin in the middle, sides along x and y
-  double side_m = 0;
-  double misfit2_m2 = 0;  ///< sum of squared distances of the survey from the best square
-  std::size_t side = 0;   ///< index of the side it shares with other squares
-};
-
-/// Corner `k` of a square of side 1.
-Eigen::Vector3d unit_corner(std::size_t k) {
-  static const std::array<Eigen::Vector3d, 4> corners{
-      Eigen::Vector3d(-0.5, -0.5, 0), Eigen::Vector3d(0.5, -0.5, 0), Eigen::Vector3d(0.5, 0.5, 0),
-      Eigen::Vector3d(-0.5, 0.5, 0)};
-  return corners[k];
-}
-
-/// The best square through four surveyed points, in whatever order they come.
-Square fit_square(const std::vector<PlacedPixel>& reference,
-                  const std::array<std::size_t, 4>& points) {
-  Square best;
-  best.misfit2_m2 = std::numeric_limits<double>::infinity();
-  constexpr std::array<std::array<std::size_t, 4>, 3> kRounds{
-      {{0, 1, 2, 3}, {0, 1, 3, 2}, {0, 2, 1, 3}}};
-  for (const auto& round : kRounds) {
-    Square square;
-    Eigen::Matrix3Xd unit(3, 4), surveyed(3, 4);
-    for (std::size_t k = 0; k < 4; ++k) {
-      square.corners[k] = points[round[k]];
-      unit.col(static_cast<Eigen::Index>(k)) = unit_corner(k);
-      surveyed.col(static_cast<Eigen::Index>(k)) = reference[square.corners[k]].point_m;
-    }
-    // Turning and scaling separate: the best scale for the best rotation is a projection.
-    square.world_from_square = fit_rigid(unit, surveyed);
-    const Eigen::Matrix3Xd turned = square.world_from_square.rotation.toRotationMatrix() * unit;
-    const Eigen::Matrix3Xd centred = surveyed.colwise() - surveyed.rowwise().mean();
-    square.side_m = turned.cwiseProduct(centred).sum() / turned.squaredNorm();
-    square.misfit2_m2 = (centred - square.side_m * turned).squaredNorm();
-    if (square.misfit2_m2 < best.misfit2_m2) best = square;
-  }
-  return best;
-}
-
-/// The squares among the reference points, with sides that agree shared.
-std::vector<Square> find_squares(const std::vector<PlacedPixel>& reference,
-                                 std::vector<double>& sides_m) {
-  constexpr double kLargestMisfit = 0.15;  // of the side, rms per corner: not a square
-  std::map<int, std::vector<std::size_t>> groups;
-  for (std::size_t i = 0; i < reference.size(); ++i) {
-    if (reference[i].group >= 0) groups[reference[i].group].push_back(i);
-  }
-  std::vector<Square> squares;
-  for (const auto& [group, points] : groups) {
-    if (points.size() != 4) continue;
-    const Square square = fit_square(reference, {points[0], points[1], points[2], points[3]});
-    if (square.side_m > 0 && std::sqrt(square.misfit2_m2 / 4) < kLargestMisfit * square.side_m) {
-      squares.push_back(square);
-    }
-  }
-  // 12 coordinates less 7 of the square; the side of one square has the survey's sigma / sqrt 2.
-  double misfit2_m2 = 0;
-  for (const auto& square : squares) misfit2_m2 += square.misfit2_m2;
-  const double survey_sigma_m =
-      std::sqrt(misfit2_m2 / std::max(5.0 * static_cast<double>(squares.size()), 1.0));
-  const double gap_m = 4 * survey_sigma_m + 1e-6;
-  std::vector<Square*> by_side;
-  for (auto& square : squares) by_side.push_back(&square);
-  std::sort(by_side.begin(), by_side.end(),
-            [](const Square* a, const Square* b) { return a->side_m < b->side_m; });
-  std::vector<double> members;
-  for (std::size_t i = 0; i < by_side.size(); ++i) {
-    if (i == 0 || by_side[i]->side_m - by_side[i - 1]->side_m > gap_m) {
-      sides_m.push_back(0);
-      members.push_back(0);
-    }
-    by_side[i]->side = sides_m.size() - 1;
-    members.back() += 1;
-    sides_m.back() += (by_side[i]->side_m - sides_m.back()) / members.back();
-  }
-  return squares;
-}
-
 struct PixelOfPoint {
   const FixedCamera* camera;
   const PlacedPixel* observed;
@@ -265,7 +181,7 @@ struct SurveyOfPoint {
 template <class Real>
 Eigen::Matrix<Real, 3, 1> square_corner(std::size_t k, const Real* world_from_square,
                                         const Real* side_m) {
-  const Eigen::Matrix<Real, 3, 1> corner = unit_corner(k).cast<Real>() * side_m[0];
+  const Eigen::Matrix<Real, 3, 1> corner = unit_square_corner(k).cast<Real>() * side_m[0];
   return transform(world_from_square, corner);
 }
 
@@ -273,12 +189,24 @@ struct PixelOfSquare {
   const FixedCamera* camera;
   const PlacedPixel* observed;
   std::size_t corner;
+  double sigma_factor;
   template <class Real>
   bool operator()(const Real* camera_from_world, const Real* world_from_square, const Real* side_m,
                   Real* out) const {
-    return camera->residual<Real>(
-        transform(camera_from_world, square_corner(corner, world_from_square, side_m)), *observed,
-        out);
+    const Eigen::Matrix<Real, 3, 1> place = square_corner(corner, world_from_square, side_m);
+    if (!camera->residual<Real>(transform(camera_from_world, place), *observed, out)) return false;
+    out[0] /= Real(sigma_factor);
+    out[1] /= Real(sigma_factor);
+    return true;
+  }
+};
+
+struct SideLikeTheOthers {
+  double sigma_m;
+  template <class Real>
+  bool operator()(const Real* side_m, const Real* common_side_m, Real* out) const {
+    out[0] = (side_m[0] - common_side_m[0]) / Real(sigma_m);
+    return true;
   }
 };
 
@@ -294,54 +222,73 @@ struct SurveyOfSquare {
   }
 };
 
+/// Standard deviation of the sides of tags printed alike, relative: what a printer keeps, and the
+/// detector's bias from one tag to the next.
+constexpr double kPrintTolerance = 1e-3;
+
 /// All unknowns of the placement.
 struct WorldUnknowns {
   PoseBlock camera_from_world{};
-  std::vector<Square> squares;
+  std::vector<TagSquare> squares;
   std::vector<PoseBlock> world_from_square;
-  std::vector<double> sides_m;
+  std::vector<double> common_sides_m;          ///< of squares that are alike
   std::vector<std::size_t> single;             ///< points that belong to no square
   std::vector<std::array<double, 3>> place_m;  ///< of the single points
 };
 
-/// What one solve leaves: residuals in sigmas, pixels first, and the inverse normal equations.
+/// The two standard deviations that the data themselves decide.
+struct Spread {
+  double survey_sigma_m = 1e-3;
+  /// Pixels of squares, in units of the stated sigma, >= 1: paper that is not quite flat and tags
+  /// that are not quite alike show here.
+  double square_factor = 1;
+};
+
+/// What one solve leaves.
 struct WorldSolve {
   bool usable = false;
-  double survey_sum = 0;         ///< of squared standardised survey residuals
+  double survey_sum = 0;         ///< of squared standardised residuals of the survey
   double survey_redundancy = 0;  ///< survey coordinates less those that the unknowns use up
+  double square_sum = 0;         ///< the same for pixels of squares
+  double square_redundancy = 0;
   Eigen::Matrix<double, 6, 6> covariance;
 };
 
 WorldSolve solve_world(const FixedCamera& camera, const std::vector<PlacedPixel>& reference,
-                       double survey_sigma_m, WorldUnknowns& unknowns) {
+                       const Spread& spread, WorldUnknowns& unknowns) {
   ceres::Problem problem;
   double* pose = unknowns.camera_from_world.data();
   problem.AddParameterBlock(pose, 7, new PoseManifold);
-  std::vector<ceres::ResidualBlockId> pixels, surveys;
+  std::vector<ceres::ResidualBlockId> square_pixels, others, surveys;
   for (std::size_t s = 0; s < unknowns.squares.size(); ++s) {
     double* square = unknowns.world_from_square[s].data();
-    double* side = &unknowns.sides_m[unknowns.squares[s].side];
+    double* side = &unknowns.squares[s].side_m;
+    double* common_side = &unknowns.common_sides_m[unknowns.squares[s].alike];
     problem.AddParameterBlock(square, 7, new PoseManifold);
+    others.push_back(
+        problem.AddResidualBlock(new ceres::AutoDiffCostFunction<SideLikeTheOthers, 1, 1, 1>(
+                                     new SideLikeTheOthers{kPrintTolerance * *common_side}),
+                                 nullptr, side, common_side));
     for (std::size_t k = 0; k < 4; ++k) {
       const PlacedPixel* point = &reference[unknowns.squares[s].corners[k]];
-      pixels.push_back(
+      square_pixels.push_back(
           problem.AddResidualBlock(new ceres::AutoDiffCostFunction<PixelOfSquare, 2, 7, 7, 1>(
-                                       new PixelOfSquare{&camera, point, k}),
+                                       new PixelOfSquare{&camera, point, k, spread.square_factor}),
                                    nullptr, pose, square, side));
       surveys.push_back(
           problem.AddResidualBlock(new ceres::AutoDiffCostFunction<SurveyOfSquare, 3, 7, 1>(
-                                       new SurveyOfSquare{point, survey_sigma_m, k}),
+                                       new SurveyOfSquare{point, spread.survey_sigma_m, k}),
                                    nullptr, square, side));
     }
   }
   for (std::size_t i = 0; i < unknowns.single.size(); ++i) {
     const PlacedPixel* point = &reference[unknowns.single[i]];
     double* place = unknowns.place_m[i].data();
-    pixels.push_back(problem.AddResidualBlock(
+    others.push_back(problem.AddResidualBlock(
         new ceres::AutoDiffCostFunction<PixelOfPoint, 2, 7, 3>(new PixelOfPoint{&camera, point}),
         nullptr, pose, place));
     surveys.push_back(problem.AddResidualBlock(new ceres::AutoDiffCostFunction<SurveyOfPoint, 3, 3>(
-                                                   new SurveyOfPoint{point, survey_sigma_m}),
+                                                   new SurveyOfPoint{point, spread.survey_sigma_m}),
                                                nullptr, place));
   }
 
@@ -352,7 +299,8 @@ WorldSolve solve_world(const FixedCamera& camera, const std::vector<PlacedPixel>
 
   // The camera's pose was added first, so its tangent holds the first six columns.
   ceres::Problem::EvaluateOptions evaluate;
-  evaluate.residual_blocks = pixels;
+  evaluate.residual_blocks = square_pixels;
+  evaluate.residual_blocks.insert(evaluate.residual_blocks.end(), others.begin(), others.end());
   evaluate.residual_blocks.insert(evaluate.residual_blocks.end(), surveys.begin(), surveys.end());
   problem.GetParameterBlocks(&evaluate.parameter_blocks);
   const auto first =
@@ -387,6 +335,10 @@ WorldSolve solve_world(const FixedCamera& camera, const std::vector<PlacedPixel>
   result.survey_sum = all.tail(survey_rows).squaredNorm();
   result.survey_redundancy =
       static_cast<double>(survey_rows) - thin_q.bottomRows(survey_rows).squaredNorm();
+  const auto square_rows = static_cast<Eigen::Index>(2 * square_pixels.size());
+  result.square_sum = all.head(square_rows).squaredNorm();
+  result.square_redundancy =
+      static_cast<double>(square_rows) - thin_q.topRows(square_rows).squaredNorm();
   result.usable = true;
   return result;
 }
@@ -488,9 +440,9 @@ SheetPoseResult place_sheet(const CameraParameters& parameters,
 WorldPlacementResult place_world(const CameraParameters& parameters,
                                  const std::vector<PlacedPixel>& reference,
                                  const std::vector<PlacedPixel>& sheet) {
-  constexpr double kFirstGuessM = 1e-3;
   constexpr double kSmallestSurveySigmaM = 1e-6;
-  constexpr int kVarianceRounds = 30;
+  constexpr double kLeastSquareRedundancy = 2;  // fewer say nothing about a standard deviation
+  constexpr int kVarianceRounds = 50;
 
   WorldPlacementResult result;
   result.covariance.setZero();
@@ -512,7 +464,7 @@ WorldPlacementResult place_world(const CameraParameters& parameters,
 
   WorldUnknowns unknowns;
   unknowns.camera_from_world = to_block(*start);
-  unknowns.squares = find_squares(reference, unknowns.sides_m);
+  unknowns.squares = find_tag_squares(reference, unknowns.common_sides_m);
   std::vector<char> in_square(reference.size(), 0);
   for (const auto& square : unknowns.squares) {
     unknowns.world_from_square.push_back(to_block(square.world_from_square));
@@ -525,16 +477,24 @@ WorldPlacementResult place_world(const CameraParameters& parameters,
     unknowns.place_m.push_back({point.x(), point.y(), point.z()});
   }
 
-  double survey_sigma_m = kFirstGuessM;
+  Spread spread;
   WorldSolve solve;
   for (int round = 0; round < kVarianceRounds; ++round) {
-    solve = solve_world(camera, reference, survey_sigma_m, unknowns);
+    solve = solve_world(camera, reference, spread, unknowns);
     if (!solve.usable || !(solve.survey_redundancy > 0)) break;
-    const double factor = std::sqrt(solve.survey_sum / solve.survey_redundancy);
-    const double next_m = std::max(survey_sigma_m * factor, kSmallestSurveySigmaM);
-    const bool settled = std::abs(next_m - survey_sigma_m) < 1e-3 * survey_sigma_m;
-    survey_sigma_m = next_m;
-    if (settled) break;
+    const Spread before = spread;
+    spread.survey_sigma_m =
+        std::max(before.survey_sigma_m * std::sqrt(solve.survey_sum / solve.survey_redundancy),
+                 kSmallestSurveySigmaM);
+    if (solve.square_redundancy > kLeastSquareRedundancy) {
+      spread.square_factor = std::max(
+          before.square_factor * std::sqrt(solve.square_sum / solve.square_redundancy), 1.0);
+    }
+    const auto settled = [](double now, double last) { return std::abs(now - last) < 3e-3 * last; };
+    if (settled(spread.survey_sigma_m, before.survey_sigma_m) &&
+        settled(spread.square_factor, before.square_factor)) {
+      break;
+    }
   }
   if (!solve.usable) {
     result.message = "the reference points leave the camera's pose undetermined";
@@ -542,7 +502,7 @@ WorldPlacementResult place_world(const CameraParameters& parameters,
   }
   result.camera_from_world = from_block(unknowns.camera_from_world);
   result.covariance = solve.covariance;
-  result.reference_survey_sigma_m = survey_sigma_m;
+  result.reference_survey_sigma_m = spread.survey_sigma_m;
   double sum_px2 = 0;
   const auto residuals = standardised_residuals(camera, reference, result.camera_from_world);
   for (std::size_t i = 0; i < reference.size(); ++i) {
@@ -553,7 +513,7 @@ WorldPlacementResult place_world(const CameraParameters& parameters,
   const double tilt_mrad = 1e3 * std::sqrt(result.covariance(0, 0));
   result.message = fmt::format(
       "{} reference points, survey sigma {:.2f} mm, {:.2f} px; camera tilt sigma {:.1f} mrad",
-      reference.size(), 1e3 * survey_sigma_m, result.reference_rms_px, tilt_mrad);
+      reference.size(), 1e3 * spread.survey_sigma_m, result.reference_rms_px, tilt_mrad);
 
   if (result.usable && !sheet.empty()) {
     const SheetPoseResult placed = place_sheet(parameters, sheet);
