@@ -381,6 +381,74 @@ std::optional<Rigid3> start_world(const CameraParameters& parameters, const Fixe
   return best->camera_from_world;
 }
 
+/// The reference points that agree with the pose. A corner misread or a place written down wrongly
+/// is off by centimetres; others by the survey's error, whose size is not known yet, seen across
+/// the ray.
+std::vector<PlacedPixel> without_blunders(const FixedCamera& camera,
+                                          const std::vector<PlacedPixel>& reference,
+                                          const Rigid3& camera_from_world) {
+  constexpr double kBlunderSpreads = 8;
+  const auto residuals = standardised_residuals(camera, reference, camera_from_world);
+  std::vector<Eigen::Vector2d> across_ray_m;
+  for (std::size_t i = 0; i < reference.size(); ++i) {
+    const double depth_m = (camera_from_world * reference[i].point_m).z();
+    across_ray_m.emplace_back(residuals[i] * reference[i].sigma_px * depth_m /
+                              camera.intrinsics[0]);
+  }
+  const double limit_m = kBlunderSpreads * robust_spread(across_ray_m);
+  std::vector<PlacedPixel> good;
+  for (std::size_t i = 0; i < reference.size(); ++i) {
+    if (across_ray_m[i].norm() <= limit_m) good.push_back(reference[i]);
+  }
+  return good;
+}
+
+WorldUnknowns first_unknowns(const std::vector<PlacedPixel>& reference,
+                             const Rigid3& camera_from_world) {
+  WorldUnknowns unknowns;
+  unknowns.camera_from_world = to_block(camera_from_world);
+  unknowns.squares = find_tag_squares(reference, unknowns.common_sides_m);
+  std::vector<char> in_square(reference.size(), 0);
+  for (const auto& square : unknowns.squares) {
+    unknowns.world_from_square.push_back(to_block(square.world_from_square));
+    for (const std::size_t corner : square.corners) in_square[corner] = 1;
+  }
+  for (std::size_t i = 0; i < reference.size(); ++i) {
+    if (in_square[i]) continue;
+    const auto& point = reference[i].point_m;
+    unknowns.single.push_back(i);
+    unknowns.place_m.push_back({point.x(), point.y(), point.z()});
+  }
+  return unknowns;
+}
+
+/// Solves for the unknowns and, in turn, for the two spreads, until these settle.
+WorldSolve solve_with_spread(const FixedCamera& camera, const std::vector<PlacedPixel>& reference,
+                             WorldUnknowns& unknowns, Spread& spread) {
+  constexpr double kSmallestSurveySigmaM = 1e-6;
+  constexpr double kLeastSquareRedundancy = 2;  // fewer say nothing about a standard deviation
+  constexpr int kRounds = 50;
+  const auto settled = [](double now, double last) { return std::abs(now - last) < 3e-3 * last; };
+  WorldSolve solve;
+  for (int round = 0; round < kRounds; ++round) {
+    solve = solve_world(camera, reference, spread, unknowns);
+    if (!solve.usable || !(solve.survey_redundancy > 0)) break;
+    const Spread before = spread;
+    spread.survey_sigma_m =
+        std::max(before.survey_sigma_m * std::sqrt(solve.survey_sum / solve.survey_redundancy),
+                 kSmallestSurveySigmaM);
+    if (solve.square_redundancy > kLeastSquareRedundancy) {
+      spread.square_factor = std::max(
+          before.square_factor * std::sqrt(solve.square_sum / solve.square_redundancy), 1.0);
+    }
+    if (settled(spread.survey_sigma_m, before.survey_sigma_m) &&
+        settled(spread.square_factor, before.square_factor)) {
+      break;
+    }
+  }
+  return solve;
+}
+
 }  // namespace
 
 SheetPoseResult place_sheet(const CameraParameters& parameters,
@@ -440,12 +508,7 @@ SheetPoseResult place_sheet(const CameraParameters& parameters,
 WorldPlacementResult place_world(const CameraParameters& parameters,
                                  const std::vector<PlacedPixel>& reference,
                                  const std::vector<PlacedPixel>& sheet) {
-  constexpr double kSmallestSurveySigmaM = 1e-6;
-  constexpr double kLeastSquareRedundancy = 2;  // fewer say nothing about a standard deviation
-  constexpr int kVarianceRounds = 50;
-
   WorldPlacementResult result;
-  result.covariance.setZero();
   if (reference.size() < 4) {
     result.message =
         fmt::format("{} reference points are seen; 4 or more place the camera", reference.size());
@@ -461,41 +524,17 @@ WorldPlacementResult place_world(const CameraParameters& parameters,
     result.message = "the reference points do not place the camera; are they on one line?";
     return result;
   }
-
-  WorldUnknowns unknowns;
-  unknowns.camera_from_world = to_block(*start);
-  unknowns.squares = find_tag_squares(reference, unknowns.common_sides_m);
-  std::vector<char> in_square(reference.size(), 0);
-  for (const auto& square : unknowns.squares) {
-    unknowns.world_from_square.push_back(to_block(square.world_from_square));
-    for (const std::size_t corner : square.corners) in_square[corner] = 1;
-  }
-  for (std::size_t i = 0; i < reference.size(); ++i) {
-    if (in_square[i]) continue;
-    const auto& point = reference[i].point_m;
-    unknowns.single.push_back(i);
-    unknowns.place_m.push_back({point.x(), point.y(), point.z()});
+  const std::vector<PlacedPixel> good = without_blunders(camera, reference, *start);
+  result.reference_rejected = static_cast<int>(reference.size() - good.size());
+  if (good.size() < 4) {
+    result.message = fmt::format("only {} of {} reference points agree on a pose of the camera",
+                                 good.size(), reference.size());
+    return result;
   }
 
+  WorldUnknowns unknowns = first_unknowns(good, *start);
   Spread spread;
-  WorldSolve solve;
-  for (int round = 0; round < kVarianceRounds; ++round) {
-    solve = solve_world(camera, reference, spread, unknowns);
-    if (!solve.usable || !(solve.survey_redundancy > 0)) break;
-    const Spread before = spread;
-    spread.survey_sigma_m =
-        std::max(before.survey_sigma_m * std::sqrt(solve.survey_sum / solve.survey_redundancy),
-                 kSmallestSurveySigmaM);
-    if (solve.square_redundancy > kLeastSquareRedundancy) {
-      spread.square_factor = std::max(
-          before.square_factor * std::sqrt(solve.square_sum / solve.square_redundancy), 1.0);
-    }
-    const auto settled = [](double now, double last) { return std::abs(now - last) < 3e-3 * last; };
-    if (settled(spread.survey_sigma_m, before.survey_sigma_m) &&
-        settled(spread.square_factor, before.square_factor)) {
-      break;
-    }
-  }
+  const WorldSolve solve = solve_with_spread(camera, good, unknowns, spread);
   if (!solve.usable) {
     result.message = "the reference points leave the camera's pose undetermined";
     return result;
@@ -504,16 +543,17 @@ WorldPlacementResult place_world(const CameraParameters& parameters,
   result.covariance = solve.covariance;
   result.reference_survey_sigma_m = spread.survey_sigma_m;
   double sum_px2 = 0;
-  const auto residuals = standardised_residuals(camera, reference, result.camera_from_world);
-  for (std::size_t i = 0; i < reference.size(); ++i) {
-    sum_px2 += (reference[i].sigma_px * residuals[i]).squaredNorm();
+  const auto residuals = standardised_residuals(camera, good, result.camera_from_world);
+  for (std::size_t i = 0; i < good.size(); ++i) {
+    sum_px2 += (good[i].sigma_px * residuals[i]).squaredNorm();
   }
-  result.reference_rms_px = std::sqrt(sum_px2 / (2 * static_cast<double>(reference.size())));
+  result.reference_rms_px = std::sqrt(sum_px2 / (2 * static_cast<double>(good.size())));
   result.usable = std::isfinite(result.reference_rms_px) && result.covariance.allFinite();
-  const double tilt_mrad = 1e3 * std::sqrt(result.covariance(0, 0));
   result.message = fmt::format(
-      "{} reference points, survey sigma {:.2f} mm, {:.2f} px; camera tilt sigma {:.1f} mrad",
-      reference.size(), 1e3 * spread.survey_sigma_m, result.reference_rms_px, tilt_mrad);
+      "{} of {} reference points, survey sigma {:.2f} mm, rms {:.2f} px; sigma of the camera's "
+      "tilt {:.1f} mrad",
+      good.size(), reference.size(), 1e3 * spread.survey_sigma_m, result.reference_rms_px,
+      1e3 * std::sqrt(result.covariance(0, 0)));
 
   if (result.usable && !sheet.empty()) {
     const SheetPoseResult placed = place_sheet(parameters, sheet);

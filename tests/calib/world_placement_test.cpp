@@ -242,6 +242,24 @@ TEST(PlaceWorld, PlacesTheSheetBesideTheReference) {
   EXPECT_LT(placed.sheet_rms_px, 1e-5);
 }
 
+TEST(PlaceWorld, SurvivesAPlaceWrittenDownWrongly) {
+  for (unsigned seed = 20; seed < 30; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    std::mt19937_64 rng(seed);
+    Scene scene = random_scene({}, rng);
+    scene.reference[6].point_m.x() += 0.05;
+    scene.reference[13].pixel_px.y() += 40;
+
+    const WorldPlacementResult placed = place_world(scene.camera, scene.reference, {});
+
+    ASSERT_TRUE(placed.usable) << placed.message;
+    EXPECT_EQ(placed.reference_rejected, 2);
+    EXPECT_LT(placed.reference_survey_sigma_m, 1.5e-3);
+    const auto error = pose_error(scene.camera_from_world, placed.camera_from_world);
+    EXPECT_LT(error.dot(placed.covariance.ldlt().solve(error)), 30);
+  }
+}
+
 TEST(PlaceWorld, TakesCornersOfATagInAnyOrder) {
   std::mt19937_64 rng(8);
   SCOPED_TRACE("seed 8");
