@@ -73,7 +73,8 @@ class PictureFolder : public ImageSource {
 
 class VideoFile : public ImageSource {
  public:
-  explicit VideoFile(const fs::path& file) : file_(file.string()), capture_(file_) {
+  // One named backend: which others OpenCV would try, and what they print, depends on the machine.
+  explicit VideoFile(const fs::path& file) : file_(file.string()), capture_(file_, cv::CAP_FFMPEG) {
     capture_.set(cv::CAP_PROP_ORIENTATION_AUTO, 0);  // as for pictures
     if (!capture_.isOpened() || !capture_.read(picture_) || picture_.empty()) {
       throw InputError(file_, "no picture can be read from it", "a folder of pictures or a video",

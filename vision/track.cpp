@@ -264,8 +264,9 @@ std::string what_appears_instead(const Readings& readings, const std::string& fa
   return "check the camera's `images`, the light, and that a tag is 30 pixels wide or more";
 }
 
-/// The mean place of a corner that does not move. What scatters from frame to frame averages out;
-/// what is left of the detections' own sigma does not.
+/// The mean place of a corner that does not move. Only the scatter from frame to frame averages
+/// out: ragged edges and the pixel grid are the same in every picture of a fixed tag, so that the
+/// detections' own sigma stays.
 ReferencePixel average(int point, const std::vector<Eigen::Vector2d>& pixels,
                        const std::vector<double>& sigmas) {
   const auto median = [](std::vector<double> values) {
@@ -281,9 +282,9 @@ ReferencePixel average(int point, const std::vector<Eigen::Vector2d>& pixels,
   const Eigen::Vector2d centre(median(u), median(v));
   for (const Eigen::Vector2d& pixel : pixels) distance.push_back((pixel - centre).norm());
 
-  // Something that passes in front bends a corner off its place for a few frames. The median
-  // distance of a normal scatter is 1.18 sigma; detections further off than 5 sigma are left out.
-  const double reach = std::max(5 * median(distance) / 1.18, 1e-3);
+  // Something that passes in front bends a corner off its place for a few frames: detections
+  // further off than 5 sigma are left out. The median distance of a normal scatter is 1.18 sigma.
+  const double reach = 5 * std::max(median(distance) / 1.18, median(sigmas));
   Eigen::Vector2d sum = Eigen::Vector2d::Zero();
   double square_sigma_sum = 0;
   int used = 0;
@@ -300,10 +301,9 @@ ReferencePixel average(int point, const std::vector<Eigen::Vector2d>& pixels,
   }
   const double stated = square_sigma_sum / used;
   scatter = used > 1 ? scatter / (used - 1) : stated;
-  const double systematic = std::max(stated - scatter, 0.0);
   return {.point = point,
           .pixel_px = mean,
-          .sigma_px = std::sqrt(scatter / used + systematic),
+          .sigma_px = std::sqrt(stated + scatter / used),
           .frames = used};
 }
 
