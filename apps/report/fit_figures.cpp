@@ -219,30 +219,29 @@ std::string observed_and_predicted_svg(const FitReport::Residuals& residuals,
       std::find_if(pictures.begin(), pictures.end(), [&](const BackgroundPicture& one) {
         return one.kind == residuals.kind && one.frame == frame;
       });
+  Eigen::AlignedBox2d box;
+  for (const PointPair& point : overlay.points) {
+    box.extend(Eigen::Vector2d(point.observed_x, point.observed_y));
+  }
+  const double margin = 0.08 * box.diagonal().norm() + 1e-9;
+  // A hanging strip would fill pages: four wide to three high at most, the points in the middle.
+  const double widen = std::max(0.0, 2 * box.sizes().y() / 3 - box.sizes().x() / 2);
+  const Eigen::Vector2d border(margin + widen, margin);
+  box = Eigen::AlignedBox2d(box.min() - border, box.max() + border);
   if (picture != pictures.end()) {
     // OpenCV's pixel (0, 0) is a pixel's centre; the picture begins half a pixel before it.
-    overlay.left = overlay.top = -0.5;
-    overlay.width = picture->width;
-    overlay.height = picture->height;
+    overlay.picture_left = overlay.picture_top = -0.5;
+    overlay.picture_width = picture->width;
+    overlay.picture_height = picture->height;
     overlay.picture_uri = data_uri("image/jpeg", picture->jpeg);
-  } else {
-    Eigen::AlignedBox2d box;
-    for (const PointPair& point : overlay.points) {
-      box.extend(Eigen::Vector2d(point.observed_x, point.observed_y));
-    }
-    const double margin = 0.08 * box.diagonal().norm() + 1e-9;
-    const Eigen::Vector2d corner = box.min() - Eigen::Vector2d::Constant(margin);
-    const Eigen::Vector2d size = box.sizes() + Eigen::Vector2d::Constant(2 * margin);
-    overlay.left = corner.x();
-    overlay.top = corner.y();
-    overlay.width = size.x();
-    // A hanging strip would fill pages: no taller than wide, the points in the middle.
-    overlay.height = size.y();
-    if (size.y() > 0.8 * size.x()) {
-      overlay.width = size.y() / 0.8;
-      overlay.left -= 0.5 * (overlay.width - size.x());
-    }
+    const Eigen::Vector2d first(-0.5, -0.5);
+    box = box.intersection(
+        Eigen::AlignedBox2d(first, first + Eigen::Vector2d(picture->width, picture->height)));
   }
+  overlay.left = box.min().x();
+  overlay.top = box.min().y();
+  overlay.width = box.sizes().x();
+  overlay.height = box.sizes().y();
   overlay.magnification = choose_magnification(overlay.points, 800 / overlay.width);
   return point_overlay(overlay);
 }

@@ -79,11 +79,10 @@ std::string correlation_section(const FitReport& report) {
   if (count < 2 || report.correlation.rows() != count || report.correlation.cols() != count) {
     return "";
   }
-  std::string html =
-      "<div class=\"wide\"><table class=\"matrix\"><caption>Correlation of the estimates: near 1 "
-      "or "
-      "−1, the data fix a combination of two parameters better than either.</caption>"
-      "<thead><tr><td></td>";
+  std::string html = paragraph(
+      "Correlation of the estimates: near 1 or −1, the data fix a combination of two parameters "
+      "better than either.");
+  html += "<div class=\"wide\"><table class=\"matrix\"><thead><tr><td></td>";
   for (const std::string& name : report.correlation_names) {
     html += fmt::format("<th scope=\"col\">{}</th>", escape_xml(name));
   }
@@ -173,7 +172,8 @@ std::string words_section() {
 std::string fit_page_html(const FitReport& report, const Recording& recording,
                           const std::vector<BackgroundPicture>& pictures) {
   std::string body = heading(report);
-  if (!report.message.empty()) body += paragraph(report.message);
+  if (!report.message.empty())
+    body += fmt::format("<p class=\"meta\">{}</p>\n", escape_xml(report.message));
   body += section("Parameters",
                   html_table(short_parameter_table(report.result),
                              "Value with one standard deviation, given the model below."));

@@ -16,7 +16,7 @@ body { margin: 0; background: #fff; color: var(--ink);
   font: 16px/1.55 "Source Sans 3", "Helvetica Neue", Arial, "Liberation Sans", "DejaVu Sans", sans-serif; }
 main { max-width: 52rem; margin: 0 auto; padding: 2.5rem 1.25rem 4rem; }
 h1 { font-size: 1.9rem; line-height: 1.2; margin: 0 0 .3rem; letter-spacing: -.01em; }
-h2 { font-size: 1.2rem; margin: 2.6rem 0 .6rem; padding-top: .8rem; border-top: 1px solid var(--rule); }
+h2 { font-size: 1.2rem; margin: 2rem 0 .5rem; padding-top: .8rem; border-top: 1px solid var(--rule); }
 p { margin: .5rem 0 .8rem; }
 .meta { color: var(--soft); margin: 0 0 1.2rem; }
 .verdict { border-left: 4px solid var(--accent); background: #f4f7fa; padding: .9rem 1.1rem; margin: 1.2rem 0; }
@@ -28,10 +28,10 @@ caption { text-align: left; color: var(--soft); padding: 0 0 .4rem; }
 th, td { padding: .32rem .7rem .32rem 0; text-align: left; vertical-align: top; }
 thead th { border-bottom: 1.5px solid var(--ink); font-weight: 600; vertical-align: bottom; }
 tbody td, tbody th { border-bottom: 1px solid var(--rule); font-weight: 400; }
-.number { text-align: right; white-space: nowrap; }
+.number { text-align: right; } td.number, tbody th { white-space: nowrap; }
 td:last-child, th:last-child { padding-right: 0; }
 .matrix { width: auto; } .matrix td, .matrix th { padding: .25rem .45rem; }
-.matrix thead th { writing-mode: vertical-rl; text-align: left; }
+.matrix thead th { writing-mode: vertical-rl; transform: rotate(180deg); text-align: left; border-bottom: 0; border-top: 1.5px solid var(--ink); padding: .45rem .25rem; }
 figure { margin: 1rem 0 1.6rem; }
 figure svg { display: block; width: 100%; height: auto; }
 figcaption { color: var(--soft); font-size: .92rem; margin-top: .4rem; }

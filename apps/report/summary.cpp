@@ -109,7 +109,7 @@ FitSummary summarise(const FitReport& report) {
       result.mesh_columns, result.mesh_rows, result.observations_used, result.recording,
       parameter_sentence(result));
   for (const ObservationErrors& errors : result.errors) {
-    summary.paragraph += " " + error_sentence(errors);
+    summary.paragraph += fmt::format(" {}", error_sentence(errors));
   }
   if (judged && worst == Grade::useful) {
     summary.paragraph +=

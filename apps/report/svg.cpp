@@ -239,11 +239,11 @@ std::string line_plot(const LinePlot& plot) {
 }
 
 std::string cloth_maps(const ClothMaps& maps) {
-  constexpr double kWidth = 800, kTop = 30, kMargin = 30, kGap = 44, kBarRoom = 92;
+  constexpr double kWidth = 800, kTop = 48, kMargin = 40, kGap = 56, kBarRoom = 100;
   const double panels = std::max<double>(1, static_cast<double>(maps.maps.size()));
   const double room = (kWidth - kMargin - kBarRoom - kGap * (panels - 1)) / panels;
-  // Panels keep the cloth's proportions inside room x 420.
-  const double scale = std::min(room / maps.width_m, 420 / maps.height_m);
+  // Panels keep the cloth's proportions inside room x 300.
+  const double scale = std::min(room / maps.width_m, 300 / maps.height_m);
   const double panel_width = scale * maps.width_m;
   const double panel_height = scale * maps.height_m;
 
@@ -257,12 +257,12 @@ std::string cloth_maps(const ClothMaps& maps) {
   }
   if (highest == 0) highest = 1;
   const double spacing = std::sqrt(panel_width * panel_height / static_cast<double>(most));
-  const double radius = std::clamp(0.42 * spacing, 2.0, 16.0);
+  const double radius = std::clamp(0.4 * spacing, 1.5, 12.0);
 
   std::string body;
   double left = kMargin;
   for (const ClothMap& map : maps.maps) {
-    body += text_at(left, kTop - 14, map.title);
+    body += text_at(left, kTop - 26, map.title);
     body += fmt::format(
         "<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" fill=\"none\" "
         "stroke=\"{}\"/>\n",
@@ -277,11 +277,11 @@ std::string cloth_maps(const ClothMaps& maps) {
     }
     left += panel_width + kGap;
   }
-  body += text_at(kMargin, kTop + panel_height + 22, "s, to the right →", "start", kSoft);
+  body += text_at(kMargin, kTop + panel_height + 28, "s, to the right →", "start", kSoft);
   body += fmt::format(
       "<text transform=\"translate({:.1f} {:.1f}) rotate(-90)\" text-anchor=\"end\" "
       "fill=\"{}\">← t, down</text>\n",
-      kMargin - 14, kTop, kSoft);
+      kMargin - 22, kTop, kSoft);
 
   // Colour bar: 0 at the bottom.
   const double bar_left = left - kGap + 28;
@@ -299,8 +299,8 @@ std::string cloth_maps(const ClothMaps& maps) {
     body += text_at(bar_left + 22, bar(tick) + 4, tick_text(tick), "start", kSoft);
   }
   const double width = std::min(kWidth, bar_left + 66);
-  body += text_at(width, kTop - 14, maps.value_label, "end");
-  return open_svg(width, kTop + panel_height + 34, maps.title, maps.description) + body +
+  body += text_at(width, kTop - 26, maps.value_label, "end");
+  return open_svg(width, kTop + panel_height + 38, maps.title, maps.description) + body +
          "</svg>\n";
 }
 
@@ -310,62 +310,64 @@ std::string point_overlay(const PointOverlay& overlay) {
   const double height = scale * overlay.height;
   const auto x_px = [&](double x) { return scale * (x - overlay.left); };
   const auto y_px = [&](double y) { return scale * (y - overlay.top); };
+  const auto path = [](const std::string& data, const char* colour, double width) {
+    return fmt::format("<path d=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"{}\"/>\n", data,
+                       colour, width);
+  };
+  const auto ring = [](double x, double y) {
+    return fmt::format("M{:.1f} {:.1f}a3.6 3.6 0 1 0 7.2 0a3.6 3.6 0 1 0 -7.2 0", x - 3.6, y);
+  };
+  const auto cross = [](double x, double y) {
+    return fmt::format("M{:.1f} {:.1f}h5m-2.5 -2.5v5", x - 2.5, y);
+  };
 
-  std::string body;
-  const bool on_picture = !overlay.picture_uri.empty();
-  if (on_picture) {
-    body += fmt::format("<image href=\"{}\" width=\"{:.1f}\" height=\"{:.1f}\"/>\n",
-                        overlay.picture_uri, kWidth, height);
-  } else {
-    body +=
-        fmt::format("<rect width=\"{:.1f}\" height=\"{:.1f}\" fill=\"#fafbfc\" stroke=\"{}\"/>\n",
-                    kWidth, height, kGrid);
-  }
-
-  std::string lines;
   std::string rings;
   std::string crosses;
+  std::string lines;
+  std::string names;
   for (const PointPair& point : overlay.points) {
     const double ox = x_px(point.observed_x);
     const double oy = y_px(point.observed_y);
     const double px = x_px(point.predicted_x);
     const double py = y_px(point.predicted_y);
     if (!std::isfinite(ox + oy + px + py)) continue;
-    rings +=
-        fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"3.6\"><title>{}</title></circle>\n",
-                    ox, oy, escape_xml(point.label));
-    crosses += fmt::format("M{:.1f} {:.1f}h5m-2.5 -2.5v5", px - 2.5, py);
-    lines +=
-        fmt::format("M{:.1f} {:.1f}L{:.1f} {:.1f}", ox, oy, ox + overlay.magnification * (px - ox),
-                    oy + overlay.magnification * (py - oy));
+    rings += ring(ox, oy);
+    crosses += cross(px, py);
+    lines += fmt::format("M{:.1f} {:.1f}l{:.1f} {:.1f}", ox, oy, overlay.magnification * (px - ox),
+                         overlay.magnification * (py - oy));
+    names += fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"6\"><title>{}</title></circle>\n",
+                         ox, oy, escape_xml(point.label));
   }
-  const auto path = [](const std::string& data, const char* colour, double width) {
-    return fmt::format("<path d=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"{}\"/>\n", data,
-                       colour, width);
-  };
-  // A dark edge keeps light marks visible on the light parts of a picture.
-  body += fmt::format("<g fill=\"none\" stroke=\"{}\" stroke-width=\"{}\">\n{}</g>\n",
-                      on_picture ? "#00c2d1" : "#1f4e79", 1.3, rings);
-  if (!lines.empty()) {
-    if (on_picture) body += path(lines, "#000000", 2.6);
-    body += path(lines, on_picture ? "#ffd23f" : kSoft, 1.3);
-    if (on_picture) body += path(crosses, "#000000", 2.4);
-    body += path(crosses, on_picture ? "#ff5a36" : "#b8431b", 1.2);
+
+  // What lies outside the rectangle is cut off by the inner <svg>.
+  std::string body = fmt::format("<svg width=\"{:.1f}\" height=\"{:.1f}\">\n", kWidth, height);
+  const bool on_picture = !overlay.picture_uri.empty();
+  if (on_picture) {
+    body += fmt::format(
+        "<image href=\"{}\" x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\"/>\n",
+        overlay.picture_uri, x_px(overlay.picture_left), y_px(overlay.picture_top),
+        scale * overlay.picture_width, scale * overlay.picture_height);
+    // A dark edge keeps the marks visible on the light parts of the picture.
+    for (const std::string* marks : {&rings, &lines, &crosses}) body += path(*marks, "#000", 2.8);
+    body +=
+        path(rings, "#37e0ee", 1.3) + path(lines, "#ffd23f", 1.3) + path(crosses, "#ff7a59", 1.3);
+  } else {
+    body +=
+        fmt::format("<rect width=\"{:.1f}\" height=\"{:.1f}\" fill=\"#fafbfc\" stroke=\"{}\"/>\n",
+                    kWidth, height, kGrid);
+    body += path(rings, "#1f4e79", 1.3) + path(lines, kSoft, 1.2) + path(crosses, "#b8431b", 1.3);
   }
+  body += fmt::format("<g fill=\"none\" pointer-events=\"all\">\n{}</g>\n</svg>\n", names);
 
   // Key below the picture.
   const double y = height + 20;
-  body += fmt::format(
-      "<circle cx=\"10\" cy=\"{:.1f}\" r=\"3.6\" fill=\"none\" stroke=\"{}\" "
-      "stroke-width=\"1.3\"/>\n",
-      y - 4, on_picture ? "#0094a0" : "#1f4e79");
-  body += text_at(20, y, "observed");
-  body += path(fmt::format("M103.5 {:.1f}h5m-2.5 -2.5v5", y - 4), "#b8431b", 1.4);
-  body += text_at(116, y, "predicted");
+  body +=
+      path(ring(10, y - 4), on_picture ? "#0094a0" : "#1f4e79", 1.4) + text_at(22, y, "observed");
+  body += path(cross(106, y - 4), "#b8431b", 1.4) + text_at(116, y, "predicted");
   body += path(fmt::format("M196 {:.1f}h24", y - 4), on_picture ? "#a07a00" : kSoft, 1.4);
-  body += text_at(228, y,
-                  fmt::format("from observed towards predicted, {} times as long",
-                              significant(overlay.magnification, 3)));
+  body += text_at(
+      228, y,
+      fmt::format("from observed towards predicted, {:g} times as long", overlay.magnification));
   return open_svg(kWidth, height + 30, overlay.title, overlay.description) + body + "</svg>\n";
 }
 

@@ -91,7 +91,8 @@ struct PointOverlay {
   std::string title;
   std::string description;
   double left = 0, top = 0, width = 0, height = 0;  ///< what is shown, in the points' unit
-  std::string picture_uri;                          ///< fills that rectangle; may be empty
+  std::string picture_uri;                          ///< may be empty
+  double picture_left = 0, picture_top = 0, picture_width = 0, picture_height = 0;
   double magnification = 1;  ///< of the lines from observed towards predicted places
   std::vector<PointPair> points;
 };
