@@ -88,6 +88,12 @@ TagPattern printed_pattern(apriltag_family_t* family, int id) {
   return pattern;
 }
 
+/// A code with b wrong bits is still twice as near to its own word as to any other while
+/// 3 b < distance; a quarter of the distance leaves room for what is no tag at all.
+int safe_corrected_bits(const apriltag_family_t& family) {
+  return (static_cast<int>(family.h) - 1) / 4;
+}
+
 }  // namespace
 
 std::vector<std::string> tag_families() {
@@ -115,7 +121,9 @@ struct TagDetector::Library {
 
 TagDetector::TagDetector(const std::string& family, int max_corrected_bits)
     : library_(std::make_unique<Library>(find_family(family))) {
-  const int bits = std::min(max_corrected_bits, affordable_corrected_bits(*library_->family));
+  const apriltag_family_t& kind = *library_->family;
+  const int bits =
+      std::min({max_corrected_bits, safe_corrected_bits(kind), affordable_corrected_bits(kind)});
   apriltag_detector_add_family_bits(library_->detector.get(), library_->family.get(), bits);
   library_->detector->nthreads = 1;  // pictures are what runs in parallel
   library_->detector->quad_decimate = 1;

@@ -28,8 +28,9 @@ std::vector<std::string> tag_families();
 /// Reads the tags of one family in pictures. Not to be shared between threads: each has its own.
 class TagDetector {
  public:
-  /// `max_corrected_bits` is at most 2; large families correct fewer, for the sake of memory.
-  /// Throws InputError for a family that is not known, listing those that are.
+  /// `max_corrected_bits` is at most 2; families whose codes lie close together correct fewer, as
+  /// do large ones for the sake of memory. Throws InputError for a family that is not known,
+  /// listing those that are.
   explicit TagDetector(const std::string& family, int max_corrected_bits = 2);
   ~TagDetector();
   TagDetector(TagDetector&&) noexcept;

@@ -23,8 +23,9 @@ struct TrackOptions {
   double min_explained = 0.7;
   /// px, > 0: corners that are placed worse are rejected.
   double max_sigma_px = 1;
-  /// 0 to 2: readings with more wrong bits are rejected.
-  int max_corrected_bits = 1;
+  /// 0 to 2: readings with more wrong bits are rejected. Families whose codes lie close together
+  /// (tag16h5) are never read with more than is safe.
+  int max_corrected_bits = 2;
   void validate() const;  ///< throws InputError
 };
 

@@ -258,6 +258,56 @@ TEST(Track, RejectsWeakReadings) {
   EXPECT_TRUE(result.usable);
 }
 
+TEST(Track, RejectsCornersAtTheBorderOfThePicture) {
+  // The tag's left edge lies one pixel inside the picture.
+  DrawnRecording drawn;
+  const cv::Mat whole = drawn.draw(0, 0);
+  drawn.add(whole.colRange(139, 320).clone());
+
+  const TrackResult result = drawn.track_it();
+
+  ASSERT_EQ(result.tracks.size(), 4U);
+  for (const Position2d& row : result.tracks) {
+    const bool left = row.marker == 0 || row.marker == 3;
+    EXPECT_EQ(row.rejected, left ? "touching_border" : "") << "corner " << row.marker;
+  }
+}
+
+TEST(Track, RejectsWhatIsPlacedWorseThanAskedFor) {
+  DrawnRecording drawn;
+  drawn.add(drawn.draw(0, 0));
+
+  EXPECT_EQ(drawn.track_it({.max_sigma_px = 0.001}).rejected,
+            (std::map<std::string, int>{{"uncertain", 4}}));
+  EXPECT_EQ(drawn.track_it({.min_explained = 0.999}).rejected,
+            (std::map<std::string, int>{{"pattern_mismatch", 4}}));
+  EXPECT_FALSE(drawn.track_it({.min_explained = 0.999}).usable);
+}
+
+TEST(Track, RejectsACodeWithMoreWrongBitsThanAskedFor) {
+  // One white cell of the code is painted black.
+  DrawnRecording drawn;
+  cv::Mat picture = drawn.draw(0, 0);
+  const cv::Point2d middle(0.5 * (picture.cols - 1), 0.5 * (picture.rows - 1));
+  constexpr double kCell = 5;  // px; 40 px over 8 cells
+  bool painted = false;
+  for (int row = -3; row < 3 && !painted; ++row) {
+    for (int column = -3; column < 3 && !painted; ++column) {
+      const cv::Rect cell(static_cast<int>(std::lround(middle.x + column * kCell)),
+                          static_cast<int>(std::lround(middle.y + row * kCell)), 5, 5);
+      if (cv::mean(picture(cell))[0] < 180) continue;
+      picture(cell).setTo(40);
+      painted = true;
+    }
+  }
+  ASSERT_TRUE(painted);
+  drawn.add(picture);
+
+  EXPECT_TRUE(drawn.track_it().usable);
+  const TrackResult strict = drawn.track_it({.max_corrected_bits = 0});
+  EXPECT_EQ(strict.rejected, (std::map<std::string, int>{{"corrected_bits", 4}}));
+}
+
 TEST(Track, ListsEveryReasonOnceWithItsMeaning) {
   std::set<std::string> codes;
   for (const RejectionReason& reason : rejection_reasons()) {
