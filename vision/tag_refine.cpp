@@ -101,8 +101,8 @@ AxisWeights axis_weights(const TagPattern& pattern, double place, double blur) {
   const double cell = pattern.cell();
   const double origin = -0.5 * cell * pattern.total_cells;
   const auto cell_at = [&](double x) {
-    return std::clamp(static_cast<int>(std::floor((x - origin) / cell)), 0,
-                      pattern.total_cells - 1);
+    // Clamped before it is cast: a poor step may ask for any place.
+    return static_cast<int>(std::clamp((x - origin) / cell, 0.0, pattern.total_cells - 1.0));
   };
   AxisWeights result;
   result.first = cell_at(place - kReach * blur);
@@ -381,6 +381,7 @@ double left_out_variance(const Unknowns& unknowns, const Eigen::Matrix2d& pixel_
 RefinedTag refine_tag(const cv::Mat& grey, const TagPattern& pattern,
                       const Eigen::Matrix3d& pixel_from_tag) {
   assert(grey.type() == CV_8UC1);
+  assert(pattern.total_cells <= AxisWeights::kMaxCells);
   RefinedTag result;
   std::vector<Sample> samples = pixels_of_tag(grey, pattern, pixel_from_tag);
   constexpr std::size_t kFewest = 4 * kUnknowns;
@@ -417,10 +418,14 @@ RefinedTag refine_tag(const cv::Mat& grey, const TagPattern& pattern,
   for (int i = 0; i < kMaxSteps && !(moved < kStill); ++i) {
     evaluate(pattern, samples, pixel_by_tag, fit);
     moved = step(prior_mean, prior, fit, covariance);
-    if (!fit.unknowns.allFinite()) return result;
+    constexpr double kFarBlur = 3;  // of the logarithm: a factor of 20, no tag any more
+    if (!fit.unknowns.allFinite() ||
+        (fit.unknowns - prior_mean).segment<2>(kBlur).cwiseAbs().maxCoeff() > kFarBlur) {
+      return result;
+    }
   }
   result.explained = fit.trust;
-  result.usable = moved < kStill && fit.unknowns[kLight + 3] > 0;
+  result.usable = moved < kStill && fit.unknowns[kLight + 3] > 0;  // white is brighter than black
   if (!result.usable) return result;
 
   const double left_out = left_out_variance(fit.unknowns, pixel_by_tag);
