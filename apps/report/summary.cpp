@@ -38,11 +38,16 @@ Grade grade(const ObservationErrors& errors) {
   return near ? Grade::to_the_noise : Grade::useful;
 }
 
+/// A kind of observation as a sentence has it.
+std::string kind_words(const std::string& kind) {
+  return kind == "tracks3d" ? "the 3D tracks" : "the pictures of camera " + kind;
+}
+
 std::string error_sentence(const ObservationErrors& errors) {
   const ShownUnit unit = shown_unit(errors.unit);
   const auto shown = [&](double value) { return significant(value * unit.factor, 3); };
-  std::string text = fmt::format("On {}, it is {} {} rms per coordinate off in the fitted frames",
-                                 errors.kind, shown(errors.fitted.rms), unit.name);
+  std::string text = fmt::format("In {}, it is {} {} rms per coordinate off in the fitted frames",
+                                 kind_words(errors.kind), shown(errors.fitted.rms), unit.name);
   if (errors.held_out.count > 0) {
     const BestTrivial trivial = best_trivial(errors.trivial);
     text += fmt::format(

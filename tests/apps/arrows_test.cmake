@@ -1,0 +1,36 @@
+# Plants includes in a small tree and asks CHECK about it: each forbidden one must stop the check
+# with its file named, each allowed one must pass.
+
+# arrow(ROOM INCLUDED allowed|refused)
+function(arrow room included expected)
+  file(REMOVE_RECURSE ${WORK_DIR})
+  file(WRITE ${WORK_DIR}/${room}/planted.cpp "#include <vector>\n#include \"${included}\"\n")
+  execute_process(COMMAND ${CMAKE_COMMAND} -D SOURCE_DIR=${WORK_DIR} -D CHECK=${CHECK}
+    -P ${CMAKE_CURRENT_LIST_DIR}/check_arrows.cmake
+    RESULT_VARIABLE status OUTPUT_VARIABLE output ERROR_VARIABLE output)
+  if(expected STREQUAL "allowed" AND NOT status EQUAL 0)
+    message(SEND_ERROR "${room} may include ${included}, but the check says:\n${output}")
+  elseif(expected STREQUAL "refused" AND status EQUAL 0)
+    message(SEND_ERROR "${room} may not include ${included}, but the check lets it pass")
+  elseif(expected STREQUAL "refused" AND NOT output MATCHES "${room}/planted.cpp")
+    message(SEND_ERROR "the check does not name ${room}/planted.cpp:\n${output}")
+  endif()
+endfunction()
+
+arrow(data model/step.h refused)
+arrow(data calib/rigid3.h refused)
+arrow(model data/input_error.h allowed)
+arrow(model data/recording.h refused)
+arrow(model fit/fit.h refused)
+arrow(calib data/recording.h allowed)
+arrow(calib vision/track.h refused)
+arrow(vision calib/rigid3.h allowed)
+arrow(vision fit/fit.h refused)
+arrow(fit model/step.h allowed)
+arrow(fit calib/projection.h allowed)
+arrow(fit calib/calibrate.h refused)
+arrow(fit vision/track.h refused)
+arrow(fit ../model/step.h refused)
+arrow(apps vision/track.h allowed)
+arrow(apps fit/fit.h allowed)
+file(REMOVE_RECURSE ${WORK_DIR})

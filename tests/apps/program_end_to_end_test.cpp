@@ -1,0 +1,112 @@
+// Whole runs of the program on bundled recordings, from outside. How good the numbers are:
+// tests/vision, tests/calib and tests/fit compare them with the truth.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <thread>
+
+#include "data/fit_result.h"
+#include "data/recording.h"
+#include "tests/apps/program_run.h"
+#include "tests/apps/scratch_folder.h"
+
+namespace clothfit {
+namespace {
+
+namespace fs = std::filesystem;
+using test::names_in;
+using test::ProgramRun;
+using test::run_program;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+const fs::path kBundled = fs::path(CLOTHFIT_SOURCE_DIR) / "data" / "recordings";
+
+std::string read_text(const fs::path& file) {
+  std::ifstream in(file);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+/// A fit kept small: few individuals, few generations.
+std::vector<std::string> small_fit(const std::string& recording, const std::string& out) {
+  return {"fit",           recording, "--population", "16",  "--generations", "2",
+          "--refine-best", "1",       "--mesh",       "9x9", "--out",         out};
+}
+
+TEST(ProgramFit, WritesAWholeResultFolder) {
+  const test::ScratchFolder here("fit");
+
+  const ProgramRun run =
+      run_program(small_fit((kBundled / "swing_plain").string(), "a.fit"), here.path());
+
+  ASSERT_EQ(run.exit_code, 0) << run.error;
+  EXPECT_THAT(names_in(here.path()), ElementsAre("a.fit"));
+  for (const char* name : {"fit.json", "report.html", "parameters.csv", "errors.csv",
+                           "residuals.csv", "overlay.svg"}) {
+    EXPECT_TRUE(fs::exists(here.path() / "a.fit" / name)) << name;
+  }
+  EXPECT_THAT(run.out, HasSubstr("Report: a.fit/report.html"));
+  const FitResult result = read_fit_result(here.path() / "a.fit" / "fit.json");
+  EXPECT_EQ(result.recording, "swing_plain");
+  EXPECT_FALSE(result.parameters.empty());
+  ASSERT_FALSE(result.errors.empty());
+  EXPECT_GT(result.errors[0].held_out.count, 0);
+  EXPECT_THAT(read_text(here.path() / "a.fit" / "report.html"), HasSubstr("<h2>Parameters</h2>"));
+}
+
+TEST(ProgramFit, LeavesNothingWhenInterrupted) {
+  const test::ScratchFolder here("interrupt");
+  const auto interrupt_once_at_work = [&](int process) {
+    // The hidden folder of the result appears when the work begins; from then on signals are
+    // caught.
+    const auto give_up = std::chrono::steady_clock::now() + std::chrono::seconds(30);
+    while (names_in(here.path()).empty() && std::chrono::steady_clock::now() < give_up) {
+      std::this_thread::yield();
+    }
+    kill(process, SIGINT);
+  };
+
+  const ProgramRun run =
+      run_program({"fit", (kBundled / "swing_plain").string(), "--generations", "100000"},
+                  here.path(), interrupt_once_at_work);
+
+  EXPECT_EQ(run.exit_code, 130) << run.error;
+  EXPECT_THAT(names_in(here.path()), IsEmpty());
+}
+
+TEST(ProgramTrack, CompletesARecordingThatAFitCanUse) {
+  const test::ScratchFolder here("track");
+
+  const ProgramRun run = run_program({"track", (kBundled / "tags_onecam").string()}, here.path());
+
+  ASSERT_EQ(run.exit_code, 0) << run.error;
+  EXPECT_THAT(names_in(here.path()), ElementsAre("tags_onecam.tracks"));
+  const Recording recording = read_recording(here.path() / "tags_onecam.tracks");
+  EXPECT_TRUE(recording.tracks2d.contains("front"));
+  ASSERT_TRUE(recording.cameras[0].file);
+  EXPECT_THAT(read_text(*recording.cameras[0].file), HasSubstr("camera_from_world"));
+  EXPECT_TRUE(fs::exists(here.path() / "tags_onecam.tracks" / "tracks.json"));
+  EXPECT_TRUE(fs::exists(here.path() / "tags_onecam.tracks" / "overlay_front.png"));
+}
+
+TEST(ProgramCalibrate, CompletesARecordingThatTrackingCanUse) {
+  const test::ScratchFolder here("calibrate");
+
+  const ProgramRun run =
+      run_program({"calibrate", (kBundled / "tags_onecam").string()}, here.path());
+
+  ASSERT_EQ(run.exit_code, 0) << run.error;
+  EXPECT_THAT(run.out, HasSubstr("fx"));
+  const fs::path folder = here.path() / "tags_onecam.calibration";
+  EXPECT_TRUE(fs::exists(folder / "calibration.json"));
+  EXPECT_TRUE(fs::exists(folder / "calibration.csv"));
+  EXPECT_TRUE(read_recording(folder).cameras[0].file);
+}
+
+}  // namespace
+}  // namespace clothfit

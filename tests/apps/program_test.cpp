@@ -1,0 +1,264 @@
+// What the program answers to wrong usage and bad input: exit code, message, nothing left behind.
+// Each reader's own refusals in detail: tests/data. Whole runs: program_end_to_end_test.cpp.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+
+#include "data/camera_parameters.h"
+#include "tests/apps/program_run.h"
+#include "tests/apps/scratch_folder.h"
+
+namespace clothfit {
+namespace {
+
+namespace fs = std::filesystem;
+using test::names_in;
+using test::ProgramRun;
+using test::run_program;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::MatchesRegex;
+
+const fs::path kBundled = fs::path(CLOTHFIT_SOURCE_DIR) / "data" / "recordings";
+
+void write_text(const fs::path& file, const std::string& text) {
+  fs::create_directories(file.parent_path());
+  std::ofstream(file) << text;
+}
+
+/// recording.yaml of a small recording with pictures; `cloth` and `more` are put in as they are.
+std::string picture_recording(const std::string& camera,
+                              const std::string& cloth = "{size: [0.4, 0.4], mass: 0.03}") {
+  return "format: clothfit-recording/1\n"
+         "name: small\n"
+         "origin: made for a test\n"
+         "cloth: " +
+         cloth +
+         "\n"
+         "markers: {kind: apriltag, family: tag36h11, file: markers.csv}\n"
+         "time: {frame_rate: 60.0}\n"
+         "gravity: [0.0, 0.0, -9.81]\n"
+         "cameras:\n"
+         "  - " +
+         camera +
+         "\n"
+         "observations: {}\n"
+         "held: [{at: [0.0, 0.0], motion: fixed}]\n"
+         "start: released_flat\n"
+         "declared: []\n";
+}
+
+void write_grey_picture(const fs::path& file, int width, int height) {
+  fs::create_directories(file.parent_path());
+  ASSERT_TRUE(cv::imwrite(file.string(), cv::Mat(height, width, CV_8UC1, cv::Scalar(128))));
+}
+
+/// A folder to run in, with a recording beside it that a test spoils.
+class Program : public ::testing::Test {
+ protected:
+  const test::ScratchFolder scratch_{
+      std::string("program_") + ::testing::UnitTest::GetInstance()->current_test_info()->name()};
+  const fs::path recording_ = scratch_.path() / "recording";
+  const fs::path here_ = scratch_.path() / "here";
+  void SetUp() override {
+    fs::create_directories(here_);
+    fs::create_directories(recording_);
+  }
+
+  /// Copies a bundled recording of tracks to spoil.
+  void copy_bundled(const std::string& name) {
+    fs::copy(kBundled / name, recording_,
+             fs::copy_options::recursive | fs::copy_options::overwrite_existing);
+  }
+
+  /// recording.yaml with the first `from` replaced.
+  void spoil_yaml(const std::string& from, const std::string& to) {
+    std::ifstream in(recording_ / "recording.yaml");
+    std::string text{std::istreambuf_iterator<char>(in), {}};
+    const std::size_t at = text.find(from);
+    ASSERT_NE(at, std::string::npos) << from;
+    text.replace(at, from.size(), to);
+    write_text(recording_ / "recording.yaml", text);
+  }
+
+  /// Runs a verb on the recording; expects a refusal that says `message` and leaves nothing.
+  void expect_refused(const std::string& verb, const std::string& message) {
+    const ProgramRun run = run_program({verb, recording_.string()}, here_);
+    EXPECT_EQ(run.exit_code, 3) << run.error;
+    EXPECT_THAT(run.error, HasSubstr(message));
+    EXPECT_THAT(names_in(here_), IsEmpty());
+  }
+};
+
+TEST_F(Program, AnswersWrongUsageWithTwo) {
+  for (const std::vector<std::string>& arguments : {std::vector<std::string>{},
+                                                    {"nonsense"},
+                                                    {"fit"},
+                                                    {"fit", "a", "--no-such-option"},
+                                                    {"fit", "a", "--mesh", "17"},
+                                                    {"fit", "a", "--mesh", "1x1"},
+                                                    {"fit", "a", "--seed", "x"},
+                                                    {"fit", "a", "--observations", "sounds"},
+                                                    {"calibrate", "a", "--board", "chessboard:9x6"},
+                                                    {"calibrate", "a", "--model", "fisheye"}}) {
+    const ProgramRun run = run_program(arguments, here_);
+    EXPECT_EQ(run.exit_code, 2) << ::testing::PrintToString(arguments) << run.error;
+    EXPECT_FALSE(run.error.empty());
+  }
+  EXPECT_THAT(names_in(here_), IsEmpty());
+}
+
+TEST_F(Program, ExplainsEveryVerbWithAnExample) {
+  for (const char* verb : {"calibrate", "track", "fit", "demo"}) {
+    const ProgramRun run = run_program({verb, "--help"}, here_);
+    EXPECT_EQ(run.exit_code, 0);
+    EXPECT_THAT(run.out, HasSubstr("Example"));
+    EXPECT_THAT(run.out, HasSubstr(std::string("clothfit ") + verb));
+  }
+}
+
+TEST_F(Program, TellsItsVersion) {
+  const ProgramRun run = run_program({"--version"}, here_);
+
+  EXPECT_EQ(run.exit_code, 0);
+  EXPECT_THAT(run.out, MatchesRegex("clothfit [0-9]+\\.[0-9]+\\.[0-9]+\n"));
+}
+
+TEST_F(Program, RefusesARecordingThatIsNotThere) {
+  for (const char* verb : {"fit", "track", "calibrate"}) expect_refused(verb, "recording");
+}
+
+TEST_F(Program, RefusesAnUnknownKeyAndNamesTheLineAndTheNearestKey) {
+  copy_bundled("swing_plain");
+  spoil_yaml("gravity:", "gravty:");
+
+  expect_refused("fit", "recording.yaml:11: ");
+  expect_refused("fit", "gravity");
+}
+
+TEST_F(Program, RefusesAClothWithoutRows) {
+  copy_bundled("swing_plain");
+  spoil_yaml("rows: 17", "rows: 0");
+
+  expect_refused("fit", "recording.yaml:");
+}
+
+TEST_F(Program, RefusesAMarkerOutsideTheCloth) {
+  copy_bundled("swing_plain");
+  write_text(recording_ / "markers.csv", "marker,s,t\n0,0.1,0.1\n1,0.9,0.1\n");
+
+  expect_refused("fit", "markers.csv:3: ");
+}
+
+TEST_F(Program, RefusesNanInTracks) {
+  copy_bundled("swing_plain");
+  fs::remove(recording_ / "tracks3d.csv.gz");
+  spoil_yaml("tracks3d.csv.gz", "tracks3d.csv");
+  write_text(recording_ / "tracks3d.csv", "frame,marker,x,y,z\n0,0,0.1,nan,0.2\n");
+
+  expect_refused("fit", "tracks3d.csv:2: ");
+}
+
+TEST_F(Program, RefusesAMissingColumn) {
+  copy_bundled("swing_plain");
+  fs::remove(recording_ / "tracks3d.csv.gz");
+  spoil_yaml("tracks3d.csv.gz", "tracks3d.csv");
+  write_text(recording_ / "tracks3d.csv", "frame,marker,x,y\n0,0,0.1,0.2\n");
+
+  expect_refused("fit", "tracks3d.csv:1: ");
+}
+
+TEST_F(Program, RefusesAnEmptyFolderOfPictures) {
+  write_text(recording_ / "recording.yaml", picture_recording("{name: front, images: frames}"));
+  write_text(recording_ / "markers.csv", "marker,s,t,tag,corner\na,0.1,0.1,0,0\n");
+  fs::create_directories(recording_ / "frames");
+
+  expect_refused("track", "frames");
+}
+
+TEST_F(Program, RefusesAVideoWithoutFrames) {
+  write_text(recording_ / "recording.yaml", picture_recording("{name: front, images: cut.mp4}"));
+  write_text(recording_ / "markers.csv", "marker,s,t,tag,corner\na,0.1,0.1,0,0\n");
+  write_text(recording_ / "cut.mp4", "");
+
+  expect_refused("track", "cut.mp4");
+}
+
+TEST_F(Program, RefusesACameraOfAnotherSizeThanThePictures) {
+  write_text(recording_ / "recording.yaml",
+             picture_recording("{name: front, file: front.yaml, images: frames}"));
+  write_text(recording_ / "markers.csv", "marker,s,t,tag,corner\na,0.1,0.1,0,0\n");
+  write_grey_picture(recording_ / "frames" / "000000.png", 320, 240);
+  CameraParameters camera;
+  camera.name = "front";
+  camera.image_width = 640;
+  camera.image_height = 480;
+  camera.focal_px = {600, 600};
+  camera.centre_px = {319.5, 239.5};
+  camera.camera_from_world = CameraPose{};
+  write_camera(camera, recording_ / "front.yaml");
+
+  expect_refused("track", "640 x 480 px");
+  expect_refused("fit", "320 x 240 px");
+}
+
+TEST_F(Program, RefusesATagFamilyThatNeverAppears) {
+  write_text(recording_ / "recording.yaml", picture_recording("{name: front, images: frames}"));
+  write_text(recording_ / "markers.csv", "marker,s,t,tag,corner\na,0.1,0.1,0,0\n");
+  write_grey_picture(recording_ / "frames" / "000000.png", 320, 240);
+
+  expect_refused("track", "tag36h11");
+}
+
+TEST_F(Program, RefusesAFitWhenNothingSaysWhereTheCameraStands) {
+  copy_bundled("swing_plain");
+  CameraParameters camera = read_camera(recording_ / "cameras" / "front.yaml");
+  camera.camera_from_world.reset();
+  write_camera(camera, recording_ / "cameras" / "front.yaml");
+
+  const ProgramRun run =
+      run_program({"fit", recording_.string(), "--observations", "tracks2d"}, here_);
+
+  EXPECT_EQ(run.exit_code, 3);
+  EXPECT_THAT(run.error, HasSubstr("camera_from_world"));
+  EXPECT_THAT(names_in(here_), IsEmpty());
+}
+
+TEST_F(Program, RefusesStillsWithoutTheBoard) {
+  write_grey_picture(recording_ / "0.png", 320, 240);
+
+  const ProgramRun run =
+      run_program({"calibrate", recording_.string(), "--board", "chessboard:9x6:0.025"}, here_);
+
+  EXPECT_EQ(run.exit_code, 3);
+  EXPECT_THAT(run.error, HasSubstr("none of the 1 stills shows the whole board"));
+  EXPECT_THAT(names_in(here_), IsEmpty());
+}
+
+TEST_F(Program, RefusesStillsOfAnotherSizeThanThePictures) {
+  write_text(recording_ / "recording.yaml",
+             picture_recording("{name: front, images: frames, calibration: {images: stills, board: "
+                               "{kind: chessboard, columns: 9, rows: 6, square: 0.025}}}"));
+  write_text(recording_ / "markers.csv", "marker,s,t,tag,corner\na,0.1,0.1,0,0\n");
+  write_grey_picture(recording_ / "frames" / "000000.png", 320, 240);
+  write_grey_picture(recording_ / "stills" / "0.png", 640, 480);
+
+  expect_refused("calibrate", "320 x 240 px");
+}
+
+TEST_F(Program, NeverReplacesAFolderOfTheUsers) {
+  copy_bundled("swing_plain");
+  write_text(here_ / "mine" / "thesis.txt", "years of work");
+
+  const ProgramRun run = run_program({"fit", recording_.string(), "--out", "mine"}, here_);
+
+  EXPECT_EQ(run.exit_code, 3);
+  EXPECT_TRUE(fs::exists(here_ / "mine" / "thesis.txt"));
+}
+
+}  // namespace
+}  // namespace clothfit

@@ -1,0 +1,64 @@
+// That a step's folder is a complete recording by itself. What the steps add to it:
+// program_end_to_end_test.cpp.
+#include "apps/recording_copy.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "data/camera_parameters.h"
+#include "data/tracks.h"
+#include "tests/apps/scratch_folder.h"
+
+namespace clothfit {
+namespace {
+
+namespace fs = std::filesystem;
+
+const fs::path kBundled = fs::path(CLOTHFIT_SOURCE_DIR) / "data" / "recordings";
+
+TEST(CopyRecording, HoldsItsTablesAndReadsBack) {
+  const test::ScratchFolder scratch("copy_recording");
+  const Recording original = read_recording(kBundled / "swing_plain");
+
+  const Recording copied = copy_recording(original, scratch.path());
+  write_recording(copied, scratch.path());
+  const Recording back = read_recording(scratch.path());
+
+  EXPECT_EQ(back.markers.markers.size(), original.markers.markers.size());
+  ASSERT_TRUE(back.tracks3d);
+  EXPECT_EQ(back.tracks3d->parent_path(), fs::canonical(scratch.path()));
+  EXPECT_EQ(read_tracks3d(*back.tracks3d, back.markers).size(),
+            read_tracks3d(*original.tracks3d, original.markers).size());
+  ASSERT_EQ(back.cameras.size(), 1U);
+  EXPECT_EQ(read_camera(*back.cameras[0].file).focal_px,
+            read_camera(*original.cameras[0].file).focal_px);
+}
+
+TEST(CopyRecording, NamesPicturesWhereTheyLie) {
+  const test::ScratchFolder scratch("copy_pictures");
+  const Recording original = read_recording(kBundled / "tags_onecam");
+
+  write_recording(copy_recording(original, scratch.path()), scratch.path());
+  const Recording back = read_recording(scratch.path());
+
+  EXPECT_FALSE(fs::exists(scratch.path() / "frames"));
+  ASSERT_TRUE(back.cameras[0].images);
+  EXPECT_TRUE(fs::equivalent(*back.cameras[0].images, *original.cameras[0].images));
+  EXPECT_EQ(back.reference.size(), original.reference.size());
+}
+
+TEST(ResultName, IsTheRecordingsOwnNameWhereThatCanBeAFile) {
+  Recording recording;
+  recording.folder = "/some/where/take_7/";
+
+  recording.name = "swing";
+  EXPECT_EQ(result_name(recording), "swing");
+  for (const char* unusable : {"", "a/b", "..", ".hidden"}) {
+    recording.name = unusable;
+    EXPECT_EQ(result_name(recording), "take_7") << unusable;
+  }
+}
+
+}  // namespace
+}  // namespace clothfit
