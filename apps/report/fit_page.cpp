@@ -63,12 +63,14 @@ std::string figures_of(const FitReport& report, const Recording& recording,
                       "Residual of each marker over the flat cloth, seen from its printed side; "
                       "one colour scale for both. A pattern here is motion the model lacks.");
     const int frame = overlay_frame(residuals);
+    const bool held_out = std::any_of(
+        residuals.rows.begin(), residuals.rows.end(),
+        [&](const FitReport::Residuals::Row& row) { return row.frame == frame && row.held_out; });
     content += figure(
         observed_and_predicted_svg(residuals, recording, pictures),
         fmt::format(
-            "Observed and predicted markers in frame {}, the last one that shows them "
-            "well.{}",
-            frame,
+            "Observed and predicted markers in frame {}, the last that shows them well{}.{}", frame,
+            held_out ? "; the fit did not see it" : "",
             residuals.unit == "m" ? " Seen level, from the side the cloth spreads most." : ""));
   }
   return content;

@@ -127,6 +127,22 @@ std::string legend(const std::vector<Series>& series, double left, double right,
   return svg;
 }
 
+/// Median distance from a value's place to its nearest neighbour; infinite for fewer than two.
+double usual_spacing(const std::vector<ClothValue>& values) {
+  std::vector<double> nearest(values.size(), std::numeric_limits<double>::infinity());
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    for (std::size_t j = 0; j < values.size(); ++j) {
+      if (i == j) continue;
+      const double distance = std::hypot(values[i].s - values[j].s, values[i].t - values[j].t);
+      nearest[i] = std::min(nearest[i], distance);
+    }
+  }
+  if (nearest.empty()) return std::numeric_limits<double>::infinity();
+  const auto middle = nearest.begin() + static_cast<std::ptrdiff_t>(nearest.size() / 2);
+  std::nth_element(nearest.begin(), middle, nearest.end());
+  return *middle;
+}
+
 std::string tick_text(double value) {
   std::string text = fmt::format("{:.6g}", value);
   return text.starts_with('-') ? "−" + text.substr(1) : text;
@@ -248,16 +264,16 @@ std::string cloth_maps(const ClothMaps& maps) {
   const double panel_height = scale * maps.height_m;
 
   double highest = 0;
-  std::size_t most = 1;
+  double spacing_m = std::numeric_limits<double>::infinity();
   for (const ClothMap& map : maps.maps) {
-    most = std::max(most, map.values.size());
+    spacing_m = std::min(spacing_m, usual_spacing(map.values));
     for (const ClothValue& value : map.values) {
       if (std::isfinite(value.value)) highest = std::max(highest, value.value);
     }
   }
   if (highest == 0) highest = 1;
-  const double spacing = std::sqrt(panel_width * panel_height / static_cast<double>(most));
-  const double radius = std::clamp(0.4 * spacing, 1.5, 12.0);
+  // As large as neighbours allow without touching.
+  const double radius = std::clamp(0.47 * scale * spacing_m, 1.5, 12.0);
 
   std::string body;
   double left = kMargin;
