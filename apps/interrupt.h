@@ -3,7 +3,7 @@
 namespace clothfit {
 
 /// From here on Ctrl-C (SIGINT) and SIGTERM set a flag instead of killing the program, so that the
-/// call at work can end cleanly; the second one kills.
+/// call at work can end cleanly; a second one, half a second later or more, kills.
 void catch_interrupts();
 
 /// Whether one arrived. Progress callbacks return the opposite.
