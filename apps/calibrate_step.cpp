@@ -12,6 +12,7 @@
 #include "apps/picture_size.h"
 #include "apps/recording_copy.h"
 #include "data/input_error.h"
+#include "data/text_file.h"
 #include "vision/chessboard.h"
 #include "vision/image_source.h"
 
@@ -107,7 +108,7 @@ void write_calibrations(const std::vector<StillsCalibration>& calibrations,
                       fmt::format("{}", parameter.sigma)});
     }
   }
-  write_text_file(json.dump(1) + "\n", folder / "calibration.json");
+  write_text(json.dump(1) + "\n", folder / "calibration.json");
   write_csv_table({"camera", "parameter", "value", "sigma"}, rows, folder / "calibration.csv");
 }
 

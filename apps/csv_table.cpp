@@ -1,8 +1,6 @@
 #include "apps/csv_table.h"
 
-#include <fstream>
-
-#include "data/input_error.h"
+#include "data/text_file.h"
 
 namespace clothfit {
 namespace {
@@ -33,17 +31,7 @@ void write_csv_table(const std::vector<std::string>& header,
   std::string text;
   add_line(header, text);
   for (const std::vector<std::string>& row : rows) add_line(row, text);
-  write_text_file(text, file);
-}
-
-void write_text_file(const std::string& text, const std::filesystem::path& file) {
-  std::ofstream out(file, std::ios::binary);
-  out << text;
-  out.close();
-  if (!out) {
-    throw InputError(file.string(), "cannot be written", "a place with room to write results",
-                     "choose another folder with --out");
-  }
+  write_text(text, file);
 }
 
 }  // namespace clothfit

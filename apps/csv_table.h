@@ -12,7 +12,4 @@ void write_csv_table(const std::vector<std::string>& header,
                      const std::vector<std::vector<std::string>>& rows,
                      const std::filesystem::path& file);
 
-/// Writes `text` as it is. Throws InputError where the file cannot be written.
-void write_text_file(const std::string& text, const std::filesystem::path& file);
-
 }  // namespace clothfit

@@ -24,6 +24,7 @@
 #include "apps/version.h"
 #include "data/input_error.h"
 #include "data/output_folder.h"
+#include "data/text_file.h"
 
 namespace clothfit {
 namespace {
@@ -91,9 +92,9 @@ void write_results(const FitReport& report, const Recording& recording, const fs
   write_csv_table(residuals.header, residuals.rows, folder / "residuals.csv");
 
   const std::vector<BackgroundPicture> pictures = background_pictures(report, recording);
-  write_text_file(fit_page_html(report, recording, pictures), folder / "report.html");
+  write_text(fit_page_html(report, recording, pictures), folder / "report.html");
   const std::string overlay = overlay_svg(report, recording, pictures);
-  if (!overlay.empty()) write_text_file(overlay, folder / "overlay.svg");
+  if (!overlay.empty()) write_text(overlay, folder / "overlay.svg");
 }
 
 void print_result(const FitReport& report, const fs::path& folder) {

@@ -7,12 +7,12 @@
 #include <opencv2/imgcodecs.hpp>
 #include <utility>
 
-#include "apps/csv_table.h"
 #include "apps/exit_code.h"
 #include "apps/picture_size.h"
 #include "apps/recording_copy.h"
 #include "data/camera_parameters.h"
 #include "data/input_error.h"
+#include "data/text_file.h"
 
 namespace clothfit {
 namespace {
@@ -166,7 +166,7 @@ TrackStepResult track_step(const Recording& recording, const std::vector<std::st
     json["cameras"].push_back(to_json(tracks));
     step.cameras.push_back(std::move(tracks));
   }
-  write_text_file(json.dump(1) + "\n", folder / "tracks.json");
+  write_text(json.dump(1) + "\n", folder / "tracks.json");
   write_recording(step.recording, folder);
   return step;
 }

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "data/number_text.h"
+
 namespace clothfit {
 namespace {
 
@@ -40,7 +42,7 @@ std::string value_text(double value, double sigma) {
 }
 
 std::string exact_text(double value) {
-  return std::isfinite(value) ? fmt::format("{}", value) : "";
+  return std::isfinite(value) ? number_text(value) : "";
 }
 
 }  // namespace clothfit
