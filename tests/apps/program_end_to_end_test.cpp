@@ -59,6 +59,23 @@ TEST(ProgramFit, WritesAWholeResultFolder) {
   EXPECT_THAT(read_text(here.path() / "a.fit" / "report.html"), HasSubstr("<h2>Parameters</h2>"));
 }
 
+TEST(ProgramFit, GivesTheSameBytesOnOneThreadAndOnTwo) {
+  const test::ScratchFolder here("threads");
+  std::vector<std::string> one = small_fit((kBundled / "swing_hem").string(), "one.fit");
+  std::vector<std::string> two = small_fit((kBundled / "swing_hem").string(), "two.fit");
+  one.insert(one.end(), {"--threads", "1"});
+  two.insert(two.end(), {"--threads", "2"});
+
+  ASSERT_EQ(run_program(one, here.path()).exit_code, 0);
+  ASSERT_EQ(run_program(two, here.path()).exit_code, 0);
+
+  for (const char* name : {"parameters.csv", "errors.csv", "residuals.csv", "overlay.svg"}) {
+    const std::string of_one = read_text(here.path() / "one.fit" / name);
+    EXPECT_FALSE(of_one.empty()) << name;
+    EXPECT_TRUE(of_one == read_text(here.path() / "two.fit" / name)) << name;
+  }
+}
+
 TEST(ProgramFit, LeavesNothingWhenInterrupted) {
   const test::ScratchFolder here("interrupt");
   const auto interrupt_once_at_work = [&](int process) {
