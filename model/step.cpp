@@ -7,6 +7,7 @@
 namespace clothfit {
 
 HeldPlacement::HeldPlacement(const Cloth& cloth) : held_(cloth.held) {
+  if (held_.empty()) return;  // free cloth: nothing to decompose
   for (const HeldVertexWeights& held : held_)
     for (const auto& [vertex, weight] : held.weights) touched_.push_back(vertex);
   std::ranges::sort(touched_);
