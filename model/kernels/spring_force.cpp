@@ -5,8 +5,9 @@
 // One source, compiled for several instruction sets and chosen when the program starts. Compiler
 // flags of this file forbid contraction, so that all of them give the same bits. Sanitizers
 // instrument the resolver that chooses before they are ready themselves, so they get the plain
-// version.
-#if defined(__x86_64__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+// version. The tests define the macro themselves, to compile for one instruction set after another.
+#if defined(CLOTHFIT_EVERY_INSTRUCTION_SET)
+#elif defined(__x86_64__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 #define CLOTHFIT_EVERY_INSTRUCTION_SET \
   __attribute__((target_clones("arch=skylake-avx512", "avx2", "default")))
 #else

@@ -1,0 +1,136 @@
+#pragma once
+
+#include <Eigen/Dense>
+
+#include "model/cloth.h"
+#include "model/kernels/spring_force.h"
+#include "model/step.h"
+
+namespace clothfit {
+
+/// The laws that the tests hold the model against, in their plainest form. The force is the only
+/// thing taken from the model; energies and momenta are written here a second time.
+
+/// Elastic energy (J): sum of k (l - l0)^2 / 2.
+inline double elastic_energy_j(const SpringNet& net, const SpringParameters& springs,
+                               const Eigen::Matrix3Xd& position_m) {
+  double energy = 0;
+  for (size_t type = 0; type < kSpringTypes; ++type) {
+    for (const Spring& spring : net[type]) {
+      const double length = (position_m.col(spring.b) - position_m.col(spring.a)).norm();
+      const double extension = length - springs.natural_length_m[type];
+      energy += 0.5 * springs.stiffness_n_per_m[type] * extension * extension;
+    }
+  }
+  return energy;
+}
+
+inline double kinetic_energy_j(const Eigen::VectorXd& mass_kg, const Eigen::Matrix3Xd& velocity) {
+  return 0.5 * velocity.colwise().squaredNorm().dot(mass_kg);
+}
+
+inline Eigen::Vector3d momentum_kg_m_per_s(const Eigen::VectorXd& mass_kg,
+                                           const Eigen::Matrix3Xd& velocity) {
+  return velocity * mass_kg;
+}
+
+/// Sum of x cross f; with f = m v the angular momentum.
+inline Eigen::Vector3d torque(const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& f) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (Eigen::Index k = 0; k < x.cols(); ++k) sum += x.col(k).head<3>().cross(f.col(k).head<3>());
+  return sum;
+}
+
+/// The same vectors in every lane.
+inline LaneVectors every_lane(const Eigen::Matrix3Xd& values) {
+  LaneVectors lanes = LaneVectors::zero(static_cast<int>(values.cols()));
+  for (int l = 0; l < kLanes; ++l) lanes.set_lane(l, values);
+  return lanes;
+}
+
+/// The same springs in every lane.
+inline LaneSprings every_lane(const SpringParameters& springs) {
+  LaneSprings lanes;
+  for (size_t type = 0; type < kSpringTypes; ++type) {
+    lanes.natural_length_m[type].setConstant(springs.natural_length_m[type]);
+    lanes.stiffness_n_per_m[type].setConstant(springs.stiffness_n_per_m[type]);
+    lanes.damping_ns_per_m[type].setConstant(springs.damping_ns_per_m[type]);
+  }
+  return lanes;
+}
+
+inline void set_lane(int l, const SpringParameters& springs, LaneSprings& lanes) {
+  for (size_t type = 0; type < kSpringTypes; ++type) {
+    lanes.natural_length_m[type][l] = springs.natural_length_m[type];
+    lanes.stiffness_n_per_m[type][l] = springs.stiffness_n_per_m[type];
+    lanes.damping_ns_per_m[type][l] = springs.damping_ns_per_m[type];
+  }
+}
+
+/// The model's spring forces on one state, 3 x vertices (N).
+inline Eigen::Matrix3Xd spring_forces_n(const SpringNet& net, const SpringParameters& springs,
+                                        const Eigen::Matrix3Xd& position_m,
+                                        const Eigen::Matrix3Xd& velocity_m_per_s) {
+  LaneVectors force_n = LaneVectors::zero(static_cast<int>(position_m.cols()));
+  add_spring_forces(net, every_lane(springs), every_lane(position_m), every_lane(velocity_m_per_s),
+                    force_n);
+  return force_n.lane(0);
+}
+
+inline Eigen::Matrix3Xd at_rest(const Eigen::Matrix3Xd& position_m) {
+  return Eigen::Matrix3Xd::Zero(3, position_m.cols());
+}
+
+/// The same parameter set in every lane, for tests that call `step` themselves.
+inline LaneParameters every_lane(const ParameterSet& set) {
+  LaneParameters lanes;
+  lanes.springs = every_lane(set.springs);
+  lanes.gravity_x.setConstant(set.gravity_m_per_s2.x());
+  lanes.gravity_y.setConstant(set.gravity_m_per_s2.y());
+  lanes.gravity_z.setConstant(set.gravity_m_per_s2.z());
+  for (const std::vector<double>& effect : set.effects) {
+    lanes.effects.emplace_back();
+    for (const double value : effect) lanes.effects.back().push_back(LaneValue::Constant(value));
+  }
+  return lanes;
+}
+
+/// One simulation, step by step; held points without a motion stay where they start.
+class SteppedCloth {
+ public:
+  SteppedCloth(const Cloth& cloth, const ParameterSet& set,
+               const Eigen::Matrix3Xd& velocity_m_per_s)
+      : cloth_(cloth),
+        parameters_(every_lane(set)),
+        held_(cloth),
+        state_{every_lane(set.start_position_m), every_lane(velocity_m_per_s)},
+        force_n_(LaneVectors::zero(cloth.mesh.vertex_count())),
+        held_target_m_(held_.locate(state_.position_m)) {}
+
+  void step(double time_step_s) {
+    const double end_s = (steps_ + 1) * time_step_s;
+    for (size_t h = 0; h < cloth_.held.size(); ++h) {
+      if (!cloth_.held[h].motion) continue;
+      const Eigen::Vector3d target = cloth_.held[h].motion(end_s);
+      held_target_m_.x.col(static_cast<Eigen::Index>(h)).setConstant(target.x());
+      held_target_m_.y.col(static_cast<Eigen::Index>(h)).setConstant(target.y());
+      held_target_m_.z.col(static_cast<Eigen::Index>(h)).setConstant(target.z());
+    }
+    clothfit::step(cloth_, parameters_, held_, held_target_m_, steps_ * time_step_s, time_step_s,
+                   state_, force_n_);
+    ++steps_;
+  }
+  Eigen::Matrix3Xd position_m() const { return state_.position_m.lane(0); }
+  Eigen::Matrix3Xd velocity_m_per_s() const { return state_.velocity_m_per_s.lane(0); }
+
+ private:
+  const Cloth& cloth_;
+  LaneParameters parameters_;
+  HeldPlacement held_;
+  LaneState state_;
+  LaneVectors force_n_;
+  LaneVectors held_target_m_;
+  int steps_ = 0;
+};
+
+}  // namespace clothfit
