@@ -33,12 +33,21 @@ constexpr int kFewestFrames = 8;
 /// Spring-steps that a search may cost; its time step is cut no finer than that.
 constexpr double kSearchSpringSteps = 1.2e9;
 
-/// The last stage is solved to rounding of the reported digits; those before only lead there.
-constexpr double kRoughGain = 1e-4;
-constexpr double kFinalGain = 1e-7;
+/// How finely a stage is solved. The last one goes to the rounding of the reported digits; those
+/// before only lead there.
+struct Effort {
+  int rounds = 0;
+  double least_gain = 0;
+};
+constexpr Effort kCoarseEffort{.rounds = 1, .least_gain = 1e-3};
+constexpr Effort kRoughEffort{.rounds = 2, .least_gain = 1e-4};
+constexpr Effort kFinalEffort{.rounds = 6, .least_gain = 1e-7};
 
 /// A log-parameter less certain than this (a factor of e^0.7 = 2 either way) is undetermined.
 constexpr double kUndeterminedLogSigma = 0.7;
+
+/// A cost whose local derivative is this many times that over two per cent is rough.
+constexpr double kRough = 3;
 
 int horizon_frames(const FitProblem& problem, double share) {
   const int wanted = static_cast<int>(std::lround(share * problem.first_held_out));
@@ -142,11 +151,10 @@ Search search(const FitProblem& problem, const FitOptions& options,
 
 /// One refinement, with its line in the report.
 RefineResult refine_stage(const FitProblem& problem, const FitOptions& options, double share,
-                          const Eigen::VectorXd& start, const ProgressCallback& progress,
-                          FitReport& report) {
-  const bool last = share == 1.0;
-  const RefineOptions refine_options{.rounds = last ? 6 : 2,
-                                     .least_gain = last ? kFinalGain : kRoughGain,
+                          const Effort& effort, const Eigen::VectorXd& start,
+                          const ProgressCallback& progress, FitReport& report) {
+  const RefineOptions refine_options{.rounds = effort.rounds,
+                                     .least_gain = effort.least_gain,
                                      .substep_scale = options.substep_scale};
   const int frames = horizon_frames(problem, share);
   RefineResult result = refine(problem, frames, start, refine_options, progress);
@@ -167,20 +175,21 @@ RefineResult refine_best(const FitProblem& coarse_problem, const FitProblem& pro
   best.values = candidates.front();
   best.cost = std::numeric_limits<double>::infinity();
   for (const Eigen::VectorXd& candidate : candidates) {
-    RefineResult result =
-        refine_stage(coarse_problem, options, kSearchShare, candidate, progress, report);
+    RefineResult result = refine_stage(coarse_problem, options, kSearchShare, kCoarseEffort,
+                                       candidate, progress, report);
     if (result.cancelled) return result;
     if (result.usable && result.cost < best.cost) best = std::move(result);
   }
   for (const double share : kHorizonShares) {
-    best = refine_stage(problem, options, share, best.values, progress, report);
+    const Effort& effort = share < 1 ? kRoughEffort : kFinalEffort;
+    best = refine_stage(problem, options, share, effort, best.values, progress, report);
     if (best.cancelled || !best.usable) return best;
   }
   return best;
 }
 
 ParameterEstimate estimate(const FitParameter& parameter, const std::string& name, double value,
-                           double sigma) {
+                           double sigma, double roughness) {
   ParameterEstimate result{.name = name, .unit = parameter.unit, .value = value, .sigma = sigma};
   const bool logarithmic = parameter.scale == ParameterScale::logarithmic;
   const double edge = logarithmic ? 1e-3 * value : 1e-6 * (parameter.upper - parameter.lower);
@@ -190,6 +199,13 @@ ParameterEstimate estimate(const FitParameter& parameter, const std::string& nam
     result.reason = fmt::format("the motion hardly depends on it (sigma {:.0f} % of the value)",
                                 100 * std::min(relative, 1e4));
     result.sigma = std::min(sigma, 1e4 * value);
+  } else if (roughness > kRough) {
+    result.state = ParameterState::undetermined;
+    result.reason = fmt::format(
+        "the cost is rough here (slope over 0.01 % is {:.0f} times that over 2 %): the motion is "
+        "too "
+        "sensitive over this span, and the sigma means nothing",
+        roughness);
   } else if (value - parameter.lower < edge || parameter.upper - value < edge) {
     const bool at_neutral =
         parameter.role == ParameterRole::effect && value - parameter.lower < edge;
@@ -214,8 +230,12 @@ ParameterEstimate constant(const std::string& name, const std::string& unit, dou
 
 /// The parameter tables of the result from the fitted values.
 void fill_parameters(const FitProblem& problem, const FitOptions& options,
-                     const Eigen::VectorXd& values, const Eigen::VectorXd& sigma,
+                     const Eigen::VectorXd& values, const Uncertainty& uncertainty,
                      FitResult& result) {
+  const auto estimate_of = [&](int p, const std::string& name) {
+    return estimate(problem.space.parameters[static_cast<size_t>(p)], name, values[p],
+                    uncertainty.sigma[p], uncertainty.roughness[p]);
+  };
   const double area_m2 = problem.cloth.mesh.width_m * problem.cloth.mesh.height_m;
   ParameterEstimate density =
       constant("areal_density", "kg/m2", problem.cloth_mass_kg / area_m2, "weighed");
@@ -231,7 +251,7 @@ void fill_parameters(const FitProblem& problem, const FitOptions& options,
     const FitParameter& parameter = problem.space.parameters[static_cast<size_t>(p)];
     if (parameter.role == ParameterRole::effect) continue;
     auto& list = parameter.role == ParameterRole::fabric ? result.parameters : result.nuisance;
-    list.push_back(estimate(parameter, parameter.name, values[p], sigma[p]));
+    list.push_back(estimate_of(p, parameter.name));
   }
   if (options.forecast) {
     for (const ParameterEstimate& known : options.forecast->parameters)
@@ -246,8 +266,7 @@ void fill_parameters(const FitProblem& problem, const FitOptions& options,
       const EffectParameter& parameter = description.parameters[p];
       effect.parameters.push_back(
           binding.parameter >= 0
-              ? estimate(problem.space.parameters[static_cast<size_t>(binding.parameter)],
-                         parameter.name, values[binding.parameter], sigma[binding.parameter])
+              ? estimate_of(binding.parameter, parameter.name)
               : constant(parameter.name, parameter.unit, binding.constant, "declared"));
     }
     result.effects.push_back(std::move(effect));
@@ -300,7 +319,7 @@ FitReport fit(const FitInput& input, const FitOptions& options, const ProgressCa
   result.observations_rejected = problem.rejected;
 
   Eigen::VectorXd values = problem.space.start();
-  Eigen::VectorXd sigma = Eigen::VectorXd::Zero(problem.space.size());
+  Uncertainty uncertainty;
   if (!options.forecast) {
     const FitProblem coarse_problem =
         make_problem(input, options, coarse(result.mesh_columns), coarse(result.mesh_rows));
@@ -320,11 +339,10 @@ FitReport fit(const FitInput& input, const FitOptions& options, const ProgressCa
     report.stop = refined.converged ? FitStop::converged : FitStop::reached_limit;
     report.message = refined.message;
     const Objective objective(problem, problem.first_held_out, result.time_step_s);
-    const Uncertainty uncertainty = estimate_uncertainty(problem, objective, values);
+    uncertainty = estimate_uncertainty(problem, objective, values);
     if (!uncertainty.usable)
       return stopped(std::move(report), FitStop::diverged,
                      "the derivatives at the optimum could not be computed");
-    sigma = uncertainty.sigma;
     report.correlation = uncertainty.correlation;
     for (const FitParameter& parameter : problem.space.parameters)
       report.correlation_names.push_back(parameter.name);
@@ -346,7 +364,7 @@ FitReport fit(const FitInput& input, const FitOptions& options, const ProgressCa
     longest_frame_s =
         std::max(longest_frame_s, problem.frame_time_s[f] - problem.frame_time_s[f - 1]);
   result.substeps = static_cast<int>(std::ceil(longest_frame_s / result.time_step_s - 1e-9));
-  fill_parameters(problem, options, values, sigma, result);
+  fill_parameters(problem, options, values, uncertainty, result);
   fill_residuals(problem, trajectories.front(), report);
   for (const ObservationSet& set : problem.observations)
     result.observations_used += static_cast<int>(set.rows.size());

@@ -45,17 +45,14 @@ std::vector<Eigen::VectorXd> Objective::residuals(
 }
 
 bool Objective::linearise(const Eigen::VectorXd& values, Eigen::VectorXd& residual,
-                          Eigen::MatrixXd& residual_by_coordinate) const {
-  // Truncation falls with the step's square, rounding (the run's, about 1e-13) rises with its
-  // inverse: 1e-4 leaves both near 1e-8.
-  constexpr double kStep = 1e-4;
+                          Eigen::MatrixXd& residual_by_coordinate, double step) const {
   const int parameters = problem_.space.size();
   const Eigen::VectorXd coordinates = problem_.space.coordinates(values);
   std::vector<Eigen::VectorXd> points{values};
   for (int p = 0; p < parameters; ++p) {
     for (const double sign : {1.0, -1.0}) {
       Eigen::VectorXd moved = coordinates;
-      moved[p] += sign * kStep;
+      moved[p] += sign * step;
       points.push_back(problem_.space.values(moved));
     }
   }
@@ -66,7 +63,7 @@ bool Objective::linearise(const Eigen::VectorXd& values, Eigen::VectorXd& residu
   residual_by_coordinate.resize(residual_count_, parameters);
   for (int p = 0; p < parameters; ++p) {
     const auto plus = static_cast<size_t>(1 + 2 * p);
-    residual_by_coordinate.col(p) = (results[plus] - results[plus + 1]) / (2 * kStep);
+    residual_by_coordinate.col(p) = (results[plus] - results[plus + 1]) / (2 * step);
   }
   return true;
 }

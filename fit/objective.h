@@ -30,10 +30,14 @@ class Objective {
   /// diverged, its step would not be stable, or a point fell behind a camera.
   std::vector<Eigen::VectorXd> residuals(const std::vector<Eigen::VectorXd>& values) const;
 
+  /// Truncation falls with the step's square, rounding (the run's, about 1e-13) rises with its
+  /// inverse: 1e-4 leaves both near 1e-8.
+  static constexpr double kDifferenceStep = 1e-4;
+
   /// Residuals at `values` and their derivative by the space's coordinates, by central differences
-  /// (all perturbed runs side by side in lanes). False where there are none.
+  /// over +-`step` (all perturbed runs side by side in lanes). False where there are none.
   bool linearise(const Eigen::VectorXd& values, Eigen::VectorXd& residual,
-                 Eigen::MatrixXd& residual_by_coordinate) const;
+                 Eigen::MatrixXd& residual_by_coordinate, double step = kDifferenceStep) const;
 
   /// Mean length of the residual of an observation: a robust cost for the evolutionary search.
   /// Infinite where there are no residuals.

@@ -224,6 +224,39 @@ void add_gravity_direction(FitProblem& problem) {
   problem.priors.push_back(std::move(prior));
 }
 
+/// The placed sheet is as uncertain as the first frame's markers are noisy, and its error would
+/// pass for physics: a small turn about its middle and a shift are fitted along. The first frame's
+/// own residuals hold them.
+void add_sheet_motion(FitProblem& problem) {
+  if (problem.start != StartKind::released_flat) return;
+  const auto add = [&](const char* name, const char* unit, double range) {
+    problem.sheet_motion.push_back({.parameter = problem.space.size(), .constant = 0});
+    problem.space.parameters.push_back({.name = name,
+                                        .unit = unit,
+                                        .role = ParameterRole::nuisance,
+                                        .scale = ParameterScale::linear,
+                                        .lower = -range,
+                                        .upper = range,
+                                        .start = 0,
+                                        .typical = 1e-3});
+  };
+  for (const char* name : {"sheet_turn_x", "sheet_turn_y", "sheet_turn_z"}) add(name, "rad", 0.1);
+  for (const char* name : {"sheet_shift_x", "sheet_shift_y", "sheet_shift_z"}) add(name, "m", 0.05);
+}
+
+Eigen::Matrix3Xd moved_sheet(const FitProblem& problem, const Eigen::VectorXd& values) {
+  if (problem.sheet_motion.empty()) return problem.placed_sheet_m;
+  Eigen::Vector3d turn, shift;
+  for (size_t c = 0; c < 3; ++c) {
+    turn[static_cast<Eigen::Index>(c)] = problem.sheet_motion[c].value(values);
+    shift[static_cast<Eigen::Index>(c)] = problem.sheet_motion[c + 3].value(values);
+  }
+  const Eigen::Vector3d middle = problem.placed_sheet_m.rowwise().mean();
+  const Eigen::Matrix3d rotation =
+      Eigen::AngleAxisd(turn.norm(), turn.stableNormalized()).toRotationMatrix();
+  return (rotation * (problem.placed_sheet_m.colwise() - middle)).colwise() + (middle + shift);
+}
+
 void place_sheet_of(const Recording& recording, FitProblem& problem) {
   if (recording.start == StartKind::unknown)
     throw InputError(recording_file(recording), "start: unknown cannot be fitted by this version",
@@ -271,7 +304,10 @@ FitProblem make_problem(const FitInput& input, const FitOptions& options, int me
   place_sheet_of(recording, problem);
   add_fabric(recording, options, problem);
   add_effects(recording, options, problem);
-  add_gravity_direction(problem);
+  if (!options.forecast) {
+    add_gravity_direction(problem);
+    add_sheet_motion(problem);
+  }
   return problem;
 }
 
@@ -291,16 +327,15 @@ ParameterSet parameter_set(const FitProblem& problem, const Eigen::VectorXd& val
     const Eigen::Vector3d turn =
         problem.level_axes *
         Eigen::Vector2d(problem.tilt[0].value(values), problem.tilt[1].value(values));
-    if (turn.norm() > 0)
-      set.gravity_m_per_s2 =
-          Eigen::AngleAxisd(turn.norm(), turn.normalized()) * problem.gravity_m_per_s2;
+    set.gravity_m_per_s2 =
+        Eigen::AngleAxisd(turn.norm(), turn.stableNormalized()) * problem.gravity_m_per_s2;
   }
   for (const std::vector<Binding>& effect : problem.effects) {
     std::vector<double> numbers;
     for (const Binding& binding : effect) numbers.push_back(binding.value(values));
     set.effects.push_back(std::move(numbers));
   }
-  set.start_position_m = problem.placed_sheet_m;
+  set.start_position_m = moved_sheet(problem, values);
   return set;
 }
 

@@ -39,6 +39,7 @@ struct FitProblem {
   std::vector<std::vector<Binding>> effects;  ///< [effect of the cloth][parameter]
   std::vector<Binding> tilt;                  ///< rotation of gravity about two level axes; or none
   Eigen::Matrix<double, 3, 2> level_axes;
+  std::vector<Binding> sheet_motion;  ///< of the placed sheet: turn (rad) and shift (m); or none
   std::vector<GaussianPrior> priors;
 
   int frames() const { return static_cast<int>(frame_time_s.size()); }

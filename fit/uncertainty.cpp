@@ -3,21 +3,52 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "fit/refine.h"
 
 namespace clothfit {
 
+namespace {
+
+/// Inverse of an information matrix. Directions that the data say nothing about get a standard
+/// deviation of a million instead of spoiling the inverse for all.
+Eigen::MatrixXd invert(const Eigen::MatrixXd& information) {
+  constexpr double kLeastInformation = 1e-12;
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(information);
+  const Eigen::VectorXd variance = eigen.eigenvalues().cwiseMax(kLeastInformation).cwiseInverse();
+  return eigen.eigenvectors() * variance.asDiagonal() * eigen.eigenvectors().transpose();
+}
+
+Eigen::MatrixXd prior_information(const FitProblem& problem, const Eigen::VectorXd& slope) {
+  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(slope.size(), slope.size());
+  for (const GaussianPrior& prior : problem.priors) {
+    Eigen::MatrixXd j = Eigen::MatrixXd::Zero(prior.mean.size(), slope.size());
+    for (size_t n = 0; n < prior.indices.size(); ++n)
+      j.col(prior.indices[n]) =
+          prior.sqrt_information.col(static_cast<Eigen::Index>(n)) * slope[prior.indices[n]];
+    information += j.transpose() * j;
+  }
+  return information;
+}
+
+}  // namespace
+
 Uncertainty estimate_uncertainty(const FitProblem& problem, const Objective& objective,
                                  const Eigen::VectorXd& values) {
   Uncertainty result;
-  const ParameterSpace& space = problem.space;
-  Eigen::VectorXd residual;
-  Eigen::MatrixXd jacobian;
+  const int parameters = problem.space.size();
+  Eigen::VectorXd residual, same_residual;
+  Eigen::MatrixXd jacobian, wide_jacobian;
   if (!objective.linearise(values, residual, jacobian)) return result;
 
   const double threshold = kHuberScales * robust_scale(residual);
-  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(space.size(), space.size());
+  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(parameters, parameters);
+  std::map<std::pair<int, int>, Eigen::VectorXd> gradient_of_marker;
+  const Objective half(problem, objective.frames(), 0.5 * objective.time_step_s());
+  const Eigen::VectorXd half_step_residual = half.residuals({values}).front();
+  if (half_step_residual.size() != residual.size()) return result;
+  Eigen::VectorXd step_gradient = Eigen::VectorXd::Zero(parameters);
   double chi_square = 0;
   double weight_sum = 0;
   for (const Objective::Block& block : objective.blocks()) {
@@ -25,34 +56,44 @@ Uncertainty estimate_uncertainty(const FitProblem& problem, const Objective& obj
     const auto j = jacobian.middleRows(block.offset, block.dimension);
     const double weight = std::min(1.0, threshold / std::max(r.norm(), 1e-300));
     information += weight * j.transpose() * j;
+    const int marker = problem.observations[static_cast<size_t>(block.set)]
+                           .rows[static_cast<size_t>(block.row)]
+                           .marker;
+    auto [gradient, is_new] =
+        gradient_of_marker.try_emplace({block.set, marker}, Eigen::VectorXd::Zero(parameters));
+    gradient->second += weight * j.transpose() * r;
+    step_gradient += weight * j.transpose() * 2 *
+                     (half_step_residual.segment(block.offset, block.dimension) - r);
     chi_square += weight * r.squaredNorm();
     weight_sum += weight * block.dimension;
   }
-  result.chi_square_per_dof = chi_square / std::max(1.0, weight_sum - space.size());
-  const double inflation = std::max(1.0, result.chi_square_per_dof);
-  information /= inflation;
+  result.chi_square_per_dof = chi_square / std::max(1.0, weight_sum - parameters);
 
-  const Eigen::VectorXd slope = space.value_by_coordinate(values);
-  for (const GaussianPrior& prior : problem.priors) {
-    Eigen::MatrixXd j = Eigen::MatrixXd::Zero(prior.mean.size(), space.size());
-    for (size_t n = 0; n < prior.indices.size(); ++n)
-      j.col(prior.indices[n]) =
-          prior.sqrt_information.col(static_cast<Eigen::Index>(n)) * slope[prior.indices[n]];
-    information += j.transpose() * j;
-  }
-
-  // Directions that the data say nothing about get a sigma of a million, which the caller reports
-  // as undetermined, instead of spoiling the inverse for all.
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(information);
-  if (eigen.info() != Eigen::Success) return result;
-  constexpr double kLeastInformation = 1e-12;
-  const Eigen::VectorXd variance = eigen.eigenvalues().cwiseMax(kLeastInformation).cwiseInverse();
+  const Eigen::VectorXd slope = problem.space.value_by_coordinate(values);
+  const Eigen::MatrixXd prior = prior_information(problem, slope);
   const Eigen::MatrixXd covariance =
-      eigen.eigenvectors() * variance.asDiagonal() * eigen.eigenvectors().transpose();
+      invert(information / std::max(1.0, result.chi_square_per_dof) + prior);
+  Eigen::MatrixXd scatter = Eigen::MatrixXd::Zero(parameters, parameters);
+  for (const auto& [marker, gradient] : gradient_of_marker)
+    scatter += gradient * gradient.transpose();
+  const Eigen::MatrixXd bread = invert(information + prior);
+  const Eigen::VectorXd robust_variance = (bread * scatter * bread).diagonal();
+
   const Eigen::VectorXd sigma = covariance.diagonal().cwiseSqrt();
-  result.sigma = sigma.cwiseProduct(slope);
   result.correlation =
       sigma.cwiseInverse().asDiagonal() * covariance * sigma.cwiseInverse().asDiagonal();
+  const Eigen::VectorXd shift = -bread * step_gradient;
+  result.step_shift = shift.cwiseProduct(slope);
+  result.sigma = (covariance.diagonal().cwiseMax(robust_variance) + shift.cwiseAbs2())
+                     .cwiseSqrt()
+                     .cwiseProduct(slope);
+
+  constexpr double kWideStep = 0.02;
+  result.roughness = Eigen::VectorXd::Ones(parameters);
+  if (objective.linearise(values, same_residual, wide_jacobian, kWideStep)) {
+    for (int p = 0; p < parameters; ++p)
+      result.roughness[p] = jacobian.col(p).norm() / std::max(wide_jacobian.col(p).norm(), 1e-300);
+  }
   result.usable = true;
   return result;
 }

@@ -1,0 +1,121 @@
+// Residuals of the trajectory cost and their derivatives. What a step of the model does is checked
+// in tests/model; the search for the minimum in refine_test.cpp.
+#include "fit/objective.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "model/stability.h"
+#include "synthetic_cloth.h"
+
+namespace clothfit {
+namespace {
+
+FitProblem small_problem(ObservationKind kind, double noise_m = 1e-9) {
+  return make_problem(synthetic_input({.noise_m = noise_m, .noise_px = 0.3}),
+                      {.observations = kind, .effects = {"viscous_damping"}}, 9, 9);
+}
+
+Eigen::VectorXd true_values(const FitProblem& problem) {
+  const Fabric fabric = SyntheticCloth{}.fabric;
+  Eigen::VectorXd values = problem.space.start();
+  const auto set = [&](const char* name, double value) {
+    values[problem.space.index(name)] = value;
+  };
+  set("tension_warp", fabric.tension_warp_n_per_m);
+  set("tension_weft", fabric.tension_weft_n_per_m);
+  set("shear", fabric.shear_n_per_m);
+  set("flexion_warp", fabric.flexion_warp_n_per_m);
+  set("flexion_weft", fabric.flexion_weft_n_per_m);
+  set("damping_warp", fabric.damping_warp_s);
+  set("damping_weft", fabric.damping_weft_s);
+  set("viscous_damping.rate", 0);
+  return values;
+}
+
+TEST(Objective, VanishesAtTheTruthWhenTheStepIsTheSame) {
+  const FitProblem problem = small_problem(ObservationKind::tracks3d);
+  const Objective objective(problem, problem.frames(), 1.0 / 60 / 200);
+
+  const Eigen::VectorXd residual = objective.residuals({true_values(problem)}).front();
+
+  ASSERT_EQ(residual.size(), objective.residual_count());
+  EXPECT_EQ(residual.size(), 3 * 49 * 36);
+  // sigma is 1e-9 m and so is the noise; the sheet placed on it is off by as little.
+  EXPECT_NEAR(std::sqrt(residual.squaredNorm() / static_cast<double>(residual.size())), 1.0, 0.1);
+}
+
+TEST(Objective, LooksAtTheFirstFramesOnly) {
+  const FitProblem problem = small_problem(ObservationKind::tracks3d);
+
+  const Objective objective(problem, 5, 1.0 / 60 / 200);
+
+  EXPECT_EQ(objective.residual_count(), 3 * 49 * 5);
+  for (const Objective::Block& block : objective.blocks())
+    EXPECT_LT(problem.observations[0].rows[static_cast<size_t>(block.row)].frame, 5);
+}
+
+TEST(Objective, DerivativesAgreeWithRichardsonExtrapolation) {
+  for (const ObservationKind kind : {ObservationKind::tracks3d, ObservationKind::tracks2d}) {
+    SCOPED_TRACE(kind == ObservationKind::tracks3d ? "3D" : "2D");
+    const FitProblem problem = small_problem(kind, 5e-4);
+    const Objective objective(problem, 20, 1.0 / 60 / 150);
+    const Eigen::VectorXd values = true_values(problem);
+
+    Eigen::VectorXd residual;
+    Eigen::MatrixXd jacobian;
+    ASSERT_TRUE(objective.linearise(values, residual, jacobian));
+
+    // Another route: differences at two large steps, extrapolated; error O(step^4)
+    const Eigen::VectorXd at = problem.space.coordinates(values);
+    for (int p = 0; p < problem.space.size(); ++p) {
+      SCOPED_TRACE(problem.space.parameters[static_cast<size_t>(p)].name);
+      const auto difference = [&](double step) -> Eigen::VectorXd {
+        Eigen::VectorXd plus = at, minus = at;
+        plus[p] += step;
+        minus[p] -= step;
+        const auto r =
+            objective.residuals({problem.space.values(plus), problem.space.values(minus)});
+        return (r[0] - r[1]) / (2 * step);
+      };
+      const Eigen::VectorXd reference = (4 * difference(2e-3) - difference(4e-3)) / 3;
+      EXPECT_LT((jacobian.col(p) - reference).norm(), 1e-5 * reference.norm());
+      EXPECT_GT(reference.norm(), 0);
+    }
+  }
+}
+
+TEST(Objective, SaysNothingWhereTheStepWouldNotBeStable) {
+  const FitProblem problem = small_problem(ObservationKind::tracks3d);
+  const Eigen::VectorXd good = true_values(problem);
+  const double stable_s = stable_time_step_s(problem.cloth, parameter_set(problem, good));
+  const Objective objective(problem, 10, 0.9 * stable_s);
+  Eigen::VectorXd stiff = good;
+  stiff[problem.space.index("tension_warp")] *= 20;
+
+  const auto residuals = objective.residuals({stiff, good, stiff});
+
+  EXPECT_EQ(residuals[0].size(), 0);
+  EXPECT_EQ(residuals[1].size(), objective.residual_count());
+  EXPECT_EQ(objective.mean_length(residuals[0]), INFINITY);
+  EXPECT_TRUE(std::isfinite(objective.mean_length(residuals[1])));
+}
+
+TEST(Objective, DoesNotDependOnWhatElseIsEvaluated) {
+  const FitProblem problem = small_problem(ObservationKind::tracks2d);
+  const Objective objective(problem, 12, 1.0 / 60 / 150);
+  const Eigen::VectorXd values = true_values(problem);
+  Eigen::VectorXd other = values;
+  other[0] *= 1.3;
+
+  const Eigen::VectorXd alone = objective.residuals({values}).front();
+  const auto among = objective.residuals(
+      {other, other, values, other, other, other, other, other, other, other, values});
+
+  EXPECT_EQ(alone, among[2]);
+  EXPECT_EQ(alone, among[10]);
+}
+
+}  // namespace
+}  // namespace clothfit

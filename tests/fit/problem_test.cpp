@@ -1,0 +1,187 @@
+// A recording made ready to be fitted: what is observed, held, declared, and what is refused. How
+// the optimum is found is in refine_test.cpp, the whole fit in fit_test.cpp, motion of held points
+// in drive_test.cpp.
+#include "fit/problem.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+
+#include "data/input_error.h"
+#include "synthetic_cloth.h"
+
+namespace clothfit {
+namespace {
+
+using ::testing::HasSubstr;
+
+template <class Call>
+std::string refusal(Call&& call) {
+  try {
+    call();
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "not refused";
+}
+
+FitProblem problem_of(const FitInput& input, const FitOptions& options = {}) {
+  return make_problem(input, options, input.recording.cloth.mesh_columns,
+                      input.recording.cloth.mesh_rows);
+}
+
+TEST(Problem, PlacesTheSheetOnTheFirstFrame) {
+  const FitInput input = synthetic_input({.noise_m = 1e-9});
+
+  const FitProblem problem = problem_of(input);
+
+  // Held corners of the true sheet lie at (0, 0, 0) and (0.4, 0, 0).
+  EXPECT_LT(problem.placed_sheet_m.col(0).norm(), 1e-7);
+  EXPECT_LT((problem.placed_sheet_m.col(8) - Eigen::Vector3d(0.4, 0, 0)).norm(), 1e-7);
+}
+
+TEST(Problem, TakesTracksThatAreThereAndLeavesOutRejectedOnes) {
+  FitInput input = synthetic_input({});
+  input.tracks2d["front"][5].rejected = "low_margin";
+  input.tracks2d["front"][9].rejected = "low_margin";
+
+  const FitProblem both = problem_of(input);
+  const FitProblem pixels = problem_of(input, {.observations = ObservationKind::tracks2d});
+
+  ASSERT_EQ(both.observations.size(), 1u);
+  EXPECT_EQ(both.observations[0].kind, "tracks3d");
+  ASSERT_EQ(pixels.observations.size(), 1u);
+  EXPECT_EQ(pixels.observations[0].rows.size(), input.tracks2d["front"].size() - 2);
+  EXPECT_EQ(pixels.rejected.at("low_margin"), 2);
+}
+
+TEST(Problem, EstimatesSigmaWhereTracksDoNotStateIt) {
+  FitInput input = synthetic_input({.noise_m = 8e-4, .seed = 3});
+  for (Position3d& row : input.tracks3d) row.sigma_m = 0;
+
+  const FitProblem problem = problem_of(input);
+
+  EXPECT_NEAR(problem.observations[0].noise, 8e-4, 0.1 * 8e-4);
+}
+
+TEST(Problem, UncertainCameraPoseMakesGravityADirectionWithAPrior) {
+  // Given a camera whose turn about its own x axis is known to 3 mrad, about y and z to 1 mrad
+  FitInput input = synthetic_input({});
+  Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Identity() * 1e-6;
+  covariance(0, 0) = 9e-6;
+  input.cameras[0].camera_from_world->covariance = covariance;
+
+  const FitProblem problem = problem_of(input, {.observations = ObservationKind::tracks2d});
+
+  // Then a turn about the world's x axis (the camera's x) has that prior, about y (its z) the other
+  ASSERT_EQ(problem.tilt.size(), 2u);
+  ASSERT_EQ(problem.priors.size(), 1u);
+  const GaussianPrior& prior = problem.priors[0];
+  for (const auto& [axis, sigma] : {std::pair(Eigen::Vector3d(Eigen::Vector3d::UnitX()), 3e-3),
+                                    std::pair(Eigen::Vector3d(Eigen::Vector3d::UnitY()), 1e-3)}) {
+    const Eigen::Vector2d turn = problem.level_axes.transpose() * (sigma * axis);
+    Eigen::VectorXd values = problem.space.start();
+    values[prior.indices[0]] = turn[0];
+    values[prior.indices[1]] = turn[1];
+    EXPECT_NEAR(prior.residual(values).norm(), 1.0, 1e-9);
+
+    // and gravity is turned by just that
+    const Eigen::Vector3d gravity = parameter_set(problem, values).gravity_m_per_s2;
+    const Eigen::Vector3d expected = Eigen::AngleAxisd(sigma, axis) * problem.gravity_m_per_s2;
+    EXPECT_LT((gravity - expected).norm(), 1e-12);
+  }
+}
+
+TEST(Problem, ExactCameraPoseAddsNoUnknown) {
+  const FitInput input = synthetic_input({});
+
+  const FitProblem problem = problem_of(input, {.observations = ObservationKind::tracks2d});
+
+  EXPECT_TRUE(problem.tilt.empty());
+  EXPECT_TRUE(problem.priors.empty());
+}
+
+TEST(Problem, SheetMotionTurnsAboutTheMiddleAndShifts) {
+  const FitInput input = synthetic_input({});
+  const FitProblem problem = problem_of(input);
+  ASSERT_EQ(problem.sheet_motion.size(), 6u);
+  Eigen::VectorXd values = problem.space.start();
+  EXPECT_LT((parameter_set(problem, values).start_position_m - problem.placed_sheet_m).norm(),
+            1e-14);
+
+  values[problem.space.index("sheet_turn_x")] = 0.02;
+  values[problem.space.index("sheet_shift_z")] = 0.003;
+  const Eigen::Matrix3Xd moved = parameter_set(problem, values).start_position_m;
+
+  const int middle = 4 * 9 + 4;
+  EXPECT_LT((moved.col(middle) - problem.placed_sheet_m.col(middle) - Eigen::Vector3d(0, 0, 0.003))
+                .norm(),
+            1e-12);
+  const Eigen::Vector3d arm = problem.placed_sheet_m.col(0) - problem.placed_sheet_m.col(middle);
+  const Eigen::Vector3d turned = Eigen::AngleAxisd(0.02, Eigen::Vector3d::UnitX()) * arm;
+  EXPECT_LT((moved.col(0) - moved.col(middle) - turned).norm(), 1e-12);
+}
+
+TEST(Problem, UnweighedClothGetsAnAssumedMass) {
+  FitInput input = synthetic_input({});
+  input.recording.cloth.mass_kg.reset();
+
+  const FitProblem problem = problem_of(input);
+
+  EXPECT_TRUE(problem.mass_assumed);
+  EXPECT_NEAR(problem.cloth.mass_kg.sum(), 0.1 * 0.16, 1e-12);
+}
+
+TEST(Problem, EffectsEnterOnlyWhenDeclaredOrAskedFor) {
+  FitInput input = synthetic_input({});
+  EXPECT_TRUE(problem_of(input).cloth.effects.empty());
+
+  const FitProblem asked = problem_of(input, {.effects = {"viscous_damping"}});
+  ASSERT_EQ(asked.effects.size(), 1u);
+  EXPECT_GE(asked.effects[0][0].parameter, 0);
+
+  input.recording.declared = {{.name = "viscous_damping", .parameters = {{"rate", {1.5}}}}};
+  const FitProblem declared = problem_of(input, {.effects = {"viscous_damping"}});
+  ASSERT_EQ(declared.effects.size(), 1u);  // once, though both declared and asked for
+  EXPECT_EQ(declared.effects[0][0].parameter, -1);
+  EXPECT_EQ(declared.effects[0][0].constant, 1.5);
+}
+
+TEST(Problem, RefusesWhatCannotBeFitted) {
+  const FitInput good = synthetic_input({});
+
+  FitInput unknown_start = good;
+  unknown_start.recording.start = StartKind::unknown;
+  EXPECT_THAT(refusal([&] { problem_of(unknown_start); }), HasSubstr("start: unknown"));
+
+  FitInput no_first_frame = good;
+  std::erase_if(no_first_frame.tracks3d,
+                [](const Position3d& row) { return row.frame == 0 && row.marker > 2; });
+  EXPECT_THAT(refusal([&] { problem_of(no_first_frame); }), HasSubstr("frame 0 shows too few"));
+
+  FitInput no_pose = good;
+  no_pose.cameras[0].camera_from_world.reset();
+  EXPECT_THAT(refusal([&] { problem_of(no_pose, {.observations = ObservationKind::tracks2d}); }),
+              HasSubstr("has no camera_from_world"));
+
+  FitInput nothing = good;
+  nothing.tracks3d.clear();
+  nothing.tracks2d.clear();
+  EXPECT_THAT(refusal([&] { problem_of(nothing); }), HasSubstr("0 frames are left to fit"));
+
+  EXPECT_THAT(refusal([&] { problem_of(good, {.effects = {"viscous_dampign"}}); }),
+              HasSubstr("known effects: viscous_damping"));
+
+  FitInput wrong_parameter = good;
+  wrong_parameter.recording.declared = {
+      {.name = "viscous_damping", .parameters = {{"ratio", {1.5}}}}};
+  EXPECT_THAT(refusal([&] { problem_of(wrong_parameter); }), HasSubstr("no parameter 'ratio'"));
+
+  FitInput all_held_out = good;
+  all_held_out.recording.held_out_from_frame = 1;
+  EXPECT_THAT(refusal([&] { problem_of(all_held_out); }), HasSubstr("left to fit"));
+}
+
+}  // namespace
+}  // namespace clothfit

@@ -1,0 +1,168 @@
+// Least squares over a trajectory, and how sure its result is. The residuals and their derivatives
+// are checked in objective_test.cpp, the whole fit from nothing in fit_test.cpp.
+#include "fit/refine.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "fit/uncertainty.h"
+#include "synthetic_cloth.h"
+
+namespace clothfit {
+namespace {
+
+/// A 5 x 5 cloth over 20 frames: a fit of it takes a fraction of a second.
+SyntheticCloth tiny(unsigned seed) {
+  return {
+      .mesh = 5, .markers = 5, .frames = 20, .held_out_from = 20, .noise_m = 5e-4, .seed = seed};
+}
+
+FitProblem tiny_problem(unsigned seed, const FitOptions& options = {}) {
+  return make_problem(synthetic_input(tiny(seed)), options, 5, 5);
+}
+
+Eigen::VectorXd truth_of(const FitProblem& problem) {
+  const Fabric fabric = SyntheticCloth{}.fabric;
+  Eigen::VectorXd values = problem.space.start();
+  values.head<7>() << fabric.tension_warp_n_per_m, fabric.tension_weft_n_per_m,
+      fabric.shear_n_per_m, fabric.flexion_warp_n_per_m, fabric.flexion_weft_n_per_m,
+      fabric.damping_warp_s, fabric.damping_weft_s;
+  return values;
+}
+
+TEST(Refine, FindsTheTruthFromAStartThatIsOffByAFactor) {
+  const FitProblem problem = tiny_problem(1);
+  const Eigen::VectorXd truth = truth_of(problem);
+  Eigen::VectorXd start = truth;
+  for (int p = 0; p < 7; ++p) start[p] *= p % 2 == 0 ? 1.6 : 0.65;
+
+  const RefineResult result = refine(problem, problem.frames(), start, {}, {});
+
+  ASSERT_TRUE(result.usable) << result.message;
+  EXPECT_TRUE(result.converged);
+  const Objective objective(problem, problem.frames(), result.time_step_s);
+  const Uncertainty uncertainty = estimate_uncertainty(problem, objective, result.values);
+  ASSERT_TRUE(uncertainty.usable);
+  for (int p = 0; p < 7; ++p) {
+    SCOPED_TRACE(problem.space.parameters[static_cast<size_t>(p)].name);
+    EXPECT_LT(std::abs(result.values[p] - truth[p]), 4 * uncertainty.sigma[p]);
+    EXPECT_NEAR(uncertainty.roughness[p], 1.0, 0.2);  // nothing chaotic in a third of a second
+  }
+  // Noise alone is left: 1500 residuals, whose mean square scatters by 4 %
+  EXPECT_NEAR(uncertainty.chi_square_per_dof, 1.0, 0.15);
+}
+
+TEST(Refine, ScatterOverNoiseIsWhatTheCovariancePredicts) {
+  constexpr int kTrials = 20;
+  Eigen::ArrayXd squared_pull = Eigen::ArrayXd::Zero(7);
+  for (unsigned trial = 0; trial < kTrials; ++trial) {
+    SCOPED_TRACE(trial);
+    const FitProblem problem = tiny_problem(100 + trial);
+    const Eigen::VectorXd truth = truth_of(problem);
+
+    const RefineResult result =
+        refine(problem, problem.frames(), truth, {.least_gain = 1e-5, .substep_scale = 6}, {});
+
+    ASSERT_TRUE(result.usable) << result.message;
+    const Objective objective(problem, problem.frames(), result.time_step_s);
+    const Uncertainty uncertainty = estimate_uncertainty(problem, objective, result.values);
+    squared_pull +=
+        ((result.values - truth).array() / uncertainty.sigma.array()).head<7>().square() / kTrials;
+  }
+  // Mean squared pull 1; of 20 it scatters by sqrt(2 / 20) = 0.32. The larger of two variance
+  // estimates is taken, which lowers it somewhat. Small steps, as the truth's: what a long one does
+  // is the next test.
+  for (int p = 0; p < 7; ++p) {
+    SCOPED_TRACE(p);
+    EXPECT_GT(squared_pull[p], 0.3);
+    EXPECT_LT(squared_pull[p], 2.0);
+  }
+}
+
+TEST(Uncertainty, ForeseesWhatALongTimeStepDoesToTheParameters) {
+  // Given the same noisy tracks fitted with long steps and with steps a tenth as long
+  const FitProblem problem = tiny_problem(8);
+  const Eigen::VectorXd truth = truth_of(problem);
+  const RefineResult rough = refine(problem, problem.frames(), truth, {}, {});
+  const RefineResult fine = refine(problem, problem.frames(), truth, {.substep_scale = 10}, {});
+  ASSERT_TRUE(rough.usable && fine.usable);
+
+  const Objective objective(problem, problem.frames(), rough.time_step_s);
+  const Uncertainty uncertainty = estimate_uncertainty(problem, objective, rough.values);
+
+  // Then the shift is foreseen: to first order in the step, and 9/10 of it was taken away
+  ASSERT_TRUE(uncertainty.usable);
+  const Eigen::VectorXd foreseen = 0.9 * uncertainty.step_shift;
+  const Eigen::VectorXd seen = fine.values - rough.values;
+  for (const char* name : {"tension_warp", "tension_weft", "damping_warp"}) {
+    SCOPED_TRACE(name);
+    const int p = problem.space.index(name);
+    EXPECT_NEAR(seen[p], foreseen[p], 0.25 * std::abs(foreseen[p]) + 0.1 * uncertainty.sigma[p]);
+  }
+}
+
+TEST(Refine, GrossOutliersHardlyPull) {
+  FitInput input = synthetic_input(tiny(2));
+  std::mt19937_64 generator(9);
+  std::uniform_real_distribution<double> uniform(-0.1, 0.1);
+  for (size_t n = 40; n < input.tracks3d.size(); n += 20)  // 5 %, up to 10 cm off; not in frame 0
+    for (double& coordinate : input.tracks3d[n].position_m) coordinate += uniform(generator);
+  const FitProblem problem = make_problem(input, {}, 5, 5);
+  const Eigen::VectorXd truth = truth_of(problem);
+
+  const RefineResult result = refine(problem, problem.frames(), truth, {}, {});
+
+  ASSERT_TRUE(result.usable) << result.message;
+  for (int p = 0; p < 3; ++p)  // tension and shear, which are known to a percent without outliers
+    EXPECT_NEAR(result.values[p] / truth[p], 1.0, 0.1);
+}
+
+TEST(Refine, PriorHoldsWhatTheDataLeaveOpen) {
+  // Given pixels of a camera whose pose is uncertain, and a start with gravity turned by 5 mrad
+  FitInput input = synthetic_input(tiny(3));
+  input.cameras[0].camera_from_world->covariance = Eigen::Matrix<double, 6, 6>::Identity() * 9e-6;
+  const FitProblem problem = make_problem(input, {.observations = ObservationKind::tracks2d}, 5, 5);
+  const int tilt_a = problem.space.index("world_tilt_a");
+  const int tilt_b = problem.space.index("world_tilt_b");
+  Eigen::VectorXd start = truth_of(problem);
+  start[tilt_a] = start[tilt_b] = 5e-3;
+
+  const RefineResult result = refine(problem, problem.frames(), start, {}, {});
+
+  // Then the data and the prior bring it back: it truly points down
+  ASSERT_TRUE(result.usable) << result.message;
+  const Objective objective(problem, problem.frames(), result.time_step_s);
+  const Uncertainty uncertainty = estimate_uncertainty(problem, objective, result.values);
+  for (const int p : {tilt_a, tilt_b}) {
+    EXPECT_LT(std::abs(result.values[p]), 4 * uncertainty.sigma[p]);
+    EXPECT_LE(uncertainty.sigma[p], 3e-3 * 1.0001);
+  }
+}
+
+TEST(Refine, EndsSoonWhenItIsCancelled) {
+  const FitProblem problem = tiny_problem(4);
+  int calls = 0;
+
+  const RefineResult result = refine(problem, problem.frames(), problem.space.start(), {},
+                                     [&](const Progress&) { return ++calls < 2; });
+
+  EXPECT_TRUE(result.cancelled);
+  EXPECT_EQ(calls, 2);
+}
+
+TEST(Uncertainty, SaysSoWhenTheDataHoldNothingAboutAParameter) {
+  // Given two frames: the cloth has hardly begun to fall
+  const FitProblem problem = tiny_problem(5);
+  const Objective objective(problem, 2, 1.0 / 60 / 100);
+
+  const Uncertainty uncertainty = estimate_uncertainty(problem, objective, truth_of(problem));
+
+  ASSERT_TRUE(uncertainty.usable);
+  const int flexion = problem.space.index("flexion_warp");
+  EXPECT_GT(uncertainty.sigma[flexion], truth_of(problem)[flexion]);
+}
+
+}  // namespace
+}  // namespace clothfit

@@ -1,0 +1,97 @@
+#include "synthetic_cloth.h"
+
+#include <Eigen/Geometry>
+#include <numbers>
+#include <random>
+
+#include "calib/projection.h"
+#include "model/cloth.h"
+#include "model/simulate.h"
+#include "model/surface.h"
+
+namespace clothfit {
+
+CameraParameters synthetic_camera() {
+  CameraParameters camera{.name = "front",
+                          .model = CameraModel::brown_conrady,
+                          .image_width = 960,
+                          .image_height = 720,
+                          .focal_px = {1000, 1000},
+                          .centre_px = {480, 360},
+                          .distortion = {-0.1, 0.03, 5e-4, -5e-4}};
+  // World x to the right, z up; the camera looks along +y at the cloth's middle.
+  Eigen::Matrix3d rotation;
+  rotation << 1, 0, 0, 0, 0, -1, 0, 1, 0;
+  camera.camera_from_world =
+      CameraPose{.rotation = Eigen::Quaterniond(rotation), .translation_m = {-0.2, -0.2, 1.0}};
+  return camera;
+}
+
+FitInput synthetic_input(const SyntheticCloth& truth) {
+  constexpr double kSize = 0.4;
+  constexpr double kMass = 0.03;
+  FitInput input;
+  Recording& recording = input.recording;
+  recording.name = "synthetic";
+  recording.folder = "synthetic";
+  recording.cloth = {.width_m = kSize,
+                     .height_m = kSize,
+                     .mass_kg = kMass,
+                     .mesh_columns = truth.mesh,
+                     .mesh_rows = truth.mesh};
+  recording.frame_rate_hz = 60;
+  recording.start = StartKind::released_flat;
+  recording.held = {{.at_m = {0, 0}}, {.at_m = {kSize, 0}}};
+  recording.held_out_from_frame = truth.held_out_from;
+  Eigen::Matrix2Xd places(2, truth.markers * truth.markers);
+  for (int i = 0; i < truth.markers; ++i) {
+    for (int j = 0; j < truth.markers; ++j) {
+      const int m = i * truth.markers + j;
+      places.col(m) << kSize * j / (truth.markers - 1), kSize * i / (truth.markers - 1);
+      const std::string name = std::string("m") + std::to_string(m);
+      recording.markers.markers.push_back({.name = name, .s_m = places(0, m), .t_m = places(1, m)});
+      recording.markers.index[name] = m;
+    }
+  }
+
+  const Mesh mesh{truth.mesh, truth.mesh, kSize, kSize};
+  Cloth cloth = Cloth::of(mesh, masses_by_area(mesh, kMass));
+  cloth.held = {held_at(mesh, 0, 0), held_at(mesh, kSize, 0)};
+  cloth.add_effect("viscous_damping", "test");
+  ParameterSet parameters{.springs = spring_parameters(truth.fabric, mesh),
+                          .effects = {{truth.drag_rate_per_s}}};
+  // The flat sheet: s to the right, t down and, turned, away from the camera.
+  const double tilt = 25.0 / 180.0 * std::numbers::pi;
+  const Eigen::Vector3d along_t(0, std::sin(tilt), -std::cos(tilt));
+  const Eigen::Matrix3Xd flat = flat_positions(mesh);
+  parameters.start_position_m = Eigen::Vector3d::UnitX() * flat.row(0) + along_t * flat.row(1);
+  Schedule schedule{.frame_time_s = {}, .time_step_s = 1.0 / 60 / 200};
+  for (int f = 0; f < truth.frames; ++f) schedule.frame_time_s.push_back(f / 60.0);
+  const SimulateResult run = simulate(cloth, {&parameters, 1}, schedule).front();
+
+  const Surface surface = make_surface(truth.mesh, truth.mesh, kSize, kSize, places);
+  const CameraParameters camera = synthetic_camera();
+  recording.cameras = {{.name = camera.name}};
+  input.cameras = {camera};
+  std::mt19937_64 generator(truth.seed);
+  std::normal_distribution<double> normal;
+  for (int f = 0; f < truth.frames; ++f) {
+    const Eigen::Matrix3Xd seen = surface.evaluate(run.position_m[static_cast<size_t>(f)]);
+    for (int m = 0; m < seen.cols(); ++m) {
+      const Eigen::Vector3d point = seen.col(m);
+      Eigen::Vector3d noise;
+      for (double& coordinate : noise) coordinate = normal(generator);
+      input.tracks3d.push_back({.frame = f,
+                                .marker = m,
+                                .position_m = point + truth.noise_m * noise,
+                                .sigma_m = truth.noise_m});
+      Eigen::Vector2d pixel = *project(camera, camera_from_world(camera) * point);
+      for (double& coordinate : pixel) coordinate += truth.noise_px * normal(generator);
+      input.tracks2d[camera.name].push_back(
+          {.frame = f, .marker = m, .position_px = pixel, .sigma_px = truth.noise_px});
+    }
+  }
+  return input;
+}
+
+}  // namespace clothfit
