@@ -13,7 +13,9 @@ namespace clothfit {
 /// of z^2 - (2 - h gamma - h^2 omega^2) z + 1 - h gamma inside the unit circle). omega^2 and gamma
 /// are bounded vertex by vertex: twice the largest eigenvalue of sum k u u' over its springs,
 /// divided by its mass, in the flat cloth; `kFoldedMargin` covers folded cloth, where springs of
-/// several directions may line up.
+/// several directions may line up. Cloth without any damping whose springs are violently crumpled
+/// (to half or twice their length) can still gain energy slowly close to this step; half of it is
+/// safe there too.
 double stable_time_step_s(const Cloth& cloth, const ParameterSet& parameters);
 
 }  // namespace clothfit

@@ -1,0 +1,61 @@
+// The table of effects. Not checked here: what each of them does (a file of its own in this
+// folder, with the contract in effect_contract.h).
+
+#include "model/effects/registry.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "data/input_error.h"
+#include "model/cloth.h"
+#include "tests/model/effect_contract.h"
+
+namespace clothfit {
+namespace {
+
+using testing::HasSubstr;
+
+TEST(EffectRegistry, ListsEffectsInAlphabeticalOrderEachOnce) {
+  const auto effects = effect_registry();
+
+  ASSERT_FALSE(effects.empty());
+  for (size_t n = 1; n < effects.size(); ++n)
+    EXPECT_LT(std::string(effects[n - 1].name), effects[n].name);
+}
+
+TEST(EffectRegistry, EveryEffectKeepsTheContract) {
+  for (const EffectEntry& entry : effect_registry()) expect_effect_contract(entry.name, {});
+}
+
+TEST(EffectRegistry, FindsEveryEffectByItsName) {
+  for (const EffectEntry& entry : effect_registry()) {
+    EXPECT_EQ(find_effect(entry.name, "test").make, entry.make);
+    Cloth cloth = square_cloth(3);
+    cloth.add_effect(entry.name, "test");
+    EXPECT_EQ(cloth.effect_descriptions.at(0).name, entry.name);
+    EXPECT_NE(cloth.effects.at(0), nullptr);
+  }
+}
+
+TEST(EffectRegistry, RefusesAnUnknownNameAndListsTheKnownOnes) {
+  Cloth cloth = square_cloth(3);
+  for (const char* name : {"viscous", "Viscous_damping", ""}) {
+    SCOPED_TRACE(name);
+    try {
+      cloth.add_effect(name, "recording.yaml:31");
+      FAIL() << "accepted";
+    } catch (const InputError& error) {
+      const std::string text = error.what();
+      EXPECT_THAT(text, HasSubstr("recording.yaml:31"));
+      EXPECT_THAT(text, HasSubstr("'" + std::string(name) + "'"));
+      for (const EffectEntry& entry : effect_registry()) EXPECT_THAT(text, HasSubstr(entry.name));
+    }
+    EXPECT_TRUE(cloth.effects.empty());
+    EXPECT_TRUE(cloth.effect_descriptions.empty());
+  }
+}
+
+}  // namespace
+}  // namespace clothfit

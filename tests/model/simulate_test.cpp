@@ -1,0 +1,324 @@
+// Runs over frames and the shape at rest. Not checked here: a single step (step_test.cpp), how long
+// it may be (stability_test.cpp), and what is made of the positions (surface_test.cpp, tests/fit/).
+
+#include "model/simulate.h"
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <cmath>
+
+#include "model/stability.h"
+#include "tests/model/mechanics.h"
+#include "tests/model/random_cloth.h"
+#include "tests/model/scalar_reference.h"
+
+namespace clothfit {
+namespace {
+
+Schedule frames(int count, double rate_hz, double time_step_s) {
+  Schedule schedule{.time_step_s = time_step_s};
+  for (int n = 0; n < count; ++n) schedule.frame_time_s.push_back(n / rate_hz);
+  return schedule;
+}
+
+/// A cloth held by its two upper corners.
+Cloth hung_cloth(int vertices_per_side) {
+  Cloth cloth = square_cloth(vertices_per_side);
+  cloth.held = {held_at(cloth.mesh, 0, 0), held_at(cloth.mesh, 0.4, 0)};
+  return cloth;
+}
+
+std::vector<ParameterSet> random_sets(const Cloth& cloth, int count, unsigned seed) {
+  Uniform uniform(seed);
+  std::vector<ParameterSet> sets;
+  for (int n = 0; n < count; ++n) {
+    sets.push_back({.springs = spring_parameters(random_fabric(uniform), cloth.mesh),
+                    .effects = {{uniform(0, 2)}},
+                    .start_position_m = crumpled(cloth.mesh, 0.1, uniform)});
+  }
+  return sets;
+}
+
+bool same_bits(const SimulateResult& a, const SimulateResult& b) {
+  if (a.reason != b.reason || a.diverged_frame != b.diverged_frame) return false;
+  if (a.position_m.size() != b.position_m.size()) return false;
+  for (size_t f = 0; f < a.position_m.size(); ++f) {
+    const bool lost = a.reason == StopReason::diverged && static_cast<int>(f) >= a.diverged_frame;
+    if (lost ? !b.position_m[f].array().isNaN().all() : a.position_m[f] != b.position_m[f])
+      return false;
+  }
+  return true;
+}
+
+// --- one result, however it is computed ----------------------------------------------------------
+
+TEST(Simulate, DependsNeitherOnTheNumberOfSetsNorOnTheirOrder) {
+  Cloth cloth = hung_cloth(6);
+  cloth.add_effect("viscous_damping", "test");
+  const std::vector<ParameterSet> sets = random_sets(cloth, 2 * kLanes + 3, 1);
+  const std::vector<ParameterSet> backwards(sets.rbegin(), sets.rend());
+  const Schedule schedule = frames(6, 30, 2e-4);
+
+  const auto together = simulate(cloth, sets, schedule);
+  const auto reversed = simulate(cloth, backwards, schedule);
+
+  ASSERT_EQ(together.size(), sets.size());
+  for (size_t n = 0; n < sets.size(); ++n) {
+    SCOPED_TRACE(n);
+    ASSERT_TRUE(together[n].usable());
+    ASSERT_EQ(together[n].position_m.size(), 6u);
+    EXPECT_TRUE(same_bits(together[n], simulate(cloth, {&sets[n], 1}, schedule).front()));
+    EXPECT_TRUE(same_bits(together[n], reversed[sets.size() - 1 - n]));
+    EXPECT_GT((together[n].position_m.back() - sets[n].start_position_m).norm(), 0.1);
+  }
+}
+
+TEST(Simulate, DoesNotDependOnTheNumberOfThreads) {
+  Cloth cloth = hung_cloth(6);
+  cloth.add_effect("viscous_damping", "test");
+  const std::vector<ParameterSet> sets = random_sets(cloth, 5 * kLanes, 2);
+  const Schedule schedule = frames(4, 30, 2e-4);
+  const auto on_threads = [&](size_t count) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, count);
+    return simulate(cloth, sets, schedule);
+  };
+
+  const auto one = on_threads(1), many = on_threads(8);
+
+  for (size_t n = 0; n < sets.size(); ++n) EXPECT_TRUE(same_bits(one[n], many[n])) << n;
+}
+
+TEST(Simulate, AgreesWithTheScalarReferenceToTheLastBit) {
+  Cloth cloth = square_cloth(7);
+  cloth.add_effect("viscous_damping", "test");
+  const std::vector<ParameterSet> sets = random_sets(cloth, kLanes + 1, 3);
+  const double h = 1.0 / 4096;  // frame intervals of a power of two are cut without rounding
+  const Schedule schedule{.frame_time_s = {0, 64 * h, 256 * h}, .time_step_s = h};
+
+  const auto results = simulate(cloth, sets, schedule);
+
+  for (size_t n = 0; n < sets.size(); ++n) {
+    SCOPED_TRACE(n);
+    const double rate_per_s = sets[n].effects[0][0];
+    EXPECT_EQ(results[n].position_m[0], sets[n].start_position_m);
+    EXPECT_EQ(results[n].position_m[1], reference_fall(cloth, sets[n], rate_per_s, h, 64));
+    EXPECT_EQ(results[n].position_m[2], reference_fall(cloth, sets[n], rate_per_s, h, 256));
+  }
+}
+
+TEST(Simulate, OfNoSetsIsNothing) {
+  EXPECT_TRUE(simulate(square_cloth(3), {}, frames(3, 30, 1e-3)).empty());
+}
+
+// --- time ----------------------------------------------------------------------------------------
+
+TEST(Schedule, CutsEachIntervalIntoTheFewestEqualSteps) {
+  // 0.03 / 0.01 is a rounding above 3: that must not cost a fourth step.
+  const Schedule schedule{.frame_time_s = {0, 0.03, 0.0301, 0.0651, 1.0651}, .time_step_s = 0.01};
+
+  EXPECT_EQ(schedule.substeps(1), 3);
+  EXPECT_EQ(schedule.substeps(2), 1);
+  EXPECT_EQ(schedule.substeps(3), 4);
+  EXPECT_EQ(schedule.substeps(4), 100);
+}
+
+TEST(Simulate, FallsFreelyThroughIrregularFrames) {
+  const Cloth cloth = square_cloth(4);
+  const ParameterSet set{.springs = spring_parameters(cotton(), cloth.mesh),
+                         .start_position_m = flat_positions(cloth.mesh)};
+  const Schedule schedule{.frame_time_s = {2.0, 2.013, 2.05, 2.0501, 2.2}, .time_step_s = 1e-3};
+
+  const SimulateResult result = simulate(cloth, {&set, 1}, schedule).front();
+
+  // Within an interval cut into n steps h: z falls by n h v + h^2 g n (n + 1) / 2, v by n h g.
+  double z = 0, v = 0;
+  for (int f = 1; f < 5; ++f) {
+    const auto at = static_cast<size_t>(f);
+    const double interval_s = schedule.frame_time_s[at] - schedule.frame_time_s[at - 1];
+    const int n = static_cast<int>(std::ceil(interval_s / 1e-3 - 1e-9));
+    const double h = interval_s / n;
+    z += n * h * v - 9.81 * h * h * n * (n + 1) / 2;
+    v -= 9.81 * n * h;
+    EXPECT_NEAR(result.position_m[at](2, 7), z, 1e-12) << f;
+  }
+}
+
+TEST(Simulate, HeldPointsAreWhereTheirMotionHasThemAtEveryFrame) {
+  Cloth cloth = hung_cloth(5);
+  const auto motion = [](double time_s) {
+    return Eigen::Vector3d(0.02 * std::sin(9 * time_s), 0.1 * time_s, -0.01 * time_s);
+  };
+  cloth.held[0].motion = motion;
+  cloth.held.push_back(held_at(cloth.mesh, 0.23, 0.31));
+  const ParameterSet set{.springs = spring_parameters(cotton(), cloth.mesh),
+                         .start_position_m = flat_positions(cloth.mesh)};
+  const Schedule schedule{.frame_time_s = {0, 0.013, 0.05, 0.0501, 0.2}, .time_step_s = 2e-4};
+
+  const SimulateResult result = simulate(cloth, {&set, 1}, schedule).front();
+
+  for (size_t f = 1; f < 5; ++f) {
+    SCOPED_TRACE(f);
+    const LaneVectors at = HeldPlacement(cloth).locate(every_lane(result.position_m[f]));
+    EXPECT_LT((at.lane(0).col(0) - motion(schedule.frame_time_s[f])).norm(), 1e-14);
+    EXPECT_LT((at.lane(0).col(1) - Eigen::Vector3d(0.4, 0, 0)).norm(), 1e-15);
+    EXPECT_LT((at.lane(0).col(2) - Eigen::Vector3d(0.23, 0.31, 0)).norm(), 1e-15);
+  }
+}
+
+// --- divergence ----------------------------------------------------------------------------------
+
+TEST(Simulate, ReportsWhatDivergesAndLeavesItsNeighboursAlone) {
+  // Given eight sets in one group of lanes, one a thousand times too stiff for the step,
+  const Cloth cloth = hung_cloth(6);
+  std::vector<ParameterSet> sets = random_sets(cloth, kLanes, 4);
+  for (ParameterSet& set : sets) set.effects.clear();
+  std::vector<ParameterSet> mixed = sets;
+  for (double& k : mixed[5].springs.stiffness_n_per_m) k *= 1000;
+  const Schedule schedule = frames(8, 30, 2e-4);
+  ASSERT_GT(2e-4, 2 * stable_time_step_s(cloth, mixed[5]));
+
+  // when they run,
+  const auto calm = simulate(cloth, sets, schedule);
+  const auto results = simulate(cloth, mixed, schedule);
+
+  // then that one says so and leaves no number behind, and the others have not noticed.
+  EXPECT_EQ(results[5].reason, StopReason::diverged);
+  EXPECT_FALSE(results[5].usable());
+  EXPECT_EQ(results[5].diverged_frame, 1);
+  ASSERT_EQ(results[5].position_m.size(), 8u);
+  EXPECT_EQ(results[5].position_m[0], mixed[5].start_position_m);
+  for (size_t f = 1; f < 8; ++f) EXPECT_TRUE(results[5].position_m[f].array().isNaN().all());
+  for (size_t n = 0; n < sets.size(); ++n) {
+    if (n == 5) continue;
+    EXPECT_TRUE(same_bits(results[n], calm[n])) << n;
+  }
+}
+
+TEST(Simulate, NamesTheFirstFrameThatLeftTheScene) {
+  // A cloth of 0.4 m counts as lost beyond a hundred diagonals, 56.57 m; free fall takes it there
+  // after 3.40 s.
+  const Cloth cloth = square_cloth(3);
+  const ParameterSet set{.springs = spring_parameters(cotton(), cloth.mesh),
+                         .start_position_m = flat_positions(cloth.mesh)};
+
+  const SimulateResult result = simulate(cloth, {&set, 1}, frames(50, 10, 1e-3)).front();
+
+  EXPECT_EQ(result.reason, StopReason::diverged);
+  EXPECT_EQ(result.diverged_frame, 34);
+  EXPECT_TRUE(result.position_m[33].allFinite());
+  ASSERT_EQ(result.position_m.size(), 50u);
+  for (size_t f = 34; f < 50; ++f) EXPECT_TRUE(result.position_m[f].array().isNaN().all());
+}
+
+// --- the shape at rest ---------------------------------------------------------------------------
+
+TEST(Relax, AHangingChainStretchesByTheWeightBelowEachSpring) {
+  // Given a strip of two columns held by its upper two vertices, structural springs only,
+  const Mesh mesh{.columns = 2, .rows = 9, .width_m = 0.05, .height_m = 0.4};
+  Cloth cloth = Cloth::of(mesh, masses_by_area(mesh, 0.02));
+  cloth.held = {held_at(mesh, 0, 0), held_at(mesh, 0.05, 0)};
+  ParameterSet set{.start_position_m = hung_flat(mesh)};
+  const double k = 15;
+  set.springs.natural_length_m = flat_lengths(mesh);
+  set.springs.stiffness_n_per_m[structural_t] = k;
+  set.springs.stiffness_n_per_m[structural_s] = k;
+  set.springs.damping_ns_per_m[structural_t] = 0.02;
+
+  // when it is relaxed,
+  const Eigen::Matrix3Xd p =
+      relax(cloth, {&set, 1}, 0, 0.5 * stable_time_step_s(cloth, set)).front();
+
+  // then each spring carries what hangs below it: l - l0 = weight / k.
+  for (int j = 0; j < 2; ++j) {
+    double weight_n = 0;
+    for (int i = mesh.rows - 1; i > 0; --i) {
+      weight_n += 9.81 * cloth.mass_kg[mesh.vertex(i, j)];
+      const double length_m = (p.col(mesh.vertex(i, j)) - p.col(mesh.vertex(i - 1, j))).norm();
+      EXPECT_NEAR((length_m - 0.05) * k, weight_n, 0.01 * weight_n) << i << ", " << j;
+    }
+  }
+  EXPECT_LT(p.row(1).cwiseAbs().maxCoeff(), 1e-12);
+}
+
+/// Largest force that is left on a free vertex, over the cloth's weight.
+double residual_force(const Cloth& cloth, const ParameterSet& set, const Eigen::Matrix3Xd& p) {
+  Eigen::Matrix3Xd force_n = spring_forces_n(cloth.springs, set.springs, p, at_rest(p));
+  force_n += set.gravity_m_per_s2 * cloth.mass_kg.transpose();
+  for (const HeldVertexWeights& held : cloth.held)
+    for (const auto& [vertex, weight] : held.weights) force_n.col(vertex).setZero();
+  return force_n.colwise().norm().maxCoeff() / (9.81 * cloth.mass_kg.sum());
+}
+
+TEST(Relax, BalancesTheForcesOfAClothHungByTwoCorners) {
+  const Cloth cloth = hung_cloth(9);
+  ParameterSet set{.springs = spring_parameters(cotton(), cloth.mesh),
+                   .start_position_m = hung_flat(cloth.mesh)};
+  // Corners closer together than the cloth is wide, so that it sags and folds.
+  Cloth sagging = cloth;
+  sagging.held[1].motion = [](double) { return Eigen::Vector3d(0.36, 0, 0); };
+
+  for (const Cloth* hung : {&cloth, static_cast<const Cloth*>(&sagging)}) {
+    SCOPED_TRACE(hung == &cloth ? "straight" : "sagging");
+    const double h = 0.5 * stable_time_step_s(*hung, set);
+    const Eigen::Matrix3Xd p = relax(*hung, {&set, 1}, 0, h).front();
+
+    EXPECT_LT(residual_force(*hung, set, p), 0.01);
+    EXPECT_GT(residual_force(*hung, set, set.start_position_m), 0.01);
+    EXPECT_LT((p.col(0) - Eigen::Vector3d(0, 0, 0)).norm(), 1e-15);
+  }
+}
+
+TEST(Relax, PutsMovingHeldPointsWhereTheyAreAtThatTime) {
+  Cloth cloth = hung_cloth(5);
+  cloth.held[1].motion = [](double time_s) { return Eigen::Vector3d(0.3 + 0.1 * time_s, 0, 0); };
+  const ParameterSet set{.springs = spring_parameters(cotton(), cloth.mesh),
+                         .start_position_m = hung_flat(cloth.mesh)};
+
+  const Eigen::Matrix3Xd p =
+      relax(cloth, {&set, 1}, 0.5, 0.5 * stable_time_step_s(cloth, set)).front();
+
+  EXPECT_LT((p.col(4) - Eigen::Vector3d(0.35, 0, 0)).norm(), 1e-15);
+}
+
+TEST(Relax, IsSmoothInTheParameters) {
+  const Cloth cloth = hung_cloth(6);
+  const double h = 1e-3;
+  // Shapes for the stiffness of one type scaled by 1 + step and 1 - step; the derivative between.
+  const auto derivative = [&](size_t type, double step) {
+    std::vector<ParameterSet> sets;
+    for (const double sign : {1.0, -1.0}) {
+      sets.push_back({.springs = spring_parameters(cotton(), cloth.mesh),
+                      .start_position_m = hung_flat(cloth.mesh)});
+      sets.back().springs.stiffness_n_per_m[type] *= 1 + sign * step;
+    }
+    const auto shapes = relax(cloth, sets, 0, h);
+    return Eigen::Matrix3Xd((shapes[0] - shapes[1]) / (2 * step));
+  };
+
+  for (const size_t type : {structural_t, structural_s, shear_down, flexion_t}) {
+    SCOPED_TRACE(type);
+    const Eigen::Matrix3Xd wide = derivative(type, 1e-2), narrow = derivative(type, 1e-4);
+
+    EXPECT_GT(narrow.norm(), 1e-6);  // metres per unit of the logarithm
+    EXPECT_LT((wide - narrow).norm(), 0.01 * narrow.norm());
+  }
+}
+
+TEST(Relax, DependsNeitherOnTheNumberOfSetsNorOnTheirOrder) {
+  const Cloth cloth = hung_cloth(5);
+  std::vector<ParameterSet> sets = random_sets(cloth, kLanes + 2, 5);
+  for (ParameterSet& set : sets) set.effects.clear();
+  const std::vector<ParameterSet> backwards(sets.rbegin(), sets.rend());
+
+  const auto shapes = relax(cloth, sets, 0, 2e-4);
+  const auto reversed = relax(cloth, backwards, 0, 2e-4);
+
+  for (size_t n = 0; n < sets.size(); ++n) {
+    EXPECT_EQ(shapes[n], reversed[sets.size() - 1 - n]) << n;
+    EXPECT_EQ(shapes[n], relax(cloth, {&sets[n], 1}, 0, 2e-4).front()) << n;
+  }
+}
+
+}  // namespace
+}  // namespace clothfit
