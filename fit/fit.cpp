@@ -38,10 +38,11 @@ constexpr double kSearchSpringSteps = 1.2e9;
 struct Effort {
   int rounds = 0;
   double least_gain = 0;
+  Differences differences = Differences::forward;
 };
 constexpr Effort kCoarseEffort{.rounds = 1, .least_gain = 1e-3};
 constexpr Effort kRoughEffort{.rounds = 2, .least_gain = 1e-4};
-constexpr Effort kFinalEffort{.rounds = 6, .least_gain = 1e-7};
+constexpr Effort kFinalEffort{.rounds = 6, .least_gain = 1e-7, .differences = Differences::central};
 
 /// A log-parameter less certain than this (a factor of e^0.7 = 2 either way) is undetermined.
 constexpr double kUndeterminedLogSigma = 0.7;
@@ -155,6 +156,7 @@ RefineResult refine_stage(const FitProblem& problem, const FitOptions& options, 
                           const ProgressCallback& progress, FitReport& report) {
   const RefineOptions refine_options{.rounds = effort.rounds,
                                      .least_gain = effort.least_gain,
+                                     .differences = effort.differences,
                                      .substep_scale = options.substep_scale};
   const int frames = horizon_frames(problem, share);
   RefineResult result = refine(problem, frames, start, refine_options, progress);

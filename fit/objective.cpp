@@ -44,17 +44,21 @@ std::vector<Eigen::VectorXd> Objective::residuals(
   return results;
 }
 
-bool Objective::linearise(const Eigen::VectorXd& values, Eigen::VectorXd& residual,
-                          Eigen::MatrixXd& residual_by_coordinate, double step) const {
+bool Objective::linearise(const Eigen::VectorXd& values, Differences differences,
+                          Eigen::VectorXd& residual, Eigen::MatrixXd& residual_by_coordinate,
+                          double step) const {
   const int parameters = problem_.space.size();
+  const bool central = differences == Differences::central;
   const Eigen::VectorXd coordinates = problem_.space.coordinates(values);
   std::vector<Eigen::VectorXd> points{values};
+  const auto add_point = [&](int p, double offset) {
+    Eigen::VectorXd moved = coordinates;
+    moved[p] += offset;
+    points.push_back(problem_.space.values(moved));
+  };
   for (int p = 0; p < parameters; ++p) {
-    for (const double sign : {1.0, -1.0}) {
-      Eigen::VectorXd moved = coordinates;
-      moved[p] += sign * step;
-      points.push_back(problem_.space.values(moved));
-    }
+    add_point(p, step);
+    if (central) add_point(p, -step);
   }
   std::vector<Eigen::VectorXd> results = residuals(points);
   for (const Eigen::VectorXd& result : results)
@@ -62,8 +66,10 @@ bool Objective::linearise(const Eigen::VectorXd& values, Eigen::VectorXd& residu
   residual = std::move(results.front());
   residual_by_coordinate.resize(residual_count_, parameters);
   for (int p = 0; p < parameters; ++p) {
-    const auto plus = static_cast<size_t>(1 + 2 * p);
-    residual_by_coordinate.col(p) = (results[plus] - results[plus + 1]) / (2 * step);
+    const auto plus = static_cast<size_t>(central ? 1 + 2 * p : 1 + p);
+    residual_by_coordinate.col(p) = central
+                                        ? ((results[plus] - results[plus + 1]) / (2 * step)).eval()
+                                        : ((results[plus] - residual) / step).eval();
   }
   return true;
 }

@@ -6,6 +6,11 @@
 
 namespace clothfit {
 
+enum class Differences {
+  forward,  ///< one run per parameter; error O(step)
+  central   ///< two runs per parameter; error O(step^2)
+};
+
 /// The trajectory cost: what a free run from the start leaves of the observations in the first
 /// `frames` frames, each coordinate divided by its sigma.
 class Objective {
@@ -34,9 +39,9 @@ class Objective {
   /// inverse: 1e-4 leaves both near 1e-8.
   static constexpr double kDifferenceStep = 1e-4;
 
-  /// Residuals at `values` and their derivative by the space's coordinates, by central differences
-  /// over +-`step` (all perturbed runs side by side in lanes). False where there are none.
-  bool linearise(const Eigen::VectorXd& values, Eigen::VectorXd& residual,
+  /// Residuals at `values` and their derivative by the space's coordinates, by differences over
+  /// `step` (all perturbed runs side by side in lanes). False where there are none.
+  bool linearise(const Eigen::VectorXd& values, Differences differences, Eigen::VectorXd& residual,
                  Eigen::MatrixXd& residual_by_coordinate, double step = kDifferenceStep) const;
 
   /// Mean length of the residual of an observation: a robust cost for the evolutionary search.

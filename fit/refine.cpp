@@ -11,25 +11,24 @@ namespace clothfit {
 namespace {
 
 /// The residuals and their Jacobian at the point that Ceres looks at, simulated once for all
-/// blocks.
+/// blocks. Both are computed whenever the point is new: a trial step's run alone would leave most
+/// lanes idle, and most trial steps are accepted and need the Jacobian next.
 class SharedEvaluation final : public ceres::EvaluationCallback {
  public:
-  SharedEvaluation(const FitProblem& problem, const Objective& objective,
-                   Eigen::VectorXd& coordinates)
-      : problem_(problem), objective_(objective), coordinates_(coordinates) {}
+  SharedEvaluation(const FitProblem& problem, const Objective& objective, Differences differences,
+                   const Eigen::VectorXd& coordinates)
+      : problem_(problem),
+        objective_(objective),
+        differences_(differences),
+        coordinates_(coordinates) {}
 
-  void PrepareForEvaluation(bool evaluate_jacobians, bool new_evaluation_point) override {
-    if (!new_evaluation_point && (has_jacobian_ || !evaluate_jacobians)) return;
-    const Eigen::VectorXd values = problem_.space.values(coordinates_);
-    if (evaluate_jacobians) {
-      usable_ = objective_.linearise(values, residual_, jacobian_);
-      simulations_ += 1 + 2 * problem_.space.size();
-    } else {
-      residual_ = objective_.residuals({values}).front();
-      usable_ = residual_.size() == objective_.residual_count();
-      ++simulations_;
-    }
-    has_jacobian_ = evaluate_jacobians;
+  /// Ceres asks again for points that its line search along the bounds has just seen.
+  void PrepareForEvaluation(bool, bool) override {
+    if (evaluated_.size() == coordinates_.size() && evaluated_ == coordinates_) return;
+    evaluated_ = coordinates_;
+    usable_ = objective_.linearise(problem_.space.values(coordinates_), differences_, residual_,
+                                   jacobian_);
+    simulations_ += 1 + (differences_ == Differences::central ? 2 : 1) * problem_.space.size();
   }
 
   bool usable() const { return usable_; }
@@ -40,9 +39,10 @@ class SharedEvaluation final : public ceres::EvaluationCallback {
  private:
   const FitProblem& problem_;
   const Objective& objective_;
+  Differences differences_;
   const Eigen::VectorXd& coordinates_;
+  Eigen::VectorXd evaluated_;
   bool usable_ = false;
-  bool has_jacobian_ = false;
   int simulations_ = 0;
   Eigen::VectorXd residual_;
   Eigen::MatrixXd jacobian_;
@@ -131,7 +131,7 @@ Round solve(const FitProblem& problem, const Objective& objective, const Eigen::
             const ProgressCallback& progress) {
   const ParameterSpace& space = problem.space;
   Eigen::VectorXd coordinates = space.coordinates(start);
-  SharedEvaluation shared(problem, objective, coordinates);
+  SharedEvaluation shared(problem, objective, refine_options.differences, coordinates);
 
   ceres::Problem::Options problem_options;
   problem_options.evaluation_callback = &shared;

@@ -40,7 +40,7 @@ Uncertainty estimate_uncertainty(const FitProblem& problem, const Objective& obj
   const int parameters = problem.space.size();
   Eigen::VectorXd residual, same_residual;
   Eigen::MatrixXd jacobian, wide_jacobian;
-  if (!objective.linearise(values, residual, jacobian)) return result;
+  if (!objective.linearise(values, Differences::central, residual, jacobian)) return result;
 
   const double threshold = kHuberScales * robust_scale(residual);
   Eigen::MatrixXd information = Eigen::MatrixXd::Zero(parameters, parameters);
@@ -90,7 +90,7 @@ Uncertainty estimate_uncertainty(const FitProblem& problem, const Objective& obj
 
   constexpr double kWideStep = 0.02;
   result.roughness = Eigen::VectorXd::Ones(parameters);
-  if (objective.linearise(values, same_residual, wide_jacobian, kWideStep)) {
+  if (objective.linearise(values, Differences::central, same_residual, wide_jacobian, kWideStep)) {
     for (int p = 0; p < parameters; ++p)
       result.roughness[p] = jacobian.col(p).norm() / std::max(wide_jacobian.col(p).norm(), 1e-300);
   }

@@ -65,7 +65,12 @@ TEST(Objective, DerivativesAgreeWithRichardsonExtrapolation) {
 
     Eigen::VectorXd residual;
     Eigen::MatrixXd jacobian;
-    ASSERT_TRUE(objective.linearise(values, residual, jacobian));
+    ASSERT_TRUE(objective.linearise(values, Differences::central, residual, jacobian));
+
+    Eigen::VectorXd same_residual;
+    Eigen::MatrixXd forward;
+    ASSERT_TRUE(objective.linearise(values, Differences::forward, same_residual, forward));
+    EXPECT_EQ(residual, same_residual);
 
     // Another route: differences at two large steps, extrapolated; error O(step^4)
     const Eigen::VectorXd at = problem.space.coordinates(values);
@@ -81,6 +86,7 @@ TEST(Objective, DerivativesAgreeWithRichardsonExtrapolation) {
       };
       const Eigen::VectorXd reference = (4 * difference(2e-3) - difference(4e-3)) / 3;
       EXPECT_LT((jacobian.col(p) - reference).norm(), 1e-5 * reference.norm());
+      EXPECT_LT((forward.col(p) - reference).norm(), 1e-2 * reference.norm());
       EXPECT_GT(reference.norm(), 0);
     }
   }
