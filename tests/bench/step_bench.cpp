@@ -1,12 +1,14 @@
 // How fast the hot loop is: one thread, all six spring types, kLanes simulations side by side.
 //
 // The counter `spring_steps` is springs x lanes x steps per second. The limit is the divider: each
-// spring-step takes one square root and one division of doubles, and both go through the one unit
-// that a core has for them. For 8 doubles Skylake's takes 24 + 16 cycles with AVX-512 and with AVX2
-// 2 x (12 + 8): 5 cycles for a spring-step of one lane, 600 million a second at 3 GHz (latencies
-// and throughputs: uops.info). What stands below that is memory traffic (a 17 x 17 mesh of 8 lanes
-// has 170 kB of state and forces, which is the second-level cache's) and the rest of the
-// arithmetic. Nothing here is asserted: timings belong to a machine and its load.
+// spring-step takes one square root and one division of doubles, both of which go through the one
+// unit that a core has for them. Intel's cores from Skylake on take about 12 and 8 cycles for four
+// doubles with AVX2 and twice that for eight with AVX-512 (uops.info), so 5 cycles for one lane's
+// spring-step: 420 million a second at 2.1 GHz, on one core. The rest of the arithmetic and the
+// memory traffic run beside it at best: a 17 x 17 mesh of 8 lanes has 170 kB of positions,
+// velocities and forces, which live in the second-level cache.
+//
+// Nothing here is asserted: timings belong to a machine and its load.
 
 #include <benchmark/benchmark.h>
 

@@ -17,11 +17,11 @@ inline Cloth swinging_cloth(int vertices_per_side) {
   return cloth;
 }
 
-/// `count` sets like cotton, each a percent stiffer than the one before.
+/// `count` sets like cotton, each a thousandth stiffer than the one before.
 inline std::vector<ParameterSet> cotton_sets(const Cloth& cloth, int count) {
   std::vector<ParameterSet> sets;
   for (int n = 0; n < count; ++n) {
-    const double stiffer = 1 + 0.01 * n;
+    const double stiffer = 1 + 0.001 * n;
     const Fabric fabric{.tension_warp_n_per_m = 60 * stiffer,
                         .tension_weft_n_per_m = 45 * stiffer,
                         .shear_n_per_m = 6 * stiffer,
