@@ -7,6 +7,11 @@
 #
 # `camera` is the part of calib/ that needs Eigen only: see its list of headers.
 
+# A script has no project to take its policies from; a function keeps those of its definition.
+if(CMAKE_SCRIPT_MODE_FILE)
+  cmake_minimum_required(VERSION 3.25)
+endif()
+
 set(CLOTHFIT_CAMERA_HEADERS projection.h projection_impl.h rigid3.h)
 set(CLOTHFIT_ARROWS_data   "data")
 set(CLOTHFIT_ARROWS_calib  "calib;data")

@@ -5,8 +5,7 @@
 function(arrow room included expected)
   file(REMOVE_RECURSE ${WORK_DIR})
   file(WRITE ${WORK_DIR}/${room}/planted.cpp "#include <vector>\n#include \"${included}\"\n")
-  execute_process(COMMAND ${CMAKE_COMMAND} -D SOURCE_DIR=${WORK_DIR} -D CHECK=${CHECK}
-    -P ${CMAKE_CURRENT_LIST_DIR}/check_arrows.cmake
+  execute_process(COMMAND ${CMAKE_COMMAND} -D SOURCE_DIR=${WORK_DIR} -P ${CHECK}
     RESULT_VARIABLE status OUTPUT_VARIABLE output ERROR_VARIABLE output)
   if(expected STREQUAL "allowed" AND NOT status EQUAL 0)
     message(SEND_ERROR "${room} may include ${included}, but the check says:\n${output}")
