@@ -120,6 +120,22 @@ class Reporter final : public ceres::IterationCallback {
   Progress now_;
 };
 
+/// Why a solve ended, for a person.
+std::string ending(const ceres::Solver::Summary& summary) {
+  switch (summary.termination_type) {
+    case ceres::CONVERGENCE:
+    case ceres::USER_SUCCESS:
+      return "converged";
+    case ceres::NO_CONVERGENCE:
+      return "still falling after " + std::to_string(summary.iterations.size()) + " iterations";
+    case ceres::USER_FAILURE:
+      return "cancelled";
+    case ceres::FAILURE:
+      break;
+  }
+  return "failed: " + summary.message;
+}
+
 struct Round {
   ceres::Solver::Summary summary;
   Eigen::VectorXd values;
@@ -210,7 +226,7 @@ RefineResult refine(const FitProblem& problem, int frames, const Eigen::VectorXd
                               options, progress);
     result.simulations += round.simulations;
     result.solver_iterations += static_cast<int>(round.summary.iterations.size());
-    result.message = round.summary.message;
+    result.message = ending(round.summary);
     if (round.summary.termination_type == ceres::USER_FAILURE) {
       result.cancelled = true;
       return result;

@@ -1,0 +1,139 @@
+// Fits of whole recordings: the bundled ones, made by another simulator, against what was
+// simulated, and recordings of real cloth where CLOTHFIT_DATA says there are some. From pictures
+// instead of tracks: tests/apps/demo_test.cpp.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "data/recording.h"
+#include "fit/fit.h"
+
+namespace clothfit {
+namespace {
+
+namespace fs = std::filesystem;
+
+const fs::path kSource = CLOTHFIT_SOURCE_DIR;
+
+FitInput read_input(const fs::path& folder) {
+  FitInput input{.recording = read_recording(folder)};
+  const Recording& recording = input.recording;
+  if (recording.tracks3d) input.tracks3d = read_tracks3d(*recording.tracks3d, recording.markers);
+  for (const auto& [camera, file] : recording.tracks2d) {
+    input.tracks2d[camera] = read_tracks2d(file, recording.markers);
+    input.cameras.push_back(read_camera(*recording.find_camera(camera)->file));
+  }
+  return input;
+}
+
+double true_stiffness(const std::string& recording, const std::string& types) {
+  std::ifstream file(kSource / "tests" / "fixtures" / "truth" / recording / "truth.json");
+  return nlohmann::json::parse(file).at("springs").at(types).at("k");
+}
+
+/// Whether fabric parameters are within `share` of what was simulated, with a sigma of 5 % at most.
+void expect_true_fabric(const FitResult& result, const std::string& recording, double share) {
+  for (const ParameterEstimate& parameter : result.parameters) {
+    std::string types;
+    if (parameter.name.starts_with("tension")) types = "types_0_1";
+    if (parameter.name.starts_with("shear")) types = "types_2_3";
+    if (parameter.name.starts_with("flexion")) types = "types_4_5";
+    if (types.empty()) continue;
+    const double truth = true_stiffness(recording, types);
+    EXPECT_EQ(parameter.state, ParameterState::fitted) << parameter.name;
+    EXPECT_NEAR(parameter.value, truth, share * truth) << parameter.name;
+    EXPECT_LT(parameter.sigma, 0.05 * parameter.value) << parameter.name;
+    EXPECT_GT(parameter.sigma, 0) << parameter.name;
+  }
+}
+
+const ObservationErrors& only_errors(const FitReport& report) {
+  EXPECT_EQ(report.result.errors.size(), 1u);
+  return report.result.errors.front();
+}
+
+fs::path further_data() {
+  const char* data = std::getenv("CLOTHFIT_DATA");
+  return data != nullptr ? fs::path(data) : fs::path();
+}
+
+TEST(Recordings, SwingPlainFrom3dTracksForecastsTheSameClothReleasedOtherwise) {
+  const FitReport report = fit(read_input(kSource / "data/recordings/swing_plain"), {}, {});
+
+  ASSERT_TRUE(report.usable()) << report.message;
+  expect_true_fabric(report.result, "swing_plain", 0.1);
+  const ObservationErrors& errors = only_errors(report);
+  // The noise is 0.5 mm; a plain model on the positions without noise left 0.58 mm as a distance,
+  // 0.34 mm per coordinate, which adds in squares to 0.60 mm.
+  EXPECT_LT(errors.fitted.rms, 0.54e-3);
+  EXPECT_LT(errors.held_out.rms, 0.66e-3);
+  EXPECT_GT(errors.trivial.first_frame, 20e-3);
+
+  const fs::path other = further_data() / "recordings" / "swing_plain_b";
+  if (further_data().empty() || !fs::exists(other))
+    GTEST_SKIP() << "fitted swing_plain; CLOTHFIT_DATA names no folder with "
+                    "recordings/swing_plain_b to forecast";
+  FitOptions options;
+  options.forecast = report.result;
+  const FitReport forecast = fit(read_input(other), options, {});
+
+  ASSERT_TRUE(forecast.usable()) << forecast.message;
+  EXPECT_LT(only_errors(forecast).held_out.rms, 0.62e-3);
+  EXPECT_GT(only_errors(forecast).trivial.first_frame, 20e-3);
+}
+
+TEST(Recordings, SwingPlainFromOneCamera) {
+  FitOptions options;
+  options.observations = ObservationKind::tracks2d;
+
+  const FitReport report = fit(read_input(kSource / "data/recordings/swing_plain"), options, {});
+
+  ASSERT_TRUE(report.usable()) << report.message;
+  expect_true_fabric(report.result, "swing_plain", 0.1);
+  EXPECT_LT(only_errors(report).fitted.rms, 0.34);
+  EXPECT_LT(only_errors(report).held_out.rms, 0.5);
+}
+
+TEST(Recordings, AHiddenWindLeavesAnErrorThatThePlainModelCannotHide) {
+  // Given a recording whose cloth is also blown at, undeclared; a search kept small
+  const FitReport report = fit(read_input(kSource / "data/recordings/swing_breeze"),
+                               {.population = 40, .generations = 10, .refine_best = 1}, {});
+
+  // Then springs alone, however they are fitted, stay far above the noise
+  ASSERT_TRUE(report.usable()) << report.message;
+  EXPECT_GT(only_errors(report).fitted.rms, 3 * only_errors(report).noise);
+  EXPECT_GT(only_errors(report).held_out.rms, 5 * only_errors(report).noise);
+}
+
+TEST(Recordings, RealClothOnARobotArmIsFittedWithNumbersWhateverTheyAre) {
+  const fs::path folder = further_data() / "real/iri-robot-cloth/s0623_n7_traj8_1";
+  if (further_data().empty() || !fs::exists(folder))
+    GTEST_SKIP() << "CLOTHFIT_DATA names no folder with real/iri-robot-cloth";
+  const FitInput input = read_input(folder);
+
+  const FitReport report = fit(input,
+                               {.effects = {"viscous_damping"},
+                                .mesh_columns = 7,
+                                .mesh_rows = 7,
+                                .population = 40,
+                                .generations = 10,
+                                .refine_best = 1},
+                               {});
+
+  // Then the fit ends, everything is finite, and what drives the cloth is not judged
+  ASSERT_TRUE(report.usable()) << report.message;
+  const ObservationErrors& errors = only_errors(report);
+  EXPECT_TRUE(std::isfinite(errors.held_out.rms));
+  EXPECT_GT(errors.held_out.rms, errors.noise);
+  EXPECT_LT(errors.held_out.rms, errors.trivial.first_frame);
+  EXPECT_GT(report.result.observations_rejected.at("drives_a_held_point"), 0);
+  EXPECT_EQ(report.result.parameters.at(0).name, "areal_density");
+  EXPECT_EQ(report.result.parameters.at(0).state, ParameterState::undetermined);
+}
+
+}  // namespace
+}  // namespace clothfit
