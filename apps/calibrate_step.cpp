@@ -9,10 +9,10 @@
 
 #include "apps/csv_table.h"
 #include "apps/exit_code.h"
+#include "apps/json_file.h"
 #include "apps/picture_size.h"
 #include "apps/recording_copy.h"
 #include "data/input_error.h"
-#include "data/text_file.h"
 #include "vision/chessboard.h"
 #include "vision/image_source.h"
 
@@ -108,7 +108,7 @@ void write_calibrations(const std::vector<StillsCalibration>& calibrations,
                       fmt::format("{}", parameter.sigma)});
     }
   }
-  write_text(json.dump(1) + "\n", folder / "calibration.json");
+  write_json(json, folder / "calibration.json");
   write_csv_table({"camera", "parameter", "value", "sigma"}, rows, folder / "calibration.csv");
 }
 

@@ -1,19 +1,20 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
-#include <cmath>
-#include <cstdio>
 #include <memory>
 #include <optional>
+#include <string_view>
 
 #include "apps/calibrate_step.h"
 #include "apps/exit_code.h"
+#include "apps/grid_size.h"
 #include "apps/progress_line.h"
-#include "apps/recording_copy.h"
 #include "apps/report/number_text.h"
 #include "apps/text_table.h"
 #include "apps/verb.h"
+#include "data/file_name.h"
 #include "data/input_error.h"
+#include "data/number_text.h"
 #include "data/output_folder.h"
 
 namespace clothfit {
@@ -33,19 +34,26 @@ struct CalibrateVerbOptions {
 /// "chessboard:9x6:0.025": inner corners along and across, side of a square in metres. Nothing
 /// where the text is not a board.
 std::optional<BoardDescription> parse_board(const std::string& text) {
-  BoardDescription board;
-  int end = 0;
-  const int fields = std::sscanf(text.c_str(), "chessboard:%dx%d:%lf%n", &board.columns,
-                                 &board.rows, &board.square_m, &end);
-  const bool whole = fields == 3 && text.c_str()[end] == '\0';
-  const bool possible = board.columns >= 2 && board.rows >= 2 && board.square_m > 0;
-  if (!whole || !possible || !std::isfinite(board.square_m)) return std::nullopt;
-  return board;
+  constexpr std::string_view kKind = "chessboard:";
+  if (!text.starts_with(kKind)) return std::nullopt;
+  const std::string_view sizes = std::string_view(text).substr(kKind.size());
+  const std::size_t colon = sizes.find(':');
+  if (colon == std::string_view::npos) return std::nullopt;
+  const std::optional<GridSize> corners = parse_grid_size(sizes.substr(0, colon));
+  const std::optional<double> square_m = parse_number(sizes.substr(colon + 1));
+  if (!corners || !square_m) return std::nullopt;
+  const BoardDescription board{corners->columns, corners->rows, *square_m};
+  return is_possible(board) ? std::optional(board) : std::nullopt;
 }
 
 std::string check_board(const std::string& text) {
   if (parse_board(text)) return "";
-  return "'" + text + "' is not a board, such as chessboard:9x6:0.025";
+  return fmt::format("'{}' is not a board, such as chessboard:9x6:0.025 ({} to {} inner corners)",
+                     text, kFewestBoardCorners, kMostBoardCorners);
+}
+
+std::string check_name(const std::string& text) {
+  return can_name_a_file(text) ? "" : "'" + text + "' cannot name a file";
 }
 
 CalibrateOptions library_options(const CalibrateVerbOptions& options) {
@@ -98,7 +106,7 @@ int run_calibrate(const CalibrateVerbOptions& options) {
                            : "camera '" + options.name + "' has no stills to calibrate from",
                        "`calibration: {images: FOLDER, board: ...}` in a camera's entry");
     }
-    OutputFolder out(out_folder(options.out, result_name(recording) + ".calibration"));
+    OutputFolder out(out_folder(options.out, recording.name + ".calibration"));
     {
       ProgressLine line;
       calibrations = calibrate_step(recording, cameras, calibrate_options, out.path(), watch(line))
@@ -140,7 +148,7 @@ void add_calibrate_verb(CLI::App& program, VerbAction& action) {
   verb->add_option("--board", options->board,
                    "Board on the stills: chessboard:COLUMNSxROWS:SQUARE, inner corners and metres")
       ->check(check_board);
-  verb->add_option("--name", options->name, "Name of the camera");
+  verb->add_option("--name", options->name, "Name of the camera")->check(check_name);
   verb->add_option("--model", options->model, "Camera model")
       ->check(CLI::IsMember({"pinhole", "brown_conrady", "kannala_brandt"}))
       ->capture_default_str();

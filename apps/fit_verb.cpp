@@ -4,16 +4,15 @@
 #include <spdlog/spdlog.h>
 
 #include <chrono>
-#include <cstdio>
 #include <memory>
 #include <optional>
 #include <utility>
 
 #include "apps/csv_table.h"
 #include "apps/exit_code.h"
+#include "apps/grid_size.h"
 #include "apps/interrupt.h"
 #include "apps/progress_line.h"
-#include "apps/recording_copy.h"
 #include "apps/report/background_picture.h"
 #include "apps/report/fit_page.h"
 #include "apps/report/fit_tables.h"
@@ -37,24 +36,16 @@ struct FitFlags {
   fs::path forecast;
 };
 
-struct MeshSize {
-  int columns = 0;
-  int rows = 0;
-};
-
-/// "17x17": columns and rows. Nothing where the text is not a mesh.
-std::optional<MeshSize> parse_mesh(const std::string& text) {
-  MeshSize mesh;
-  int end = 0;
-  const int fields = std::sscanf(text.c_str(), "%dx%d%n", &mesh.columns, &mesh.rows, &end);
-  const bool whole = fields == 2 && text.c_str()[end] == '\0';
-  if (!whole || mesh.columns < 2 || mesh.rows < 2) return std::nullopt;
-  return mesh;
+/// Nothing where the text is not a mesh that a fit takes.
+std::optional<GridSize> parse_mesh(const std::string& text) {
+  const std::optional<GridSize> mesh = parse_grid_size(text);
+  return mesh && is_possible_mesh(mesh->columns, mesh->rows) ? mesh : std::nullopt;
 }
 
 std::string check_mesh(const std::string& text) {
   if (parse_mesh(text)) return "";
-  return "'" + text + "' is not a mesh, such as 17x17 (each at least 2)";
+  return fmt::format("'{}' is not a mesh, such as 17x17 (each at least 2, {} vertices at most)",
+                     text, kMostMeshVertices);
 }
 
 ObservationKind parse_observations(const std::string& text) {
@@ -112,7 +103,7 @@ int run_fit(const FitVerbOptions& options) {
   options.fit.validate();
   const Recording given = read_recording(recording_folder(options.recording));
 
-  OutputFolder out(out_folder(options.out, result_name(given) + ".fit"));
+  OutputFolder out(out_folder(options.out, given.name + ".fit"));
   Recording recording;
   FitReport report;
   {

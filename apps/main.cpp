@@ -1,14 +1,18 @@
+#include <fmt/format.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
 #include <CLI/CLI.hpp>
 #include <exception>
+#include <string>
+#include <vector>
 
 #include "apps/exit_code.h"
 #include "apps/interrupt.h"
 #include "apps/verb.h"
 #include "apps/version.h"
 #include "data/input_error.h"
+#include "data/nearest_name.h"
 
 namespace {
 
@@ -25,6 +29,14 @@ int run(int argc, char** argv) {
   clothfit::add_calibrate_verb(program, action);
   clothfit::add_track_verb(program, action);
   clothfit::add_fit_verb(program, action);
+  const bool names_verb = argc > 1 && argv[1][0] != '-';
+  if (names_verb && program.get_subcommand_no_throw(argv[1]) == nullptr) {
+    std::vector<std::string> verbs;
+    for (const CLI::App* verb : program.get_subcommands({})) verbs.push_back(verb->get_name());
+    fmt::print(stderr, "There is no verb `{}`; {}\n", argv[1],
+               clothfit::known_names(argv[1], verbs));
+    return clothfit::kExitWrongUsage;
+  }
   try {
     program.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -11,20 +11,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Copies one file to the place it has in the recording, or, when it lies elsewhere, to
-/// `folder`/`subfolder`. A name already taken by another file gets a number in front.
-fs::path copy_file_into(const fs::path& folder, const fs::path& recording_folder,
-                        const fs::path& file, const fs::path& subfolder) {
-  const fs::path inside = file.lexically_relative(recording_folder);
-  const bool lies_inside = !inside.empty() && *inside.begin() != "..";
-  const fs::path wanted = lies_inside ? inside : subfolder / file.filename();
-
-  fs::path target = folder / wanted;
-  for (int number = 2; !lies_inside && fs::exists(target); ++number) {
-    target =
-        folder / wanted.parent_path() / fmt::format("{}_{}", number, wanted.filename().string());
-  }
-
+fs::path copy_file(const fs::path& file, const fs::path& target) {
   std::error_code error;
   fs::create_directories(target.parent_path(), error);
   if (!error) fs::copy_file(file, target, fs::copy_options::overwrite_existing, error);
@@ -33,6 +20,21 @@ fs::path copy_file_into(const fs::path& folder, const fs::path& recording_folder
                      "a file of the recording that can be read, and room for its copy");
   }
   return target;
+}
+
+/// Copies one file to the place it has in the recording, or, when it lies elsewhere, to
+/// `folder`/`subfolder`. A name already taken by another file gets a number in front.
+fs::path copy_file_into(const fs::path& folder, const fs::path& recording_folder,
+                        const fs::path& file, const fs::path& subfolder) {
+  const fs::path inside = file.lexically_relative(recording_folder);
+  const bool lies_inside = !inside.empty() && *inside.begin() != "..";
+  if (lies_inside) return copy_file(file, folder / inside);
+
+  fs::path target = folder / subfolder / file.filename();
+  for (int number = 2; fs::exists(target); ++number) {
+    target = folder / subfolder / fmt::format("{}_{}", number, file.filename().string());
+  }
+  return copy_file(file, target);
 }
 
 }  // namespace
@@ -50,21 +52,15 @@ Recording copy_recording(const Recording& recording, const std::filesystem::path
   if (copy.tracks3d) move_in(*copy.tracks3d, "");
   for (auto& [camera, file] : copy.tracks2d) move_in(file, "tracks2d");
   for (CameraEntry& camera : copy.cameras) {
-    if (camera.file) move_in(*camera.file, "cameras");
+    if (!camera.file) continue;
+    // Cameras may share a file of intrinsics; each needs its own for its place in the world.
+    const char* ending = camera.file->extension() == ".gz" ? ".yaml.gz" : ".yaml";
+    camera.file = copy_file(*camera.file, folder / "cameras" / (camera.name + ending));
   }
   for (HeldPoint& held : copy.held) {
     if (held.file) move_in(*held.file, "held");
   }
   return copy;
-}
-
-std::string result_name(const Recording& recording) {
-  const std::string& name = recording.name;
-  const bool makes_a_file_name =
-      !name.empty() && name.front() != '.' && name.find('/') == std::string::npos;
-  if (makes_a_file_name) return name;
-  const fs::path folder = fs::absolute(recording.folder).lexically_normal();
-  return (folder.has_filename() ? folder : folder.parent_path()).filename().string();
 }
 
 }  // namespace clothfit

@@ -7,13 +7,9 @@
 namespace clothfit {
 
 /// Copies the small files of a recording (markers, times, reference points, held paths, tracks,
-/// cameras) into `folder` and returns the recording as it stands there. Pictures, videos, point
-/// clouds and body logs stay where they are and are named by their path. recording.yaml is the
-/// caller's to write, after it has added what it found.
+/// cameras, each to cameras/NAME.yaml) into `folder` and returns the recording as it stands there.
+/// Pictures, videos, point clouds and body logs stay where they are and are named by their path.
+/// recording.yaml is the caller's to write, after it has added what it found.
 Recording copy_recording(const Recording& recording, const std::filesystem::path& folder);
-
-/// Name for the result folder of a verb: the recording's, or its folder's where the name would not
-/// make a file name.
-std::string result_name(const Recording& recording);
 
 }  // namespace clothfit

@@ -8,11 +8,11 @@
 #include <utility>
 
 #include "apps/exit_code.h"
+#include "apps/json_file.h"
 #include "apps/picture_size.h"
 #include "apps/recording_copy.h"
 #include "data/camera_parameters.h"
 #include "data/input_error.h"
-#include "data/text_file.h"
 
 namespace clothfit {
 namespace {
@@ -142,11 +142,13 @@ TrackStepResult track_step(const Recording& recording, const std::vector<std::st
 
   for (const CameraEntry& camera : step.recording.cameras) {
     if (std::find(cameras.begin(), cameras.end(), camera.name) == cameras.end()) continue;
-    if (camera.file) check_size(camera);
+    // What is refused is named where the user has it, not where its copy lies.
+    const CameraEntry& given = *recording.find_camera(camera.name);
+    if (given.file) check_size(given);
 
     CameraTracks tracks;
     tracks.camera = camera.name;
-    tracks.result = track(step.recording, camera, options, progress);
+    tracks.result = track(recording, given, options, progress);
     if (tracks.result.cancelled) throw Cancelled();
     if (!tracks.result.usable) {
       throw NoResult(
@@ -160,13 +162,16 @@ TrackStepResult track_step(const Recording& recording, const std::vector<std::st
     write_tracks2d(tracks.result.tracks, step.recording.markers, file);
     step.recording.tracks2d[camera.name] = file;
     if (!tracks.result.overlay.empty()) {
-      cv::imwrite((folder / fmt::format("overlay_{}.png", camera.name)).string(),
-                  tracks.result.overlay);
+      const fs::path overlay = folder / fmt::format("overlay_{}.png", camera.name);
+      if (!cv::imwrite(overlay.string(), tracks.result.overlay)) {
+        throw InputError(overlay.string(), "cannot be written",
+                         "a writable place with room on its disk");
+      }
     }
     json["cameras"].push_back(to_json(tracks));
     step.cameras.push_back(std::move(tracks));
   }
-  write_text(json.dump(1) + "\n", folder / "tracks.json");
+  write_json(json, folder / "tracks.json");
   write_recording(step.recording, folder);
   return step;
 }

@@ -7,7 +7,6 @@
 #include "apps/calibrate_step.h"
 #include "apps/exit_code.h"
 #include "apps/progress_line.h"
-#include "apps/recording_copy.h"
 #include "apps/report/number_text.h"
 #include "apps/text_table.h"
 #include "apps/track_step.h"
@@ -54,7 +53,7 @@ int run_track(const TrackVerbOptions& options) {
                      "`images: FOLDER or VIDEO` in a camera's entry");
   }
 
-  OutputFolder out(out_folder(options.out, result_name(recording) + ".tracks"));
+  OutputFolder out(out_folder(options.out, recording.name + ".tracks"));
   TrackStepResult step;
   {
     ProgressLine line;

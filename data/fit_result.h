@@ -63,7 +63,7 @@ struct FitResult {
   std::string start;
   std::vector<ParameterEstimate> parameters;
   std::vector<EffectEstimate> effects;
-  std::vector<ParameterEstimate> nuisance;  ///< measurement unknowns fitted along, with their prior
+  std::vector<ParameterEstimate> nuisance;  ///< measurement unknowns fitted along
   std::vector<ObservationErrors> errors;
   int observations_used = 0;
   std::map<std::string, int> observations_rejected;  ///< reason -> count

@@ -6,6 +6,7 @@
 #include <cassert>
 
 #include "data/csv_table.h"
+#include "data/file_name.h"
 #include "data/input_error.h"
 #include "data/nearest_name.h"
 #include "data/recording_words.h"
@@ -62,13 +63,9 @@ class RecordingFiles {
   std::filesystem::path folder_;
 };
 
-/// A name that also names files, such as cameras/NAME.yaml or NAME.fit.
 std::string read_file_name(const YamlValue& value) {
   const std::string name = value.text();
-  const bool printable = std::none_of(name.begin(), name.end(), [](char c) {
-    return static_cast<unsigned char>(c) < ' ' || c == 127 || c == '/';
-  });
-  if (!printable || name.front() == '.') {
+  if (!can_name_a_file(name)) {
     value.refuse(value.name() + " cannot name a file",
                  "printable characters without a slash, the first of them no dot");
   }
@@ -101,6 +98,10 @@ ClothDescription read_cloth(const YamlValue& value) {
     const YamlMap sizes = mesh->map({"columns", "rows"});
     cloth.mesh_columns = sizes.at("columns").whole_number(2);
     cloth.mesh_rows = sizes.at("rows").whole_number(2);
+    if (!is_possible_mesh(cloth.mesh_columns, cloth.mesh_rows)) {
+      mesh->refuse(fmt::format("cloth.mesh = {} x {}", cloth.mesh_columns, cloth.mesh_rows),
+                   fmt::format("{} vertices at most", kMostMeshVertices));
+    }
   }
   return cloth;
 }
@@ -163,9 +164,8 @@ CalibrationStills read_calibration(const YamlValue& value, const RecordingFiles&
   stills.images = files.folder(map.at("images"));
   const YamlMap board = map.at("board").map({"kind", "columns", "rows", "square"});
   board.at("kind").one_of<int>({{"chessboard", 0}});
-  // Fewer inner corners than 3 x 3 cannot be told from other corners.
-  stills.board.columns = board.at("columns").whole_number(3);
-  stills.board.rows = board.at("rows").whole_number(3);
+  stills.board.columns = board.at("columns").whole_number(kFewestBoardCorners, kMostBoardCorners);
+  stills.board.rows = board.at("rows").whole_number(kFewestBoardCorners, kMostBoardCorners);
   stills.board.square_m = board.at("square").positive_number();
   return stills;
 }

@@ -14,6 +14,12 @@ namespace clothfit {
 /// `by_area`: an edge vertex weighs half, a corner a quarter. `equal`: as in the founding paper.
 enum class MassDistribution { by_area, equal };
 
+/// The largest mesh that a fit takes, 256 x 256: what it keeps of one run is some gigabytes then.
+inline constexpr int kMostMeshVertices = 65'536;
+constexpr bool is_possible_mesh(int columns, int rows) {
+  return columns >= 2 && rows >= 2 && columns <= kMostMeshVertices / rows;
+}
+
 struct ClothDescription {
   double width_m = 0;             ///< along s; flat and unstretched; > 0
   double height_m = 0;            ///< along t; > 0
@@ -23,12 +29,21 @@ struct ClothDescription {
   int mesh_rows = 17;     ///< >= 2
 };
 
+/// Inner corners along a side of a board: fewer cannot be told from other corners, more are finer
+/// than any picture shows.
+inline constexpr int kFewestBoardCorners = 3;
+inline constexpr int kMostBoardCorners = 200;
+
 /// A printed calibration board; columns and rows count inner corners.
 struct BoardDescription {
   int columns = 0;
   int rows = 0;
   double square_m = 0;
 };
+constexpr bool is_possible(const BoardDescription& board) {
+  const auto possible = [](int n) { return n >= kFewestBoardCorners && n <= kMostBoardCorners; };
+  return possible(board.columns) && possible(board.rows) && board.square_m > 0;
+}
 
 struct CalibrationStills {
   std::filesystem::path images;  ///< folder

@@ -48,7 +48,12 @@ std::string read_status(const CsvTable& table, int row, int column) {
   return table.name(row, column).substr(kRejected.size());
 }
 
-/// Sorts rows (given in the table's order) by frame, then marker; refuses a pair that comes twice.
+/// More frames than this without any row are a frame number mistyped, not a pause: whoever fits the
+/// tracks has to simulate all of them.
+constexpr int kLongestGap = 10'000;
+
+/// Sorts rows (given in the table's order) by frame, then marker; refuses a pair that comes twice
+/// and a frame far beyond the one before.
 template <class Position>
 std::vector<Position> sorted(const CsvTable& table, std::vector<Position> rows,
                              const MarkerSet& markers) {
@@ -71,6 +76,13 @@ std::vector<Position> sorted(const CsvTable& table, std::vector<Position> rows,
                                markers.markers[static_cast<std::size_t>(at(row).marker)].name,
                                at(row).frame, table.line(previous)),
                    "one row per frame and marker", "remove one of the two rows");
+    }
+    const int frame_before = previous >= 0 ? at(previous).frame : 0;
+    if (at(row).frame - frame_before > kLongestGap) {
+      table.refuse(row,
+                   fmt::format("frame {} comes next after frame {}", at(row).frame, frame_before),
+                   fmt::format("{} frames without any row at most", kLongestGap),
+                   "correct the number, or make two recordings of it");
     }
     result.push_back(at(row));
     previous = row;

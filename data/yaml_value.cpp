@@ -81,6 +81,7 @@ void YamlValue::refuse(const std::string& problem, const std::string& expected,
 }
 
 std::string YamlValue::shown() const {
+  if (name_.empty()) return "the file is " + kind_of(node_);
   if (!node_.IsScalar()) return name_ + " is " + kind_of(node_);
   return name_ + " = " + shown_text(node_.Scalar());
 }
@@ -113,11 +114,13 @@ double YamlValue::positive_number() const {
   return value;
 }
 
-int YamlValue::whole_number(int least) const {
+int YamlValue::whole_number(int least, int most) const {
   const std::optional<int> value =
       node_.IsScalar() ? parse_whole_number(node_.Scalar()) : std::nullopt;
-  if (!value || *value < least) {
-    refuse(shown(), fmt::format("a whole number, {} or more", least));
+  if (!value || *value < least || *value > most) {
+    const bool open = most == std::numeric_limits<int>::max();
+    refuse(shown(), open ? fmt::format("a whole number, {} or more", least)
+                         : fmt::format("a whole number, {} to {}", least, most));
   }
   return *value;
 }

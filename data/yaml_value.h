@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <filesystem>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -33,7 +34,7 @@ class YamlValue {
   std::string text() const;
   double number() const;
   double positive_number() const;
-  int whole_number(int least) const;
+  int whole_number(int least, int most = std::numeric_limits<int>::max()) const;
   std::vector<double> numbers() const;
   /// Exactly N numbers.
   template <std::size_t N>

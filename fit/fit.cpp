@@ -34,15 +34,20 @@ constexpr int kFewestFrames = 8;
 constexpr double kSearchSpringSteps = 1.2e9;
 
 /// How finely a stage is solved. The last one goes to the rounding of the reported digits; those
-/// before only lead there.
+/// before only lead there, and look at slopes over wider spans: the cost of folding cloth is rough,
+/// and its trend is what a start far away needs.
 struct Effort {
   int rounds = 0;
   double least_gain = 0;
   Differences differences = Differences::forward;
+  double difference_step = 0;
 };
-constexpr Effort kCoarseEffort{.rounds = 1, .least_gain = 1e-3};
-constexpr Effort kRoughEffort{.rounds = 2, .least_gain = 1e-4};
-constexpr Effort kFinalEffort{.rounds = 6, .least_gain = 1e-7, .differences = Differences::central};
+constexpr Effort kCoarseEffort{
+    .rounds = 1, .least_gain = 1e-3, .differences = Differences::forward, .difference_step = 2e-2};
+constexpr Effort kRoughEffort{
+    .rounds = 2, .least_gain = 1e-4, .differences = Differences::forward, .difference_step = 5e-3};
+constexpr Effort kFinalEffort{
+    .rounds = 6, .least_gain = 1e-7, .differences = Differences::central, .difference_step = 1e-3};
 
 /// A log-parameter less certain than this (a factor of e^0.7 = 2 either way) is undetermined.
 constexpr double kUndeterminedLogSigma = 0.7;
@@ -157,6 +162,7 @@ RefineResult refine_stage(const FitProblem& problem, const FitOptions& options, 
   const RefineOptions refine_options{.rounds = effort.rounds,
                                      .least_gain = effort.least_gain,
                                      .differences = effort.differences,
+                                     .difference_step = effort.difference_step,
                                      .substep_scale = options.substep_scale};
   const int frames = horizon_frames(problem, share);
   RefineResult result = refine(problem, frames, start, refine_options, progress);
@@ -204,9 +210,8 @@ ParameterEstimate estimate(const FitParameter& parameter, const std::string& nam
   } else if (roughness > kRough) {
     result.state = ParameterState::undetermined;
     result.reason = fmt::format(
-        "the cost is rough here (slope over 0.01 % is {:.0f} times that over 2 %): the motion is "
-        "too "
-        "sensitive over this span, and the sigma means nothing",
+        "the cost is rough here (its slope over 0.01 % is {:.0f} times that over 2 %), as where "
+        "cloth folds and unfolds: sigma means nothing",
         roughness);
   } else if (value - parameter.lower < edge || parameter.upper - value < edge) {
     const bool at_neutral =
@@ -266,10 +271,10 @@ void fill_parameters(const FitProblem& problem, const FitOptions& options,
     for (size_t p = 0; p < description.parameters.size(); ++p) {
       const Binding& binding = problem.effects[e][p];
       const EffectParameter& parameter = description.parameters[p];
-      effect.parameters.push_back(
-          binding.parameter >= 0
-              ? estimate_of(binding.parameter, parameter.name)
-              : constant(parameter.name, parameter.unit, binding.constant, "declared"));
+      effect.parameters.push_back(binding.parameter >= 0
+                                      ? estimate_of(binding.parameter, parameter.name)
+                                      : constant(parameter.name, parameter.unit, binding.constant,
+                                                 options.forecast ? "given" : "declared"));
     }
     result.effects.push_back(std::move(effect));
   }
@@ -292,7 +297,7 @@ void FitOptions::validate() const {
   require(population >= 4, "population", "at least 4 individuals");
   require(generations >= 1, "generations", "at least 1");
   require(refine_best >= 1, "refine-best", "at least 1");
-  require(substep_scale > 0 && std::isfinite(substep_scale), "substep-scale", "a number > 0");
+  require(substep_scale >= 1 && std::isfinite(substep_scale), "substep-scale", "1 or more");
   require(threads >= 0, "threads", "0 (all) or more");
 }
 

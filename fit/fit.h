@@ -34,7 +34,7 @@ struct FitOptions {
   int population = 100;      ///< individuals of the evolutionary search [louchet1995]
   int generations = 40;      ///< at most; the search stops earlier when it no longer gains
   int refine_best = 3;       ///< individuals that go to refinement
-  double substep_scale = 1;  ///< > 1: smaller time steps than stability asks for
+  double substep_scale = 1;  ///< >= 1; more cuts time finer than stability asks
   int threads = 0;           ///< 0: as many as the machine has
   /// Parameters taken from an earlier fit: nothing is fitted, the recording is forecast from its
   /// own first frame.
@@ -42,7 +42,7 @@ struct FitOptions {
   void validate() const;  ///< throws InputError
 };
 
-enum class FitStop { converged, reached_limit, cancelled, diverged, no_observations };
+enum class FitStop { converged, reached_limit, cancelled, diverged };
 
 /// A fit with all that a report shows.
 struct FitReport {

@@ -35,8 +35,8 @@ class Objective {
   /// diverged, its step would not be stable, or a point fell behind a camera.
   std::vector<Eigen::VectorXd> residuals(const std::vector<Eigen::VectorXd>& values) const;
 
-  /// Truncation falls with the step's square, rounding (the run's, about 1e-13) rises with its
-  /// inverse: 1e-4 leaves both near 1e-8.
+  /// Truncation of central differences falls with the step's square, rounding (the run's, about
+  /// 1e-13) rises with its inverse: 1e-4 leaves both near 1e-8.
   static constexpr double kDifferenceStep = 1e-4;
 
   /// Residuals at `values` and their derivative by the space's coordinates, by differences over

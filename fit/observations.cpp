@@ -14,15 +14,17 @@ namespace {
 /// Gives rows without a sigma the noise that the tracks themselves show. Cameras keep their rate,
 /// trackers that answer when they are done do not: where no run of frames is even enough, uneven
 /// ones have to do.
-void estimate_missing_sigma(ObservationSet& set, const std::vector<double>& frame_time_s,
-                            int marker_count) {
+void estimate_missing_sigma(ObservationSet& set, const ObservedFrames& frames, int marker_count) {
   if (std::ranges::all_of(set.rows, [](const Observation& row) { return row.sigma > 0; })) return;
-  const std::vector<Eigen::MatrixXd> tracks =
-      marker_tracks(set, marker_count, static_cast<int>(frame_time_s.size()));
+  std::vector<Eigen::MatrixXd> tracks =
+      marker_tracks(set, marker_count, static_cast<int>(frames.time_s.size()));
+  for (Eigen::MatrixXd& track : tracks)
+    track.rightCols(track.cols() - frames.first_held_out)
+        .setConstant(std::numeric_limits<double>::quiet_NaN());
   constexpr int kFewest = 100;
   NoiseEstimate estimate;
   for (const double tolerance : {0.05, 0.2, 0.5}) {
-    estimate = estimate_noise(frame_time_s, tracks, {.interval_tolerance = tolerance});
+    estimate = estimate_noise(frames.time_s, tracks, {.interval_tolerance = tolerance});
     if (estimate.differences >= kFewest) break;
   }
   if (!(estimate.sigma > 0))
@@ -50,7 +52,7 @@ std::optional<Eigen::Vector3d> ObservationSet::predict(const Eigen::Vector3d& po
   return Eigen::Vector3d(pixel->x(), pixel->y(), 0.0);
 }
 
-ObservationSet observations_3d(const Tracks3d& tracks, const std::vector<double>& frame_time_s,
+ObservationSet observations_3d(const Tracks3d& tracks, const ObservedFrames& frames,
                                int marker_count, const std::vector<int>& excluded,
                                std::map<std::string, int>& rejected) {
   ObservationSet set{.kind = "tracks3d", .unit = "m", .dimension = 3, .camera = {}, .rows = {}};
@@ -61,13 +63,13 @@ ObservationSet observations_3d(const Tracks3d& tracks, const std::vector<double>
     }
     set.rows.push_back({row.frame, row.marker, row.position_m, row.sigma_m});
   }
-  estimate_missing_sigma(set, frame_time_s, marker_count);
+  estimate_missing_sigma(set, frames, marker_count);
   finish(set);
   return set;
 }
 
 ObservationSet observations_2d(const Tracks2d& tracks, const CameraParameters& camera,
-                               const std::vector<double>& frame_time_s, int marker_count,
+                               const ObservedFrames& frames, int marker_count,
                                const std::vector<int>& excluded,
                                std::map<std::string, int>& rejected) {
   ObservationSet set{
@@ -82,7 +84,7 @@ ObservationSet observations_2d(const Tracks2d& tracks, const CameraParameters& c
           {row.frame, row.marker, {row.position_px.x(), row.position_px.y(), 0.0}, row.sigma_px});
     }
   }
-  estimate_missing_sigma(set, frame_time_s, marker_count);
+  estimate_missing_sigma(set, frames, marker_count);
   finish(set);
   return set;
 }

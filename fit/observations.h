@@ -33,14 +33,21 @@ struct ObservationSet {
   std::optional<Eigen::Vector3d> predict(const Eigen::Vector3d& position_m) const;
 };
 
-/// The usable rows of measured tracks. A row without a sigma gets the one estimated from the data
-/// (fit/noise.h). Rejected rows and those of `excluded` markers (they drive held points) are left
-/// out and counted in `rejected` by reason.
-ObservationSet observations_3d(const Tracks3d& tracks, const std::vector<double>& frame_time_s,
+/// The frames of a recording: their times, and the first one that is held out (= their number when
+/// none is).
+struct ObservedFrames {
+  std::vector<double> time_s;
+  int first_held_out = 0;
+};
+
+/// The usable rows of measured tracks. A row without a sigma gets the one estimated from the fitted
+/// frames (fit/noise.h). Rejected rows and those of `excluded` markers (they drive held points) are
+/// left out and counted in `rejected` by reason.
+ObservationSet observations_3d(const Tracks3d& tracks, const ObservedFrames& frames,
                                int marker_count, const std::vector<int>& excluded,
                                std::map<std::string, int>& rejected);
 ObservationSet observations_2d(const Tracks2d& tracks, const CameraParameters& camera,
-                               const std::vector<double>& frame_time_s, int marker_count,
+                               const ObservedFrames& frames, int marker_count,
                                const std::vector<int>& excluded,
                                std::map<std::string, int>& rejected);
 

@@ -26,11 +26,19 @@ std::string recording_file(const Recording& recording) {
   return (recording.folder / "recording.yaml").string();
 }
 
+/// Frames up to the last observed one. A slip of the keyboard in a frame number must not ask for a
+/// simulation of years.
 int frame_count(const FitInput& input) {
+  constexpr int kMostFrames = 1'000'000;
   int last = -1;
   for (const Position3d& row : input.tracks3d) last = std::max(last, row.frame);
   for (const auto& [camera, tracks] : input.tracks2d)
     for (const Position2d& row : tracks) last = std::max(last, row.frame);
+  if (last >= kMostFrames)
+    throw InputError(recording_file(input.recording),
+                     "the tracks name frame " + std::to_string(last),
+                     "at most " + std::to_string(kMostFrames) + " frames",
+                     "look for a slip in the frame column");
   return last + 1;
 }
 
@@ -49,8 +57,10 @@ Eigen::Matrix2Xd marker_places(const MarkerSet& markers) {
 void add_observations(const FitInput& input, const FitOptions& options, FitProblem& problem) {
   const Recording& recording = input.recording;
   const auto markers = static_cast<int>(recording.markers.markers.size());
+  const ObservedFrames frames{.time_s = problem.frame_time_s,
+                              .first_held_out = problem.first_held_out};
   if (use_3d(input, options)) {
-    problem.observations.push_back(observations_3d(input.tracks3d, problem.frame_time_s, markers,
+    problem.observations.push_back(observations_3d(input.tracks3d, frames, markers,
                                                    problem.driving_markers, problem.rejected));
   } else {
     for (const CameraParameters& camera : input.cameras) {
@@ -60,9 +70,8 @@ void add_observations(const FitInput& input, const FitOptions& options, FitProbl
         throw InputError("camera " + camera.name, "has no camera_from_world",
                          "a fit needs to know where each camera stands",
                          "give the recording reference points, or the pose in the camera file");
-      problem.observations.push_back(observations_2d(tracks->second, camera, problem.frame_time_s,
-                                                     markers, problem.driving_markers,
-                                                     problem.rejected));
+      problem.observations.push_back(observations_2d(tracks->second, camera, frames, markers,
+                                                     problem.driving_markers, problem.rejected));
     }
   }
   std::erase_if(problem.observations, [](const ObservationSet& set) { return set.rows.empty(); });
@@ -127,7 +136,8 @@ void add_fabric(const Recording& recording, const FitOptions& options, FitProble
 
 /// Adds an effect to the cloth and binds its parameters: to `given` values, else to the fit.
 void add_effect(const std::string& name, const std::string& where,
-                const std::map<std::string, std::vector<double>>& given, FitProblem& problem) {
+                const std::map<std::string, std::vector<double>>& given, const FitOptions& options,
+                FitProblem& problem) {
   problem.cloth.add_effect(name, where);
   const EffectDescription& description = problem.cloth.effect_descriptions.back();
   std::vector<Binding> bindings;
@@ -139,6 +149,9 @@ void add_effect(const std::string& name, const std::string& where,
         throw InputError(where, name + "." + parameter.name + " is not one number",
                          "one number in " + parameter.unit);
       binding.constant = value->second.front();
+    } else if (options.forecast) {
+      throw InputError("--forecast", "the fit holds no value for " + name + "." + parameter.name,
+                       "a forecast fits nothing", "fit with --effect " + name + " first");
     } else {
       binding.parameter = problem.space.size();
       problem.space.parameters.push_back({.name = name + "." + parameter.name,
@@ -171,18 +184,18 @@ void add_effects(const Recording& recording, const FitOptions& options, FitProbl
       std::map<std::string, std::vector<double>> given;
       for (const ParameterEstimate& parameter : effect.parameters)
         given[parameter.name] = {parameter.value};
-      add_effect(effect.name, "--forecast", given, problem);
+      add_effect(effect.name, "--forecast", given, options, problem);
       present.push_back(effect.name);
     }
   }
   for (const DeclaredEffect& effect : recording.declared) {
     if (!absent(effect.name)) continue;
-    add_effect(effect.name, recording_file(recording), effect.parameters, problem);
+    add_effect(effect.name, recording_file(recording), effect.parameters, options, problem);
     present.push_back(effect.name);
   }
   for (const std::string& name : options.effects) {
     if (!absent(name)) continue;
-    add_effect(name, "--effect", {}, problem);
+    add_effect(name, "--effect", {}, options, problem);
     present.push_back(name);
   }
 }

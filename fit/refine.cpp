@@ -15,20 +15,18 @@ namespace {
 /// lanes idle, and most trial steps are accepted and need the Jacobian next.
 class SharedEvaluation final : public ceres::EvaluationCallback {
  public:
-  SharedEvaluation(const FitProblem& problem, const Objective& objective, Differences differences,
-                   const Eigen::VectorXd& coordinates)
-      : problem_(problem),
-        objective_(objective),
-        differences_(differences),
-        coordinates_(coordinates) {}
+  SharedEvaluation(const FitProblem& problem, const Objective& objective,
+                   const RefineOptions& options, const Eigen::VectorXd& coordinates)
+      : problem_(problem), objective_(objective), options_(options), coordinates_(coordinates) {}
 
   /// Ceres asks again for points that its line search along the bounds has just seen.
   void PrepareForEvaluation(bool, bool) override {
     if (evaluated_.size() == coordinates_.size() && evaluated_ == coordinates_) return;
     evaluated_ = coordinates_;
-    usable_ = objective_.linearise(problem_.space.values(coordinates_), differences_, residual_,
-                                   jacobian_);
-    simulations_ += 1 + (differences_ == Differences::central ? 2 : 1) * problem_.space.size();
+    usable_ = objective_.linearise(problem_.space.values(coordinates_), options_.differences,
+                                   residual_, jacobian_, options_.difference_step);
+    simulations_ +=
+        1 + (options_.differences == Differences::central ? 2 : 1) * problem_.space.size();
   }
 
   bool usable() const { return usable_; }
@@ -39,7 +37,7 @@ class SharedEvaluation final : public ceres::EvaluationCallback {
  private:
   const FitProblem& problem_;
   const Objective& objective_;
-  Differences differences_;
+  const RefineOptions& options_;
   const Eigen::VectorXd& coordinates_;
   Eigen::VectorXd evaluated_;
   bool usable_ = false;
@@ -147,7 +145,7 @@ Round solve(const FitProblem& problem, const Objective& objective, const Eigen::
             const ProgressCallback& progress) {
   const ParameterSpace& space = problem.space;
   Eigen::VectorXd coordinates = space.coordinates(start);
-  SharedEvaluation shared(problem, objective, refine_options.differences, coordinates);
+  SharedEvaluation shared(problem, objective, refine_options, coordinates);
 
   ceres::Problem::Options problem_options;
   problem_options.evaluation_callback = &shared;

@@ -10,7 +10,8 @@ struct RefineOptions {
   int iterations = 25;       ///< of one Ceres solve
   int rounds = 6;            ///< solves, each with a time step chosen anew
   double least_gain = 1e-7;  ///< a solve ends when the cost falls by less than this share
-  Differences differences = Differences::central;  ///< forward: half the runs, a blunter end
+  Differences differences = Differences::central;       ///< forward: half the runs, a blunter end
+  double difference_step = Objective::kDifferenceStep;  ///< in coordinates; wider sees the trend
   double stability_margin = 1.5;  ///< stiffness and damping may grow this much before a new round
   double substep_scale = 1;
 };

@@ -21,7 +21,7 @@ struct Uncertainty {
 /// How sure the optimum is, from the Jacobian J there, Huber's weights W and the priors. Of two
 /// estimates of the variance the larger counts, parameter by parameter:
 ///
-///   (J' W J + P)^-1 x max(1, chi-square per degree of freedom): independent residuals, of the size
+///   (J' W J / max(1, chi-square per degree of freedom) + P)^-1: independent residuals, of the size
 ///     that is left rather than the stated one;
 ///   H^-1 (sum over markers g g') H^-1, g = J_m' W r_m, H = J' W J + P: the sandwich that lets each
 ///     marker's residuals be correlated in time in any way [huber1967, liang1986], as they are when

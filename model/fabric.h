@@ -16,10 +16,10 @@ struct SpringParameters {
 /// The parameter set `fabric`: what a person would say of a cloth, warp along t and weft along s.
 ///
 /// Stiffness values are the springs' own (N/m). A square lattice of them amounts to a continuum
-/// with C11 = k01 + k23 + 4 k45 and C12 = C33 = k23 (N/m), whatever its spacing.
-/// Damping is a retardation time: each spring of stiffness k carries a dashpot k * damping beside
-/// it (a Kelvin-Voigt solid), so that it too is the fabric's and not the mesh's. Shear springs,
-/// which run between warp and weft, use the mean of the two times.
+/// with C11 = k01 + k23 + 4 k45 and C12 = C33 = k23 (N/m) away from its edges, whatever its
+/// spacing. Damping is a retardation time: each spring of stiffness k carries a dashpot k * damping
+/// beside it (a Kelvin-Voigt solid), so that it too is the fabric's and not the mesh's. Shear
+/// springs, which run between warp and weft, use the mean of the two times.
 struct Fabric {
   double tension_warp_n_per_m = 0;  ///< type 0
   double tension_weft_n_per_m = 0;  ///< type 1

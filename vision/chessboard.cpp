@@ -1,5 +1,7 @@
 #include "vision/chessboard.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 #include <opencv2/calib3d.hpp>
@@ -42,10 +44,11 @@ bool turns_like_the_board(const std::vector<cv::Point2f>& corners, int columns, 
 
 std::optional<std::vector<Eigen::Vector2d>> find_chessboard(const cv::Mat& grey,
                                                             const BoardDescription& board) {
-  if (board.columns < 2 || board.rows < 2) {
-    throw InputError("board", "too few inner corners",
-                     "at least 2 columns and 2 rows of inner corners",
-                     "count where four squares meet");
+  if (!is_possible(board)) {
+    throw InputError(
+        "board", fmt::format("{} x {} inner corners", board.columns, board.rows),
+        fmt::format("{} to {} along each side", kFewestBoardCorners, kMostBoardCorners),
+        "count where four squares meet");
   }
   std::vector<cv::Point2f> corners;
   const cv::Size pattern(board.columns, board.rows);

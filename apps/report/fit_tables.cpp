@@ -50,8 +50,6 @@ std::string to_string(FitStop stop) {
       return "cancelled";
     case FitStop::diverged:
       return "diverged";
-    case FitStop::no_observations:
-      return "no observations";
   }
   return "";
 }

@@ -66,6 +66,13 @@ std::string error_sentence(const ObservationErrors& errors) {
   return text + ".";
 }
 
+/// A forecast takes every number of the fabric from elsewhere.
+bool is_forecast(const FitResult& result) {
+  return std::ranges::none_of(result.parameters, [](const ParameterEstimate& parameter) {
+    return parameter.name != "areal_density" && parameter.state != ParameterState::fixed;
+  });
+}
+
 std::string parameter_sentence(const FitResult& result) {
   int fitted = 0;
   std::vector<std::string> undetermined;
@@ -108,11 +115,16 @@ FitSummary summarise(const FitReport& report) {
     summary.verdict = "Do not use: a trivial guess predicts the held-out frames better";
   }
 
-  summary.paragraph = fmt::format(
-      "A simulated cloth of {} x {} masses was fitted to {} observations of the "
-      "recording “{}”. {}",
-      result.mesh_columns, result.mesh_rows, result.observations_used, result.recording,
-      parameter_sentence(result));
+  summary.paragraph =
+      fmt::format("A simulated cloth of {} x {} masses ", result.mesh_columns, result.mesh_rows);
+  summary.paragraph +=
+      is_forecast(result)
+          ? fmt::format(
+                "with the parameters of an earlier fit was compared with {} observations of "
+                "the recording “{}”; nothing was fitted.",
+                result.observations_used, result.recording)
+          : fmt::format("was fitted to {} observations of the recording “{}”. {}",
+                        result.observations_used, result.recording, parameter_sentence(result));
   for (const ObservationErrors& errors : result.errors) {
     summary.paragraph += fmt::format(" {}", error_sentence(errors));
   }

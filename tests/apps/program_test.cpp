@@ -95,21 +95,33 @@ class Program : public ::testing::Test {
 };
 
 TEST_F(Program, AnswersWrongUsageWithTwo) {
-  for (const std::vector<std::string>& arguments : {std::vector<std::string>{},
-                                                    {"nonsense"},
-                                                    {"fit"},
-                                                    {"fit", "a", "--no-such-option"},
-                                                    {"fit", "a", "--mesh", "17"},
-                                                    {"fit", "a", "--mesh", "1x1"},
-                                                    {"fit", "a", "--seed", "x"},
-                                                    {"fit", "a", "--observations", "sounds"},
-                                                    {"calibrate", "a", "--board", "chessboard:9x6"},
-                                                    {"calibrate", "a", "--model", "fisheye"}}) {
+  for (const std::vector<std::string>& arguments :
+       {std::vector<std::string>{},
+        {"nonsense"},
+        {"fit"},
+        {"fit", "a", "--no-such-option"},
+        {"fit", "a", "--mesh", "17"},
+        {"fit", "a", "--mesh", "1x1"},
+        {"fit", "a", "--mesh", "4294967313x17"},
+        {"fit", "a", "--mesh", "60000x60000"},
+        {"fit", "a", "--seed", "x"},
+        {"fit", "a", "--observations", "sounds"},
+        {"calibrate", "a", "--board", "chessboard:9x6"},
+        {"calibrate", "a", "--board", "chessboard:2x2:0.1"},
+        {"calibrate", "a", "--name", "../b"},
+        {"calibrate", "a", "--model", "fisheye"}}) {
     const ProgramRun run = run_program(arguments, here_);
     EXPECT_EQ(run.exit_code, 2) << ::testing::PrintToString(arguments) << run.error;
     EXPECT_FALSE(run.error.empty());
   }
   EXPECT_THAT(names_in(here_), IsEmpty());
+}
+
+TEST_F(Program, NamesTheNearestVerb) {
+  const ProgramRun run = run_program({"fitt", "a"}, here_);
+
+  EXPECT_EQ(run.exit_code, 2);
+  EXPECT_THAT(run.error, HasSubstr("did you mean `fit`?"));
 }
 
 TEST_F(Program, ExplainsEveryVerbWithAnExample) {
@@ -163,6 +175,16 @@ TEST_F(Program, RefusesNanInTracks) {
   expect_refused("fit", "tracks3d.csv:2: ");
 }
 
+TEST_F(Program, RefusesAFrameNumberThatIsOnlyMistyped) {
+  copy_bundled("swing_plain");
+  fs::remove(recording_ / "tracks3d.csv.gz");
+  spoil_yaml("tracks3d.csv.gz", "tracks3d.csv");
+  write_text(recording_ / "tracks3d.csv",
+             "frame,marker,x,y,z\n0,m00_00,0,0,0\n2000000000,m00_00,0,0,0\n");
+
+  expect_refused("fit", "tracks3d.csv:3: frame 2000000000 comes next after frame 0");
+}
+
 TEST_F(Program, RefusesAMissingColumn) {
   copy_bundled("swing_plain");
   fs::remove(recording_ / "tracks3d.csv.gz");
@@ -202,6 +224,8 @@ TEST_F(Program, RefusesACameraOfAnotherSizeThanThePictures) {
   camera.camera_from_world = CameraPose{};
   write_camera(camera, recording_ / "front.yaml");
 
+  // The file is named where the user has it, not in the folder that is gone afterwards.
+  expect_refused("track", (recording_ / "front.yaml").string() + ": ");
   expect_refused("track", "640 x 480 px");
   expect_refused("fit", "320 x 240 px");
 }

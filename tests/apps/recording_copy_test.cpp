@@ -48,16 +48,17 @@ TEST(CopyRecording, NamesPicturesWhereTheyLie) {
   EXPECT_EQ(back.reference.size(), original.reference.size());
 }
 
-TEST(ResultName, IsTheRecordingsOwnNameWhereThatCanBeAFile) {
-  Recording recording;
-  recording.folder = "/some/where/take_7/";
+TEST(CopyRecording, GivesCamerasThatShareAFileOneEach) {
+  const test::ScratchFolder scratch("copy_shared_camera");
+  Recording original = read_recording(kBundled / "swing_plain");
+  original.cameras.push_back({.name = "side", .file = original.cameras[0].file});
 
-  recording.name = "swing";
-  EXPECT_EQ(result_name(recording), "swing");
-  for (const char* unusable : {"", "a/b", "..", ".hidden"}) {
-    recording.name = unusable;
-    EXPECT_EQ(result_name(recording), "take_7") << unusable;
-  }
+  const Recording copied = copy_recording(original, scratch.path());
+
+  EXPECT_EQ(*copied.cameras[0].file, scratch.path() / "cameras" / "front.yaml");
+  EXPECT_EQ(*copied.cameras[1].file, scratch.path() / "cameras" / "side.yaml");
+  EXPECT_EQ(read_camera(*copied.cameras[1].file).focal_px,
+            read_camera(*original.cameras[0].file).focal_px);
 }
 
 }  // namespace

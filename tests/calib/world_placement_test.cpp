@@ -13,6 +13,7 @@
 #include <random>
 
 #include "calib/projection.h"
+#include "calib/sheet_pose.h"
 #include "data/camera_parameters.h"
 #include "data/markers.h"
 

@@ -156,6 +156,8 @@ TEST(Tables, RefuseWhatTheFormatDoesNotAllowWithFileAndLine) {
       {header + "0,a,0x1p3,2,0.3,ok\n", "t.csv:3: u = `0x1p3`; a finite number"},
       {header + "-1,a,1,2,0.3,ok\n", "t.csv:3: frame = `-1`; a whole number, 0 or more"},
       {header + "1.5,a,1,2,0.3,ok\n", "t.csv:3: frame = `1.5`; a whole number, 0 or more"},
+      {header + "0,a,1,2,0.3,ok\n10001,a,1,2,0.3,ok\n",
+       "t.csv:4: frame 10001 comes next after frame 0; 10000 frames without any row at most"},
       {header + "99999999999,a,1,2,0.3,ok\n", "t.csv:3: frame = `99999999999`; a whole number"},
       {header + "0,c,1,2,0.3,ok\n", "t.csv:3: unknown marker `c`; a marker that markers.csv"},
       {header + "0,,1,2,0.3,ok\n", "t.csv:3: marker = ``; a name"},

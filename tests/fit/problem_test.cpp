@@ -65,6 +65,20 @@ TEST(Problem, EstimatesSigmaWhereTracksDoNotStateIt) {
   EXPECT_NEAR(problem.observations[0].noise, 8e-4, 0.1 * 8e-4);
 }
 
+TEST(Problem, LooksAwayFromHeldOutFramesWhenItEstimatesSigma) {
+  // Given tracks without sigma whose held-out frames are ten times noisier
+  FitInput input = synthetic_input({.held_out_from = 18, .noise_m = 8e-4, .seed = 3});
+  const FitInput noisier = synthetic_input({.held_out_from = 18, .noise_m = 8e-3, .seed = 4});
+  for (size_t n = 0; n < input.tracks3d.size(); ++n) {
+    if (input.tracks3d[n].frame >= 18) input.tracks3d[n] = noisier.tracks3d[n];
+    input.tracks3d[n].sigma_m = 0;
+  }
+
+  const FitProblem problem = problem_of(input);
+
+  EXPECT_NEAR(problem.observations[0].noise, 8e-4, 0.1 * 8e-4);
+}
+
 TEST(Problem, UncertainCameraPoseMakesGravityADirectionWithAPrior) {
   // Given a camera whose turn about its own x axis is known to 3 mrad, about y and z to 1 mrad
   FitInput input = synthetic_input({});
@@ -177,6 +191,18 @@ TEST(Problem, RefusesWhatCannotBeFitted) {
   wrong_parameter.recording.declared = {
       {.name = "viscous_damping", .parameters = {{"ratio", {1.5}}}}};
   EXPECT_THAT(refusal([&] { problem_of(wrong_parameter); }), HasSubstr("no parameter 'ratio'"));
+
+  FitInput slip = good;
+  slip.tracks3d.back().frame = 2'000'000'000;
+  EXPECT_THAT(refusal([&] { problem_of(slip); }), HasSubstr("frame 2000000000"));
+
+  FitResult earlier;
+  for (const char* name : {"tension_warp", "tension_weft", "shear", "flexion_warp", "flexion_weft",
+                           "damping_warp", "damping_weft"})
+    earlier.parameters.push_back({.name = name, .value = 1});
+  EXPECT_THAT(
+      refusal([&] { problem_of(good, {.effects = {"viscous_damping"}, .forecast = earlier}); }),
+      HasSubstr("holds no value for viscous_damping.rate"));
 
   FitInput all_held_out = good;
   all_held_out.recording.held_out_from_frame = 1;
