@@ -3,6 +3,7 @@
 #include <spdlog/spdlog.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <exception>
 #include <string>
 #include <vector>
@@ -29,12 +30,11 @@ int run(int argc, char** argv) {
   clothfit::add_calibrate_verb(program, action);
   clothfit::add_track_verb(program, action);
   clothfit::add_fit_verb(program, action);
-  const bool names_verb = argc > 1 && argv[1][0] != '-';
-  if (names_verb && program.get_subcommand_no_throw(argv[1]) == nullptr) {
-    std::vector<std::string> verbs;
-    for (const CLI::App* verb : program.get_subcommands({})) verbs.push_back(verb->get_name());
-    fmt::print(stderr, "There is no verb `{}`; {}\n", argv[1],
-               clothfit::known_names(argv[1], verbs));
+  std::vector<std::string> verbs;
+  for (const CLI::App* verb : program.get_subcommands({})) verbs.push_back(verb->get_name());
+  const std::string first = argc > 1 ? argv[1] : "-";
+  if (!first.starts_with('-') && std::find(verbs.begin(), verbs.end(), first) == verbs.end()) {
+    fmt::print(stderr, "There is no verb `{}`; {}\n", first, clothfit::known_names(first, verbs));
     return clothfit::kExitWrongUsage;
   }
   try {

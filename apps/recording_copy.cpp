@@ -11,7 +11,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-fs::path copy_file(const fs::path& file, const fs::path& target) {
+fs::path place_copy(const fs::path& file, const fs::path& target) {
   std::error_code error;
   fs::create_directories(target.parent_path(), error);
   if (!error) fs::copy_file(file, target, fs::copy_options::overwrite_existing, error);
@@ -28,13 +28,13 @@ fs::path copy_file_into(const fs::path& folder, const fs::path& recording_folder
                         const fs::path& file, const fs::path& subfolder) {
   const fs::path inside = file.lexically_relative(recording_folder);
   const bool lies_inside = !inside.empty() && *inside.begin() != "..";
-  if (lies_inside) return copy_file(file, folder / inside);
+  if (lies_inside) return place_copy(file, folder / inside);
 
   fs::path target = folder / subfolder / file.filename();
   for (int number = 2; fs::exists(target); ++number) {
     target = folder / subfolder / fmt::format("{}_{}", number, file.filename().string());
   }
-  return copy_file(file, target);
+  return place_copy(file, target);
 }
 
 }  // namespace
@@ -55,7 +55,7 @@ Recording copy_recording(const Recording& recording, const std::filesystem::path
     if (!camera.file) continue;
     // Cameras may share a file of intrinsics; each needs its own for its place in the world.
     const char* ending = camera.file->extension() == ".gz" ? ".yaml.gz" : ".yaml";
-    camera.file = copy_file(*camera.file, folder / "cameras" / (camera.name + ending));
+    camera.file = place_copy(*camera.file, folder / "cameras" / (camera.name + ending));
   }
   for (HeldPoint& held : copy.held) {
     if (held.file) move_in(*held.file, "held");
