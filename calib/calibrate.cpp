@@ -18,7 +18,7 @@
 #include "calib/pose_start.h"
 #include "calib/projection.h"
 #include "calib/robust_scale.h"
-#include "calib/world_placement.h"
+#include "calib/sheet_pose.h"
 #include "data/input_error.h"
 
 namespace clothfit {

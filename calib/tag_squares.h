@@ -7,8 +7,8 @@
 #include <cstddef>
 #include <vector>
 
+#include "calib/placed_pixel.h"
 #include "calib/rigid3.h"
-#include "calib/world_placement.h"
 
 namespace clothfit {
 

@@ -7,156 +7,16 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <optional>
 
+#include "calib/exact_pose.h"
 #include "calib/pose_block.h"
 #include "calib/pose_start.h"
-#include "calib/projection.h"
-#include "calib/robust_scale.h"
+#include "calib/sheet_pose.h"
 #include "calib/tag_squares.h"
 
 namespace clothfit {
 namespace {
-
-/// The camera with its numbers in the order that project() takes.
-struct FixedCamera {
-  CameraModel model;
-  std::array<double, kMaxIntrinsics> intrinsics;
-  int distortion_count;
-
-  explicit FixedCamera(const CameraParameters& camera)
-      : model(camera.model),
-        intrinsics(intrinsics_of(camera)),
-        distortion_count(static_cast<int>(camera.distortion.size())) {}
-
-  /// (projected - observed) / sigma; false behind the camera.
-  template <class Real>
-  bool residual(const Eigen::Matrix<Real, 3, 1>& in_camera, const PlacedPixel& observed,
-                Real* out) const {
-    if (!(in_camera[2] > Real(0.0))) return false;
-    std::array<Real, kMaxIntrinsics> numbers;
-    for (std::size_t i = 0; i < numbers.size(); ++i) numbers[i] = Real(intrinsics[i]);
-    const Eigen::Matrix<Real, 2, 1> pixel =
-        project<Real>(model, numbers.data(), distortion_count, in_camera);
-    out[0] = (pixel[0] - observed.pixel_px.x()) / observed.sigma_px;
-    out[1] = (pixel[1] - observed.pixel_px.y()) / observed.sigma_px;
-    return true;
-  }
-};
-
-/// Pixel of a point whose place is taken as exact; unknown is the camera's pose.
-struct PixelOfExactPoint {
-  const FixedCamera* camera;
-  const PlacedPixel* observed;
-  template <class Real>
-  bool operator()(const Real* camera_from_world, Real* out) const {
-    const Eigen::Matrix<Real, 3, 1> point = observed->point_m.cast<Real>();
-    return camera->residual<Real>(transform(camera_from_world, point), *observed, out);
-  }
-};
-
-ceres::Solver::Options solver_options() {
-  ceres::Solver::Options options;
-  options.linear_solver_type = ceres::DENSE_QR;
-  options.max_num_iterations = 100;
-  options.function_tolerance = 1e-14;
-  options.parameter_tolerance = 1e-13;
-  options.gradient_tolerance = 1e-13;
-  options.logging_type = ceres::SILENT;
-  return options;
-}
-
-/// Residuals of points taken as exact, in sigmas; infinite behind the camera.
-std::vector<Eigen::Vector2d> standardised_residuals(const FixedCamera& camera,
-                                                    const std::vector<PlacedPixel>& pixels,
-                                                    const Rigid3& camera_from_world) {
-  std::vector<Eigen::Vector2d> residuals;
-  for (const auto& pixel : pixels) {
-    Eigen::Vector2d residual;
-    if (!camera.residual<double>(camera_from_world * pixel.point_m, pixel, residual.data())) {
-      residual.setConstant(std::numeric_limits<double>::infinity());
-    }
-    residuals.push_back(residual);
-  }
-  return residuals;
-}
-
-double robust_spread(const std::vector<Eigen::Vector2d>& residuals) {
-  std::vector<double> coordinates;
-  for (const auto& residual : residuals) {
-    coordinates.push_back(residual.x());
-    coordinates.push_back(residual.y());
-  }
-  return robust_sigma(std::move(coordinates));
-}
-
-/// Moves `camera_from_world` to the least squares of the pixels marked `used`; `cauchy_scale` 0
-/// stands for no robust loss.
-bool refine_pose(const FixedCamera& camera, const std::vector<PlacedPixel>& pixels,
-                 const std::vector<char>& used, double cauchy_scale, Rigid3& camera_from_world) {
-  PoseBlock block = to_block(camera_from_world);
-  ceres::Problem problem;
-  problem.AddParameterBlock(block.data(), 7, new PoseManifold);
-  for (std::size_t i = 0; i < pixels.size(); ++i) {
-    if (!used[i]) continue;
-    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<PixelOfExactPoint, 2, 7>(
-                                 new PixelOfExactPoint{&camera, &pixels[i]}),
-                             cauchy_scale > 0 ? new ceres::CauchyLoss(cauchy_scale) : nullptr,
-                             block.data());
-  }
-  ceres::Solver::Summary summary;
-  ceres::Solve(solver_options(), &problem, &summary);
-  camera_from_world = from_block(block);
-  return summary.IsSolutionUsable();
-}
-
-/// A pose refined with gross errors held off, and the robust spread it leaves (in sigmas).
-struct RobustPose {
-  Rigid3 camera_from_world;
-  double spread = std::numeric_limits<double>::infinity();
-  double cost = std::numeric_limits<double>::infinity();
-};
-
-RobustPose refine_pose_robustly(const FixedCamera& camera, const std::vector<PlacedPixel>& pixels,
-                                const Rigid3& start) {
-  constexpr int kRounds = 6;
-  const std::vector<char> all(pixels.size(), 1);
-  RobustPose result{.camera_from_world = start};
-  result.spread = robust_spread(standardised_residuals(camera, pixels, start));
-  for (int round = 0; round < kRounds && std::isfinite(result.spread); ++round) {
-    const double before = result.spread;
-    if (!refine_pose(camera, pixels, all, 2 * before, result.camera_from_world)) return result;
-    result.spread = robust_spread(standardised_residuals(camera, pixels, result.camera_from_world));
-    if (result.spread > 0.9 * before) break;
-  }
-  result.cost = 0;
-  for (const auto& residual : standardised_residuals(camera, pixels, result.camera_from_world)) {
-    result.cost += std::log1p(residual.squaredNorm());
-  }
-  return result;
-}
-
-/// Where the rays through the pixels meet the plane z = 1 in front of the camera; nothing where a
-/// pixel has no ray.
-std::optional<std::vector<Eigen::Vector2d>> on_image_plane(const CameraParameters& camera,
-                                                           const std::vector<PlacedPixel>& pixels) {
-  std::vector<Eigen::Vector2d> image;
-  for (const auto& pixel : pixels) {
-    const auto direction = unproject(camera, pixel.pixel_px);
-    if (!direction || !(direction->z() > 0)) return std::nullopt;
-    image.emplace_back(direction->hnormalized());
-  }
-  return image;
-}
-
-bool is_finite(const std::vector<PlacedPixel>& pixels) {
-  return std::all_of(pixels.begin(), pixels.end(), [](const PlacedPixel& pixel) {
-    return pixel.point_m.allFinite() && pixel.pixel_px.allFinite() && pixel.sigma_px > 0;
-  });
-}
-
-// ---- The world from reference points ----
 
 struct PixelOfPoint {
   const FixedCamera* camera;
@@ -450,60 +310,6 @@ WorldSolve solve_with_spread(const FixedCamera& camera, const std::vector<Placed
 }
 
 }  // namespace
-
-SheetPoseResult place_sheet(const CameraParameters& parameters,
-                            const std::vector<PlacedPixel>& sheet) {
-  SheetPoseResult result;
-  if (sheet.size() < 4) {
-    result.message = fmt::format("the sheet shows {} points; 4 or more place it", sheet.size());
-    return result;
-  }
-  if (!is_finite(sheet)) {
-    result.message = "a point of the sheet is not a number, or its sigma is not > 0";
-    return result;
-  }
-  const FixedCamera camera(parameters);
-  const auto image = on_image_plane(parameters, sheet);
-  if (!image) {
-    result.message = "the camera's distortion sends no ray to some pixel of the sheet";
-    return result;
-  }
-  std::vector<Eigen::Vector2d> on_plane_m;
-  for (const auto& point : sheet) on_plane_m.emplace_back(point.point_m.head<2>());
-  const double tolerance = 0.01 * std::hypot(parameters.image_width, parameters.image_height) /
-                           parameters.focal_px.maxCoeff();
-  RobustPose best;
-  for (const auto& candidate : plane_poses(on_plane_m, *image, tolerance)) {
-    const RobustPose refined = refine_pose_robustly(camera, sheet, candidate);
-    if (refined.cost < best.cost) best = refined;
-  }
-  if (!std::isfinite(best.cost)) {
-    result.message = "no pose of a flat sheet explains its points; are they on one line?";
-    return result;
-  }
-
-  constexpr double kOutlierSpreads = 5;
-  const auto residuals = standardised_residuals(camera, sheet, best.camera_from_world);
-  std::vector<char> used;
-  for (const auto& residual : residuals) {
-    used.push_back(residual.norm() <= kOutlierSpreads * best.spread ? 1 : 0);
-  }
-  const auto good = std::count(used.begin(), used.end(), char{1});
-  result.camera_from_sheet = best.camera_from_world;
-  if (good < 4 || !refine_pose(camera, sheet, used, 0, result.camera_from_sheet)) {
-    result.message = "the sheet's points agree on no pose";
-    return result;
-  }
-  double sum_px2 = 0;
-  const auto final_residuals = standardised_residuals(camera, sheet, result.camera_from_sheet);
-  for (std::size_t i = 0; i < sheet.size(); ++i) {
-    if (used[i]) sum_px2 += (sheet[i].sigma_px * final_residuals[i]).squaredNorm();
-  }
-  result.rms_px = std::sqrt(sum_px2 / (2 * static_cast<double>(good)));
-  result.usable = std::isfinite(result.rms_px);
-  result.message = fmt::format("{} of {} points, rms {:.3f} px", good, sheet.size(), result.rms_px);
-  return result;
-}
 
 WorldPlacementResult place_world(const CameraParameters& parameters,
                                  const std::vector<PlacedPixel>& reference,

@@ -3,20 +3,11 @@
 #include <string>
 #include <vector>
 
+#include "calib/placed_pixel.h"
 #include "calib/rigid3.h"
 #include "data/camera_parameters.h"
 
 namespace clothfit {
-
-/// A point known in some frame, and its pixel.
-struct PlacedPixel {
-  Eigen::Vector3d point_m = Eigen::Vector3d::Zero();
-  Eigen::Vector2d pixel_px = Eigen::Vector2d::Zero();
-  double sigma_px = 1;  ///< per coordinate, > 0
-  /// The four corners of one printed tag share a group, in any order; -1: none. Groups of another
-  /// number of points, or whose survey is far from a square, count as points without a group.
-  int group = -1;
-};
 
 struct WorldPlacementResult {
   bool usable = false;
@@ -43,7 +34,7 @@ struct WorldPlacementResult {
 /// way matters: taken as exact, errors of a millimetre tilt gravity by milliradians and a fit would
 /// take that for physics. The sheet's place in the world is free, so it shares no unknown with the
 /// reference but the camera's pose, and the joint optimum is the reference's camera with the sheet
-/// that place_sheet finds.
+/// that place_sheet (sheet_pose.h) finds.
 ///
 /// The minimum of
 ///   sum |pixel - project(camera_from_world X_i)|^2 / (f sigma_px)^2 + sum |X_i - survey_i|^2 / s^2
@@ -65,17 +56,5 @@ struct WorldPlacementResult {
 WorldPlacementResult place_world(const CameraParameters& camera,
                                  const std::vector<PlacedPixel>& reference,
                                  const std::vector<PlacedPixel>& sheet);
-
-struct SheetPoseResult {
-  bool usable = false;
-  std::string message;  ///< one line for a person, also when it failed
-  Rigid3 camera_from_sheet;
-  double rms_px = 0;  ///< per coordinate, over the points that took part
-};
-
-/// Pose of a flat sheet from its pixels alone: at least 4 points, point_m is (s, t, 0). Both poses
-/// under which a flat figure looks nearly alike are refined and the better one is kept; points
-/// beyond 5 robust sigma of it take no part.
-SheetPoseResult place_sheet(const CameraParameters& camera, const std::vector<PlacedPixel>& sheet);
 
 }  // namespace clothfit
