@@ -179,7 +179,7 @@ TEST(CameraFile, IsRefusedWithFileAndLine) {
     const auto file = folder.write("c.yaml", text);
     expect_refused(folder, "c.yaml:1: holds no keys", [&] { read_camera(file); });
   }
-  expect_refused(folder, "c.yaml:1:  is a list",
+  expect_refused(folder, "c.yaml:1: the file is a list",
                  [&] { read_camera(folder.write("c.yaml", "- format: clothfit-camera/1\n")); });
 }
 
