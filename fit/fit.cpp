@@ -294,7 +294,7 @@ void FitOptions::validate() const {
   };
   require(mesh_columns == 0 || mesh_columns >= 2, "mesh", "at least 2 columns");
   require(mesh_rows == 0 || mesh_rows >= 2, "mesh", "at least 2 rows");
-  require(population >= 4, "population", "at least 4 individuals");
+  require(population >= 4 && population <= 100000, "population", "4 to 100000 individuals");
   require(generations >= 1, "generations", "at least 1");
   require(refine_best >= 1, "refine-best", "at least 1");
   require(substep_scale >= 1 && std::isfinite(substep_scale), "substep-scale", "1 or more");

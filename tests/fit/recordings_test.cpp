@@ -99,9 +99,11 @@ TEST(Recordings, SwingPlainFromOneCamera) {
 }
 
 TEST(Recordings, AHiddenWindLeavesAnErrorThatThePlainModelCannotHide) {
-  // Given a recording whose cloth is also blown at, undeclared; a search kept small
-  const FitReport report = fit(read_input(kSource / "data/recordings/swing_breeze"),
-                               {.population = 40, .generations = 10, .refine_best = 1}, {});
+  // Given a recording whose cloth is also blown at, undeclared; mesh and search kept small
+  const FitReport report = fit(
+      read_input(kSource / "data/recordings/swing_breeze"),
+      {.mesh_columns = 9, .mesh_rows = 9, .population = 40, .generations = 10, .refine_best = 1},
+      {});
 
   // Then springs alone, however they are fitted, stay far above the noise
   ASSERT_TRUE(report.usable()) << report.message;
