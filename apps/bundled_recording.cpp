@@ -18,9 +18,10 @@ std::filesystem::path bundled_recording(const std::string& name) {
   }
   const fs::path source = fs::path(CLOTHFIT_SOURCE_RECORDINGS) / name;
   if (fs::exists(source / "recording.yaml")) return source;
-  throw InputError(source.string(), "the bundled recording is not there",
-                   "it in the source tree, or in share/clothfit/recordings beside the program",
-                   "install again, or name a recording: clothfit fit RECORDING");
+  throw InputError(
+      source.string(), "the bundled recording is not there",
+      "looked for in the source tree, or in share/clothfit/recordings beside the program",
+      "install again, or name a recording: clothfit fit RECORDING");
 }
 
 }  // namespace clothfit

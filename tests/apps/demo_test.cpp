@@ -137,9 +137,10 @@ void expect_true_gravity(const fs::path& demo) {
   const double error_placed = std::acos(std::min(1.0, truth.dot(placed.rotation * down)));
   const double error_fitted = std::acos(std::min(1.0, truth.dot(placed.rotation * fitted_down)));
 
-  // Survey errors of 1 mm leave the placed camera off by up to three of its sigma of 2.7 mrad.
+  // Survey errors of 1 mm leave the placed camera off by up to three of its sigma of 2.7 mrad; the
+  // swing knows better than a third of that sigma.
   EXPECT_LT(error_placed, 8e-3);
-  EXPECT_LT(error_fitted, 0.5e-3);
+  EXPECT_LT(error_fitted, 0.9e-3);
   EXPECT_LT(error_fitted, error_placed);
 }
 
