@@ -41,13 +41,23 @@ struct Effort {
   double least_gain = 0;
   Differences differences = Differences::forward;
   double difference_step = 0;
+  double spring_steps = 0;  ///< a stage stops there: a wrong model may lead it on for hours
 };
-constexpr Effort kCoarseEffort{
-    .rounds = 1, .least_gain = 1e-3, .differences = Differences::forward, .difference_step = 2e-2};
-constexpr Effort kRoughEffort{
-    .rounds = 2, .least_gain = 1e-4, .differences = Differences::forward, .difference_step = 5e-3};
-constexpr Effort kFinalEffort{
-    .rounds = 6, .least_gain = 1e-7, .differences = Differences::central, .difference_step = 1e-3};
+constexpr Effort kCoarseEffort{.rounds = 1,
+                               .least_gain = 1e-3,
+                               .differences = Differences::forward,
+                               .difference_step = 2e-2,
+                               .spring_steps = 1e9};
+constexpr Effort kRoughEffort{.rounds = 2,
+                              .least_gain = 1e-4,
+                              .differences = Differences::forward,
+                              .difference_step = 5e-3,
+                              .spring_steps = 5e9};
+constexpr Effort kFinalEffort{.rounds = 6,
+                              .least_gain = 1e-7,
+                              .differences = Differences::central,
+                              .difference_step = 1e-3,
+                              .spring_steps = 2e10};
 
 /// A log-parameter less certain than this (a factor of e^0.7 = 2 either way) is undetermined.
 constexpr double kUndeterminedLogSigma = 0.7;
@@ -73,13 +83,11 @@ double search_time_step_s(const FitProblem& problem, const FitOptions& options, 
     if (problem.space.parameters[static_cast<size_t>(p)].role != ParameterRole::nuisance)
       corner[p] = problem.space.parameters[static_cast<size_t>(p)].upper;
   const double stable_s = stable_time_step_s(problem.cloth, parameter_set(problem, corner));
-  size_t springs = 0;
-  for (const auto& type : problem.cloth.springs) springs += type.size();
   const double simulated_s =
       problem.frame_time_s[static_cast<size_t>(frames - 1)] - problem.frame_time_s.front();
   const double simulations = 0.5 * options.population * (options.generations + 1);
-  const double affordable_s =
-      simulated_s * static_cast<double>(springs) * simulations / kSearchSpringSteps;
+  const double affordable_s = simulated_s * static_cast<double>(problem.cloth.spring_count()) *
+                              simulations / kSearchSpringSteps;
   return std::max(stable_s, affordable_s);
 }
 
@@ -163,6 +171,7 @@ RefineResult refine_stage(const FitProblem& problem, const FitOptions& options, 
                                      .least_gain = effort.least_gain,
                                      .differences = effort.differences,
                                      .difference_step = effort.difference_step,
+                                     .spring_steps = effort.spring_steps,
                                      .substep_scale = options.substep_scale};
   const int frames = horizon_frames(problem, share);
   RefineResult result = refine(problem, frames, start, refine_options, progress);

@@ -4,6 +4,9 @@
 #include <cmath>
 #include <limits>
 
+#include "model/simulate.h"
+#include "model/stability.h"
+
 namespace clothfit {
 
 Objective::Objective(const FitProblem& problem, int frames, double time_step_s)
@@ -17,6 +20,13 @@ Objective::Objective(const FitProblem& problem, int frames, double time_step_s)
       residual_count_ += set.dimension;
     }
   }
+}
+
+double Objective::spring_steps_per_run() const {
+  const Schedule schedule{.frame_time_s = problem_.frame_time_s, .time_step_s = time_step_s_};
+  double steps = 0;
+  for (int frame = 1; frame < frames_; ++frame) steps += schedule.substeps(frame);
+  return steps * static_cast<double>(problem_.cloth.spring_count());
 }
 
 std::vector<Eigen::VectorXd> Objective::residuals(
@@ -44,9 +54,9 @@ std::vector<Eigen::VectorXd> Objective::residuals(
   return results;
 }
 
-bool Objective::linearise(const Eigen::VectorXd& values, Differences differences,
-                          Eigen::VectorXd& residual, Eigen::MatrixXd& residual_by_coordinate,
-                          double step) const {
+Linearisation Objective::linearise(const Eigen::VectorXd& values, Differences differences,
+                                   double step) const {
+  Linearisation result;
   const int parameters = problem_.space.size();
   const bool central = differences == Differences::central;
   const Eigen::VectorXd coordinates = problem_.space.coordinates(values);
@@ -60,18 +70,24 @@ bool Objective::linearise(const Eigen::VectorXd& values, Differences differences
     add_point(p, step);
     if (central) add_point(p, -step);
   }
-  std::vector<Eigen::VectorXd> results = residuals(points);
-  for (const Eigen::VectorXd& result : results)
-    if (result.size() != residual_count_) return false;
-  residual = std::move(results.front());
-  residual_by_coordinate.resize(residual_count_, parameters);
+  // One whose time step would not be stable spoils all; the others need not run then.
+  for (const Eigen::VectorXd& point : points)
+    if (stable_time_step_s(problem_.cloth, parameter_set(problem_, point)) < time_step_s_)
+      return result;
+  std::vector<Eigen::VectorXd> residuals_of = residuals(points);
+  result.runs = static_cast<int>(points.size());
+  for (const Eigen::VectorXd& residual : residuals_of)
+    if (residual.size() != residual_count_) return result;
+  result.usable = true;
+  result.residual = std::move(residuals_of.front());
+  result.residual_by_coordinate.resize(residual_count_, parameters);
   for (int p = 0; p < parameters; ++p) {
     const auto plus = static_cast<size_t>(central ? 1 + 2 * p : 1 + p);
-    residual_by_coordinate.col(p) = central
-                                        ? ((results[plus] - results[plus + 1]) / (2 * step)).eval()
-                                        : ((results[plus] - residual) / step).eval();
+    const Eigen::VectorXd& from = central ? residuals_of[plus + 1] : result.residual;
+    result.residual_by_coordinate.col(p) =
+        (residuals_of[plus] - from) / (central ? 2 * step : step);
   }
-  return true;
+  return result;
 }
 
 double Objective::mean_length(const Eigen::VectorXd& residual) const {

@@ -11,6 +11,14 @@ enum class Differences {
   central   ///< two runs per parameter; error O(step^2)
 };
 
+/// A cost near one parameter vector, to first order.
+struct Linearisation {
+  bool usable = false;
+  int runs = 0;  ///< simulations that it took
+  Eigen::VectorXd residual;
+  Eigen::MatrixXd residual_by_coordinate;  ///< residuals x parameters
+};
+
 /// The trajectory cost: what a free run from the start leaves of the observations in the first
 /// `frames` frames, each coordinate divided by its sigma.
 class Objective {
@@ -31,6 +39,10 @@ class Objective {
   int frames() const { return frames_; }
   double time_step_s() const { return time_step_s_; }
 
+  /// Springs times time steps of one run: what it costs, on any machine. (Relaxing a start at rest
+  /// comes on top.)
+  double spring_steps_per_run() const;
+
   /// Whitened residuals for each parameter vector; empty where there are none because the run
   /// diverged, its step would not be stable, or a point fell behind a camera.
   std::vector<Eigen::VectorXd> residuals(const std::vector<Eigen::VectorXd>& values) const;
@@ -40,9 +52,9 @@ class Objective {
   static constexpr double kDifferenceStep = 1e-4;
 
   /// Residuals at `values` and their derivative by the space's coordinates, by differences over
-  /// `step` (all perturbed runs side by side in lanes). False where there are none.
-  bool linearise(const Eigen::VectorXd& values, Differences differences, Eigen::VectorXd& residual,
-                 Eigen::MatrixXd& residual_by_coordinate, double step = kDifferenceStep) const;
+  /// `step` (all perturbed runs side by side in lanes). Not usable where there are none.
+  Linearisation linearise(const Eigen::VectorXd& values, Differences differences,
+                          double step = kDifferenceStep) const;
 
   /// Mean length of the residual of an observation: a robust cost for the evolutionary search.
   /// Infinite where there are no residuals.

@@ -10,6 +10,8 @@
 namespace clothfit {
 namespace {
 
+constexpr const char* kOutOfWork = "not converged at the limit of work";
+
 /// The residuals and their Jacobian at the point that Ceres looks at, simulated once for all
 /// blocks. Both are computed whenever the point is new: a trial step's run alone would leave most
 /// lanes idle, and most trial steps are accepted and need the Jacobian next.
@@ -19,20 +21,18 @@ class SharedEvaluation final : public ceres::EvaluationCallback {
                    const RefineOptions& options, const Eigen::VectorXd& coordinates)
       : problem_(problem), objective_(objective), options_(options), coordinates_(coordinates) {}
 
-  /// Ceres asks again for points that its line search along the bounds has just seen.
+  /// Ceres asks again for a point that it has accepted.
   void PrepareForEvaluation(bool, bool) override {
     if (evaluated_.size() == coordinates_.size() && evaluated_ == coordinates_) return;
     evaluated_ = coordinates_;
-    usable_ = objective_.linearise(problem_.space.values(coordinates_), options_.differences,
-                                   residual_, jacobian_, options_.difference_step);
-    simulations_ +=
-        1 + (options_.differences == Differences::central ? 2 : 1) * problem_.space.size();
+    now_ = objective_.linearise(problem_.space.values(coordinates_), options_.differences,
+                                options_.difference_step);
+    simulations_ += now_.runs;
   }
 
-  bool usable() const { return usable_; }
-  const Eigen::VectorXd& residual() const { return residual_; }
-  const Eigen::MatrixXd& jacobian() const { return jacobian_; }
+  const Linearisation& now() const { return now_; }
   int simulations() const { return simulations_; }
+  double spring_steps() const { return simulations_ * objective_.spring_steps_per_run(); }
 
  private:
   const FitProblem& problem_;
@@ -40,10 +40,8 @@ class SharedEvaluation final : public ceres::EvaluationCallback {
   const RefineOptions& options_;
   const Eigen::VectorXd& coordinates_;
   Eigen::VectorXd evaluated_;
-  bool usable_ = false;
+  Linearisation now_;
   int simulations_ = 0;
-  Eigen::VectorXd residual_;
-  Eigen::MatrixXd jacobian_;
 };
 
 /// One observation's part of the shared evaluation.
@@ -56,13 +54,14 @@ class ObservationCost final : public ceres::CostFunction {
   }
 
   bool Evaluate(double const* const*, double* residuals, double** jacobians) const override {
-    if (!shared_.usable()) return false;
+    const Linearisation& now = shared_.now();
+    if (!now.usable) return false;
     Eigen::Map<Eigen::VectorXd>(residuals, block_.dimension) =
-        shared_.residual().segment(block_.offset, block_.dimension);
+        now.residual.segment(block_.offset, block_.dimension);
     if (jacobians != nullptr && jacobians[0] != nullptr) {
       using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-      Eigen::Map<RowMajor>(jacobians[0], block_.dimension, shared_.jacobian().cols()) =
-          shared_.jacobian().middleRows(block_.offset, block_.dimension);
+      Eigen::Map<RowMajor>(jacobians[0], block_.dimension, now.residual_by_coordinate.cols()) =
+          now.residual_by_coordinate.middleRows(block_.offset, block_.dimension);
     }
     return true;
   }
@@ -102,28 +101,37 @@ class PriorCost final : public ceres::CostFunction {
   const GaussianPrior& prior_;
 };
 
+/// Reports after each iteration; ends the solve on the caller's word or at the limit of work.
 class Reporter final : public ceres::IterationCallback {
  public:
-  Reporter(const ProgressCallback& progress, Progress progress_now)
-      : progress_(progress), now_(std::move(progress_now)) {}
+  Reporter(const ProgressCallback& progress, Progress progress_now, const SharedEvaluation& shared,
+           double spring_steps)
+      : progress_(progress),
+        now_(std::move(progress_now)),
+        shared_(shared),
+        spring_steps_(spring_steps) {}
   ceres::CallbackReturnType operator()(const ceres::IterationSummary& summary) override {
     now_.done = summary.iteration;
     now_.note = "cost " + std::to_string(summary.cost);
     if (progress_ && !progress_(now_)) return ceres::SOLVER_ABORT;
-    return ceres::SOLVER_CONTINUE;
+    return shared_.spring_steps() < spring_steps_ ? ceres::SOLVER_CONTINUE
+                                                  : ceres::SOLVER_TERMINATE_SUCCESSFULLY;
   }
 
  private:
   const ProgressCallback& progress_;
   Progress now_;
+  const SharedEvaluation& shared_;
+  double spring_steps_;
 };
 
 /// Why a solve ended, for a person.
 std::string ending(const ceres::Solver::Summary& summary) {
   switch (summary.termination_type) {
     case ceres::CONVERGENCE:
-    case ceres::USER_SUCCESS:
       return "converged";
+    case ceres::USER_SUCCESS:
+      return kOutOfWork;
     case ceres::NO_CONVERGENCE:
       return "still falling after " + std::to_string(summary.iterations.size()) + " iterations";
     case ceres::USER_FAILURE:
@@ -141,7 +149,7 @@ struct Round {
 };
 
 Round solve(const FitProblem& problem, const Objective& objective, const Eigen::VectorXd& start,
-            double huber_threshold, const RefineOptions& refine_options,
+            double huber_threshold, const RefineOptions& refine_options, double spring_steps,
             const ProgressCallback& progress) {
   const ParameterSpace& space = problem.space;
   Eigen::VectorXd coordinates = space.coordinates(start);
@@ -178,12 +186,16 @@ Round solve(const FitProblem& problem, const Objective& objective, const Eigen::
   options.function_tolerance = refine_options.least_gain;
   options.parameter_tolerance = 1e-6;
   options.initial_trust_region_radius = 1e2;
+  // A step that fails is shortened by the trust region, with a new direction; Ceres' line search
+  // along the bounds would first try the old one up to twenty times, a linearisation each.
+  options.max_num_line_search_step_size_iterations = 0;
   Reporter reporter(progress,
                     {.stage = "refining over " + std::to_string(objective.frames()) + " frames",
                      .done = 0,
                      .total = static_cast<double>(refine_options.iterations),
                      .unit = "iterations",
-                     .note = {}});
+                     .note = {}},
+                    shared, spring_steps);
   options.callbacks.push_back(&reporter);
   Round round;
   ceres::Solve(options, &least_squares, &round.summary);
@@ -208,6 +220,7 @@ RefineResult refine(const FitProblem& problem, int frames, const Eigen::VectorXd
                     const RefineOptions& options, const ProgressCallback& progress) {
   RefineResult result;
   result.values = start;
+  double spring_steps_left = options.spring_steps;
   for (int n = 0; n < options.rounds; ++n) {
     const double stable_s =
         stable_time_step_s(problem.cloth, parameter_set(problem, result.values));
@@ -221,8 +234,9 @@ RefineResult refine(const FitProblem& problem, int frames, const Eigen::VectorXd
     }
     result.robust_scale = robust_scale(before);
     const Round round = solve(problem, objective, result.values, kHuberScales * result.robust_scale,
-                              options, progress);
+                              options, spring_steps_left, progress);
     result.simulations += round.simulations;
+    spring_steps_left -= round.simulations * objective.spring_steps_per_run();
     result.solver_iterations += static_cast<int>(round.summary.iterations.size());
     result.message = ending(round.summary);
     if (round.summary.termination_type == ceres::USER_FAILURE) {
@@ -245,6 +259,11 @@ RefineResult refine(const FitProblem& problem, int frames, const Eigen::VectorXd
     const double scale_now = after.size() > 0 ? robust_scale(after) : result.robust_scale;
     const bool same_scale = scale_now > 0.8 * result.robust_scale;
     if (room > 1.05 && result.converged && (same_scale || moved < 1e-3)) break;
+    if (spring_steps_left <= 0) {
+      result.converged = false;
+      result.message = kOutOfWork;
+      break;
+    }
   }
   return result;
 }

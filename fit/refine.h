@@ -12,6 +12,7 @@ struct RefineOptions {
   double least_gain = 1e-7;  ///< a solve ends when the cost falls by less than this share
   Differences differences = Differences::central;       ///< forward: half the runs, a blunter end
   double difference_step = Objective::kDifferenceStep;  ///< in coordinates; wider sees the trend
+  double spring_steps = 1e18;     ///< springs times time steps of all runs; no solve goes on after
   double stability_margin = 1.5;  ///< stiffness and damping may grow this much before a new round
   double substep_scale = 1;
 };

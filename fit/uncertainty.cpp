@@ -38,9 +38,10 @@ Uncertainty estimate_uncertainty(const FitProblem& problem, const Objective& obj
                                  const Eigen::VectorXd& values) {
   Uncertainty result;
   const int parameters = problem.space.size();
-  Eigen::VectorXd residual, same_residual;
-  Eigen::MatrixXd jacobian, wide_jacobian;
-  if (!objective.linearise(values, Differences::central, residual, jacobian)) return result;
+  const Linearisation linear = objective.linearise(values, Differences::central);
+  if (!linear.usable) return result;
+  const Eigen::VectorXd& residual = linear.residual;
+  const Eigen::MatrixXd& jacobian = linear.residual_by_coordinate;
 
   const double threshold = kHuberScales * robust_scale(residual);
   Eigen::MatrixXd information = Eigen::MatrixXd::Zero(parameters, parameters);
@@ -90,9 +91,11 @@ Uncertainty estimate_uncertainty(const FitProblem& problem, const Objective& obj
 
   constexpr double kWideStep = 0.02;
   result.roughness = Eigen::VectorXd::Ones(parameters);
-  if (objective.linearise(values, Differences::central, same_residual, wide_jacobian, kWideStep)) {
+  const Linearisation wide = objective.linearise(values, Differences::central, kWideStep);
+  if (wide.usable) {
     for (int p = 0; p < parameters; ++p)
-      result.roughness[p] = jacobian.col(p).norm() / std::max(wide_jacobian.col(p).norm(), 1e-300);
+      result.roughness[p] =
+          jacobian.col(p).norm() / std::max(wide.residual_by_coordinate.col(p).norm(), 1e-300);
   }
   result.usable = true;
   return result;

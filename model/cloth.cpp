@@ -48,4 +48,10 @@ void Cloth::add_effect(const std::string& name, const std::string& where) {
   effects.push_back(entry.make());
 }
 
+size_t Cloth::spring_count() const {
+  size_t count = 0;
+  for (const std::vector<Spring>& type : springs) count += type.size();
+  return count;
+}
+
 }  // namespace clothfit

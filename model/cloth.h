@@ -38,6 +38,8 @@ struct Cloth {
   /// A cloth of a mesh with its springs, without held points or effects.
   static Cloth of(const Mesh& mesh, Eigen::VectorXd mass_kg);
   void add_effect(const std::string& name, const std::string& where);
+
+  size_t spring_count() const;
 };
 
 /// What may change between simulations.
