@@ -48,6 +48,11 @@ std::string check_mesh(const std::string& text) {
                      text, kMostMeshVertices);
 }
 
+/// CLI11 wraps a negative number into a huge one.
+std::string check_seed(const std::string& text) {
+  return text.starts_with('-') ? "'" + text + "' is not a seed: a whole number, 0 or more" : "";
+}
+
 ObservationKind parse_observations(const std::string& text) {
   if (text == "tracks3d") return ObservationKind::tracks3d;
   if (text == "tracks2d") return ObservationKind::tracks2d;
@@ -147,8 +152,8 @@ void add_fit_verb(CLI::App& program, VerbAction& action) {
       ->type_name("CxR")
       ->check(check_mesh);
   verb->add_option("--seed", options->fit.seed,
-                   "Seed of the search; the same one gives the same "
-                   "result")
+                   "Seed of the search; the same one gives the same result")
+      ->check(check_seed)
       ->capture_default_str();
   verb->add_option("--forecast", flags->forecast,
                    "Take the parameters of this fit.json, fit nothing, forecast the recording from "

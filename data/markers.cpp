@@ -70,12 +70,16 @@ bool any_tag(const std::vector<Point>& points) {
 
 }  // namespace
 
+bool lies_on_cloth(double s_m, double t_m, double width_m, double height_m) {
+  return s_m >= -kPlaceRounding_m && s_m <= width_m + kPlaceRounding_m &&
+         t_m >= -kPlaceRounding_m && t_m <= height_m + kPlaceRounding_m;
+}
+
 std::vector<Marker> read_markers(const std::filesystem::path& file, double width_m,
                                  double height_m) {
   enum Column { kMarker, kS, kT, kTag, kCorner };
   const CsvTable table(file, {{"marker"}, {"s"}, {"t"}, {"tag", false}, {"corner", false}});
   table.require_rows("markers");
-  constexpr double kRounding_m = 1e-6;
   std::vector<Marker> markers;
   markers.reserve(static_cast<std::size_t>(table.rows()));
   NamesSoFar names;
@@ -84,9 +88,7 @@ std::vector<Marker> read_markers(const std::filesystem::path& file, double width
     marker.name = table.name(row, kMarker);
     marker.s_m = table.number(row, kS);
     marker.t_m = table.number(row, kT);
-    const bool inside = marker.s_m >= -kRounding_m && marker.s_m <= width_m + kRounding_m &&
-                        marker.t_m >= -kRounding_m && marker.t_m <= height_m + kRounding_m;
-    if (!inside) {
+    if (!lies_on_cloth(marker.s_m, marker.t_m, width_m, height_m)) {
       table.refuse(row,
                    fmt::format("marker `{}` at (s, t) = ({}, {}) lies outside the cloth",
                                marker.name, marker.s_m, marker.t_m),

@@ -27,9 +27,13 @@ struct MarkerSet {
   std::unordered_map<std::string, int> index;  ///< name -> place in `markers`
 };
 
+inline constexpr double kPlaceRounding_m = 1e-6;  ///< what a place may be off by rounding
+
+/// Whether (s, t) lies on a cloth of width x height metres, its edges included.
+bool lies_on_cloth(double s_m, double t_m, double width_m, double height_m);
+
 /// Reads the rows of markers.csv. Refuses duplicate names, a tag without a corner, and a marker
-/// outside a cloth of `width_m` x `height_m` (1 micrometre allowed for rounding). Throws
-/// InputError.
+/// outside a cloth of `width_m` x `height_m`. Throws InputError.
 std::vector<Marker> read_markers(const std::filesystem::path& file, double width_m,
                                  double height_m);
 void write_markers(const std::vector<Marker>& markers, const std::filesystem::path& file);

@@ -16,7 +16,12 @@
 namespace clothfit {
 namespace {
 
-constexpr double kRounding_m = 1e-6;  ///< what a place on the cloth may be off by rounding
+/// Sizes of a cloth or a board's square beyond these are slips in the unit or the exponent.
+constexpr double kSmallest_m = 1e-4;
+constexpr double kLargest_m = 1e3;
+
+/// Whoever fits the recording has to simulate all of it.
+constexpr double kLongestInterval_s = 1000;
 
 /// Finds the files that recording.yaml names. Errors show paths as the user gave them.
 class RecordingFiles {
@@ -75,22 +80,12 @@ std::string read_file_name(const YamlValue& value) {
 ClothDescription read_cloth(const YamlValue& value) {
   const YamlMap map = value.map({"size", "mass", "masses", "mesh"});
   ClothDescription cloth;
-  const YamlValue& size = map.at("size");
-  const auto [width, height] = size.numbers<2>();
-  if (width <= 0 || height <= 0) {
-    size.refuse(fmt::format("cloth.size = [{}, {}]", width, height),
-                "[width, height] in metres, both > 0", "measure the flat cloth");
-  }
+  const auto [width, height] = map.at("size").numbers_between<2>(
+      kSmallest_m, kLargest_m, "a side of the flat cloth in metres");
   cloth.width_m = width;
   cloth.height_m = height;
-  if (const YamlValue* mass = map.find("mass")) {
-    cloth.mass_kg = mass->number();
-    if (*cloth.mass_kg <= 0) {
-      mass->refuse(fmt::format("cloth.mass = {}", *cloth.mass_kg),
-                   "the mass of the dry cloth in kilograms, > 0, or null",
-                   "weigh it, or write null");
-    }
-  }
+  if (const YamlValue* mass = map.find("mass"))
+    cloth.mass_kg = mass->number_between(1e-6, 1e4, "the dry cloth's mass in kilograms (or null)");
   if (const YamlValue* masses = map.find("masses")) {
     cloth.masses = masses->one_of(mass_distribution_words());
   }
@@ -138,6 +133,12 @@ std::vector<double> read_times(const std::filesystem::path& file) {
                    "every frame from 0 on, in order");
     }
     times_s.push_back(table.rising_number(row, kTime));
+    const double interval_s = row > 0 ? times_s.back() - times_s[times_s.size() - 2] : 0;
+    if (interval_s > kLongestInterval_s) {
+      table.refuse(row, fmt::format("{} seconds after the frame before", interval_s),
+                   fmt::format("{} seconds at most", kLongestInterval_s),
+                   "correct the time (seconds), or make two recordings of it");
+    }
   }
   return times_s;
 }
@@ -151,7 +152,7 @@ void read_time(const YamlValue& value, const RecordingFiles& files, Recording& r
                  "{frame_rate: FRAMES_PER_SECOND} or {file: times.csv}");
   }
   if (rate != nullptr) {
-    recording.frame_rate_hz = rate->positive_number();
+    recording.frame_rate_hz = rate->number_between(1e-3, 1e6, "frames per second");
   } else {
     recording.times_file = files.file(*file);
     recording.times_s = read_times(files.shown(*file));
@@ -166,7 +167,8 @@ CalibrationStills read_calibration(const YamlValue& value, const RecordingFiles&
   board.at("kind").one_of<int>({{"chessboard", 0}});
   stills.board.columns = board.at("columns").whole_number(kFewestBoardCorners, kMostBoardCorners);
   stills.board.rows = board.at("rows").whole_number(kFewestBoardCorners, kMostBoardCorners);
-  stills.board.square_m = board.at("square").positive_number();
+  stills.board.square_m =
+      board.at("square").number_between(kSmallest_m, kLargest_m, "a square's side in metres");
   return stills;
 }
 
@@ -217,9 +219,7 @@ void read_observations(const YamlValue& value, const RecordingFiles& files, Reco
 /// A place (s, t) inside the cloth.
 Eigen::Vector2d read_place(const YamlValue& value, const ClothDescription& cloth) {
   const auto [s, t] = value.numbers<2>();
-  const bool inside = s >= -kRounding_m && s <= cloth.width_m + kRounding_m && t >= -kRounding_m &&
-                      t <= cloth.height_m + kRounding_m;
-  if (!inside) {
+  if (!lies_on_cloth(s, t, cloth.width_m, cloth.height_m)) {
     value.refuse(fmt::format("{} = [{}, {}] lies outside the cloth", value.name(), s, t),
                  fmt::format("0 <= s <= {}, 0 <= t <= {} (metres)", cloth.width_m, cloth.height_m));
   }
@@ -271,7 +271,7 @@ std::vector<HeldPoint> read_held(const YamlValue& value, const RecordingFiles& f
     if (at != nullptr) point.at_m = read_place(*at, cloth);
     if (edge != nullptr) point.edge = edge->one_of(cloth_edge_words());
     for (const HeldPoint& earlier : held) {
-      if (earlier.edge == point.edge && (earlier.at_m - point.at_m).norm() <= kRounding_m) {
+      if (earlier.edge == point.edge && (earlier.at_m - point.at_m).norm() <= kPlaceRounding_m) {
         item.refuse(item.name() + " is held already", "every held point or edge once");
       }
     }
@@ -368,7 +368,7 @@ Recording read_recording(const std::filesystem::path& folder) {
   read_marker_set(map.at("markers"), files, recording);
   read_time(map.at("time"), files, recording);
   if (const YamlValue* gravity = map.find("gravity")) {
-    const auto [x, y, z] = gravity->numbers<3>();
+    const auto [x, y, z] = gravity->numbers_between<3>(-1e3, 1e3, "m/s2 along each axis");
     recording.gravity_m_per_s2 = {x, y, z};
   }
   if (const YamlValue* cameras = map.find("cameras")) {

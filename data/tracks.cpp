@@ -24,13 +24,18 @@ int read_marker(const CsvTable& table, int row, int column, const MarkerSet& mar
   return found->second;
 }
 
+/// Far beyond what is measured in metres or pixels: slips in the exponent.
+constexpr double kSmallestSigma = 1e-9;
+constexpr double kLargestSigma = 1e6;
+
 /// 0 where the file does not say.
 double read_sigma(const CsvTable& table, int row, int column, const std::string& unit) {
   if (table.empty(row, column)) return 0;
   const double sigma = table.number(row, column);
-  if (sigma <= 0) {
+  if (sigma < kSmallestSigma || sigma > kLargestSigma) {
     table.refuse(row, fmt::format("sigma = {}", sigma),
-                 "one standard deviation per coordinate (" + unit + "), > 0",
+                 fmt::format("one standard deviation per coordinate ({}), {} to {}", unit,
+                             kSmallestSigma, kLargestSigma),
                  "leave the field empty where it is not known");
   }
   return sigma;

@@ -108,9 +108,10 @@ double YamlValue::number() const {
   return *value;
 }
 
-double YamlValue::positive_number() const {
+double YamlValue::number_between(double least, double most, const std::string& what) const {
   const double value = number();
-  if (value <= 0) refuse(shown(), "a number > 0");
+  if (value < least || value > most)
+    refuse(shown(), fmt::format("{}, {} to {}", what, least, most));
   return value;
 }
 

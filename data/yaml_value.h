@@ -33,12 +33,17 @@ class YamlValue {
   /// A scalar that is not empty.
   std::string text() const;
   double number() const;
-  double positive_number() const;
+  /// A number from `least` to `most`; `what` says of what, for the message: a slip of the keyboard
+  /// in an exponent would otherwise be simulated.
+  double number_between(double least, double most, const std::string& what) const;
   int whole_number(int least, int most = std::numeric_limits<int>::max()) const;
   std::vector<double> numbers() const;
   /// Exactly N numbers.
   template <std::size_t N>
   std::array<double, N> numbers() const;
+  /// Exactly N numbers, each from `least` to `most`.
+  template <std::size_t N>
+  std::array<double, N> numbers_between(double least, double most, const std::string& what) const;
   std::vector<YamlValue> items() const;
   /// A map of known keys.
   YamlMap map(const std::vector<std::string>& known_keys) const;
@@ -86,6 +91,14 @@ std::array<double, N> YamlValue::numbers() const {
   const std::vector<double> all = numbers_of(N);
   std::array<double, N> result{};
   std::copy(all.begin(), all.end(), result.begin());
+  return result;
+}
+
+template <std::size_t N>
+std::array<double, N> YamlValue::numbers_between(double least, double most,
+                                                 const std::string& what) const {
+  const std::array<double, N> result = numbers<N>();
+  for (const YamlValue& item : items()) item.number_between(least, most, what);
   return result;
 }
 

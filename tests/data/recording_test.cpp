@@ -262,6 +262,15 @@ TEST(Recording, HasNoTimeForAFrameBeyondItsTimes) {
                  [&] { recording.frame_time_s(3); });
 }
 
+TEST(Recording, RefusesAPauseOfHours) {
+  const TemporaryFolder folder;
+  write_full_recording(folder);
+  folder.write("times.csv", "frame,time\n0,0\n1,0.1\n2,1e300\n");
+
+  expect_refused(folder, "times.csv:4: 1e+300 seconds after the frame before; 1000 seconds at most",
+                 [&] { read_recording(folder.path()); });
+}
+
 TEST(Recording, IsRefusedWithFileAndLine) {
   struct Case {
     std::string from, to;
@@ -278,13 +287,17 @@ TEST(Recording, IsRefusedWithFileAndLine) {
       {"name: full", "\"na\\nme\": full", ":2: unknown key `na?me`; did you mean `name`?"},
       {"name: full", "name: ..", ":2: name cannot name a file"},
       {"name: full", "name: full\nname: again", ":3: `name` stands on line 2 already"},
-      {"[0.40, 0.30]", "[0.40, 0]", ":5: cloth.size = [0.4, 0]; [width, height] in metres"},
+      {"[0.40, 0.30]", "[0.40, 0]",
+       ":5: cloth.size[1] = 0; a side of the flat cloth in metres, 0.0001 to 1000"},
       {"[0.40, 0.30]", "[0.40]", ":5: cloth.size has 1 items; a list of 2 numbers"},
       {"[0.40, 0.30]", "[0.40, wide]", ":5: cloth.size[1] = wide; a finite number"},
       {"[0.40, 0.30]", "[0.40, .nan]", ":5: cloth.size[1] = .nan; a finite number"},
       {"  size: [0.40, 0.30]\n", "", ":4: `size` is missing in cloth"},
-      {"0.0305", "-0.02", ":6: cloth.mass = -0.02; the mass of the dry cloth in kilograms"},
-      {"0.0305", "0", ":6: cloth.mass = 0; the mass"},
+      {"[0.40, 0.30]", "[4e20, 0.30]", ":5: cloth.size[0] = 4e20; a side of the flat cloth"},
+      {"0.0305", "-0.02",
+       ":6: cloth.mass = -0.02; the dry cloth's mass in kilograms (or null), 1e-06"},
+      {"0.0305", "0", ":6: cloth.mass = 0; the dry cloth's mass"},
+      {"0.0305", "1e-300", ":6: cloth.mass = 1e-300; the dry cloth's mass"},
       {"0.0305", "light", ":6: cloth.mass = light; a finite number"},
       {"masses: equal", "masses: same", ":7: cloth.masses = same; known are `by_area`, `equal`"},
       {"rows: 13", "rows: 0", ":8: cloth.mesh.rows = 0; a whole number, 2 or more"},
@@ -300,8 +313,10 @@ TEST(Recording, IsRefusedWithFileAndLine) {
       {", file: markers.csv", "", ":9: `file` is missing in markers"},
       {"file: times.csv", "file: times.csv, frame_rate: 60", ":10: time has both a frame_rate and"},
       {"{file: times.csv}", "{}", ":10: time is not given"},
-      {"file: times.csv", "frame_rate: 0", ":10: time.frame_rate = 0; a number > 0"},
+      {"file: times.csv", "frame_rate: 0", ":10: time.frame_rate = 0; frames per second, 0.001"},
+      {"file: times.csv", "frame_rate: 1e300", ":10: time.frame_rate = 1e300; frames per second"},
       {"file: times.csv", "file: none.csv", ":10: time.file = none.csv: there is no such file"},
+      {"-9.81]", "-1e200]", ":11: gravity[2] = -1e200; m/s2 along each axis, -1000 to 1000"},
       {"[0.0, 0.1, -9.81]", "-9.81", ":11: gravity = -9.81; a list of 3 numbers"},
       {"file: cameras/front.yaml", "file: cameras/none.yaml",
        ":13: cameras[0].file = cameras/none.yaml: there is no such file"},
@@ -314,7 +329,8 @@ TEST(Recording, IsRefusedWithFileAndLine) {
       {"kind: chessboard", "kind: charuco", ":18: cameras[1].calibration.board.kind = charuco"},
       {"rows: 6", "rows: 2", ":18: cameras[1].calibration.board.rows = 2; a whole number, 3 to"},
       {"rows: 6", "rows: 2000000000", ":18: cameras[1].calibration.board.rows = 2000000000; a"},
-      {"square: 0.025", "square: 0", ":18: cameras[1].calibration.board.square = 0; a number > 0"},
+      {"square: 0.025", "square: 0",
+       ":18: cameras[1].calibration.board.square = 0; a square's side"},
       {"tracks3d: tracks3d.csv", "tracks3d: x.csv", ":19: observations.tracks3d = x.csv: there is"},
       {"{front: tracks2d", "{fron: tracks2d",
        ":19: there is no camera `fron`; did you mean `front`? known are `front`, `side`"},

@@ -163,6 +163,7 @@ TEST(Tables, RefuseWhatTheFormatDoesNotAllowWithFileAndLine) {
       {header + "0,,1,2,0.3,ok\n", "t.csv:3: marker = ``; a name"},
       {header + "0,a,1,2,-0.3,ok\n", "t.csv:3: sigma = -0.3; one standard deviation"},
       {header + "0,a,1,2,0,ok\n", "t.csv:3: sigma = 0; one standard deviation"},
+      {header + "0,a,1,2,1e300,ok\n", "t.csv:3: sigma = 1e+300; one standard deviation"},
       {header + "0,a,1,2,0.3,good\n", "t.csv:3: status = `good`; `ok` or `rejected:REASON`"},
       {header + "0,a,1,2,0.3,rejected:\n", "t.csv:3: status = `rejected:`; `ok` or"},
       {header + "0,a,1,2,,\n0,b,1,2,,\n\n0,a,3,4,,\n",
