@@ -5,12 +5,14 @@
 #include <cmath>
 #include <limits>
 
+#include "data/median.h"
+
 namespace clothfit {
 namespace {
 
-/// 1 / (0.6745 sqrt(20)): from the median absolute third difference of white normal noise to the
+/// From the median absolute third difference of white normal noise to the
 /// standard deviation of one value.
-const double kMedianToSigma = 1.4826 / std::sqrt(20.0);
+const double kMedianToSigma = kMadToSigma / std::sqrt(20.0);
 constexpr double kBeyond = 5;
 
 /// Whether the three intervals between frames f ... f + 3 are nearly equal.
@@ -34,7 +36,7 @@ double robust_sigma(const std::vector<double>& sorted) {
   std::size_t count = sorted.size();
   while (true) {
     const double middle = median(sorted, count);
-    const auto end = std::upper_bound(sorted.begin(), sorted.end(), kBeyond * 1.4826 * middle);
+    const auto end = std::upper_bound(sorted.begin(), sorted.end(), kBeyond * kMadToSigma * middle);
     const auto within = static_cast<std::size_t>(end - sorted.begin());
     if (within >= count) return kMedianToSigma * middle;
     count = within;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "data/median.h"
 #include "model/stability.h"
 
 namespace clothfit {
@@ -211,9 +212,7 @@ double robust_scale(const Eigen::VectorXd& residual) {
   for (Eigen::Index n = 0; n < residual.size(); ++n)
     sizes[static_cast<size_t>(n)] = std::abs(residual[n]);
   if (sizes.empty()) return 1;
-  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
-  std::ranges::nth_element(sizes, middle);
-  return std::max(1.0, 1.4826 * *middle);
+  return std::max(1.0, kMadToSigma * median(std::move(sizes)));
 }
 
 RefineResult refine(const FitProblem& problem, int frames, const Eigen::VectorXd& start,

@@ -10,13 +10,13 @@
 #include <utility>
 
 #include "data/input_error.h"
+#include "data/median.h"
 
 namespace clothfit {
 namespace {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-constexpr double kHuber = 1.345;        ///< 95 % efficient for normal noise
-constexpr double kMadToSigma = 1.4826;  ///< of a normal distribution
+constexpr double kHuber = 1.345;  ///< 95 % efficient for normal noise
 /// Price of a degree of freedom in the cross-validation score. 1 is the plain score; 1.2 to 1.4
 /// hold it back from following the noise and cost next to nothing elsewhere [kim2004].
 constexpr double kCaution = 1.4;
@@ -258,12 +258,6 @@ std::pair<std::vector<double>, std::vector<Eigen::Index>> used_samples(
     used.second.push_back(static_cast<Eigen::Index>(k));
   }
   return used;
-}
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 /// Largest coordinate of each sample's distance from the path, in robust standard deviations.

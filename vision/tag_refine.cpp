@@ -8,6 +8,8 @@
 #include <cmath>
 #include <limits>
 
+#include "data/median.h"
+
 namespace clothfit {
 namespace {
 
@@ -200,12 +202,6 @@ std::vector<Sample> pixels_of_tag(const cv::Mat& grey, const TagPattern& pattern
   return samples;
 }
 
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 /// One row per sample; single precision is ample for grey levels of 8 bits and twice as fast.
 using Rows = Eigen::Matrix<float, Eigen::Dynamic, kUnknowns, Eigen::RowMajor>;
 
@@ -239,12 +235,12 @@ void weigh(Fit& fit) {
       inverse_square_slope.push_back(1 / square(fit.slope[i]));
     }
   }
-  constexpr double kNormal = 1.4826;  // standard deviation by median absolute value
-  constexpr double kRounding = 0.3;   // grey levels; what 8 bits leave
-  const double noise = std::max(flat.empty() ? 0 : kNormal * median(std::move(flat)), kRounding);
+  constexpr double kRounding = 0.3;  // grey levels; what 8 bits leave
+  const double noise =
+      std::max(flat.empty() ? 0 : kMadToSigma * median(std::move(flat)), kRounding);
   double square_roughness = 0;
   if (!rough.empty()) {
-    square_roughness = square(kNormal * median(std::move(rough))) -
+    square_roughness = square(kMadToSigma * median(std::move(rough))) -
                        square(noise) * median(std::move(inverse_square_slope));
   }
   square_roughness = std::max(square_roughness, 0.0);

@@ -6,20 +6,18 @@
 #include <tbb/info.h>
 #include <tbb/parallel_pipeline.h>
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <atomic>
 #include <bit>
-#include <cmath>
-#include <limits>
 #include <set>
 
 #include "data/input_error.h"
+#include "vision/fixed_corner.h"
 #include "vision/image_source.h"
 #include "vision/overlay.h"
-#include "vision/rejection.h"
 #include "vision/tag_detector.h"
+#include "vision/tag_history.h"
 
 namespace clothfit {
 namespace {
@@ -50,114 +48,9 @@ PointsByTag points_by_tag(const std::vector<Point>& points, const std::string& f
   return by_tag;
 }
 
-/// One reading of a tag and why it, or single corners of it, are doubted (empty: they are not).
-struct Reading {
-  int frame = 0;
-  TagDetection tag;
-  std::array<std::string, 4> rejected;
-
-  bool good() const {
-    return std::any_of(rejected.begin(), rejected.end(),
-                       [](const std::string& reason) { return reason.empty(); });
-  }
-  void reject(const char* reason) {
-    for (std::string& corner : rejected) {
-      if (corner.empty()) corner = reason;
-    }
-  }
-  Eigen::Vector2d centre_px() const {
-    return (tag.corner_px[0] + tag.corner_px[1] + tag.corner_px[2] + tag.corner_px[3]) / 4;
-  }
-};
-
-/// The readings of one tag, sorted by frame.
-using History = std::vector<Reading>;
-
-double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
-  return a.x() * b.y() - a.y() * b.x();
-}
-
-/// True where two edges meet so flatly, or the quadrilateral is so thin, that corners slide along
-/// edges: an angle within `kSmallestAngle` of 0 or 180 degrees.
-bool nearly_degenerate(const std::array<Eigen::Vector2d, 4>& corner_px) {
-  constexpr double kSmallestAngle = 15 * M_PI / 180;
-  for (std::size_t c = 0; c < 4; ++c) {
-    const Eigen::Vector2d forward = corner_px[(c + 1) % 4] - corner_px[c];
-    const Eigen::Vector2d back = corner_px[(c + 3) % 4] - corner_px[c];
-    // Corners run counter-clockwise as seen, which is a negative turn with y pointing down.
-    const double sine = -cross(forward, back) / (forward.norm() * back.norm());
-    if (!(sine > std::sin(kSmallestAngle))) return true;
-  }
-  return false;
-}
-
-/// Reasons that show in one picture alone.
-void judge_alone(Reading& reading, const TrackOptions& options, const cv::Size& size) {
-  const TagDetection& tag = reading.tag;
-  if (tag.decision_margin < options.min_decision_margin) reading.reject(rejection::kLowMargin);
-  if (tag.corrected_bits > options.max_corrected_bits) reading.reject(rejection::kCorrectedBits);
-  if (nearly_degenerate(tag.corner_px)) reading.reject(rejection::kTooOblique);
-  if (!tag.refined || tag.explained < options.min_explained) {
-    reading.reject(rejection::kPatternMismatch);
-  }
-  constexpr double kBorder = 2;  // px; what an edge's blur reaches
-  for (std::size_t c = 0; c < 4; ++c) {
-    const Eigen::Vector2d& corner = tag.corner_px[c];
-    const bool inside = corner.x() >= kBorder && corner.x() <= size.width - 1 - kBorder &&
-                        corner.y() >= kBorder && corner.y() <= size.height - 1 - kBorder;
-    if (!inside && reading.rejected[c].empty()) reading.rejected[c] = rejection::kTouchingBorder;
-    if (tag.sigma_px[c] > options.max_sigma_px && reading.rejected[c].empty()) {
-      reading.rejected[c] = rejection::kUncertain;
-    }
-  }
-}
-
-/// A tag read twice in a picture: no telling which is it. One row per frame stays, that of the
-/// clearest reading, rejected.
-void judge_duplicates(History& history) {
-  std::stable_sort(history.begin(), history.end(), [](const Reading& a, const Reading& b) {
-    if (a.frame != b.frame) return a.frame < b.frame;
-    if (a.good() != b.good()) return a.good();
-    return a.tag.decision_margin > b.tag.decision_margin;
-  });
-  History kept;
-  for (Reading& reading : history) {
-    if (kept.empty() || kept.back().frame != reading.frame) {
-      kept.push_back(std::move(reading));
-    } else if (reading.good()) {
-      kept.back().reject(rejection::kDuplicateId);
-    }
-  }
-  history = std::move(kept);
-}
-
-/// A tag that is out of reach from where it was before and from where it is after. At the ends of
-/// its history the two next readings on the one side stand for both.
-void judge_jumps(History& history, double max_speed_px) {
-  std::vector<Reading*> good;
-  for (Reading& reading : history) {
-    if (reading.good()) good.push_back(&reading);
-  }
-  const auto out_of_reach = [&](std::size_t a, std::size_t b) {
-    const double frames = std::abs(good[a]->frame - good[b]->frame);
-    return (good[a]->centre_px() - good[b]->centre_px()).norm() > max_speed_px * frames;
-  };
-  if (good.size() < 3) return;
-  std::vector<bool> jumps(good.size());
-  const std::size_t last = good.size() - 1;
-  for (std::size_t i = 1; i < last; ++i) {
-    jumps[i] = out_of_reach(i, i - 1) && out_of_reach(i, i + 1);
-  }
-  jumps[0] = out_of_reach(0, 1) && out_of_reach(0, 2);
-  jumps[last] = out_of_reach(last, last - 1) && out_of_reach(last, last - 2);
-  for (std::size_t i = 0; i < good.size(); ++i) {
-    if (jumps[i]) good[i]->reject(rejection::kJump);
-  }
-}
-
 /// Readings of all listed tags in all pictures.
 struct Readings {
-  std::map<int, History> by_tag;
+  std::map<int, TagHistory> by_tag;
   std::set<int> unlisted;  ///< tags that no marker and no reference point names
   int frames = 0;
   bool cancelled = false;
@@ -264,49 +157,6 @@ std::string what_appears_instead(const Readings& readings, const std::string& fa
   return "check the camera's `images`, the light, and that a tag is 30 pixels wide or more";
 }
 
-/// The mean place of a corner that does not move. Only the scatter from frame to frame averages
-/// out: ragged edges and the pixel grid are the same in every picture of a fixed tag, so that the
-/// detections' own sigma stays.
-ReferencePixel average(int point, const std::vector<Eigen::Vector2d>& pixels,
-                       const std::vector<double>& sigmas) {
-  const auto median = [](std::vector<double> values) {
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
-  };
-  std::vector<double> u, v, distance;
-  for (const Eigen::Vector2d& pixel : pixels) {
-    u.push_back(pixel.x());
-    v.push_back(pixel.y());
-  }
-  const Eigen::Vector2d centre(median(u), median(v));
-  for (const Eigen::Vector2d& pixel : pixels) distance.push_back((pixel - centre).norm());
-
-  // Something that passes in front bends a corner off its place for a few frames: detections
-  // further off than 5 sigma are left out. The median distance of a normal scatter is 1.18 sigma.
-  const double reach = 5 * std::max(median(distance) / 1.18, median(sigmas));
-  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
-  double square_sigma_sum = 0;
-  int used = 0;
-  for (std::size_t i = 0; i < pixels.size(); ++i) {
-    if (distance[i] > reach) continue;
-    sum += pixels[i];
-    square_sigma_sum += sigmas[i] * sigmas[i];
-    ++used;
-  }
-  const Eigen::Vector2d mean = sum / used;
-  double scatter = 0;  // variance per coordinate
-  for (std::size_t i = 0; i < pixels.size(); ++i) {
-    if (distance[i] <= reach) scatter += (pixels[i] - mean).squaredNorm() / 2;
-  }
-  const double stated = square_sigma_sum / used;
-  scatter = used > 1 ? scatter / (used - 1) : stated;
-  return {.point = point,
-          .pixel_px = mean,
-          .sigma_px = std::sqrt(stated + scatter / used),
-          .frames = used};
-}
-
 std::vector<ReferencePixel> average_reference(const Readings& readings,
                                               const PointsByTag& reference) {
   std::vector<ReferencePixel> result;
@@ -316,13 +166,17 @@ std::vector<ReferencePixel> average_reference(const Readings& readings,
     for (std::size_t c = 0; c < 4; ++c) {
       std::vector<Eigen::Vector2d> pixels;
       std::vector<double> sigmas;
-      for (const Reading& reading : history->second) {
+      for (const TagReading& reading : history->second) {
         if (!reading.rejected[c].empty()) continue;
         pixels.push_back(reading.tag.corner_px[c]);
         sigmas.push_back(reading.tag.sigma_px[c]);
       }
       if (points[c] == kNone || pixels.empty()) continue;
-      result.push_back(average(points[c], pixels, sigmas));
+      const FixedCorner corner = average_fixed_corner(pixels, sigmas);
+      result.push_back({.point = points[c],
+                        .pixel_px = corner.pixel_px,
+                        .sigma_px = corner.sigma_px,
+                        .frames = corner.frames});
     }
   }
   std::sort(result.begin(), result.end(),
@@ -335,7 +189,7 @@ Tracks2d collect_tracks(const Readings& readings, const PointsByTag& markers) {
   for (const auto& [id, points] : markers) {
     const auto history = readings.by_tag.find(id);
     if (history == readings.by_tag.end()) continue;
-    for (const Reading& reading : history->second) {
+    for (const TagReading& reading : history->second) {
       for (std::size_t c = 0; c < 4; ++c) {
         if (points[c] == kNone) continue;
         tracks.push_back({.frame = reading.frame,
@@ -419,11 +273,7 @@ TrackResult track(const Recording& recording, const CameraEntry& camera,
     return result;
   }
 
-  for (auto& [id, history] : readings.by_tag) {
-    for (Reading& reading : history) judge_alone(reading, options, readings.size);
-    judge_duplicates(history);
-    judge_jumps(history, options.max_speed_px);
-  }
+  for (auto& [id, history] : readings.by_tag) judge(history, options, readings.size);
   result.tracks = collect_tracks(readings, markers);
   if (result.tracks.empty()) {
     std::set<int> ids;

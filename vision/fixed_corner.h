@@ -1,0 +1,20 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+namespace clothfit {
+
+struct FixedCorner {
+  Eigen::Vector2d pixel_px = Eigen::Vector2d::Zero();
+  double sigma_px = 0;  ///< one standard deviation per coordinate
+  int frames = 0;       ///< detections that took part
+};
+
+/// The mean place of a corner that does not move, from its detections (one or more, with their
+/// sigmas). Only the scatter from frame to frame averages out: ragged edges and the pixel grid are
+/// the same in every picture of a fixed tag, so that the detections' own sigma stays.
+FixedCorner average_fixed_corner(const std::vector<Eigen::Vector2d>& pixels,
+                                 const std::vector<double>& sigmas);
+
+}  // namespace clothfit
