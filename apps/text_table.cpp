@@ -2,17 +2,11 @@
 
 #include <algorithm>
 #include <cassert>
-#include <cstdlib>
+
+#include "apps/report/number_text.h"
 
 namespace clothfit {
 namespace {
-
-bool looks_like_number(const std::string& cell) {
-  if (cell.empty() || cell == "-") return true;
-  char* end = nullptr;
-  std::strtod(cell.c_str(), &end);
-  return *end == '\0' || *end == '%';
-}
 
 /// Characters, not bytes: continuation bytes of UTF-8 take no room.
 std::size_t width_of(const std::string& cell) {
@@ -33,7 +27,7 @@ std::string text_table(const std::vector<std::string>& header,
     assert(row.size() == columns);
     for (std::size_t c = 0; c < columns; ++c) {
       width[c] = std::max(width[c], width_of(row[c]));
-      right[c] = right[c] && looks_like_number(row[c]);
+      right[c] = right[c] && shows_number(row[c]);
     }
   }
 

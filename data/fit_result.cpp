@@ -20,19 +20,6 @@ constexpr const char* kFormat = "clothfit-fit/1";
 constexpr const char* kExpectedFile = "a file of format clothfit-fit/1";
 constexpr const char* kRemedy = "run `clothfit fit` again";
 
-std::string word_of(ParameterState state) {
-  switch (state) {
-    case ParameterState::fitted:
-      return "fitted";
-    case ParameterState::fixed:
-      return "fixed";
-    case ParameterState::undetermined:
-      return "undetermined";
-  }
-  assert(false && "every state has a word");
-  return {};
-}
-
 double finite(double value) {
   assert(std::isfinite(value));
   return value;
@@ -43,7 +30,7 @@ Json to_json(const ParameterEstimate& parameter) {
           {"unit", parameter.unit},
           {"value", finite(parameter.value)},
           {"sigma", finite(parameter.sigma)},
-          {"state", word_of(parameter.state)},
+          {"state", to_string(parameter.state)},
           {"reason", parameter.reason}};
 }
 
@@ -143,7 +130,7 @@ ParameterEstimate read_parameter(const JsonValue& json) {
   const std::vector<ParameterState> states = {ParameterState::fitted, ParameterState::fixed,
                                               ParameterState::undetermined};
   const auto found = std::find_if(states.begin(), states.end(),
-                                  [&](ParameterState s) { return word_of(s) == word; });
+                                  [&](ParameterState s) { return to_string(s) == word; });
   if (found == states.end()) {
     state.refuse("is `" + word + "`", "`fitted`, `fixed` or `undetermined`");
   }
@@ -190,6 +177,19 @@ Json parse(const std::filesystem::path& file) {
 }
 
 }  // namespace
+
+std::string to_string(ParameterState state) {
+  switch (state) {
+    case ParameterState::fitted:
+      return "fitted";
+    case ParameterState::fixed:
+      return "fixed";
+    case ParameterState::undetermined:
+      return "undetermined";
+  }
+  assert(false && "every state has a word");
+  return {};
+}
 
 void write_fit_result(const FitResult& result, const std::filesystem::path& file) {
   Json effects = Json::array();

@@ -8,6 +8,7 @@
 namespace clothfit {
 
 enum class ParameterState { fitted, fixed, undetermined };
+std::string to_string(ParameterState state);
 
 struct ParameterEstimate {
   std::string name;

@@ -28,18 +28,6 @@ std::string relative_text(const ParameterEstimate& parameter) {
 
 }  // namespace
 
-std::string to_string(ParameterState state) {
-  switch (state) {
-    case ParameterState::fitted:
-      return "fitted";
-    case ParameterState::fixed:
-      return "fixed";
-    case ParameterState::undetermined:
-      return "undetermined";
-  }
-  return "";
-}
-
 std::string to_string(FitStop stop) {
   switch (stop) {
     case FitStop::converged:

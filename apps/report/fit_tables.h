@@ -13,8 +13,6 @@ struct Table {
   std::vector<std::vector<std::string>> rows;
 };
 
-/// Text forms used in reports and CSV files.
-std::string to_string(ParameterState state);
 std::string to_string(FitStop stop);
 
 /// Every parameter with all its digits, effects' and nuisance parameters included (CSV).

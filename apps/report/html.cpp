@@ -3,7 +3,8 @@
 #include <fmt/format.h>
 
 #include <cstdint>
-#include <cstdlib>
+
+#include "apps/report/number_text.h"
 
 namespace clothfit {
 namespace {
@@ -46,13 +47,6 @@ ol.stages { padding-left: 1.4rem; font-size: .92rem; }
   pre { white-space: pre-wrap; }
 }
 )";
-
-bool is_number(const std::string& cell) {
-  if (cell.empty() || cell == "-") return true;
-  char* end = nullptr;
-  std::strtod(cell.c_str(), &end);
-  return *end == '\0' || (*end == '%' && end[1] == '\0') || std::string_view(end) == " %";
-}
 
 }  // namespace
 
@@ -100,7 +94,7 @@ std::string typeset_number(const std::string& text) {
 std::string html_table(const Table& table, const std::string& caption) {
   std::vector<bool> number(table.header.size(), true);
   for (const std::vector<std::string>& row : table.rows) {
-    for (std::size_t c = 0; c < row.size(); ++c) number[c] = number[c] && is_number(row[c]);
+    for (std::size_t c = 0; c < row.size(); ++c) number[c] = number[c] && shows_number(row[c]);
   }
   const auto mark = [&](std::size_t c) { return number[c] ? " class=\"number\"" : ""; };
 
@@ -116,7 +110,7 @@ std::string html_table(const Table& table, const std::string& caption) {
     for (std::size_t c = 0; c < row.size(); ++c) {
       const char* tag = c == 0 ? "th" : "td";
       html += fmt::format("<{}{}{}>{}</{}>", tag, c == 0 ? " scope=\"row\"" : "", mark(c),
-                          is_number(row[c]) ? typeset_number(row[c]) : escape_xml(row[c]), tag);
+                          shows_number(row[c]) ? typeset_number(row[c]) : escape_xml(row[c]), tag);
     }
     html += "</tr>\n";
   }

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
+#include <string_view>
 
 #include "data/number_text.h"
 
@@ -43,6 +45,14 @@ std::string value_text(double value, double sigma) {
 
 std::string exact_text(double value) {
   return std::isfinite(value) ? number_text(value) : "";
+}
+
+bool shows_number(const std::string& cell) {
+  if (cell.empty() || cell == "-") return true;
+  char* end = nullptr;
+  std::strtod(cell.c_str(), &end);
+  const std::string_view rest(end);
+  return rest.empty() || rest == "%" || rest == " %";
 }
 
 }  // namespace clothfit

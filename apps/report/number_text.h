@@ -14,4 +14,8 @@ std::string value_text(double value, double sigma);
 /// Shortest text that reads back to the same double; empty where it is not a number. For CSV.
 std::string exact_text(double value);
 
+/// Whether a table's cell shows a number, a percentage or the absence of one: those stand to the
+/// right.
+bool shows_number(const std::string& cell);
+
 }  // namespace clothfit

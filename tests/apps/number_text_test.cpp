@@ -55,5 +55,12 @@ TEST(NumberText, WritesExactTextThatReadsBackToTheSameBits) {
   }
 }
 
+TEST(ShowsNumber, TellsNumbersFromWords) {
+  for (const char* number : {"", "-", "0.12", "-3", "1.2e-05", "12%", "0.41 %"})
+    EXPECT_TRUE(shows_number(number)) << number;
+  for (const char* word : {"N/m", "12 mm", "fitted", "3.1.2", "5 %%"})
+    EXPECT_FALSE(shows_number(word)) << word;
+}
+
 }  // namespace
 }  // namespace clothfit
