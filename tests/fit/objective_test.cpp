@@ -107,6 +107,9 @@ TEST(Objective, SaysNothingWhereTheStepWouldNotBeStable) {
   EXPECT_EQ(residuals[1].size(), objective.residual_count());
   EXPECT_EQ(objective.mean_length(residuals[0]), INFINITY);
   EXPECT_TRUE(std::isfinite(objective.mean_length(residuals[1])));
+  const Linearisation linear = objective.linearise(stiff, Differences::forward);
+  EXPECT_FALSE(linear.usable);
+  EXPECT_EQ(linear.runs, 0);
 }
 
 TEST(Objective, DoesNotDependOnWhatElseIsEvaluated) {

@@ -54,6 +54,25 @@ TEST(Refine, FindsTheTruthFromAStartThatIsOffByAFactor) {
   EXPECT_NEAR(uncertainty.chi_square_per_dof, 1.0, 0.15);
 }
 
+TEST(Refine, EndsAtTheLimitOfWorkWithWhatItHasReached) {
+  const FitProblem problem = tiny_problem(1);
+  Eigen::VectorXd start = truth_of(problem);
+  for (int p = 0; p < 7; ++p) start[p] *= p % 2 == 0 ? 1.6 : 0.65;
+  const RefineResult whole = refine(problem, problem.frames(), start, {}, {});
+  ASSERT_GT(whole.solver_iterations, 3);
+  const double run = Objective(problem, problem.frames(), whole.time_step_s).spring_steps_per_run();
+  const double first_two_points = 1.5 * (1 + 2 * problem.space.size()) * run;
+
+  const RefineResult cut =
+      refine(problem, problem.frames(), start, {.spring_steps = first_two_points}, {});
+
+  EXPECT_TRUE(cut.usable);
+  EXPECT_FALSE(cut.converged);
+  EXPECT_EQ(cut.message, "not converged at the limit of work");
+  EXPECT_LT(cut.simulations, whole.simulations);
+  EXPECT_GT(cut.cost, whole.cost);
+}
+
 TEST(Refine, ScatterOverNoiseIsWhatTheCovariancePredicts) {
   constexpr int kTrials = 20;
   Eigen::ArrayXd squared_pull = Eigen::ArrayXd::Zero(7);
