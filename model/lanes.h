@@ -23,6 +23,11 @@ struct LaneVectors {
     return {LaneArray::Zero(kLanes, vertices), LaneArray::Zero(kLanes, vertices),
             LaneArray::Zero(kLanes, vertices)};
   }
+  void set_zero() {
+    x.setZero();
+    y.setZero();
+    z.setZero();
+  }
   int vertices() const { return static_cast<int>(x.cols()); }
   Eigen::Matrix3Xd lane(int l) const {
     Eigen::Matrix3Xd result(3, x.cols());

@@ -35,9 +35,9 @@ LaneParameters lane_parameters(const Cloth& cloth, std::span<const ParameterSet*
       result.springs.stiffness_n_per_m[type][l] = set.springs.stiffness_n_per_m[type];
       result.springs.damping_ns_per_m[type][l] = set.springs.damping_ns_per_m[type];
     }
-    result.gravity_x[l] = set.gravity_m_per_s2.x();
-    result.gravity_y[l] = set.gravity_m_per_s2.y();
-    result.gravity_z[l] = set.gravity_m_per_s2.z();
+    result.gravity_m_per_s2.x[l] = set.gravity_m_per_s2.x();
+    result.gravity_m_per_s2.y[l] = set.gravity_m_per_s2.y();
+    result.gravity_m_per_s2.z[l] = set.gravity_m_per_s2.z();
     for (size_t e = 0; e < cloth.effects.size(); ++e)
       for (size_t p = 0; p < result.effects[e].size(); ++p)
         result.effects[e][p][l] = set.effects[e][p];
@@ -49,16 +49,13 @@ LaneParameters lane_parameters(const Cloth& cloth, std::span<const ParameterSet*
 class LaneRun {
  public:
   LaneRun(const Cloth& cloth, std::span<const ParameterSet> group)
-      : cloth_(cloth),
-        held_(cloth),
-        parameters_(lane_parameters(cloth, fill_lanes(group))),
-        force_n_(LaneVectors::zero(cloth.mesh.vertex_count())) {
+      : cloth_(cloth), stepper_(cloth), parameters_(lane_parameters(cloth, fill_lanes(group))) {
     const int vertices = cloth.mesh.vertex_count();
     state_ = {LaneVectors::zero(vertices), LaneVectors::zero(vertices)};
     const auto lanes = fill_lanes(group);
     for (int l = 0; l < kLanes; ++l)
       state_.position_m.set_lane(l, lanes[static_cast<size_t>(l)]->start_position_m);
-    held_target_m_ = held_.locate(state_.position_m);
+    held_target_m_ = stepper_.held().locate(state_.position_m);
   }
 
   const LaneState& state() const { return state_; }
@@ -69,7 +66,7 @@ class LaneRun {
     const double h = (to_s - from_s) / steps;
     for (int n = 0; n < steps; ++n) {
       aim_held_points(from_s + (n + 1) * h, 1);
-      step(cloth_, parameters_, held_, held_target_m_, from_s + n * h, h, state_, force_n_);
+      stepper_.step(parameters_, held_target_m_, from_s + n * h, h, state_);
     }
   }
 
@@ -80,7 +77,7 @@ class LaneRun {
     for (int n = 0; n < steps; ++n) {
       held_target_m_ = from;
       aim_held_points(time_s, std::min(1.0, 5.0 * (n + 1) / steps));
-      step(cloth_, parameters_, held_, held_target_m_, time_s, time_step_s, state_, force_n_);
+      stepper_.step(parameters_, held_target_m_, time_s, time_step_s, state_);
     }
   }
 
@@ -99,10 +96,9 @@ class LaneRun {
   }
 
   const Cloth& cloth_;
-  HeldPlacement held_;
+  EulerStepper stepper_;
   LaneParameters parameters_;
   LaneState state_;
-  LaneVectors force_n_;
   LaneVectors held_target_m_;
 };
 

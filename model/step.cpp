@@ -6,7 +6,8 @@
 
 namespace clothfit {
 
-HeldPlacement::HeldPlacement(const Cloth& cloth) : held_(cloth.held) {
+HeldPlacement::HeldPlacement(const Cloth& cloth)
+    : held_(cloth.held), missing_m_(kLanes, static_cast<Eigen::Index>(cloth.held.size())) {
   if (held_.empty()) return;  // free cloth: nothing to decompose
   for (const HeldVertexWeights& held : held_)
     for (const auto& [vertex, weight] : held.weights) touched_.push_back(vertex);
@@ -29,51 +30,68 @@ HeldPlacement::HeldPlacement(const Cloth& cloth) : held_(cloth.held) {
       inverse_mass_a * (a * inverse_mass_a).completeOrthogonalDecomposition().pseudoInverse();
 }
 
+namespace {
+
+/// Adds the held point's place between the vertices to `sum`.
+void add_place(const HeldVertexWeights& held, const LaneArray& position, LaneArray& sum,
+               Eigen::Index column) {
+  for (const auto& [vertex, weight] : held.weights)
+    sum.col(column) += weight * position.col(vertex);
+}
+
+}  // namespace
+
 LaneVectors HeldPlacement::locate(const LaneVectors& position_m) const {
   LaneVectors located = LaneVectors::zero(count());
   for (int h = 0; h < count(); ++h) {
-    for (const auto& [vertex, weight] : held_[static_cast<size_t>(h)].weights) {
-      located.x.col(h) += weight * position_m.x.col(vertex);
-      located.y.col(h) += weight * position_m.y.col(vertex);
-      located.z.col(h) += weight * position_m.z.col(vertex);
-    }
+    const HeldVertexWeights& held = held_[static_cast<size_t>(h)];
+    add_place(held, position_m.x, located.x, h);
+    add_place(held, position_m.y, located.y, h);
+    add_place(held, position_m.z, located.z, h);
   }
   return located;
 }
 
-void HeldPlacement::place(const LaneVectors& target_m, double time_step_s, LaneState& state) const {
-  if (held_.empty()) return;
-  const LaneVectors now = locate(state.position_m);
-  const auto correct = [&](const LaneArray& target, const LaneArray& located, LaneArray& position,
-                           LaneArray& velocity) {
+void HeldPlacement::place(const LaneVectors& target_m, double time_step_s, LaneState& state) {
+  const auto correct = [&](const LaneArray& target, LaneArray& position, LaneArray& velocity) {
+    missing_m_.setZero();
+    for (int h = 0; h < count(); ++h) {
+      add_place(held_[static_cast<size_t>(h)], position, missing_m_, h);
+      missing_m_.col(h) = target.col(h) - missing_m_.col(h);
+    }
     for (size_t n = 0; n < touched_.size(); ++n) {
       LaneValue shift = LaneValue::Zero();
       for (int h = 0; h < count(); ++h)
-        shift += correction_(static_cast<Eigen::Index>(n), h) * (target.col(h) - located.col(h));
+        shift += correction_(static_cast<Eigen::Index>(n), h) * missing_m_.col(h);
       position.col(touched_[n]) += shift;
       velocity.col(touched_[n]) += shift / time_step_s;
     }
   };
-  correct(target_m.x, now.x, state.position_m.x, state.velocity_m_per_s.x);
-  correct(target_m.y, now.y, state.position_m.y, state.velocity_m_per_s.y);
-  correct(target_m.z, now.z, state.position_m.z, state.velocity_m_per_s.z);
+  correct(target_m.x, state.position_m.x, state.velocity_m_per_s.x);
+  correct(target_m.y, state.position_m.y, state.velocity_m_per_s.y);
+  correct(target_m.z, state.position_m.z, state.velocity_m_per_s.z);
 }
 
-void step(const Cloth& cloth, const LaneParameters& parameters, const HeldPlacement& held,
-          const LaneVectors& held_target_m, double time_s, double time_step_s, LaneState& state,
-          LaneVectors& force_n) {
-  for (Eigen::Index k = 0; k < cloth.mass_kg.size(); ++k) {
-    force_n.x.col(k) = cloth.mass_kg[k] * parameters.gravity_x;
-    force_n.y.col(k) = cloth.mass_kg[k] * parameters.gravity_y;
-    force_n.z.col(k) = cloth.mass_kg[k] * parameters.gravity_z;
+EulerStepper::EulerStepper(const Cloth& cloth)
+    : cloth_(cloth),
+      inverse_mass_per_kg_(cloth.mass_kg.cwiseInverse()),
+      held_(cloth),
+      sweep_(cloth.mesh),
+      effect_force_n_(LaneVectors::zero(cloth.mesh.vertex_count())) {}
+
+void EulerStepper::step(const LaneParameters& parameters, const LaneVectors& held_target_m,
+                        double time_s, double time_step_s, LaneState& state) {
+  const bool any_effect = !cloth_.effects.empty();
+  if (any_effect) {
+    effect_force_n_.set_zero();
+    const EffectScene scene{state.position_m, state.velocity_m_per_s, cloth_.mass_kg, time_s};
+    for (size_t e = 0; e < cloth_.effects.size(); ++e)
+      cloth_.effects[e]->add_force(scene, parameters.effects[e], effect_force_n_);
   }
-  add_spring_forces(cloth.springs, parameters.springs, state.position_m, state.velocity_m_per_s,
-                    force_n);
-  const EffectScene scene{state.position_m, state.velocity_m_per_s, cloth.mass_kg, time_s};
-  for (size_t e = 0; e < cloth.effects.size(); ++e)
-    cloth.effects[e]->add_force(scene, parameters.effects[e], force_n);
-  integrate_euler(cloth.mass_kg, time_step_s, force_n, state.velocity_m_per_s, state.position_m);
-  held.place(held_target_m, time_step_s, state);
+  sweep_.step_euler(parameters.springs, parameters.gravity_m_per_s2, inverse_mass_per_kg_,
+                    any_effect ? &effect_force_n_ : nullptr, time_step_s, state.position_m,
+                    state.velocity_m_per_s);
+  held_.place(held_target_m, time_step_s, state);
 }
 
 }  // namespace clothfit

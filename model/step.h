@@ -1,7 +1,7 @@
 #pragma once
 
 #include "model/cloth.h"
-#include "model/kernels/spring_force.h"
+#include "model/kernels/cloth_sweep.h"
 #include "model/lanes.h"
 
 namespace clothfit {
@@ -9,7 +9,7 @@ namespace clothfit {
 /// The parameter sets of kLanes simulations.
 struct LaneParameters {
   LaneSprings springs;
-  LaneValue gravity_x, gravity_y, gravity_z;
+  LaneGravity gravity_m_per_s2;
   std::vector<std::vector<LaneValue>> effects;  ///< [effect][parameter]
 };
 
@@ -32,19 +32,35 @@ class HeldPlacement {
   LaneVectors locate(const LaneVectors& position_m) const;
 
   /// Moves the state so that the held points are at `target_m`; `time_step_s` > 0.
-  void place(const LaneVectors& target_m, double time_step_s, LaneState& state) const;
+  void place(const LaneVectors& target_m, double time_step_s, LaneState& state);
 
  private:
   std::vector<HeldVertexWeights> held_;
   std::vector<int> touched_;    ///< vertices with a weight in any held point
   Eigen::MatrixXd correction_;  ///< touched x held
+  LaneArray missing_m_;         ///< scratch: one coordinate of what each held point lacks
 };
 
-/// One time step of the founding paper's scheme [louchet1995, section 2.3], in every lane:
-/// forces at (P, V, t) -> V += h F / m -> P += h V -> held points placed.
-/// `force_n` is scratch of the same shape as the positions; `held_target_m` belongs to t + h.
-void step(const Cloth& cloth, const LaneParameters& parameters, const HeldPlacement& held,
-          const LaneVectors& held_target_m, double time_s, double time_step_s, LaneState& state,
-          LaneVectors& force_n);
+/// Steps kLanes simulations of one cloth through time. Holds scratch memory: one object per thread.
+class EulerStepper {
+ public:
+  /// `cloth` must outlive the stepper.
+  explicit EulerStepper(const Cloth& cloth);
+
+  const HeldPlacement& held() const { return held_; }
+
+  /// One time step of the founding paper's scheme [louchet1995, section 2.3], in every lane:
+  /// forces at (P, V, t) -> V += h F / m -> P += h V -> held points placed.
+  /// `held_target_m` belongs to t + h.
+  void step(const LaneParameters& parameters, const LaneVectors& held_target_m, double time_s,
+            double time_step_s, LaneState& state);
+
+ private:
+  const Cloth& cloth_;
+  Eigen::VectorXd inverse_mass_per_kg_;
+  HeldPlacement held_;
+  ClothSweep sweep_;
+  LaneVectors effect_force_n_;
+};
 
 }  // namespace clothfit

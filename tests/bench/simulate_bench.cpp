@@ -27,7 +27,8 @@ void simulate_72_frames(benchmark::State& run) {
   run.counters["steps"] = steps;
   run.counters["simulations"] = benchmark::Counter(runs * count, benchmark::Counter::kIsRate);
   run.counters["spring_steps"] =
-      benchmark::Counter(runs * count * steps * spring_count(cloth), benchmark::Counter::kIsRate);
+      benchmark::Counter(runs * count * steps * static_cast<double>(cloth.spring_count()),
+                         benchmark::Counter::kIsRate);
 }
 BENCHMARK(simulate_72_frames)
     ->Arg(1)

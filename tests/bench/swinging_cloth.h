@@ -38,10 +38,4 @@ inline std::vector<ParameterSet> cotton_sets(const Cloth& cloth, int count) {
   return sets;
 }
 
-inline int spring_count(const Cloth& cloth) {
-  size_t count = 0;
-  for (const std::vector<Spring>& springs : cloth.springs) count += springs.size();
-  return static_cast<int>(count);
-}
-
 }  // namespace clothfit

@@ -1,5 +1,5 @@
 // What a fabric's numbers amount to: springs by type, and the continuum that the lattice stands
-// for. Not checked here: the forces of these springs (spring_force_test.cpp) and how they move the
+// for. Not checked here: the forces of these springs (cloth_sweep_test.cpp) and how they move the
 // cloth (step_test.cpp).
 
 #include "model/fabric.h"

@@ -3,7 +3,7 @@
 #include <Eigen/Dense>
 
 #include "model/cloth.h"
-#include "model/kernels/spring_force.h"
+#include "model/kernels/cloth_sweep.h"
 #include "model/step.h"
 
 namespace clothfit {
@@ -68,12 +68,12 @@ inline void set_lane(int l, const SpringParameters& springs, LaneSprings& lanes)
 }
 
 /// The model's spring forces on one state, 3 x vertices (N).
-inline Eigen::Matrix3Xd spring_forces_n(const SpringNet& net, const SpringParameters& springs,
+inline Eigen::Matrix3Xd spring_forces_n(const Mesh& mesh, const SpringParameters& springs,
                                         const Eigen::Matrix3Xd& position_m,
                                         const Eigen::Matrix3Xd& velocity_m_per_s) {
   LaneVectors force_n = LaneVectors::zero(static_cast<int>(position_m.cols()));
-  add_spring_forces(net, every_lane(springs), every_lane(position_m), every_lane(velocity_m_per_s),
-                    force_n);
+  ClothSweep(mesh).add_spring_forces(every_lane(springs), every_lane(position_m),
+                                     every_lane(velocity_m_per_s), force_n);
   return force_n.lane(0);
 }
 
@@ -85,9 +85,9 @@ inline Eigen::Matrix3Xd at_rest(const Eigen::Matrix3Xd& position_m) {
 inline LaneParameters every_lane(const ParameterSet& set) {
   LaneParameters lanes;
   lanes.springs = every_lane(set.springs);
-  lanes.gravity_x.setConstant(set.gravity_m_per_s2.x());
-  lanes.gravity_y.setConstant(set.gravity_m_per_s2.y());
-  lanes.gravity_z.setConstant(set.gravity_m_per_s2.z());
+  lanes.gravity_m_per_s2.x.setConstant(set.gravity_m_per_s2.x());
+  lanes.gravity_m_per_s2.y.setConstant(set.gravity_m_per_s2.y());
+  lanes.gravity_m_per_s2.z.setConstant(set.gravity_m_per_s2.z());
   for (const std::vector<double>& effect : set.effects) {
     lanes.effects.emplace_back();
     for (const double value : effect) lanes.effects.back().push_back(LaneValue::Constant(value));
@@ -102,10 +102,9 @@ class SteppedCloth {
                const Eigen::Matrix3Xd& velocity_m_per_s)
       : cloth_(cloth),
         parameters_(every_lane(set)),
-        held_(cloth),
+        stepper_(cloth),
         state_{every_lane(set.start_position_m), every_lane(velocity_m_per_s)},
-        force_n_(LaneVectors::zero(cloth.mesh.vertex_count())),
-        held_target_m_(held_.locate(state_.position_m)) {}
+        held_target_m_(stepper_.held().locate(state_.position_m)) {}
 
   void step(double time_step_s) {
     const double end_s = (steps_ + 1) * time_step_s;
@@ -116,8 +115,7 @@ class SteppedCloth {
       held_target_m_.y.col(static_cast<Eigen::Index>(h)).setConstant(target.y());
       held_target_m_.z.col(static_cast<Eigen::Index>(h)).setConstant(target.z());
     }
-    clothfit::step(cloth_, parameters_, held_, held_target_m_, steps_ * time_step_s, time_step_s,
-                   state_, force_n_);
+    stepper_.step(parameters_, held_target_m_, steps_ * time_step_s, time_step_s, state_);
     ++steps_;
   }
   Eigen::Matrix3Xd position_m() const { return state_.position_m.lane(0); }
@@ -126,9 +124,8 @@ class SteppedCloth {
  private:
   const Cloth& cloth_;
   LaneParameters parameters_;
-  HeldPlacement held_;
+  EulerStepper stepper_;
   LaneState state_;
-  LaneVectors force_n_;
   LaneVectors held_target_m_;
   int steps_ = 0;
 };

@@ -1,5 +1,5 @@
 // The grid of masses, its springs and how a cloth's mass sits on it. Not checked here: what the
-// springs pull with (spring_force_test.cpp) and the surface between the vertices
+// springs pull with (cloth_sweep_test.cpp) and the surface between the vertices
 // (surface_test.cpp).
 
 #include "model/mesh.h"

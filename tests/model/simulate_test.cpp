@@ -243,7 +243,7 @@ TEST(Relax, AHangingChainStretchesByTheWeightBelowEachSpring) {
 
 /// Largest force that is left on a free vertex, over the cloth's weight.
 double residual_force(const Cloth& cloth, const ParameterSet& set, const Eigen::Matrix3Xd& p) {
-  Eigen::Matrix3Xd force_n = spring_forces_n(cloth.springs, set.springs, p, at_rest(p));
+  Eigen::Matrix3Xd force_n = spring_forces_n(cloth.mesh, set.springs, p, at_rest(p));
   force_n += set.gravity_m_per_s2 * cloth.mass_kg.transpose();
   for (const HeldVertexWeights& held : cloth.held)
     for (const auto& [vertex, weight] : held.weights) force_n.col(vertex).setZero();

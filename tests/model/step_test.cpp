@@ -1,5 +1,5 @@
 // One time step and what follows from many: the paper's scheme in closed form, what it conserves,
-// its order, held points. Not checked here: the spring force itself (spring_force_test.cpp), how
+// its order, held points. Not checked here: the spring force itself (cloth_sweep_test.cpp), how
 // long a step may be (stability_test.cpp), and runs over frames (simulate_test.cpp).
 
 #include "model/step.h"
@@ -199,17 +199,16 @@ TEST(Step, ActsOnEveryLaneByItsOwnParameters) {
                     .effects = {{uniform(0, 2)}},
                     .start_position_m = crumpled(cloth.mesh, 0.3, uniform)});
     set_lane(l, sets.back().springs, together.springs);
-    together.gravity_x[l] = sets.back().gravity_m_per_s2.x();
-    together.gravity_y[l] = sets.back().gravity_m_per_s2.y();
-    together.gravity_z[l] = sets.back().gravity_m_per_s2.z();
+    together.gravity_m_per_s2.x[l] = sets.back().gravity_m_per_s2.x();
+    together.gravity_m_per_s2.y[l] = sets.back().gravity_m_per_s2.y();
+    together.gravity_m_per_s2.z[l] = sets.back().gravity_m_per_s2.z();
     together.effects[0][0][l] = sets.back().effects[0][0];
     state.position_m.set_lane(l, sets.back().start_position_m);
   }
-  const HeldPlacement held(cloth);
-  const LaneVectors target = held.locate(state.position_m);
-  LaneVectors force = LaneVectors::zero(25);
+  EulerStepper stepper(cloth);
+  const LaneVectors target = stepper.held().locate(state.position_m);
 
-  for (int n = 0; n < 100; ++n) step(cloth, together, held, target, n * 1e-4, 1e-4, state, force);
+  for (int n = 0; n < 100; ++n) stepper.step(together, target, n * 1e-4, 1e-4, state);
 
   for (int l = 0; l < kLanes; ++l) {
     SCOPED_TRACE(l);
@@ -316,7 +315,7 @@ TEST(HeldPlacement, LetsTwoPointsInTheSamePlaceShare) {
     cloth.held = {held_at(cloth.mesh, s, 0.2), held_at(cloth.mesh, s, 0.2)};
     const Eigen::Matrix3Xd p = flat_positions(cloth.mesh);
     LaneState state{every_lane(p), every_lane(at_rest(p))};
-    const HeldPlacement held(cloth);
+    HeldPlacement held(cloth);
     Eigen::Matrix3Xd target(3, 2);
     target.col(0) << s, 0.2, 0.01;
     target.col(1) << s, 0.2, 0.03;

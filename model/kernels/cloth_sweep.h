@@ -1,0 +1,63 @@
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "model/lanes.h"
+#include "model/mesh.h"
+
+namespace clothfit {
+
+/// The springs' constants in every lane.
+struct LaneSprings {
+  std::array<LaneValue, kSpringTypes> natural_length_m;
+  std::array<LaneValue, kSpringTypes> stiffness_n_per_m;
+  std::array<LaneValue, kSpringTypes> damping_ns_per_m;
+};
+
+/// A gravity vector in every lane (m/s2).
+struct LaneGravity {
+  LaneValue x, y, z;
+};
+
+/// The hot loop: the springs' forces on every vertex in every lane, and the Euler step that they
+/// drive. Spring and dashpot pull with
+///
+///   f_a = (k (l - l0) + c dl/dt) u,  f_b = -f_a,  u = (x_b - x_a) / l
+///
+/// Source: elastic term [louchet1995, section 2.2]; the dashpot is ours. It acts along u only, so
+/// cloth that turns rigidly loses no energy. A spring of zero length adds nothing: u is undefined
+/// there, and a search that tries poor parameters needs to carry on.
+///
+/// The mesh is swept once, vertex by vertex, and each pulls its springs to the right and down; what
+/// they exert on the vertices there is kept until those are reached. A vertex moves as soon as all
+/// its forces are known: no spring of a later one reaches back to it. So each number is read and
+/// written once per step, and each spring is computed once.
+///
+/// Strict IEEE double: no contraction, only operations that are rounded correctly (1 / l by
+/// Newton's method, to 3e-16), sums in an order that does not depend on the vector length. So the
+/// bits are the same on every instruction set. Compiled for several; the processor's best is taken
+/// when the program starts.
+///
+/// Holds scratch memory: one object per thread.
+class ClothSweep {
+ public:
+  explicit ClothSweep(const Mesh& mesh);
+
+  /// Adds the springs' forces (N) to `force_n`.
+  void add_spring_forces(const LaneSprings& springs, const LaneVectors& position_m,
+                         const LaneVectors& velocity_m_per_s, LaneVectors& force_n);
+
+  /// The paper's Euler scheme, velocities first, positions with the new velocities
+  /// [louchet1995, equation 2]:  V += h (g + F / m),  P += h V,  with F the springs' forces and,
+  /// where given, `effect_force_n`.
+  void step_euler(const LaneSprings& springs, const LaneGravity& gravity,
+                  const Eigen::VectorXd& inverse_mass_per_kg, const LaneVectors* effect_force_n,
+                  double time_step_s, LaneVectors& position_m, LaneVectors& velocity_m_per_s);
+
+ private:
+  Mesh mesh_;
+  std::vector<double> scratch_;  ///< forces on vertices that are not reached yet
+};
+
+}  // namespace clothfit
