@@ -7,6 +7,7 @@
 
 #include "model/effects/effect.h"
 #include "model/fabric.h"
+#include "model/kernels/strain_limit.h"
 #include "model/mesh.h"
 
 namespace clothfit {
@@ -26,12 +27,14 @@ struct HeldVertexWeights {
 /// The point of `mesh` at material coordinates (s, t), which must lie on the cloth.
 HeldVertexWeights held_at(const Mesh& mesh, double s_m, double t_m);
 
-/// What does not change between the simulations of one fit: mesh, masses, held points, effects.
+/// What does not change between the simulations of one fit: mesh, masses, held points, strain
+/// limit, effects.
 struct Cloth {
   Mesh mesh;
   SpringNet springs;
   Eigen::VectorXd mass_kg;  ///< per vertex, > 0
   std::vector<HeldVertexWeights> held;
+  StrainLimit strain_limit;
   std::vector<EffectDescription> effect_descriptions;
   std::vector<std::shared_ptr<const Effect>> effects;  ///< in the order of the descriptions
 

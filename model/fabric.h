@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <limits>
 
 #include "model/mesh.h"
 
@@ -11,6 +12,12 @@ struct SpringParameters {
   std::array<double, kSpringTypes> natural_length_m{};   ///< > 0
   std::array<double, kSpringTypes> stiffness_n_per_m{};  ///< >= 0
   std::array<double, kSpringTypes> damping_ns_per_m{};   ///< >= 0; along the spring
+  /// Elongation, as a share of the natural length, that a strain limit allows.
+  std::array<double, kSpringTypes> critical_elongation = kNoLimit;
+
+  static constexpr double kInfinite = std::numeric_limits<double>::infinity();
+  static constexpr std::array<double, kSpringTypes> kNoLimit{kInfinite, kInfinite, kInfinite,
+                                                             kInfinite, kInfinite, kInfinite};
 };
 
 /// The parameter set `fabric`: what a person would say of a cloth, warp along t and weft along s.

@@ -30,11 +30,7 @@ LaneParameters lane_parameters(const Cloth& cloth, std::span<const ParameterSet*
     result.effects[e].resize(cloth.effect_descriptions[e].parameters.size());
   for (int l = 0; l < kLanes; ++l) {
     const ParameterSet& set = *lanes[static_cast<size_t>(l)];
-    for (size_t type = 0; type < kSpringTypes; ++type) {
-      result.springs.natural_length_m[type][l] = set.springs.natural_length_m[type];
-      result.springs.stiffness_n_per_m[type][l] = set.springs.stiffness_n_per_m[type];
-      result.springs.damping_ns_per_m[type][l] = set.springs.damping_ns_per_m[type];
-    }
+    set_lane(l, set.springs, cloth.strain_limit, result);
     result.gravity_m_per_s2.x[l] = set.gravity_m_per_s2.x();
     result.gravity_m_per_s2.y[l] = set.gravity_m_per_s2.y();
     result.gravity_m_per_s2.z[l] = set.gravity_m_per_s2.z();

@@ -72,11 +72,36 @@ void HeldPlacement::place(const LaneVectors& target_m, double time_step_s, LaneS
   correct(target_m.z, state.position_m.z, state.velocity_m_per_s.z);
 }
 
+namespace {
+
+/// Inverse masses, 0 where a held point has a say.
+Eigen::VectorXd movable(const Cloth& cloth, const HeldPlacement& held) {
+  Eigen::VectorXd inverse_mass_per_kg = cloth.mass_kg.cwiseInverse();
+  for (const int vertex : held.touched()) inverse_mass_per_kg[vertex] = 0;
+  return inverse_mass_per_kg;
+}
+
+}  // namespace
+
+void set_lane(int lane, const SpringParameters& springs, const StrainLimit& strain_limit,
+              LaneParameters& parameters) {
+  for (size_t type = 0; type < kSpringTypes; ++type) {
+    const double natural_m = springs.natural_length_m[type];
+    parameters.springs.natural_length_m[type][lane] = natural_m;
+    parameters.springs.stiffness_n_per_m[type][lane] = springs.stiffness_n_per_m[type];
+    parameters.springs.damping_ns_per_m[type][lane] = springs.damping_ns_per_m[type];
+    const double critical = springs.critical_elongation[type];
+    parameters.limits.longest_m[type][lane] = natural_m * (1 + critical);
+    parameters.limits.tolerated_m[type][lane] = natural_m * (1 + critical + strain_limit.tolerance);
+  }
+}
+
 EulerStepper::EulerStepper(const Cloth& cloth)
     : cloth_(cloth),
       inverse_mass_per_kg_(cloth.mass_kg.cwiseInverse()),
       held_(cloth),
       sweep_(cloth.mesh),
+      limiter_(cloth.mesh, movable(cloth, held_)),
       effect_force_n_(LaneVectors::zero(cloth.mesh.vertex_count())) {}
 
 void EulerStepper::step(const LaneParameters& parameters, const LaneVectors& held_target_m,
@@ -92,6 +117,18 @@ void EulerStepper::step(const LaneParameters& parameters, const LaneVectors& hel
                     any_effect ? &effect_force_n_ : nullptr, time_step_s, state.position_m,
                     state.velocity_m_per_s);
   held_.place(held_target_m, time_step_s, state);
+  switch (cloth_.strain_limit.mode) {
+    case StrainLimitMode::off:
+      break;
+    case StrainLimitMode::positions:
+      too_long_ = limiter_.limit_positions(parameters.limits, state.position_m);
+      break;
+    case StrainLimitMode::consistent:
+      too_long_ =
+          limiter_.limit_consistently(parameters.limits, cloth_.strain_limit.most_sweeps,
+                                      time_step_s, state.position_m, state.velocity_m_per_s);
+      break;
+  }
 }
 
 }  // namespace clothfit

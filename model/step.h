@@ -9,6 +9,7 @@ namespace clothfit {
 /// The parameter sets of kLanes simulations.
 struct LaneParameters {
   LaneSprings springs;
+  LaneLimits limits;  ///< for a cloth with a strain limit
   LaneGravity gravity_m_per_s2;
   std::vector<std::vector<LaneValue>> effects;  ///< [effect][parameter]
 };
@@ -17,6 +18,10 @@ struct LaneState {
   LaneVectors position_m;
   LaneVectors velocity_m_per_s;
 };
+
+/// The same springs in a lane, for a cloth with this strain limit.
+void set_lane(int lane, const SpringParameters& springs, const StrainLimit& strain_limit,
+              LaneParameters& parameters);
 
 /// Puts held points where they belong.
 ///
@@ -27,6 +32,8 @@ class HeldPlacement {
  public:
   explicit HeldPlacement(const Cloth& cloth);
   int count() const { return static_cast<int>(held_.size()); }
+  /// Vertices with a weight in any held point, rising.
+  const std::vector<int>& touched() const { return touched_; }
 
   /// Where the held points are in the given positions: kLanes x held.
   LaneVectors locate(const LaneVectors& position_m) const;
@@ -36,7 +43,7 @@ class HeldPlacement {
 
  private:
   std::vector<HeldVertexWeights> held_;
-  std::vector<int> touched_;    ///< vertices with a weight in any held point
+  std::vector<int> touched_;
   Eigen::MatrixXd correction_;  ///< touched x held
   LaneArray missing_m_;         ///< scratch: one coordinate of what each held point lacks
 };
@@ -50,16 +57,22 @@ class EulerStepper {
   const HeldPlacement& held() const { return held_; }
 
   /// One time step of the founding paper's scheme [louchet1995, section 2.3], in every lane:
-  /// forces at (P, V, t) -> V += h F / m -> P += h V -> held points placed.
-  /// `held_target_m` belongs to t + h.
+  /// forces at (P, V, t) -> V += h F / m -> P += h V -> held points placed -> springs limited.
+  /// `held_target_m` belongs to t + h. Vertices that a held point touches are not moved by the
+  /// strain limit.
   void step(const LaneParameters& parameters, const LaneVectors& held_target_m, double time_s,
             double time_step_s, LaneState& state);
+
+  /// Springs that the last step's strain limit had to shorten, in every lane.
+  const LaneValue& too_long() const { return too_long_; }
 
  private:
   const Cloth& cloth_;
   Eigen::VectorXd inverse_mass_per_kg_;
   HeldPlacement held_;
   ClothSweep sweep_;
+  StrainLimiter limiter_;
+  LaneValue too_long_ = LaneValue::Zero();
   LaneVectors effect_force_n_;
 };
 

@@ -30,11 +30,7 @@ struct LaneCloth {
     const std::vector<ParameterSet> sets = cotton_sets(cloth, kLanes);
     for (int l = 0; l < kLanes; ++l) {
       const ParameterSet& set = sets[static_cast<size_t>(l)];
-      for (size_t type = 0; type < kSpringTypes; ++type) {
-        parameters.springs.natural_length_m[type][l] = set.springs.natural_length_m[type];
-        parameters.springs.stiffness_n_per_m[type][l] = set.springs.stiffness_n_per_m[type];
-        parameters.springs.damping_ns_per_m[type][l] = set.springs.damping_ns_per_m[type];
-      }
+      set_lane(l, set.springs, cloth.strain_limit, parameters);
       parameters.gravity_m_per_s2.x[l] = set.gravity_m_per_s2.x();
       parameters.gravity_m_per_s2.y[l] = set.gravity_m_per_s2.y();
       parameters.gravity_m_per_s2.z[l] = set.gravity_m_per_s2.z();
@@ -87,6 +83,34 @@ void step_with_viscous_damping(benchmark::State& run) {
   lanes.count(run);
 }
 BENCHMARK(step_with_viscous_damping)->Arg(17);
+
+/// A cloth that hangs and swings with some of its springs at their limit; `at_limit` is their
+/// share.
+void step_with_strain_limit(benchmark::State& run) {
+  LaneCloth lanes(17);
+  lanes.cloth.strain_limit.mode = static_cast<StrainLimitMode>(run.range(0));
+  for (int l = 0; l < kLanes; ++l) {
+    SpringParameters springs = cotton_sets(lanes.cloth, kLanes)[static_cast<size_t>(l)].springs;
+    for (double& k : springs.stiffness_n_per_m) k /= 4;
+    springs.critical_elongation.fill(0.05);
+    set_lane(l, springs, lanes.cloth.strain_limit, lanes.parameters);
+  }
+  EulerStepper stepper(lanes.cloth);
+  const LaneVectors target = stepper.held().locate(lanes.state.position_m);
+  double too_long = 0;
+  for ([[maybe_unused]] const auto _ : run) {
+    stepper.step(lanes.parameters, target, 0, 2e-4, lanes.state);
+    too_long += stepper.too_long().mean();
+  }
+  lanes.count(run);
+  run.counters["at_limit"] = too_long / static_cast<double>(run.iterations()) /
+                             static_cast<double>(lanes.cloth.spring_count());
+}
+BENCHMARK(step_with_strain_limit)
+    ->Arg(static_cast<int>(StrainLimitMode::off))
+    ->Arg(static_cast<int>(StrainLimitMode::positions))
+    ->Arg(static_cast<int>(StrainLimitMode::consistent))
+    ->ArgName("mode");
 
 }  // namespace
 }  // namespace clothfit

@@ -5,11 +5,11 @@
 #include "model/kernels/cloth_sweep.h"
 
 #include <gtest/gtest.h>
-#include <hwy/targets.h>
 
 #include <cmath>
 #include <vector>
 
+#include "tests/model/instruction_sets.h"
 #include "tests/model/mechanics.h"
 #include "tests/model/random_cloth.h"
 #include "tests/model/scalar_reference.h"
@@ -282,25 +282,7 @@ TEST(SpringForce, LanesKnowNothingOfEachOther) {
   }
 }
 
-/// Instruction sets that the sweep is compiled for and this machine has, as Highway's bits.
-std::vector<int64_t> instruction_sets() {
-  std::vector<int64_t> sets;
-  for (const int64_t target : {HWY_AVX3, HWY_AVX2, HWY_SSE4, HWY_STATIC_TARGET})
-    if ((hwy::SupportedTargets() & target) != 0 || target == HWY_STATIC_TARGET)
-      sets.push_back(target);
-  return sets;
-}
-
-/// Makes the sweep run on one instruction set while it lives.
-class OnInstructionSet {
- public:
-  explicit OnInstructionSet(int64_t target) { hwy::GetChosenTarget().Update(target); }
-  ~OnInstructionSet() { hwy::GetChosenTarget().Update(hwy::SupportedTargets()); }
-  OnInstructionSet(const OnInstructionSet&) = delete;
-  OnInstructionSet& operator=(const OnInstructionSet&) = delete;
-};
-
-class ClothSweepOn : public testing::TestWithParam<int64_t> {};
+class ClothSweepOn : public testing::TestWithParam<InstructionSet> {};
 
 TEST_P(ClothSweepOn, AgreesWithTheScalarReferenceToTheLastBit) {
   const unsigned seed = 14;
@@ -361,9 +343,7 @@ TEST_P(ClothSweepOn, AgreesWithTheScalarReferenceToTheLastBit) {
 }
 
 INSTANTIATE_TEST_SUITE_P(InstructionSets, ClothSweepOn, testing::ValuesIn(instruction_sets()),
-                         [](const auto& target) {
-                           return std::string(hwy::TargetName(target.param));
-                         });
+                         [](const auto& set) { return set.param.name(); });
 
 TEST(ClothSweep, MovesPositionsWithTheNewVelocities) {
   Eigen::VectorXd mass_kg(4);

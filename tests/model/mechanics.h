@@ -82,9 +82,9 @@ inline Eigen::Matrix3Xd at_rest(const Eigen::Matrix3Xd& position_m) {
 }
 
 /// The same parameter set in every lane, for tests that call `step` themselves.
-inline LaneParameters every_lane(const ParameterSet& set) {
+inline LaneParameters every_lane(const ParameterSet& set, const StrainLimit& strain_limit = {}) {
   LaneParameters lanes;
-  lanes.springs = every_lane(set.springs);
+  for (int l = 0; l < kLanes; ++l) set_lane(l, set.springs, strain_limit, lanes);
   lanes.gravity_m_per_s2.x.setConstant(set.gravity_m_per_s2.x());
   lanes.gravity_m_per_s2.y.setConstant(set.gravity_m_per_s2.y());
   lanes.gravity_m_per_s2.z.setConstant(set.gravity_m_per_s2.z());
@@ -101,7 +101,7 @@ class SteppedCloth {
   SteppedCloth(const Cloth& cloth, const ParameterSet& set,
                const Eigen::Matrix3Xd& velocity_m_per_s)
       : cloth_(cloth),
-        parameters_(every_lane(set)),
+        parameters_(every_lane(set, cloth.strain_limit)),
         stepper_(cloth),
         state_{every_lane(set.start_position_m), every_lane(velocity_m_per_s)},
         held_target_m_(stepper_.held().locate(state_.position_m)) {}
@@ -118,6 +118,7 @@ class SteppedCloth {
     stepper_.step(parameters_, held_target_m_, steps_ * time_step_s, time_step_s, state_);
     ++steps_;
   }
+  double too_long() const { return stepper_.too_long()[0]; }
   Eigen::Matrix3Xd position_m() const { return state_.position_m.lane(0); }
   Eigen::Matrix3Xd velocity_m_per_s() const { return state_.velocity_m_per_s.lane(0); }
 

@@ -1,0 +1,67 @@
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "model/lanes.h"
+#include "model/mesh.h"
+
+namespace clothfit {
+
+/// How springs are kept from stretching beyond their critical elongation after each time step.
+enum class StrainLimitMode {
+  off,
+  positions,  ///< as the founding paper has it: one sweep over the springs, velocities untouched
+  consistent  ///< sweeps until no spring is longer than tolerated; velocities follow the positions
+};
+
+struct StrainLimit {
+  StrainLimitMode mode = StrainLimitMode::off;
+  double tolerance = 1e-3;  ///< `consistent`: elongation beyond the critical one that may remain
+  int most_sweeps = 100;    ///< `consistent`: of one time step
+};
+
+/// Lengths that springs may have, in every lane; infinite where there is no limit.
+struct LaneLimits {
+  std::array<LaneValue, kSpringTypes> longest_m;    ///< natural length times (1 + critical one)
+  std::array<LaneValue, kSpringTypes> tolerated_m;  ///< `consistent` sweeps until none exceeds this
+};
+
+/// Shares of a correction that the first and the second end of a spring take.
+struct SpringShares {
+  double first = 0, second = 0;
+};
+
+/// Sets springs that are longer than `longest_m` to exactly that by moving their two ends along
+/// them [louchet1995, section 2.4; provot1995], by shares in proportion to the inverse masses, so
+/// that equal ends move half each and a held one not at all. Momentum is kept between free ends.
+///
+/// A sweep takes the springs one after the other, each as those before have left it, in an order
+/// that is part of the model: types 0 to 5; of types 0, 2 and 3 first the springs that start in
+/// even rows, then those in odd rows; of type 1 the same with columns; of types 4 and 5 first rows
+/// (columns) 0, 1, 4, 5, 8, ..., then the others. The springs of one such group share no vertex, so
+/// their order among themselves does not matter.
+///
+/// Strict IEEE double, the same bits on every instruction set. A lane's result does not depend on
+/// what the others carry.
+class StrainLimiter {
+ public:
+  /// `inverse_mass_per_kg` is 0 where a vertex must not move.
+  StrainLimiter(const Mesh& mesh, const Eigen::VectorXd& inverse_mass_per_kg);
+
+  /// One sweep over positions alone. Returns how many springs of each lane were too long.
+  LaneValue limit_positions(const LaneLimits& limits, LaneVectors& position_m);
+
+  /// Sweeps until no spring of a lane is longer than tolerated, at most `most_sweeps` times; what a
+  /// vertex is moved by, over the time step, is added to its velocity. Returns how many springs of
+  /// each lane were too long in the first sweep.
+  LaneValue limit_consistently(const LaneLimits& limits, int most_sweeps, double time_step_s,
+                               LaneVectors& position_m, LaneVectors& velocity_m_per_s);
+
+ private:
+  Mesh mesh_;
+  std::array<std::vector<SpringShares>, kSpringTypes>
+      shares_;  ///< by the vertex that a spring leaves
+};
+
+}  // namespace clothfit

@@ -1,0 +1,299 @@
+// Springs kept from stretching beyond their critical elongation. Not checked here: what the springs
+// pull with (cloth_sweep_test.cpp).
+
+#include "model/kernels/strain_limit.h"
+
+#include <gtest/gtest.h>
+
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include "tests/model/instruction_sets.h"
+#include "tests/model/mechanics.h"
+#include "tests/model/random_cloth.h"
+
+namespace clothfit {
+namespace {
+
+/// Two springs of type structural_t, 1 m apart: between vertices 0 and 2, and between 1 and 3.
+constexpr Mesh kPair{.columns = 2, .rows = 2, .width_m = 1, .height_m = 0.1};
+
+LaneLimits no_limits() {
+  LaneLimits limits;
+  for (LaneValue& longest : limits.longest_m) longest.setConstant(INFINITY);
+  limits.tolerated_m = limits.longest_m;
+  return limits;
+}
+
+/// Every type's springs limited to (1 + `critical`) times their flat length.
+LaneLimits limits_of(const Mesh& mesh, double critical, double tolerance = 0) {
+  LaneLimits limits;
+  for (size_t type = 0; type < kSpringTypes; ++type) {
+    limits.longest_m[type].setConstant((1 + critical) * flat_lengths(mesh)[type]);
+    limits.tolerated_m[type].setConstant((1 + critical + tolerance) * flat_lengths(mesh)[type]);
+  }
+  return limits;
+}
+
+/// A flat cloth, `stretch` times as large, with noise.
+Eigen::Matrix3Xd stretched(const Mesh& mesh, double stretch, Uniform& uniform) {
+  return stretch * flat_positions(mesh) + uniform.vectors(mesh.vertex_count(), 0.02);
+}
+
+/// Largest elongation beyond `critical`, as a share of the flat length.
+double largest_excess(const Mesh& mesh, const Eigen::Matrix3Xd& position_m, double critical) {
+  double largest = -1;
+  const SpringNet net = make_springs(mesh);
+  for (size_t type = 0; type < kSpringTypes; ++type)
+    for (const auto& [a, b] : net[type])
+      largest = std::max(
+          largest,
+          (position_m.col(b) - position_m.col(a)).norm() / flat_lengths(mesh)[type] - 1 - critical);
+  return largest;
+}
+
+TEST(StrainLimit, SetsASpringToExactlyItsCriticalElongation) {
+  // Given a spring of 0.1 m drawn out to 0.15 m between masses of 1 kg and 3 kg,
+  LaneLimits limits = no_limits();
+  limits.longest_m[structural_t].setConstant(0.11);
+  Eigen::VectorXd mass_kg(4);
+  mass_kg << 1, 1, 3, 1;
+  Eigen::Matrix3Xd p = Eigen::Matrix3Xd::Zero(3, 4);
+  p.col(2) << 0, 0.09, 0.12;
+  p.col(1) << 1, 0, 0;
+  p.col(3) << 1, 0.05, 0;  // and another that is shorter than it may be,
+  LaneVectors position = every_lane(p);
+
+  const LaneValue too_long =
+      StrainLimiter(kPair, mass_kg.cwiseInverse()).limit_positions(limits, position);
+
+  // then it is 0.11 m long, along the same line, and the light end moved three times as far.
+  const Eigen::Matrix3Xd moved = position.lane(0);
+  const Eigen::Vector3d along = p.col(2).normalized();
+  EXPECT_LT((moved.col(0) - 0.75 * 0.04 * along).norm(), 1e-16);
+  EXPECT_LT((moved.col(2) - (0.15 - 0.25 * 0.04) * along).norm(), 1e-16);
+  EXPECT_EQ(moved.col(1), p.col(1));
+  EXPECT_EQ(moved.col(3), p.col(3));
+  EXPECT_TRUE((too_long == 1).all());
+}
+
+TEST(StrainLimit, MovesTheFreeEndAloneWhenTheOtherIsHeld) {
+  LaneLimits limits = no_limits();
+  limits.longest_m[structural_t].setConstant(0.11);
+  Eigen::VectorXd inverse_mass(4);
+  inverse_mass << 0, 0, 1, 0;  // the second pair is held at both ends
+  Eigen::Matrix3Xd p = Eigen::Matrix3Xd::Zero(3, 4);
+  p(1, 2) = 0.15;
+  p.col(1) << 1, 0, 0;
+  p.col(3) << 1, 0.2, 0;
+  LaneVectors position = every_lane(p);
+
+  StrainLimiter(kPair, inverse_mass).limit_positions(limits, position);
+
+  Eigen::Matrix3Xd expected = p;
+  expected(1, 2) = 0.11;
+  EXPECT_LT((position.lane(0) - expected).cwiseAbs().maxCoeff(), 1e-16);
+}
+
+TEST(StrainLimit, LeavesClothWithinItsLimitsAsItIs) {
+  Uniform uniform(1);
+  const Mesh mesh = square_mesh(9);
+  const Eigen::Matrix3Xd p = flat_positions(mesh) + uniform.vectors(81, 0.002);
+  ASSERT_LT(largest_excess(mesh, p, 0.2), 0);
+  const Eigen::VectorXd inverse_mass = Eigen::VectorXd::Ones(81);
+  LaneVectors position = every_lane(p), velocity = every_lane(uniform.vectors(81, 1));
+  const Eigen::Matrix3Xd v = velocity.lane(0);
+  StrainLimiter limiter(mesh, inverse_mass);
+
+  EXPECT_TRUE((limiter.limit_positions(limits_of(mesh, 0.2), position) == 0).all());
+  EXPECT_TRUE(
+      (limiter.limit_consistently(limits_of(mesh, 0.2), 10, 1e-3, position, velocity) == 0).all());
+  EXPECT_TRUE((limiter.limit_positions(no_limits(), position) == 0).all());
+
+  EXPECT_EQ(position.lane(0), p);
+  EXPECT_EQ(velocity.lane(0), v);
+}
+
+TEST(StrainLimit, KeepsTheCentreOfMassAndMomentum) {
+  for (const unsigned seed : {2u, 3u}) {
+    SCOPED_TRACE(seed);
+    Uniform uniform(seed);
+    const Mesh mesh = square_mesh(9);
+    const Eigen::VectorXd mass_kg = masses_by_area(mesh, 0.025);
+    const Eigen::Matrix3Xd p = stretched(mesh, 1.3, uniform), v = uniform.vectors(81, 1);
+    LaneVectors position = every_lane(p), velocity = every_lane(v);
+
+    StrainLimiter(mesh, mass_kg.cwiseInverse())
+        .limit_consistently(limits_of(mesh, 0.1), 20, 1e-3, position, velocity);
+
+    const Eigen::Matrix3Xd moved = position.lane(0);
+    EXPECT_GT((moved - p).cwiseAbs().maxCoeff(), 0.01);
+    EXPECT_LT(((moved - p) * mass_kg).norm(), 1e-16);  // kg m
+    EXPECT_LT(((velocity.lane(0) - v) * mass_kg).norm(), 1e-13);
+    // What moved a vertex is in its velocity.
+    EXPECT_LT((velocity.lane(0) - v - (moved - p) / 1e-3).cwiseAbs().maxCoeff(), 1e-11);
+  }
+}
+
+TEST(StrainLimit, SweepsUntilNoSpringIsLongerThanTolerated) {
+  Uniform uniform(4);
+  const Mesh mesh = square_mesh(9);
+  Eigen::VectorXd inverse_mass = masses_by_area(mesh, 0.025).cwiseInverse();
+  inverse_mass[0] = inverse_mass[8] = 0;
+  Eigen::Matrix3Xd p = stretched(mesh, 1.3, uniform);
+  p.col(0) << 0, 0, 0;  // held where the cloth can reach
+  p.col(8) << 0.4, 0, 0;
+  LaneVectors once = every_lane(p), position = once, velocity = every_lane(at_rest(p));
+  StrainLimiter limiter(mesh, inverse_mass);
+
+  limiter.limit_positions(limits_of(mesh, 0.1), once);
+  limiter.limit_consistently(limits_of(mesh, 0.1, 1e-3), 1000, 1e-3, position, velocity);
+
+  EXPECT_GT(largest_excess(mesh, once.lane(0), 0.1), 0.01);  // one sweep does not
+  EXPECT_LT(largest_excess(mesh, position.lane(0), 0.1), 1e-3 + 1e-12);
+  EXPECT_EQ(position.lane(0).col(0), p.col(0));
+  EXPECT_EQ(position.lane(0).col(8), p.col(8));
+}
+
+// --- against plain arithmetic --------------------------------------------------------------------
+
+/// One sweep over plain vectors in the published order; returns whether a spring was longer than
+/// tolerated.
+bool reference_sweep(const Mesh& mesh, const Eigen::VectorXd& inverse_mass,
+                     const LaneLimits& limits, Eigen::Index lane, double steps_per_s,
+                     Eigen::Matrix3Xd& p, Eigen::Matrix3Xd& v) {
+  bool intolerable = false;
+  const SpringNet net = make_springs(mesh);
+  for (size_t type = 0; type < kSpringTypes; ++type) {
+    for (const int group : {0, 1}) {
+      for (const Spring& spring : net[type]) {
+        const int self = type == shear_up ? spring.b : spring.a;
+        const int other = type == shear_up ? spring.a : spring.b;
+        const int i = self / mesh.columns, j = self % mesh.columns;
+        const int place = type == structural_s ? j
+                          : type == flexion_s  ? j / 2
+                          : type == flexion_t  ? i / 2
+                                               : i;
+        if (place % 2 != group) continue;
+        const Eigen::Vector3d along = p.col(other) - p.col(self);
+        const double length2 =
+            along.x() * along.x() + along.y() * along.y() + along.z() * along.z();
+        const double longest = limits.longest_m[type][lane];
+        const double tolerated = limits.tolerated_m[type][lane];
+        if (!(length2 > longest * longest)) continue;
+        intolerable = intolerable || length2 > tolerated * tolerated;
+        double inverse =
+            std::bit_cast<double>(0x5fe6eb50c7b537a9 - (std::bit_cast<std::int64_t>(length2) >> 1));
+        for (int n = 0; n < 4; ++n)
+          inverse = inverse * (1.5 - (0.5 * length2) * (inverse * inverse));
+        const Eigen::Vector3d correction = (1 - longest * inverse) * along;
+        const double sum = inverse_mass[self] + inverse_mass[other];
+        if (sum == 0) continue;
+        const Eigen::Vector3d first = inverse_mass[self] / sum * correction;
+        const Eigen::Vector3d second = inverse_mass[other] / sum * correction;
+        p.col(self) += first;
+        p.col(other) -= second;
+        v.col(self) += steps_per_s * first;
+        v.col(other) -= steps_per_s * second;
+      }
+    }
+  }
+  return intolerable;
+}
+
+class StrainLimitOn : public testing::TestWithParam<InstructionSet> {};
+
+TEST_P(StrainLimitOn, AgreesWithPlainArithmeticToTheLastBit) {
+  const OnInstructionSet on(GetParam());
+  Uniform uniform(5);
+  for (const Mesh& mesh :
+       {square_mesh(9), Mesh{.columns = 3, .rows = 6, .width_m = 0.1, .height_m = 0.25}}) {
+    SCOPED_TRACE(mesh.columns);
+    // Given lanes that are stretched unlike, the first of them not at all,
+    Eigen::VectorXd inverse_mass = masses_by_area(mesh, 0.025).cwiseInverse();
+    inverse_mass[0] = inverse_mass[2] = 0;
+    LaneLimits limits = limits_of(mesh, 0.1, 2e-3);
+    LaneVectors position = LaneVectors::zero(mesh.vertex_count()), velocity = position;
+    std::vector<Eigen::Matrix3Xd> p, v;
+    for (int l = 0; l < kLanes; ++l) {
+      p.push_back(l == 0 ? flat_positions(mesh) : stretched(mesh, 1 + 0.05 * l, uniform));
+      v.push_back(uniform.vectors(mesh.vertex_count(), 1));
+      for (LaneValue& longest : limits.longest_m) longest[l] *= 1 + 0.001 * l;
+      position.set_lane(l, p.back());
+      velocity.set_lane(l, v.back());
+    }
+    const LaneVectors start = position;
+
+    // when they are limited until all are done,
+    StrainLimiter limiter(mesh, inverse_mass);
+    limiter.limit_consistently(limits, 40, 1e-3, position, velocity);
+    LaneVectors once = start;
+    limiter.limit_positions(limits, once);
+
+    // then each is where it would be alone, bit for bit.
+    for (int l = 0; l < kLanes; ++l) {
+      SCOPED_TRACE(l);
+      Eigen::Matrix3Xd first = start.lane(l), unused = at_rest(first);
+      reference_sweep(mesh, inverse_mass, limits, l, 0, first, unused);
+      EXPECT_EQ(once.lane(l), first);
+
+      const auto lane = static_cast<size_t>(l);
+      for (int n = 0; n < 40; ++n)
+        if (!reference_sweep(mesh, inverse_mass, limits, l, 1000, p[lane], v[lane])) break;
+      EXPECT_EQ(position.lane(l), p[lane]);
+      EXPECT_EQ(velocity.lane(l), v[lane]);
+    }
+    EXPECT_EQ(position.lane(0), start.lane(0));
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(InstructionSets, StrainLimitOn, testing::ValuesIn(instruction_sets()),
+                         [](const auto& set) { return set.param.name(); });
+
+// --- in a cloth that swings ----------------------------------------------------------------------
+
+/// Largest elongation beyond 10 % while a soft cloth, let go flat, falls into its two held corners
+/// for half a second; and how many springs the limit had to shorten in the last step.
+struct Swing {
+  double largest_excess = -1;
+  double too_long = 0;
+};
+
+Swing swing(StrainLimitMode mode) {
+  Cloth cloth = square_cloth(9);
+  cloth.held = {held_at(cloth.mesh, 0, 0), held_at(cloth.mesh, 0.4, 0)};
+  cloth.strain_limit = {.mode = mode, .tolerance = 1e-3, .most_sweeps = 500};
+  Fabric soft = cotton();
+  soft.tension_warp_n_per_m = soft.tension_weft_n_per_m = 4;
+  ParameterSet set{.springs = spring_parameters(soft, cloth.mesh),
+                   .start_position_m = flat_positions(cloth.mesh)};
+  set.springs.critical_elongation.fill(0.1);
+  SteppedCloth run(cloth, set, at_rest(set.start_position_m));
+  Swing result;
+  for (int n = 0; n < 1000; ++n) {
+    run.step(5e-4);
+    result.largest_excess =
+        std::max(result.largest_excess, largest_excess(cloth.mesh, run.position_m(), 0.1));
+  }
+  result.too_long = run.too_long();
+  return result;
+}
+
+TEST(StrainLimit, HoldsTheWholeClothInTheConsistentMode) {
+  const Swing free = swing(StrainLimitMode::off);
+  const Swing paper = swing(StrainLimitMode::positions);
+  const Swing consistent = swing(StrainLimitMode::consistent);
+
+  EXPECT_GT(free.largest_excess, 0.3);
+  EXPECT_EQ(free.too_long, 0);
+  EXPECT_LT(consistent.largest_excess, 1e-3 + 1e-12);
+  // The paper's single sweep lets later springs undo what earlier ones were given.
+  EXPECT_GT(paper.largest_excess, 1e-3);
+  EXPECT_LT(paper.largest_excess, free.largest_excess);
+  EXPECT_GT(paper.too_long, 0);
+}
+
+}  // namespace
+}  // namespace clothfit
