@@ -174,7 +174,7 @@ void add_fit_verb(CLI::App& program, VerbAction& action) {
   verb->footer(
       "Examples:\n"
       "  clothfit fit data/recordings/tags_onecam\n"
-      "  clothfit fit data/recordings/swing_breeze --effect viscous_damping --seed 7\n"
+      "  clothfit fit data/recordings/swing_breeze --effect wind --seed 7\n"
       "  clothfit fit OTHER_RECORDING --forecast swing_plain.fit/fit.json");
   verb->callback([options, flags, &action] {
     action = [options, flags] {

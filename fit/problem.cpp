@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cassert>
 #include <cmath>
 
@@ -134,21 +135,53 @@ void add_fabric(const Recording& recording, const FitOptions& options, FitProble
   fabric.damping_weft = bind("damping_weft", "s", 1e-5, 2e-2);
 }
 
+/// The numbers given for an effect by the names of its own parameters: a vector [x, y, z] under
+/// NAME stands for NAME_x, NAME_y and NAME_z.
+std::map<std::string, double> by_parameter(
+    const EffectDescription& effect, const std::string& where,
+    const std::map<std::string, std::vector<double>>& given) {
+  const auto is_parameter = [&](const std::string& name) {
+    return std::ranges::find(effect.parameters, name, &EffectParameter::name) !=
+           effect.parameters.end();
+  };
+  std::map<std::string, double> numbers;
+  for (const auto& [key, values] : given) {
+    const bool is_vector = is_parameter(key + "_x");
+    if (!is_vector && !is_parameter(key)) {
+      std::string known;
+      for (const EffectParameter& parameter : effect.parameters)
+        known += (known.empty() ? "" : ", ") + parameter.name;
+      throw InputError(where, "effect " + effect.name + " has no parameter '" + key + "'",
+                       "its parameters are " + known);
+    }
+    const size_t expected = is_vector ? 3 : 1;
+    if (values.size() != expected)
+      throw InputError(
+          where, effect.name + "." + key + " has " + std::to_string(values.size()) + " numbers",
+          is_vector ? "a vector [x, y, z]" : "one number");
+    if (!is_vector) {
+      numbers[key] = values.front();
+      continue;
+    }
+    for (size_t axis = 0; axis < 3; ++axis)
+      numbers[key + std::array{"_x", "_y", "_z"}[axis]] = values[axis];
+  }
+  return numbers;
+}
+
 /// Adds an effect to the cloth and binds its parameters: to `given` values, else to the fit.
 void add_effect(const std::string& name, const std::string& where,
                 const std::map<std::string, std::vector<double>>& given, const FitOptions& options,
                 FitProblem& problem) {
   problem.cloth.add_effect(name, where);
   const EffectDescription& description = problem.cloth.effect_descriptions.back();
+  const std::map<std::string, double> values = by_parameter(description, where, given);
   std::vector<Binding> bindings;
   for (const EffectParameter& parameter : description.parameters) {
     Binding binding;
-    const auto value = given.find(parameter.name);
-    if (value != given.end()) {
-      if (value->second.size() != 1)
-        throw InputError(where, name + "." + parameter.name + " is not one number",
-                         "one number in " + parameter.unit);
-      binding.constant = value->second.front();
+    const auto value = values.find(parameter.name);
+    if (value != values.end()) {
+      binding.constant = value->second;
     } else if (options.forecast) {
       throw InputError("--forecast", "the fit holds no value for " + name + "." + parameter.name,
                        "a forecast fits nothing", "fit with --effect " + name + " first");
@@ -164,12 +197,6 @@ void add_effect(const std::string& name, const std::string& where,
                                           .typical = parameter.typical});
     }
     bindings.push_back(binding);
-  }
-  for (const auto& [key, numbers] : given) {
-    if (std::ranges::find(description.parameters, key, &EffectParameter::name) ==
-        description.parameters.end())
-      throw InputError(where, "effect " + name + " has no parameter '" + key + "'",
-                       "its first parameter is " + description.parameters.front().name);
   }
   problem.effects.push_back(std::move(bindings));
 }

@@ -38,7 +38,7 @@ double stable_time_step_s(const Cloth& cloth, const ParameterSet& parameters) {
   const double omega2 = kFoldedMargin * network_bound(cloth, parameters.springs.stiffness_n_per_m);
   double gamma = kFoldedMargin * network_bound(cloth, parameters.springs.damping_ns_per_m);
   for (size_t e = 0; e < cloth.effects.size(); ++e)
-    gamma += cloth.effects[e]->damping_rate_per_s(parameters.effects[e]);
+    gamma += cloth.effects[e]->damping_rate_per_s(cloth.mesh, cloth.mass_kg, parameters.effects[e]);
   // h^2 omega2 + 2 h gamma - 4 = 0, in the form that survives omega2 = 0.
   const double root = std::sqrt(gamma * gamma + 4 * omega2);
   return gamma + root > 0 ? 4 / (gamma + root) : INFINITY;

@@ -109,7 +109,8 @@ void EulerStepper::step(const LaneParameters& parameters, const LaneVectors& hel
   const bool any_effect = !cloth_.effects.empty();
   if (any_effect) {
     effect_force_n_.set_zero();
-    const EffectScene scene{state.position_m, state.velocity_m_per_s, cloth_.mass_kg, time_s};
+    const EffectScene scene{cloth_.mesh, state.position_m, state.velocity_m_per_s, cloth_.mass_kg,
+                            time_s};
     for (size_t e = 0; e < cloth_.effects.size(); ++e)
       cloth_.effects[e]->add_force(scene, parameters.effects[e], effect_force_n_);
   }

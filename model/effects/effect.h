@@ -5,13 +5,15 @@
 #include <vector>
 
 #include "model/lanes.h"
+#include "model/mesh.h"
 
 namespace clothfit {
 
 /// How a fit walks along a parameter.
 enum class ParameterScale { linear, logarithmic };
 
-/// A parameter of an effect. At `neutral` the effect leaves the trajectory bit-equal.
+/// A parameter of an effect. At `neutral` the effect leaves the trajectory bit-equal. Three named
+/// NAME_x, NAME_y, NAME_z are a vector's, which a recording may declare as NAME: [x, y, z].
 struct EffectParameter {
   std::string name;
   std::string unit;
@@ -30,6 +32,7 @@ struct EffectDescription {
 
 /// What an effect may look at: the state at the beginning of a step.
 struct EffectScene {
+  const Mesh& mesh;
   const LaneVectors& position_m;
   const LaneVectors& velocity_m_per_s;
   const Eigen::VectorXd& mass_kg;  ///< per vertex
@@ -47,7 +50,8 @@ class Effect {
 
   /// Upper bound of the rate (1/s) at which the effect damps a velocity, for the choice of a stable
   /// time step. `parameters` in the description's order.
-  virtual double damping_rate_per_s(const std::vector<double>& parameters) const = 0;
+  virtual double damping_rate_per_s(const Mesh& mesh, const Eigen::VectorXd& mass_kg,
+                                    const std::vector<double>& parameters) const = 0;
 };
 
 }  // namespace clothfit

@@ -5,6 +5,7 @@
 
 #include "data/input_error.h"
 #include "model/effects/viscous_damping.h"
+#include "model/effects/wind.h"
 
 namespace clothfit {
 namespace {
@@ -13,6 +14,7 @@ namespace {
 constexpr std::array kEffects = {
     // alphabetical
     EffectEntry{"viscous_damping", viscous_damping::describe, viscous_damping::make},
+    EffectEntry{"wind", wind::describe, wind::make},
 };
 
 }  // namespace

@@ -17,7 +17,8 @@ class ViscousDamping final : public Effect {
     }
   }
 
-  double damping_rate_per_s(const std::vector<double>& parameters) const override {
+  double damping_rate_per_s(const Mesh&, const Eigen::VectorXd&,
+                            const std::vector<double>& parameters) const override {
     return parameters[0];
   }
 };

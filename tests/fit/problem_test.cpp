@@ -162,6 +162,21 @@ TEST(Problem, EffectsEnterOnlyWhenDeclaredOrAskedFor) {
   EXPECT_EQ(declared.effects[0][0].constant, 1.5);
 }
 
+TEST(Problem, AVectorIsDeclaredAsOne) {
+  FitInput input = synthetic_input({});
+  input.recording.declared = {{.name = "wind", .parameters = {{"q", {0.1, 0.2, 0.3}}}}};
+
+  const FitProblem problem = problem_of(input, {});
+
+  // c is left to the fit, q_x, q_y and q_z are what was declared.
+  ASSERT_EQ(problem.effects.size(), 1u);
+  EXPECT_EQ(problem.effects[0][0].parameter, problem.space.index("wind.c"));
+  for (size_t axis = 0; axis < 3; ++axis) {
+    EXPECT_EQ(problem.effects[0][1 + axis].parameter, -1);
+    EXPECT_EQ(problem.effects[0][1 + axis].constant, (std::array{0.1, 0.2, 0.3}[axis]));
+  }
+}
+
 TEST(Problem, RefusesWhatCannotBeFitted) {
   const FitInput good = synthetic_input({});
 
@@ -191,6 +206,12 @@ TEST(Problem, RefusesWhatCannotBeFitted) {
   wrong_parameter.recording.declared = {
       {.name = "viscous_damping", .parameters = {{"ratio", {1.5}}}}};
   EXPECT_THAT(refusal([&] { problem_of(wrong_parameter); }), HasSubstr("no parameter 'ratio'"));
+  wrong_parameter.recording.declared = {{.name = "wind", .parameters = {{"q", {1.5}}}}};
+  EXPECT_THAT(refusal([&] { problem_of(wrong_parameter); }),
+              HasSubstr("wind.q has 1 numbers; a vector [x, y, z]"));
+  wrong_parameter.recording.declared = {{.name = "wind", .parameters = {{"c", {1.5, 2}}}}};
+  EXPECT_THAT(refusal([&] { problem_of(wrong_parameter); }),
+              HasSubstr("wind.c has 2 numbers; one number"));
 
   FitInput slip = good;
   slip.tracks3d.back().frame = 2'000'000'000;

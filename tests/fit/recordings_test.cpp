@@ -102,6 +102,28 @@ TEST(Recordings, SwingPlainFromOneCamera) {
   EXPECT_LT(only_errors(report).held_out.rms, 0.5);
 }
 
+TEST(Recordings, AWindThatWasNotDeclaredIsFoundWhenAskedFor) {
+  // Given the windy recording and the true pressure, 0.25 Pa in a level direction
+  std::ifstream file(kSource / "tests/fixtures/truth/swing_breeze/truth.json");
+  const nlohmann::json truth = nlohmann::json::parse(file).at("hidden_effects").at(0);
+  const auto direction = truth.at("direction").get<std::vector<double>>();
+  const double pressure = truth.at("pressure_pa");
+
+  const FitReport report =
+      fit(read_input(kSource / "data/recordings/swing_breeze"), {.effects = {"wind"}}, {});
+
+  ASSERT_TRUE(report.usable()) << report.message;
+  ASSERT_EQ(report.result.effects.size(), 1u);
+  const std::vector<ParameterEstimate>& wind = report.result.effects.front().parameters;
+  ASSERT_EQ(wind.size(), 4u);
+  EXPECT_LT(wind[0].value, 0.02);  // c: the wind did not depend on the cloth's speed
+  for (size_t axis = 0; axis < 3; ++axis)
+    EXPECT_NEAR(wind[1 + axis].value, pressure * direction[axis], 0.03 * pressure) << axis;
+  // Then nothing but the noise is left, in frames that took no part too
+  EXPECT_LT(only_errors(report).held_out.rms, 1.1 * only_errors(report).noise);
+  expect_true_fabric(report.result, "swing_breeze", 0.03);
+}
+
 TEST(Recordings, AHiddenWindLeavesAnErrorThatThePlainModelCannotHide) {
   // Given a recording whose cloth is also blown at, undeclared; mesh and search kept small
   const FitReport report = fit(

@@ -60,7 +60,7 @@ inline Eigen::Matrix3Xd force_n(const EffectEntry& entry, const State& state,
   const LaneVectors position_m = clothfit::every_lane(state.position_m);
   const LaneVectors velocity_m_per_s = clothfit::every_lane(state.velocity_m_per_s);
   LaneVectors force = LaneVectors::zero(36);
-  entry.make()->add_force({position_m, velocity_m_per_s, state.mass_kg, 0.3},
+  entry.make()->add_force({square_mesh(6), position_m, velocity_m_per_s, state.mass_kg, 0.3},
                           every_lane(parameters), force);
   return force.lane(0);
 }
@@ -97,7 +97,8 @@ inline void expect_nothing_at_neutral(const EffectEntry& entry, Uniform& uniform
   set.effects = {neutral(entry.describe())};
   const SimulateResult at_neutral = simulate(with, {&set, 1}, schedule).front();
   EXPECT_EQ(at_neutral.position_m, without.position_m);
-  EXPECT_EQ(with.effects.front()->damping_rate_per_s(set.effects.front()), 0);
+  EXPECT_EQ(with.effects.front()->damping_rate_per_s(with.mesh, with.mass_kg, set.effects.front()),
+            0);
 
   // when they are not, then it does.
   set.effects = {random_parameters(entry.describe(), uniform)};
@@ -113,7 +114,7 @@ inline void expect_to_add_to_what_is_there(const EffectEntry& entry, Uniform& un
   const LaneVectors velocity_m_per_s = clothfit::every_lane(state.velocity_m_per_s);
   LaneVectors sum_n = clothfit::every_lane(there_n);
 
-  entry.make()->add_force({position_m, velocity_m_per_s, state.mass_kg, 0.3},
+  entry.make()->add_force({square_mesh(6), position_m, velocity_m_per_s, state.mass_kg, 0.3},
                           every_lane(parameters), sum_n);
 
   EXPECT_LT((sum_n.lane(0) - there_n - force_n(entry, state, parameters)).cwiseAbs().maxCoeff(),
@@ -135,7 +136,7 @@ inline void expect_lanes_to_know_nothing_of_each_other(const EffectEntry& entry,
     for (size_t p = 0; p < values.size(); ++p) values[p][l] = parameters.back()[p];
   }
 
-  entry.make()->add_force({position, velocity, mass_kg, 0.3}, values, together);
+  entry.make()->add_force({square_mesh(6), position, velocity, mass_kg, 0.3}, values, together);
 
   for (int l = 0; l < kLanes; ++l) {
     const auto lane = static_cast<size_t>(l);
@@ -166,8 +167,9 @@ inline void expect_to_damp_only(const EffectEntry& entry, Uniform& uniform) {
 
   EXPECT_LT(power_w, 0);
   // and no faster than it tells those who choose the time step: -F.v <= rate m v^2.
-  EXPECT_LE(-power_w, entry.make()->damping_rate_per_s(parameters) * 2 *
-                          kinetic_energy_j(state.mass_kg, state.velocity_m_per_s) * (1 + 1e-12));
+  EXPECT_LE(-power_w, entry.make()->damping_rate_per_s(square_mesh(6), state.mass_kg, parameters) *
+                          2 * kinetic_energy_j(state.mass_kg, state.velocity_m_per_s) *
+                          (1 + 1e-12));
 }
 
 inline void expect_proportional(const EffectEntry& entry, Uniform& uniform) {
