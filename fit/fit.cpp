@@ -41,23 +41,23 @@ struct Effort {
   double least_gain = 0;
   Differences differences = Differences::forward;
   double difference_step = 0;
-  double spring_steps = 0;  ///< a stage stops there: a wrong model may lead it on for hours
+  double most_spring_steps = 0;  ///< a stage stops there: a wrong model may lead it on for hours
 };
 constexpr Effort kCoarseEffort{.rounds = 1,
                                .least_gain = 1e-3,
                                .differences = Differences::forward,
                                .difference_step = 2e-2,
-                               .spring_steps = 1e9};
+                               .most_spring_steps = 1e9};
 constexpr Effort kRoughEffort{.rounds = 2,
                               .least_gain = 1e-4,
                               .differences = Differences::forward,
                               .difference_step = 5e-3,
-                              .spring_steps = 5e9};
+                              .most_spring_steps = 5e9};
 constexpr Effort kFinalEffort{.rounds = 6,
                               .least_gain = 1e-7,
                               .differences = Differences::central,
                               .difference_step = 1e-3,
-                              .spring_steps = 2e10};
+                              .most_spring_steps = 2e10};
 
 /// A log-parameter less certain than this (a factor of e^0.7 = 2 either way) is undetermined.
 constexpr double kUndeterminedLogSigma = 0.7;
@@ -171,7 +171,7 @@ RefineResult refine_stage(const FitProblem& problem, const FitOptions& options, 
                                      .least_gain = effort.least_gain,
                                      .differences = effort.differences,
                                      .difference_step = effort.difference_step,
-                                     .spring_steps = effort.spring_steps,
+                                     .most_spring_steps = effort.most_spring_steps,
                                      .substep_scale = options.substep_scale};
   const int frames = horizon_frames(problem, share);
   RefineResult result = refine(problem, frames, start, refine_options, progress);

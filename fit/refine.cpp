@@ -13,14 +13,39 @@ namespace {
 
 constexpr const char* kOutOfWork = "not converged at the limit of work";
 
+/// The ranges in coordinates.
+struct Box {
+  Eigen::VectorXd lower, upper;
+
+  explicit Box(const ParameterSpace& space) : lower(space.size()), upper(space.size()) {
+    for (int p = 0; p < space.size(); ++p) {
+      lower[p] = space.parameters[static_cast<size_t>(p)].lower;
+      upper[p] = space.parameters[static_cast<size_t>(p)].upper;
+    }
+    lower = space.coordinates(lower);
+    upper = space.coordinates(upper);
+  }
+  /// Whether a fall of the cost along coordinate `p`, against its `gradient`, would leave the box.
+  bool blocks(int p, double coordinate, double gradient) const {
+    const double edge = 1e-12 * (upper[p] - lower[p]);
+    return gradient > 0 ? coordinate - lower[p] <= edge : upper[p] - coordinate <= edge;
+  }
+};
+
 /// The residuals and their Jacobian at the point that Ceres looks at, simulated once for all
 /// blocks. Both are computed whenever the point is new: a trial step's run alone would leave most
 /// lanes idle, and most trial steps are accepted and need the Jacobian next.
 class SharedEvaluation final : public ceres::EvaluationCallback {
  public:
   SharedEvaluation(const FitProblem& problem, const Objective& objective,
-                   const RefineOptions& options, const Eigen::VectorXd& coordinates)
-      : problem_(problem), objective_(objective), options_(options), coordinates_(coordinates) {}
+                   const RefineOptions& options, const Box& box, double huber_threshold,
+                   const Eigen::VectorXd& coordinates)
+      : problem_(problem),
+        objective_(objective),
+        options_(options),
+        box_(box),
+        huber_threshold_(huber_threshold),
+        coordinates_(coordinates) {}
 
   /// Ceres asks again for a point that it has accepted.
   void PrepareForEvaluation(bool, bool) override {
@@ -29,19 +54,54 @@ class SharedEvaluation final : public ceres::EvaluationCallback {
     now_ = objective_.linearise(problem_.space.values(coordinates_), options_.differences,
                                 options_.difference_step);
     simulations_ += now_.runs;
+    if (now_.usable) hold_at_bounds();
   }
 
+  /// The derivatives by coordinates that are held at a bound are zero.
   const Linearisation& now() const { return now_; }
+  bool is_held(int p) const { return held_[static_cast<size_t>(p)]; }
   int simulations() const { return simulations_; }
   double spring_steps() const { return simulations_ * objective_.spring_steps_per_run(); }
 
  private:
+  /// Ceres clips its steps to the bounds, but computes them as if there were none: where one
+  /// coordinate is clipped the others get what would have gone with its full step. So a coordinate
+  /// at a bound that blocks it takes no part.
+  void hold_at_bounds() {
+    const Eigen::VectorXd values = problem_.space.values(coordinates_);
+    const Eigen::VectorXd slope = problem_.space.value_by_coordinate(values);
+    Eigen::VectorXd gradient = Eigen::VectorXd::Zero(coordinates_.size());
+    for (const Objective::Block& block : objective_.blocks()) {
+      const auto r = now_.residual.segment(block.offset, block.dimension);
+      const double weight = std::min(1.0, huber_threshold_ / std::max(r.norm(), 1e-300));
+      gradient +=
+          weight *
+          now_.residual_by_coordinate.middleRows(block.offset, block.dimension).transpose() * r;
+    }
+    for (const GaussianPrior& prior : problem_.priors) {
+      const Eigen::VectorXd r = prior.residual(values);
+      for (size_t n = 0; n < prior.indices.size(); ++n)
+        gradient[prior.indices[n]] +=
+            slope[prior.indices[n]] *
+            prior.sqrt_information.col(static_cast<Eigen::Index>(n)).dot(r);
+    }
+    held_.assign(static_cast<size_t>(coordinates_.size()), false);
+    for (int p = 0; p < coordinates_.size(); ++p) {
+      if (!box_.blocks(p, coordinates_[p], gradient[p])) continue;
+      held_[static_cast<size_t>(p)] = true;
+      now_.residual_by_coordinate.col(p).setZero();
+    }
+  }
+
   const FitProblem& problem_;
   const Objective& objective_;
   const RefineOptions& options_;
+  const Box& box_;
+  double huber_threshold_;
   const Eigen::VectorXd& coordinates_;
   Eigen::VectorXd evaluated_;
   Linearisation now_;
+  std::vector<bool> held_;
   int simulations_ = 0;
 };
 
@@ -74,8 +134,8 @@ class ObservationCost final : public ceres::CostFunction {
 
 class PriorCost final : public ceres::CostFunction {
  public:
-  PriorCost(const ParameterSpace& space, const GaussianPrior& prior)
-      : space_(space), prior_(prior) {
+  PriorCost(const SharedEvaluation& shared, const ParameterSpace& space, const GaussianPrior& prior)
+      : shared_(shared), space_(space), prior_(prior) {
     set_num_residuals(static_cast<int>(prior.mean.size()));
     mutable_parameter_block_sizes()->push_back(space.size());
   }
@@ -90,14 +150,17 @@ class PriorCost final : public ceres::CostFunction {
       Eigen::Map<RowMajor> jacobian(jacobians[0], num_residuals(), space_.size());
       jacobian.setZero();
       const Eigen::VectorXd slope = space_.value_by_coordinate(values);
-      for (size_t n = 0; n < prior_.indices.size(); ++n)
+      for (size_t n = 0; n < prior_.indices.size(); ++n) {
+        if (shared_.is_held(prior_.indices[n])) continue;
         jacobian.col(prior_.indices[n]) =
             prior_.sqrt_information.col(static_cast<Eigen::Index>(n)) * slope[prior_.indices[n]];
+      }
     }
     return true;
   }
 
  private:
+  const SharedEvaluation& shared_;
   const ParameterSpace& space_;
   const GaussianPrior& prior_;
 };
@@ -106,24 +169,25 @@ class PriorCost final : public ceres::CostFunction {
 class Reporter final : public ceres::IterationCallback {
  public:
   Reporter(const ProgressCallback& progress, Progress progress_now, const SharedEvaluation& shared,
-           double spring_steps)
+           double most_spring_steps)
       : progress_(progress),
         now_(std::move(progress_now)),
         shared_(shared),
-        spring_steps_(spring_steps) {}
+        most_spring_steps_(most_spring_steps) {}
   ceres::CallbackReturnType operator()(const ceres::IterationSummary& summary) override {
     now_.done = summary.iteration;
     now_.note = "cost " + std::to_string(summary.cost);
     if (progress_ && !progress_(now_)) return ceres::SOLVER_ABORT;
-    return shared_.spring_steps() < spring_steps_ ? ceres::SOLVER_CONTINUE
-                                                  : ceres::SOLVER_TERMINATE_SUCCESSFULLY;
+    // However large the mesh, one step is tried.
+    const bool go_on = summary.iteration == 0 || shared_.spring_steps() < most_spring_steps_;
+    return go_on ? ceres::SOLVER_CONTINUE : ceres::SOLVER_TERMINATE_SUCCESSFULLY;
   }
 
  private:
   const ProgressCallback& progress_;
   Progress now_;
   const SharedEvaluation& shared_;
-  double spring_steps_;
+  double most_spring_steps_;
 };
 
 /// Why a solve ended, for a person.
@@ -150,11 +214,13 @@ struct Round {
 };
 
 Round solve(const FitProblem& problem, const Objective& objective, const Eigen::VectorXd& start,
-            double huber_threshold, const RefineOptions& refine_options, double spring_steps,
+            double huber_threshold, const RefineOptions& refine_options, double most_spring_steps,
             const ProgressCallback& progress) {
   const ParameterSpace& space = problem.space;
   Eigen::VectorXd coordinates = space.coordinates(start);
-  SharedEvaluation shared(problem, objective, refine_options, coordinates);
+  const Box box(space);
+  coordinates = coordinates.cwiseMax(box.lower).cwiseMin(box.upper);
+  SharedEvaluation shared(problem, objective, refine_options, box, huber_threshold, coordinates);
 
   ceres::Problem::Options problem_options;
   problem_options.evaluation_callback = &shared;
@@ -166,18 +232,10 @@ Round solve(const FitProblem& problem, const Objective& objective, const Eigen::
   for (const Objective::Block& rows : objective.blocks())
     least_squares.AddResidualBlock(new ObservationCost(shared, rows, space.size()), &loss, block);
   for (const GaussianPrior& prior : problem.priors)
-    least_squares.AddResidualBlock(new PriorCost(space, prior), nullptr, block);
-  Eigen::VectorXd lower(space.size()), upper(space.size());
+    least_squares.AddResidualBlock(new PriorCost(shared, space, prior), nullptr, block);
   for (int p = 0; p < space.size(); ++p) {
-    lower[p] = space.parameters[static_cast<size_t>(p)].lower;
-    upper[p] = space.parameters[static_cast<size_t>(p)].upper;
-  }
-  lower = space.coordinates(lower);
-  upper = space.coordinates(upper);
-  for (int p = 0; p < space.size(); ++p) {
-    coordinates[p] = std::clamp(coordinates[p], lower[p], upper[p]);
-    least_squares.SetParameterLowerBound(block, p, lower[p]);
-    least_squares.SetParameterUpperBound(block, p, upper[p]);
+    least_squares.SetParameterLowerBound(block, p, box.lower[p]);
+    least_squares.SetParameterUpperBound(block, p, box.upper[p]);
   }
 
   ceres::Solver::Options options;
@@ -196,7 +254,7 @@ Round solve(const FitProblem& problem, const Objective& objective, const Eigen::
                      .total = static_cast<double>(refine_options.iterations),
                      .unit = "iterations",
                      .note = {}},
-                    shared, spring_steps);
+                    shared, most_spring_steps);
   options.callbacks.push_back(&reporter);
   Round round;
   ceres::Solve(options, &least_squares, &round.summary);
@@ -219,8 +277,9 @@ RefineResult refine(const FitProblem& problem, int frames, const Eigen::VectorXd
                     const RefineOptions& options, const ProgressCallback& progress) {
   RefineResult result;
   result.values = start;
-  double spring_steps_left = options.spring_steps;
+  double spring_steps_left = options.most_spring_steps;
   for (int n = 0; n < options.rounds; ++n) {
+    result.converged = false;
     const double stable_s =
         stable_time_step_s(problem.cloth, parameter_set(problem, result.values));
     result.time_step_s = stable_s / (options.stability_margin * options.substep_scale);
@@ -250,19 +309,20 @@ RefineResult refine(const FitProblem& problem, int frames, const Eigen::VectorXd
             .maxCoeff();
     result.values = round.values;
     result.cost = round.summary.final_cost / objective.residual_count();
-    result.converged = round.summary.termination_type == ceres::CONVERGENCE;
+    const bool settled = round.summary.termination_type == ceres::CONVERGENCE;
     // Done when neither the step limit nor the loss's scale had a say in where the round ended.
     const double room = stable_time_step_s(problem.cloth, parameter_set(problem, result.values)) /
                         result.time_step_s;
     const Eigen::VectorXd after = objective.residuals({result.values}).front();
     const double scale_now = after.size() > 0 ? robust_scale(after) : result.robust_scale;
     const bool same_scale = scale_now > 0.8 * result.robust_scale;
-    if (room > 1.05 && result.converged && (same_scale || moved < 1e-3)) break;
+    result.converged = room > 1.05 && settled && (same_scale || moved < 1e-3);
+    if (result.converged) break;
     if (spring_steps_left <= 0) {
-      result.converged = false;
       result.message = kOutOfWork;
       break;
     }
+    if (settled) result.message = "each round led on to another";
   }
   return result;
 }

@@ -12,7 +12,9 @@ struct RefineOptions {
   double least_gain = 1e-7;  ///< a solve ends when the cost falls by less than this share
   Differences differences = Differences::central;       ///< forward: half the runs, a blunter end
   double difference_step = Objective::kDifferenceStep;  ///< in coordinates; wider sees the trend
-  double spring_steps = 1e18;     ///< springs times time steps of all runs; no solve goes on after
+  /// Springs times time steps of the linearisations' runs: looked at after each iteration but the
+  /// first.
+  double most_spring_steps = 1e18;
   double stability_margin = 1.5;  ///< stiffness and damping may grow this much before a new round
   double substep_scale = 1;
 };
@@ -34,7 +36,8 @@ struct RefineResult {
 /// every observation under a Huber loss whose scale is the residuals' own at the start of each
 /// round, and the problem's priors. The time step of a round is fixed; a parameter vector for which
 /// it would not be stable is refused like any failed step, and when the optimum leans on that limit
-/// another round follows with a smaller one.
+/// another round follows with a smaller one. A coordinate at a bound that keeps it from a lower
+/// cost takes no part in a step.
 RefineResult refine(const FitProblem& problem, int frames, const Eigen::VectorXd& start,
                     const RefineOptions& options, const ProgressCallback& progress);
 

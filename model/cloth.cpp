@@ -9,7 +9,8 @@
 namespace clothfit {
 
 HeldVertexWeights held_at(const Mesh& mesh, double s_m, double t_m) {
-  assert(s_m > -1e-6 && s_m < mesh.width_m + 1e-6 && t_m > -1e-6 && t_m < mesh.height_m + 1e-6);
+  // Readers allow a micrometre outside for rounding.
+  assert(s_m > -2e-6 && s_m < mesh.width_m + 2e-6 && t_m > -2e-6 && t_m < mesh.height_m + 2e-6);
   // A point within a millionth of a cell of a vertex is that vertex: markers are written in
   // decimals.
   const auto locate = [](double place, int count, int& cell, double& fraction) {

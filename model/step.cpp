@@ -122,10 +122,10 @@ void EulerStepper::step(const LaneParameters& parameters, const LaneVectors& hel
     case StrainLimitMode::off:
       break;
     case StrainLimitMode::positions:
-      too_long_ = limiter_.limit_positions(parameters.limits, state.position_m);
+      limit_outcome_ = limiter_.limit_positions(parameters.limits, state.position_m);
       break;
     case StrainLimitMode::consistent:
-      too_long_ =
+      limit_outcome_ =
           limiter_.limit_consistently(parameters.limits, cloth_.strain_limit.most_sweeps,
                                       time_step_s, state.position_m, state.velocity_m_per_s);
       break;

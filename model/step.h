@@ -19,7 +19,7 @@ struct LaneState {
   LaneVectors velocity_m_per_s;
 };
 
-/// The same springs in a lane, for a cloth with this strain limit.
+/// Sets one lane's springs, and their limits for a cloth with this strain limit.
 void set_lane(int lane, const SpringParameters& springs, const StrainLimit& strain_limit,
               LaneParameters& parameters);
 
@@ -63,8 +63,8 @@ class EulerStepper {
   void step(const LaneParameters& parameters, const LaneVectors& held_target_m, double time_s,
             double time_step_s, LaneState& state);
 
-  /// Springs that the last step's strain limit had to shorten, in every lane.
-  const LaneValue& too_long() const { return too_long_; }
+  /// What the last step's strain limit found.
+  const LimitOutcome& limit_outcome() const { return limit_outcome_; }
 
  private:
   const Cloth& cloth_;
@@ -72,7 +72,7 @@ class EulerStepper {
   HeldPlacement held_;
   ClothSweep sweep_;
   StrainLimiter limiter_;
-  LaneValue too_long_ = LaneValue::Zero();
+  LimitOutcome limit_outcome_;
   LaneVectors effect_force_n_;
 };
 

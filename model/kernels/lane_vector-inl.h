@@ -56,6 +56,12 @@ HWY_INLINE Vector3 operator*(const Vector& a, const Vector3& b) {
   return {hn::Mul(a, b.x), hn::Mul(a, b.y), hn::Mul(a, b.z)};
 }
 
+/// `a` where `mask` holds, else `b`.
+HWY_INLINE Vector3 select(const hn::Mask<Tag>& mask, const Vector3& a, const Vector3& b) {
+  return {hn::IfThenElse(mask, a.x, b.x), hn::IfThenElse(mask, a.y, b.y),
+          hn::IfThenElse(mask, a.z, b.z)};
+}
+
 HWY_INLINE Vector dot(const Vector3& a, const Vector3& b) {
   return hn::Add(hn::Add(hn::Mul(a.x, b.x), hn::Mul(a.y, b.y)), hn::Mul(a.z, b.z));
 }

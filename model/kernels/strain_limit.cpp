@@ -21,7 +21,7 @@ struct SpringReach {
 inline constexpr SpringReach kReach[kSpringTypes] = {{1, 0},  {0, 1}, {1, 1},
                                                      {1, -1}, {2, 0}, {0, 2}};
 
-/// What one sweep works on; element (vertex * kLanes + lane) of each array is one vertex in one
+/// What one pass works on; element (vertex * kLanes + lane) of each array is one vertex in one
 /// lane.
 struct LimitArrays {
   Mesh mesh;
@@ -30,9 +30,9 @@ struct LimitArrays {
   std::array<double*, 3> position_m;
   std::array<double*, 3> velocity_m_per_s;  ///< null: not corrected
   double steps_per_s = 0;
-  LaneValue active = LaneValue::Ones();    ///< 1 in lanes to work on, else 0
-  LaneValue found = LaneValue::Zero();     ///< set to 1 where a spring was longer than tolerated
-  LaneValue too_long = LaneValue::Zero();  ///< counts the springs that were too long
+  LaneValue active = LaneValue::Ones();       ///< 1 in lanes to work on, else 0
+  LaneValue shortened = LaneValue::Zero();    ///< counts the springs that a sweep has shortened
+  LaneValue intolerable = LaneValue::Zero();  ///< set to 1 where a spring is longer than tolerated
 };
 
 }  // namespace clothfit
@@ -43,8 +43,14 @@ namespace clothfit {
 namespace {
 namespace HWY_NAMESPACE {
 
+enum class Pass {
+  sweep,  ///< shortens springs
+  check   ///< only looks for springs that are longer than tolerated
+};
+
 /// The springs of one type in the lanes from `lane` on.
-HWY_INLINE void limit_type(LimitArrays& arrays, size_t type, std::ptrdiff_t lane) {
+template <Pass pass>
+HWY_INLINE void visit(LimitArrays& arrays, size_t type, std::ptrdiff_t lane) {
   using Mask = hn::Mask<Tag>;
   const Tag d;
   const auto [down, right] = kReach[type];
@@ -52,13 +58,15 @@ HWY_INLINE void limit_type(LimitArrays& arrays, size_t type, std::ptrdiff_t lane
   const std::ptrdiff_t other = (down * columns + right) * kLanes;
   const std::array<double*, 3> position = arrays.position_m, velocity = arrays.velocity_m_per_s;
   const bool correct_velocity = velocity[0] != nullptr;
+  const Vector one = hn::Set(d, 1.0);
   const Vector steps_per_s = hn::Set(d, arrays.steps_per_s);
   const Vector longest = hn::LoadU(d, arrays.limits.longest_m[type].data() + lane);
   const Vector tolerated = hn::LoadU(d, arrays.limits.tolerated_m[type].data() + lane);
-  const Vector longest2 = hn::Mul(longest, longest), tolerated2 = hn::Mul(tolerated, tolerated);
+  const Vector allowed = pass == Pass::sweep ? longest : tolerated;
+  const Vector allowed2 = hn::Mul(allowed, allowed);
   const Mask active = hn::Gt(hn::LoadU(d, arrays.active.data() + lane), hn::Zero(d));
-  Vector too_long = hn::LoadU(d, arrays.too_long.data() + lane);
-  Vector found = hn::LoadU(d, arrays.found.data() + lane);
+  Vector shortened = hn::LoadU(d, arrays.shortened.data() + lane);
+  Vector intolerable = hn::LoadU(d, arrays.intolerable.data() + lane);
 
   const int reach = down > 0 ? down : right;
   for (int group = 0; group < 2; ++group) {
@@ -69,33 +77,46 @@ HWY_INLINE void limit_type(LimitArrays& arrays, size_t type, std::ptrdiff_t lane
         const std::ptrdiff_t vertex = i * columns + j, self = vertex * kLanes + lane;
         const Vector3 along = load(position, self + other) - load(position, self);
         const Vector length2 = dot(along, along);
-        const Mask exceeds = hn::And(active, hn::Gt(length2, longest2));
+        const Mask exceeds = hn::And(active, hn::Gt(length2, allowed2));
         if (hn::AllFalse(d, exceeds)) continue;
-        found =
-            hn::IfThenElse(hn::And(exceeds, hn::Gt(length2, tolerated2)), hn::Set(d, 1.0), found);
-        too_long = hn::Add(too_long, hn::IfThenElseZero(exceeds, hn::Set(d, 1.0)));
-        const Vector excess =
-            hn::Sub(hn::Set(d, 1.0), hn::Mul(longest, inverse_square_root(length2)));
-        const Vector3 correction = hn::IfThenElseZero(exceeds, excess) * along;
         const SpringShares& shares = arrays.shares[type][static_cast<size_t>(vertex)];
-        const Vector3 first = hn::Set(d, shares.first) * correction;
-        const Vector3 second = hn::Set(d, shares.second) * correction;
-        store(load(position, self) + first, position, self);
-        store(load(position, self + other) - second, position, self + other);
-        if (!correct_velocity) continue;
-        store(load(velocity, self) + steps_per_s * first, velocity, self);
-        store(load(velocity, self + other) - steps_per_s * second, velocity, self + other);
+        if (shares.first == 0 && shares.second == 0) continue;
+        if (pass == Pass::check) {
+          intolerable = hn::IfThenElse(exceeds, one, intolerable);
+          continue;
+        }
+        shortened = hn::Add(shortened, hn::IfThenElseZero(exceeds, one));
+        const Vector excess = hn::Sub(one, hn::Mul(longest, inverse_square_root(length2)));
+        const auto move = [&](const std::array<double*, 3>& of, const Vector& share) HWY_ATTR {
+          // Lanes that do not exceed keep their bits.
+          const Vector3 first = hn::Mul(share, hn::Set(d, shares.first)) * along;
+          const Vector3 second = hn::Mul(share, hn::Set(d, shares.second)) * along;
+          const Vector3 a = load(of, self), b = load(of, self + other);
+          store(select(exceeds, a + first, a), of, self);
+          store(select(exceeds, b - second, b), of, self + other);
+        };
+        move(position, excess);
+        if (correct_velocity) move(velocity, hn::Mul(steps_per_s, excess));
       }
     }
   }
-  hn::StoreU(too_long, d, arrays.too_long.data() + lane);
-  hn::StoreU(found, d, arrays.found.data() + lane);
+  hn::StoreU(shortened, d, arrays.shortened.data() + lane);
+  hn::StoreU(intolerable, d, arrays.intolerable.data() + lane);
 }
 
-void limit(LimitArrays& arrays) {
+template <Pass pass>
+HWY_INLINE void visit_all(LimitArrays& arrays) {
   const Tag d;
   for (std::ptrdiff_t lane = 0; lane < kLanes; lane += static_cast<std::ptrdiff_t>(hn::Lanes(d)))
-    for (size_t type = 0; type < kSpringTypes; ++type) limit_type(arrays, type, lane);
+    for (size_t type = 0; type < kSpringTypes; ++type) visit<pass>(arrays, type, lane);
+}
+
+void sweep_springs(LimitArrays& arrays) {
+  visit_all<Pass::sweep>(arrays);
+}
+
+void check_springs(LimitArrays& arrays) {
+  visit_all<Pass::check>(arrays);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -106,7 +127,8 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace clothfit {
 namespace {
-HWY_EXPORT(limit);
+HWY_EXPORT(sweep_springs);
+HWY_EXPORT(check_springs);
 
 std::array<double*, 3> data_of(LaneVectors& vectors) {
   return {vectors.x.data(), vectors.y.data(), vectors.z.data()};
@@ -130,33 +152,40 @@ StrainLimiter::StrainLimiter(const Mesh& mesh, const Eigen::VectorXd& inverse_ma
   }
 }
 
-LaneValue StrainLimiter::limit_positions(const LaneLimits& limits, LaneVectors& position_m) {
+LimitOutcome StrainLimiter::limit_positions(const LaneLimits& limits, LaneVectors& position_m) {
   LimitArrays arrays{.mesh = mesh_,
                      .limits = limits,
                      .shares = shares_,
                      .position_m = data_of(position_m),
                      .velocity_m_per_s = {}};
-  HWY_DYNAMIC_DISPATCH(limit)(arrays);
-  return arrays.too_long;
+  HWY_DYNAMIC_DISPATCH(sweep_springs)(arrays);
+  return {.too_long = arrays.shortened};
 }
 
-LaneValue StrainLimiter::limit_consistently(const LaneLimits& limits, int most_sweeps,
-                                            double time_step_s, LaneVectors& position_m,
-                                            LaneVectors& velocity_m_per_s) {
+LimitOutcome StrainLimiter::limit_consistently(const LaneLimits& limits, int most_sweeps,
+                                               double time_step_s, LaneVectors& position_m,
+                                               LaneVectors& velocity_m_per_s) {
   LimitArrays arrays{.mesh = mesh_,
                      .limits = limits,
                      .shares = shares_,
                      .position_m = data_of(position_m),
                      .velocity_m_per_s = data_of(velocity_m_per_s),
                      .steps_per_s = 1 / time_step_s};
-  LaneValue too_long = LaneValue::Zero();
-  for (int n = 0; n < most_sweeps && (arrays.active > 0).any(); ++n) {
-    HWY_DYNAMIC_DISPATCH(limit)(arrays);
-    if (n == 0) too_long = arrays.too_long;
-    arrays.active = arrays.found;
-    arrays.found.setZero();
+  LimitOutcome outcome;
+  for (int n = 0; n < most_sweeps; ++n) {
+    arrays.shortened.setZero();
+    HWY_DYNAMIC_DISPATCH(sweep_springs)(arrays);
+    if (n == 0) outcome.too_long = arrays.shortened;
+    // A correction may lengthen springs that were visited before: look at all of them again.
+    arrays.active = (arrays.shortened > 0).select(arrays.active, 0.0);
+    if (!(arrays.active > 0).any()) return outcome;
+    arrays.intolerable.setZero();
+    HWY_DYNAMIC_DISPATCH(check_springs)(arrays);
+    arrays.active = arrays.intolerable;
+    if (!(arrays.active > 0).any()) return outcome;
   }
-  return too_long;
+  outcome.unmet = arrays.active;
+  return outcome;
 }
 
 }  // namespace clothfit

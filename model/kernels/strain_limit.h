@@ -32,9 +32,16 @@ struct SpringShares {
   double first = 0, second = 0;
 };
 
+/// What a limit found, in every lane.
+struct LimitOutcome {
+  LaneValue too_long = LaneValue::Zero();  ///< springs that the first sweep shortened
+  LaneValue unmet = LaneValue::Zero();     ///< 1 where a spring is still longer than tolerated
+};
+
 /// Sets springs that are longer than `longest_m` to exactly that by moving their two ends along
 /// them [louchet1995, section 2.4; provot1995], by shares in proportion to the inverse masses, so
-/// that equal ends move half each and a held one not at all. Momentum is kept between free ends.
+/// that equal ends move half each and a held one not at all; a spring held at both ends is left
+/// out. Momentum is kept between free ends.
 ///
 /// A sweep takes the springs one after the other, each as those before have left it, in an order
 /// that is part of the model: types 0 to 5; of types 0, 2 and 3 first the springs that start in
@@ -49,14 +56,14 @@ class StrainLimiter {
   /// `inverse_mass_per_kg` is 0 where a vertex must not move.
   StrainLimiter(const Mesh& mesh, const Eigen::VectorXd& inverse_mass_per_kg);
 
-  /// One sweep over positions alone. Returns how many springs of each lane were too long.
-  LaneValue limit_positions(const LaneLimits& limits, LaneVectors& position_m);
+  /// One sweep over positions alone; `unmet` is not looked at.
+  LimitOutcome limit_positions(const LaneLimits& limits, LaneVectors& position_m);
 
   /// Sweeps until no spring of a lane is longer than tolerated, at most `most_sweeps` times; what a
-  /// vertex is moved by, over the time step, is added to its velocity. Returns how many springs of
-  /// each lane were too long in the first sweep.
-  LaneValue limit_consistently(const LaneLimits& limits, int most_sweeps, double time_step_s,
-                               LaneVectors& position_m, LaneVectors& velocity_m_per_s);
+  /// vertex is moved by, over the time step, is added to its velocity. Held points that are further
+  /// apart than the springs between them may reach leave the limit unmet.
+  LimitOutcome limit_consistently(const LaneLimits& limits, int most_sweeps, double time_step_s,
+                                  LaneVectors& position_m, LaneVectors& velocity_m_per_s);
 
  private:
   Mesh mesh_;

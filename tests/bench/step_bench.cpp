@@ -100,7 +100,7 @@ void step_with_strain_limit(benchmark::State& run) {
   double too_long = 0;
   for ([[maybe_unused]] const auto _ : run) {
     stepper.step(lanes.parameters, target, 0, 2e-4, lanes.state);
-    too_long += stepper.too_long().mean();
+    too_long += stepper.limit_outcome().too_long.mean();
   }
   lanes.count(run);
   run.counters["at_limit"] = too_long / static_cast<double>(run.iterations()) /

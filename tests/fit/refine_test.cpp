@@ -54,6 +54,33 @@ TEST(Refine, FindsTheTruthFromAStartThatIsOffByAFactor) {
   EXPECT_NEAR(uncertainty.chi_square_per_dof, 1.0, 0.15);
 }
 
+TEST(Refine, FindsTheBestOfTheOthersWhenOneEndsAtItsBound) {
+  // Given a range that ends well below the true stiffness,
+  FitProblem problem = tiny_problem(1);
+  const Eigen::VectorXd truth = truth_of(problem);
+  FitParameter& tension = problem.space.parameters.front();
+  tension.upper = 0.7 * truth[0];
+  Eigen::VectorXd start = truth;
+  start[0] = 0.5 * truth[0];
+  for (int p = 1; p < 7; ++p) start[p] *= p % 2 == 0 ? 1.4 : 0.7;
+
+  const RefineResult result = refine(problem, problem.frames(), start, {}, {});
+
+  ASSERT_TRUE(result.usable) << result.message;
+  EXPECT_TRUE(result.converged) << result.message;
+  EXPECT_NEAR(result.values[0], tension.upper, 1e-9 * tension.upper);
+  // then the others are where they end with that one known and none at a bound.
+  tension.lower = tension.upper * (1 - 1e-9);
+  start[0] = tension.upper;
+  const RefineResult given = refine(problem, problem.frames(), start, {}, {});
+  ASSERT_TRUE(given.converged) << given.message;
+  EXPECT_NEAR(result.cost, given.cost, 1e-3 * given.cost);  // their time steps differ
+  const Objective objective(problem, problem.frames(), result.time_step_s);
+  const Uncertainty uncertainty = estimate_uncertainty(problem, objective, given.values);
+  for (int p = 1; p < 7; ++p)
+    EXPECT_NEAR(result.values[p], given.values[p], 0.05 * uncertainty.sigma[p]) << p;
+}
+
 TEST(Refine, EndsAtTheLimitOfWorkWithWhatItHasReached) {
   const FitProblem problem = tiny_problem(1);
   Eigen::VectorXd start = truth_of(problem);
@@ -64,7 +91,7 @@ TEST(Refine, EndsAtTheLimitOfWorkWithWhatItHasReached) {
   const double first_two_points = 1.5 * (1 + 2 * problem.space.size()) * run;
 
   const RefineResult cut =
-      refine(problem, problem.frames(), start, {.spring_steps = first_two_points}, {});
+      refine(problem, problem.frames(), start, {.most_spring_steps = first_two_points}, {});
 
   EXPECT_TRUE(cut.usable);
   EXPECT_FALSE(cut.converged);

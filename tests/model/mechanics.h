@@ -118,7 +118,7 @@ class SteppedCloth {
     stepper_.step(parameters_, held_target_m_, steps_ * time_step_s, time_step_s, state_);
     ++steps_;
   }
-  double too_long() const { return stepper_.too_long()[0]; }
+  const LimitOutcome& limit_outcome() const { return stepper_.limit_outcome(); }
   Eigen::Matrix3Xd position_m() const { return state_.position_m.lane(0); }
   Eigen::Matrix3Xd velocity_m_per_s() const { return state_.velocity_m_per_s.lane(0); }
 
