@@ -74,6 +74,7 @@ std::string command_text(const FitVerbOptions& options, const FitFlags& flags) {
   add("--population", options.fit.population, defaults.population);
   add("--generations", options.fit.generations, defaults.generations);
   add("--refine-best", options.fit.refine_best, defaults.refine_best);
+  add("--work", options.fit.work, defaults.work);
   add("--substep-scale", options.fit.substep_scale, defaults.substep_scale);
   return text;
 }
@@ -164,6 +165,9 @@ void add_fit_verb(CLI::App& program, VerbAction& action) {
   verb->add_option("--generations", options->fit.generations, "Generations of the search, at most")
       ->capture_default_str();
   verb->add_option("--refine-best", options->fit.refine_best, "Individuals that go to refinement")
+      ->capture_default_str();
+  verb->add_option("--work", options->fit.work,
+                   "Times as much work as refinement is allowed before it ends unconverged")
       ->capture_default_str();
   verb->add_option("--substep-scale", options->fit.substep_scale,
                    "Above 1: smaller time steps than stability asks for")

@@ -171,7 +171,7 @@ RefineResult refine_stage(const FitProblem& problem, const FitOptions& options, 
                                      .least_gain = effort.least_gain,
                                      .differences = effort.differences,
                                      .difference_step = effort.difference_step,
-                                     .most_spring_steps = effort.most_spring_steps,
+                                     .most_spring_steps = options.work * effort.most_spring_steps,
                                      .substep_scale = options.substep_scale};
   const int frames = horizon_frames(problem, share);
   RefineResult result = refine(problem, frames, start, refine_options, progress);
@@ -307,6 +307,7 @@ void FitOptions::validate() const {
   require(generations >= 1, "generations", "at least 1");
   require(refine_best >= 1, "refine-best", "at least 1");
   require(substep_scale >= 1 && std::isfinite(substep_scale), "substep-scale", "1 or more");
+  require(work > 0 && std::isfinite(work), "work", "more than 0");
   require(threads >= 0, "threads", "0 (all) or more");
 }
 

@@ -34,6 +34,7 @@ struct FitOptions {
   int population = 100;      ///< individuals of the evolutionary search [louchet1995]
   int generations = 40;      ///< at most; the search stops earlier when it no longer gains
   int refine_best = 3;       ///< individuals that go to refinement
+  double work = 1;           ///< > 0; times the limits of work of the refinement's stages
   double substep_scale = 1;  ///< >= 1; more cuts time finer than stability asks
   int threads = 0;           ///< 0: as many as the machine has
   /// Parameters taken from an earlier fit: nothing is fitted, the recording is forecast from its

@@ -138,6 +138,7 @@ TEST(Fit, RefusesOptionsOutOfRange) {
   const FitInput input = synthetic_input({.mesh = 5, .markers = 5});
   EXPECT_THROW(fit(input, {.mesh_columns = 1}, {}), InputError);
   EXPECT_THROW(fit(input, {.population = 1}, {}), InputError);
+  EXPECT_THROW(fit(input, {.work = 0}, {}), InputError);
   EXPECT_THROW(fit(input, {.substep_scale = 0}, {}), InputError);
 }
 
