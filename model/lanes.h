@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 
 namespace clothfit {
 
@@ -28,6 +29,8 @@ struct LaneVectors {
     y.setZero();
     z.setZero();
   }
+  std::array<double*, 3> data() { return {x.data(), y.data(), z.data()}; }
+  std::array<const double*, 3> data() const { return {x.data(), y.data(), z.data()}; }
   int vertices() const { return static_cast<int>(x.cols()); }
   Eigen::Matrix3Xd lane(int l) const {
     Eigen::Matrix3Xd result(3, x.cols());

@@ -171,13 +171,6 @@ namespace clothfit {
 namespace {
 HWY_EXPORT(add_forces);
 HWY_EXPORT(step_euler);
-
-std::array<const double*, 3> data_of(const LaneVectors& vectors) {
-  return {vectors.x.data(), vectors.y.data(), vectors.z.data()};
-}
-std::array<double*, 3> data_of(LaneVectors& vectors) {
-  return {vectors.x.data(), vectors.y.data(), vectors.z.data()};
-}
 }  // namespace
 
 ClothSweep::ClothSweep(const Mesh& mesh)
@@ -185,23 +178,23 @@ ClothSweep::ClothSweep(const Mesh& mesh)
 
 void ClothSweep::add_spring_forces(const LaneSprings& springs, const LaneVectors& position_m,
                                    const LaneVectors& velocity_m_per_s, LaneVectors& force_n) {
-  const SweepArrays arrays{mesh_, springs, data_of(position_m), data_of(velocity_m_per_s),
+  const SweepArrays arrays{mesh_, springs, position_m.data(), velocity_m_per_s.data(),
                            scratch_.data()};
-  HWY_DYNAMIC_DISPATCH(add_forces)(arrays, data_of(force_n));
+  HWY_DYNAMIC_DISPATCH(add_forces)(arrays, force_n.data());
 }
 
 void ClothSweep::step_euler(const LaneSprings& springs, const LaneGravity& gravity,
                             const Eigen::VectorXd& inverse_mass_per_kg,
                             const LaneVectors* effect_force_n, double time_step_s,
                             LaneVectors& position_m, LaneVectors& velocity_m_per_s) {
-  const SweepArrays arrays{mesh_, springs, data_of(std::as_const(position_m)),
-                           data_of(std::as_const(velocity_m_per_s)), scratch_.data()};
+  const SweepArrays arrays{mesh_, springs, std::as_const(position_m).data(),
+                           std::as_const(velocity_m_per_s).data(), scratch_.data()};
   const EulerArrays euler{
-      .position_m = data_of(position_m),
-      .velocity_m_per_s = data_of(velocity_m_per_s),
+      .position_m = position_m.data(),
+      .velocity_m_per_s = velocity_m_per_s.data(),
       .gravity_m_per_s2 = {gravity.x.data(), gravity.y.data(), gravity.z.data()},
       .effect_force_n =
-          effect_force_n != nullptr ? data_of(*effect_force_n) : std::array<const double*, 3>{},
+          effect_force_n != nullptr ? effect_force_n->data() : std::array<const double*, 3>{},
       .inverse_mass_per_kg = inverse_mass_per_kg.data(),
       .time_step_s = time_step_s};
   HWY_DYNAMIC_DISPATCH(step_euler)(arrays, euler);

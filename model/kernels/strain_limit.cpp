@@ -1,7 +1,5 @@
 #include "model/kernels/strain_limit.h"
 
-#include <utility>
-
 // This source is compiled once for each instruction set, in a namespace of its own.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "model/kernels/strain_limit.cpp"
@@ -129,10 +127,6 @@ namespace clothfit {
 namespace {
 HWY_EXPORT(sweep_springs);
 HWY_EXPORT(check_springs);
-
-std::array<double*, 3> data_of(LaneVectors& vectors) {
-  return {vectors.x.data(), vectors.y.data(), vectors.z.data()};
-}
 }  // namespace
 
 StrainLimiter::StrainLimiter(const Mesh& mesh, const Eigen::VectorXd& inverse_mass_per_kg)
@@ -156,7 +150,7 @@ LimitOutcome StrainLimiter::limit_positions(const LaneLimits& limits, LaneVector
   LimitArrays arrays{.mesh = mesh_,
                      .limits = limits,
                      .shares = shares_,
-                     .position_m = data_of(position_m),
+                     .position_m = position_m.data(),
                      .velocity_m_per_s = {}};
   HWY_DYNAMIC_DISPATCH(sweep_springs)(arrays);
   return {.too_long = arrays.shortened};
@@ -168,8 +162,8 @@ LimitOutcome StrainLimiter::limit_consistently(const LaneLimits& limits, int mos
   LimitArrays arrays{.mesh = mesh_,
                      .limits = limits,
                      .shares = shares_,
-                     .position_m = data_of(position_m),
-                     .velocity_m_per_s = data_of(velocity_m_per_s),
+                     .position_m = position_m.data(),
+                     .velocity_m_per_s = velocity_m_per_s.data(),
                      .steps_per_s = 1 / time_step_s};
   LimitOutcome outcome;
   for (int n = 0; n < most_sweeps; ++n) {
