@@ -45,7 +45,8 @@ class SharedEvaluation final : public ceres::EvaluationCallback {
         options_(options),
         box_(box),
         huber_threshold_(huber_threshold),
-        coordinates_(coordinates) {}
+        coordinates_(coordinates),
+        held_(static_cast<size_t>(coordinates.size()), false) {}
 
   /// Ceres asks again for a point that it has accepted.
   void PrepareForEvaluation(bool, bool) override {
