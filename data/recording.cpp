@@ -298,6 +298,7 @@ std::vector<DeclaredEffect> read_declared(const YamlValue& value) {
     const YamlMap map = item.map({"effect", "parameters"});
     DeclaredEffect effect;
     effect.name = map.at("effect").text();
+    effect.line = map.at("effect").line();
     for (const DeclaredEffect& earlier : declared) {
       if (earlier.name == effect.name) {
         map.at("effect").refuse("effect `" + effect.name + "` is declared twice",

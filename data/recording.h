@@ -86,6 +86,7 @@ enum class StartKind { at_rest, released_flat, unknown };
 struct DeclaredEffect {
   std::string name;
   std::map<std::string, std::vector<double>> parameters;
+  int line = 0;  ///< of recording.yaml; 0 when it was not read from there
 };
 
 struct RigidBody {

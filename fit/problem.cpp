@@ -217,7 +217,8 @@ void add_effects(const Recording& recording, const FitOptions& options, FitProbl
   }
   for (const DeclaredEffect& effect : recording.declared) {
     if (!absent(effect.name)) continue;
-    add_effect(effect.name, recording_file(recording), effect.parameters, options, problem);
+    const std::string line = effect.line > 0 ? ":" + std::to_string(effect.line) : "";
+    add_effect(effect.name, recording_file(recording) + line, effect.parameters, options, problem);
     present.push_back(effect.name);
   }
   for (const std::string& name : options.effects) {

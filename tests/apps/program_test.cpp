@@ -152,6 +152,13 @@ TEST_F(Program, RefusesAnUnknownKeyAndNamesTheLineAndTheNearestKey) {
   expect_refused("fit", "gravity");
 }
 
+TEST_F(Program, RefusesADeclaredEffectWithoutSuchAParameterAndNamesTheLine) {
+  copy_bundled("swing_plain");
+  spoil_yaml("declared: []", "declared: [{effect: wind, parameters: {speed: 3}}]");
+
+  expect_refused("fit", "recording.yaml:19: effect wind has no parameter 'speed'");
+}
+
 TEST_F(Program, RefusesAClothWithoutRows) {
   copy_bundled("swing_plain");
   spoil_yaml("rows: 17", "rows: 0");
