@@ -47,7 +47,7 @@ class LaneRun {
   LaneRun(const Cloth& cloth, std::span<const ParameterSet> group)
       : cloth_(cloth), stepper_(cloth), parameters_(lane_parameters(cloth, fill_lanes(group))) {
     const int vertices = cloth.mesh.vertex_count();
-    state_ = {LaneVectors::zero(vertices), LaneVectors::zero(vertices)};
+    state_ = {LaneVectors<>::zero(vertices), LaneVectors<>::zero(vertices)};
     const auto lanes = fill_lanes(group);
     for (int l = 0; l < kLanes; ++l)
       state_.position_m.set_lane(l, lanes[static_cast<size_t>(l)]->start_position_m);
@@ -69,7 +69,7 @@ class LaneRun {
   /// Lets `steps` steps pass while time stands still at `time_s`. Held points glide from where they
   /// are to where they belong over the first fifth: a jump would hit the cloth like a hammer.
   void settle(double time_s, double time_step_s, int steps) {
-    const LaneVectors from = held_target_m_;
+    const LaneVectors<> from = held_target_m_;
     for (int n = 0; n < steps; ++n) {
       held_target_m_ = from;
       aim_held_points(time_s, std::min(1.0, 5.0 * (n + 1) / steps));
@@ -95,7 +95,7 @@ class LaneRun {
   EulerStepper stepper_;
   LaneParameters parameters_;
   LaneState state_;
-  LaneVectors held_target_m_;
+  LaneVectors<> held_target_m_;
 };
 
 bool left_the_scene(const Eigen::Matrix3Xd& now, const Eigen::Matrix3Xd& start, const Mesh& mesh) {

@@ -33,7 +33,7 @@ HeldPlacement::HeldPlacement(const Cloth& cloth)
 namespace {
 
 /// Adds the held point's place between the vertices to `sum`.
-void add_place(const HeldVertexWeights& held, const LaneArray& position, LaneArray& sum,
+void add_place(const HeldVertexWeights& held, const LaneArray<>& position, LaneArray<>& sum,
                Eigen::Index column) {
   for (const auto& [vertex, weight] : held.weights)
     sum.col(column) += weight * position.col(vertex);
@@ -41,8 +41,8 @@ void add_place(const HeldVertexWeights& held, const LaneArray& position, LaneArr
 
 }  // namespace
 
-LaneVectors HeldPlacement::locate(const LaneVectors& position_m) const {
-  LaneVectors located = LaneVectors::zero(count());
+LaneVectors<> HeldPlacement::locate(const LaneVectors<>& position_m) const {
+  LaneVectors<> located = LaneVectors<>::zero(count());
   for (int h = 0; h < count(); ++h) {
     const HeldVertexWeights& held = held_[static_cast<size_t>(h)];
     add_place(held, position_m.x, located.x, h);
@@ -52,15 +52,16 @@ LaneVectors HeldPlacement::locate(const LaneVectors& position_m) const {
   return located;
 }
 
-void HeldPlacement::place(const LaneVectors& target_m, double time_step_s, LaneState& state) {
-  const auto correct = [&](const LaneArray& target, LaneArray& position, LaneArray& velocity) {
+void HeldPlacement::place(const LaneVectors<>& target_m, double time_step_s, LaneState& state) {
+  const auto correct = [&](const LaneArray<>& target, LaneArray<>& position,
+                           LaneArray<>& velocity) {
     missing_m_.setZero();
     for (int h = 0; h < count(); ++h) {
       add_place(held_[static_cast<size_t>(h)], position, missing_m_, h);
       missing_m_.col(h) = target.col(h) - missing_m_.col(h);
     }
     for (size_t n = 0; n < touched_.size(); ++n) {
-      LaneValue shift = LaneValue::Zero();
+      LaneValue<> shift = LaneValue<>::Zero();
       for (int h = 0; h < count(); ++h)
         shift += correction_(static_cast<Eigen::Index>(n), h) * missing_m_.col(h);
       position.col(touched_[n]) += shift;
@@ -102,9 +103,9 @@ EulerStepper::EulerStepper(const Cloth& cloth)
       held_(cloth),
       sweep_(cloth.mesh),
       limiter_(cloth.mesh, movable(cloth, held_)),
-      effect_force_n_(LaneVectors::zero(cloth.mesh.vertex_count())) {}
+      effect_force_n_(LaneVectors<>::zero(cloth.mesh.vertex_count())) {}
 
-void EulerStepper::step(const LaneParameters& parameters, const LaneVectors& held_target_m,
+void EulerStepper::step(const LaneParameters& parameters, const LaneVectors<>& held_target_m,
                         double time_s, double time_step_s, LaneState& state) {
   const bool any_effect = !cloth_.effects.empty();
   if (any_effect) {

@@ -33,8 +33,8 @@ struct EffectDescription {
 /// What an effect may look at: the state at the beginning of a step.
 struct EffectScene {
   const Mesh& mesh;
-  const LaneVectors& position_m;
-  const LaneVectors& velocity_m_per_s;
+  const LaneVectors<>& position_m;
+  const LaneVectors<>& velocity_m_per_s;
   const Eigen::VectorXd& mass_kg;  ///< per vertex
   double time_s = 0;
 };
@@ -45,8 +45,8 @@ class Effect {
   virtual ~Effect() = default;
 
   /// Adds the effect's force to `force_n`. `parameters[p]` holds parameter p in every lane.
-  virtual void add_force(const EffectScene& scene, const std::vector<LaneValue>& parameters,
-                         LaneVectors& force_n) const = 0;
+  virtual void add_force(const EffectScene& scene, const std::vector<LaneValue<>>& parameters,
+                         LaneVectors<>& force_n) const = 0;
 
   /// Upper bound of the rate (1/s) at which the effect damps a velocity, for the choice of a stable
   /// time step. `parameters` in the description's order.

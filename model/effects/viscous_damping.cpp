@@ -5,12 +5,12 @@ namespace {
 
 class ViscousDamping final : public Effect {
  public:
-  void add_force(const EffectScene& scene, const std::vector<LaneValue>& parameters,
-                 LaneVectors& force_n) const override {
-    const LaneValue& rate_per_s = parameters[0];
-    const LaneVectors& v = scene.velocity_m_per_s;
+  void add_force(const EffectScene& scene, const std::vector<LaneValue<>>& parameters,
+                 LaneVectors<>& force_n) const override {
+    const LaneValue<>& rate_per_s = parameters[0];
+    const LaneVectors<>& v = scene.velocity_m_per_s;
     for (Eigen::Index k = 0; k < scene.mass_kg.size(); ++k) {
-      const LaneValue c = rate_per_s * scene.mass_kg[k];
+      const LaneValue<> c = rate_per_s * scene.mass_kg[k];
       force_n.x.col(k) -= c * v.x.col(k);
       force_n.y.col(k) -= c * v.y.col(k);
       force_n.z.col(k) -= c * v.z.col(k);

@@ -19,7 +19,7 @@ namespace {
 /// What a sweep works on; element (vertex * kLanes + lane) of each array is one vertex in one lane.
 struct SweepArrays {
   Mesh mesh;
-  const LaneSprings& springs;
+  const LaneSprings<>& springs;
   std::array<const double*, 3> position_m;
   std::array<const double*, 3> velocity_m_per_s;
   double* scratch;  ///< kScratchRows rows of columns x kLanes
@@ -173,20 +173,26 @@ HWY_EXPORT(add_forces);
 HWY_EXPORT(step_euler);
 }  // namespace
 
-ClothSweep::ClothSweep(const Mesh& mesh)
+template <>
+ClothSweep<ExactLanes>::ClothSweep(const Mesh& mesh)
     : mesh_(mesh), scratch_(static_cast<size_t>(kScratchRows * mesh.columns) * kLanes) {}
 
-void ClothSweep::add_spring_forces(const LaneSprings& springs, const LaneVectors& position_m,
-                                   const LaneVectors& velocity_m_per_s, LaneVectors& force_n) {
+template <>
+void ClothSweep<ExactLanes>::add_spring_forces(const LaneSprings<>& springs,
+                                               const LaneVectors<>& position_m,
+                                               const LaneVectors<>& velocity_m_per_s,
+                                               LaneVectors<>& force_n) {
   const SweepArrays arrays{mesh_, springs, position_m.data(), velocity_m_per_s.data(),
                            scratch_.data()};
   HWY_DYNAMIC_DISPATCH(add_forces)(arrays, force_n.data());
 }
 
-void ClothSweep::step_euler(const LaneSprings& springs, const LaneGravity& gravity,
-                            const Eigen::VectorXd& inverse_mass_per_kg,
-                            const LaneVectors* effect_force_n, double time_step_s,
-                            LaneVectors& position_m, LaneVectors& velocity_m_per_s) {
+template <>
+void ClothSweep<ExactLanes>::step_euler(const LaneSprings<>& springs, const LaneVector<>& gravity,
+                                        const Eigen::VectorXd& inverse_mass_per_kg,
+                                        const LaneVectors<>* effect_force_n, double time_step_s,
+                                        LaneVectors<>& position_m,
+                                        LaneVectors<>& velocity_m_per_s) {
   const SweepArrays arrays{mesh_, springs, std::as_const(position_m).data(),
                            std::as_const(velocity_m_per_s).data(), scratch_.data()};
   const EulerArrays euler{

@@ -9,15 +9,11 @@
 namespace clothfit {
 
 /// The springs' constants in every lane.
+template <class L = ExactLanes>
 struct LaneSprings {
-  std::array<LaneValue, kSpringTypes> natural_length_m;
-  std::array<LaneValue, kSpringTypes> stiffness_n_per_m;
-  std::array<LaneValue, kSpringTypes> damping_ns_per_m;
-};
-
-/// A gravity vector in every lane (m/s2).
-struct LaneGravity {
-  LaneValue x, y, z;
+  std::array<LaneValue<L>, kSpringTypes> natural_length_m;
+  std::array<LaneValue<L>, kSpringTypes> stiffness_n_per_m;
+  std::array<LaneValue<L>, kSpringTypes> damping_ns_per_m;
 };
 
 /// The hot loop: the springs' forces on every vertex in every lane, and the Euler step that they
@@ -40,24 +36,25 @@ struct LaneGravity {
 /// when the program starts.
 ///
 /// Holds scratch memory: one object per thread.
+template <class L = ExactLanes>
 class ClothSweep {
  public:
   explicit ClothSweep(const Mesh& mesh);
 
   /// Adds the springs' forces (N) to `force_n`.
-  void add_spring_forces(const LaneSprings& springs, const LaneVectors& position_m,
-                         const LaneVectors& velocity_m_per_s, LaneVectors& force_n);
+  void add_spring_forces(const LaneSprings<L>& springs, const LaneVectors<L>& position_m,
+                         const LaneVectors<L>& velocity_m_per_s, LaneVectors<L>& force_n);
 
   /// The paper's Euler scheme, velocities first, positions with the new velocities
   /// [louchet1995, equation 2]:  V += h (g + F / m),  P += h V,  with F the springs' forces and,
   /// where given, `effect_force_n`.
-  void step_euler(const LaneSprings& springs, const LaneGravity& gravity,
-                  const Eigen::VectorXd& inverse_mass_per_kg, const LaneVectors* effect_force_n,
-                  double time_step_s, LaneVectors& position_m, LaneVectors& velocity_m_per_s);
+  void step_euler(const LaneSprings<L>& springs, const LaneVector<L>& gravity,
+                  const Eigen::VectorXd& inverse_mass_per_kg, const LaneVectors<L>* effect_force_n,
+                  double time_step_s, LaneVectors<L>& position_m, LaneVectors<L>& velocity_m_per_s);
 
  private:
   Mesh mesh_;
-  std::vector<double> scratch_;  ///< forces on vertices that are not reached yet
+  std::vector<typename L::Number> scratch_;  ///< forces on vertices that are not reached yet
 };
 
 }  // namespace clothfit

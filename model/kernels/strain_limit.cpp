@@ -23,14 +23,15 @@ inline constexpr SpringReach kReach[kSpringTypes] = {{1, 0},  {0, 1}, {1, 1},
 /// lane.
 struct LimitArrays {
   Mesh mesh;
-  const LaneLimits& limits;
+  const LaneLimits<>& limits;
   const std::array<std::vector<SpringShares>, kSpringTypes>& shares;
   std::array<double*, 3> position_m;
   std::array<double*, 3> velocity_m_per_s;  ///< null: not corrected
   double steps_per_s = 0;
-  LaneValue active = LaneValue::Ones();       ///< 1 in lanes to work on, else 0
-  LaneValue shortened = LaneValue::Zero();    ///< counts the springs that a sweep has shortened
-  LaneValue intolerable = LaneValue::Zero();  ///< set to 1 where a spring is longer than tolerated
+  LaneValue<> active = LaneValue<>::Ones();     ///< 1 in lanes to work on, else 0
+  LaneValue<> shortened = LaneValue<>::Zero();  ///< counts the springs that a sweep has shortened
+  LaneValue<> intolerable =
+      LaneValue<>::Zero();  ///< set to 1 where a spring is longer than tolerated
 };
 
 }  // namespace clothfit
@@ -129,7 +130,9 @@ HWY_EXPORT(sweep_springs);
 HWY_EXPORT(check_springs);
 }  // namespace
 
-StrainLimiter::StrainLimiter(const Mesh& mesh, const Eigen::VectorXd& inverse_mass_per_kg)
+template <>
+StrainLimiter<ExactLanes>::StrainLimiter(const Mesh& mesh,
+                                         const Eigen::VectorXd& inverse_mass_per_kg)
     : mesh_(mesh) {
   for (size_t type = 0; type < kSpringTypes; ++type) {
     const auto [down, right] = kReach[type];
@@ -146,7 +149,9 @@ StrainLimiter::StrainLimiter(const Mesh& mesh, const Eigen::VectorXd& inverse_ma
   }
 }
 
-LimitOutcome StrainLimiter::limit_positions(const LaneLimits& limits, LaneVectors& position_m) {
+template <>
+LimitOutcome<> StrainLimiter<ExactLanes>::limit_positions(const LaneLimits<>& limits,
+                                                          LaneVectors<>& position_m) {
   LimitArrays arrays{.mesh = mesh_,
                      .limits = limits,
                      .shares = shares_,
@@ -156,16 +161,18 @@ LimitOutcome StrainLimiter::limit_positions(const LaneLimits& limits, LaneVector
   return {.too_long = arrays.shortened};
 }
 
-LimitOutcome StrainLimiter::limit_consistently(const LaneLimits& limits, int most_sweeps,
-                                               double time_step_s, LaneVectors& position_m,
-                                               LaneVectors& velocity_m_per_s) {
+template <>
+LimitOutcome<> StrainLimiter<ExactLanes>::limit_consistently(const LaneLimits<>& limits,
+                                                             int most_sweeps, double time_step_s,
+                                                             LaneVectors<>& position_m,
+                                                             LaneVectors<>& velocity_m_per_s) {
   LimitArrays arrays{.mesh = mesh_,
                      .limits = limits,
                      .shares = shares_,
                      .position_m = position_m.data(),
                      .velocity_m_per_s = velocity_m_per_s.data(),
                      .steps_per_s = 1 / time_step_s};
-  LimitOutcome outcome;
+  LimitOutcome<> outcome;
   for (int n = 0; n < most_sweeps; ++n) {
     arrays.shortened.setZero();
     HWY_DYNAMIC_DISPATCH(sweep_springs)(arrays);

@@ -22,9 +22,11 @@ struct StrainLimit {
 };
 
 /// Lengths that springs may have, in every lane; infinite where there is no limit.
+template <class L = ExactLanes>
 struct LaneLimits {
-  std::array<LaneValue, kSpringTypes> longest_m;    ///< natural length times (1 + critical one)
-  std::array<LaneValue, kSpringTypes> tolerated_m;  ///< `consistent` sweeps until none exceeds this
+  std::array<LaneValue<L>, kSpringTypes> longest_m;  ///< natural length times (1 + critical one)
+  std::array<LaneValue<L>, kSpringTypes>
+      tolerated_m;  ///< `consistent` sweeps until none exceeds this
 };
 
 /// Shares of a correction that the first and the second end of a spring take.
@@ -33,9 +35,10 @@ struct SpringShares {
 };
 
 /// What a limit found, in every lane.
+template <class L = ExactLanes>
 struct LimitOutcome {
-  LaneValue too_long = LaneValue::Zero();  ///< springs that the first sweep shortened
-  LaneValue unmet = LaneValue::Zero();     ///< 1 where a spring is still longer than tolerated
+  LaneValue<L> too_long = LaneValue<L>::Zero();  ///< springs that the first sweep shortened
+  LaneValue<L> unmet = LaneValue<L>::Zero();  ///< 1 where a spring is still longer than tolerated
 };
 
 /// Sets springs that are longer than `longest_m` to exactly that by moving their two ends along
@@ -51,19 +54,21 @@ struct LimitOutcome {
 ///
 /// Strict IEEE double, the same bits on every instruction set. A lane's result does not depend on
 /// what the others carry.
+template <class L = ExactLanes>
 class StrainLimiter {
  public:
   /// `inverse_mass_per_kg` is 0 where a vertex must not move.
   StrainLimiter(const Mesh& mesh, const Eigen::VectorXd& inverse_mass_per_kg);
 
   /// One sweep over positions alone; `unmet` is not looked at.
-  LimitOutcome limit_positions(const LaneLimits& limits, LaneVectors& position_m);
+  LimitOutcome<L> limit_positions(const LaneLimits<L>& limits, LaneVectors<L>& position_m);
 
   /// Sweeps until no spring of a lane is longer than tolerated, at most `most_sweeps` times; what a
   /// vertex is moved by, over the time step, is added to its velocity. Held points that are further
   /// apart than the springs between them may reach leave the limit unmet.
-  LimitOutcome limit_consistently(const LaneLimits& limits, int most_sweeps, double time_step_s,
-                                  LaneVectors& position_m, LaneVectors& velocity_m_per_s);
+  LimitOutcome<L> limit_consistently(const LaneLimits<L>& limits, int most_sweeps,
+                                     double time_step_s, LaneVectors<L>& position_m,
+                                     LaneVectors<L>& velocity_m_per_s);
 
  private:
   Mesh mesh_;

@@ -25,8 +25,8 @@ struct LaneCloth {
 
   explicit LaneCloth(int vertices_per_side)
       : cloth(swinging_cloth(vertices_per_side)),
-        state{LaneVectors::zero(cloth.mesh.vertex_count()),
-              LaneVectors::zero(cloth.mesh.vertex_count())} {
+        state{LaneVectors<>::zero(cloth.mesh.vertex_count()),
+              LaneVectors<>::zero(cloth.mesh.vertex_count())} {
     const std::vector<ParameterSet> sets = cotton_sets(cloth, kLanes);
     for (int l = 0; l < kLanes; ++l) {
       const ParameterSet& set = sets[static_cast<size_t>(l)];
@@ -47,8 +47,8 @@ struct LaneCloth {
 
 void add_spring_forces(benchmark::State& run) {
   const LaneCloth lanes(static_cast<int>(run.range(0)));
-  ClothSweep sweep(lanes.cloth.mesh);
-  LaneVectors force_n = LaneVectors::zero(lanes.cloth.mesh.vertex_count());
+  ClothSweep<> sweep(lanes.cloth.mesh);
+  LaneVectors<> force_n = LaneVectors<>::zero(lanes.cloth.mesh.vertex_count());
   for ([[maybe_unused]] const auto _ : run) {
     sweep.add_spring_forces(lanes.parameters.springs, lanes.state.position_m,
                             lanes.state.velocity_m_per_s, force_n);
@@ -61,7 +61,7 @@ BENCHMARK(add_spring_forces)->Arg(9)->Arg(17)->Arg(33);
 void step(benchmark::State& run) {
   LaneCloth lanes(static_cast<int>(run.range(0)));
   EulerStepper stepper(lanes.cloth);
-  const LaneVectors target = stepper.held().locate(lanes.state.position_m);
+  const LaneVectors<> target = stepper.held().locate(lanes.state.position_m);
   for ([[maybe_unused]] const auto _ : run) {
     stepper.step(lanes.parameters, target, 0, 1e-4, lanes.state);
     benchmark::ClobberMemory();
@@ -73,9 +73,9 @@ BENCHMARK(step)->Arg(9)->Arg(17)->Arg(33)->Arg(65)->Arg(129);
 void step_with_viscous_damping(benchmark::State& run) {
   LaneCloth lanes(static_cast<int>(run.range(0)));
   lanes.cloth.add_effect("viscous_damping", "benchmark");
-  lanes.parameters.effects = {{LaneValue::Constant(0.1)}};
+  lanes.parameters.effects = {{LaneValue<>::Constant(0.1)}};
   EulerStepper stepper(lanes.cloth);
-  const LaneVectors target = stepper.held().locate(lanes.state.position_m);
+  const LaneVectors<> target = stepper.held().locate(lanes.state.position_m);
   for ([[maybe_unused]] const auto _ : run) {
     stepper.step(lanes.parameters, target, 0, 1e-4, lanes.state);
     benchmark::ClobberMemory();
@@ -96,7 +96,7 @@ void step_with_strain_limit(benchmark::State& run) {
     set_lane(l, springs, lanes.cloth.strain_limit, lanes.parameters);
   }
   EulerStepper stepper(lanes.cloth);
-  const LaneVectors target = stepper.held().locate(lanes.state.position_m);
+  const LaneVectors<> target = stepper.held().locate(lanes.state.position_m);
   double too_long = 0;
   for ([[maybe_unused]] const auto _ : run) {
     stepper.step(lanes.parameters, target, 0, 2e-4, lanes.state);

@@ -104,10 +104,10 @@ TEST(SpringForce, DashpotResistsTheRateOfStretchingOnly) {
 TEST(SpringForce, AddsToWhatIsThere) {
   const SpringParameters springs = one_spring_parameters(0.10, 50, 0);
   const Eigen::Matrix3Xd position_m = pair_of({0, 0, 0}, {0, 0.11, 0});
-  LaneVectors force_n = every_lane(Eigen::Matrix3Xd::Constant(3, 4, 4.0));
+  LaneVectors<> force_n = every_lane(Eigen::Matrix3Xd::Constant(3, 4, 4.0));
 
-  ClothSweep(kPair).add_spring_forces(every_lane(springs), every_lane(position_m),
-                                      every_lane(at_rest(position_m)), force_n);
+  ClothSweep<>(kPair).add_spring_forces(every_lane(springs), every_lane(position_m),
+                                        every_lane(at_rest(position_m)), force_n);
 
   EXPECT_NEAR(force_n.lane(0)(1, 0), 4.5, 1e-14);
   EXPECT_EQ(force_n.lane(0)(0, 0), 4.0);
@@ -257,9 +257,9 @@ TEST(SpringForce, StaysFiniteDownToTheSmallestLengths) {
 TEST(SpringForce, LanesKnowNothingOfEachOther) {
   Uniform uniform(13);
   const Mesh mesh = square_mesh(7);
-  LaneSprings springs;
-  LaneVectors position = LaneVectors::zero(mesh.vertex_count());
-  LaneVectors velocity = position, force = position;
+  LaneSprings<> springs;
+  LaneVectors<> position = LaneVectors<>::zero(mesh.vertex_count());
+  LaneVectors<> velocity = position, force = position;
   std::vector<CrumpledState> states;
   for (int l = 0; l < kLanes; ++l) {
     states.emplace_back(uniform, 7);
@@ -269,7 +269,7 @@ TEST(SpringForce, LanesKnowNothingOfEachOther) {
   }
   position.x(3, 5) = NAN;  // one lane is lost
 
-  ClothSweep(mesh).add_spring_forces(springs, position, velocity, force);
+  ClothSweep<>(mesh).add_spring_forces(springs, position, velocity, force);
 
   for (int l = 0; l < kLanes; ++l) {
     SCOPED_TRACE(l);
@@ -297,10 +297,10 @@ TEST_P(ClothSweepOn, AgreesWithTheScalarReferenceToTheLastBit) {
     const double h = 1e-4;
 
     // Given other springs, another gravity and another crumpled start in every lane,
-    LaneSprings springs;
-    LaneGravity gravity;
-    LaneVectors position = LaneVectors::zero(mesh.vertex_count());
-    LaneVectors velocity = position;
+    LaneSprings<> springs;
+    LaneVector<> gravity;
+    LaneVectors<> position = LaneVectors<>::zero(mesh.vertex_count());
+    LaneVectors<> velocity = position;
     std::vector<CrumpledState> states;
     std::vector<Eigen::Vector3d> pulls;
     for (int l = 0; l < kLanes; ++l) {
@@ -320,7 +320,7 @@ TEST_P(ClothSweepOn, AgreesWithTheScalarReferenceToTheLastBit) {
     }
 
     // when they move for many steps,
-    ClothSweep sweep(mesh);
+    ClothSweep<> sweep(mesh);
     for (int n = 0; n < 200; ++n)
       sweep.step_euler(springs, gravity, mass_kg.cwiseInverse(), nullptr, h, position, velocity);
 
@@ -349,12 +349,12 @@ TEST(ClothSweep, MovesPositionsWithTheNewVelocities) {
   Eigen::VectorXd mass_kg(4);
   mass_kg << 0.5, 2, 1, 1;
   const Eigen::Matrix3Xd ones = Eigen::Matrix3Xd::Ones(3, 4);
-  LaneVectors velocity = every_lane(3 * ones), position = every_lane(10 * ones);
-  const LaneVectors force = every_lane(4 * ones);
-  const LaneGravity gravity{LaneValue::Zero(), LaneValue::Zero(), LaneValue::Constant(-8)};
+  LaneVectors<> velocity = every_lane(3 * ones), position = every_lane(10 * ones);
+  const LaneVectors<> force = every_lane(4 * ones);
+  const LaneVector<> gravity{LaneValue<>::Zero(), LaneValue<>::Zero(), LaneValue<>::Constant(-8)};
 
-  ClothSweep(kPair).step_euler(every_lane(SpringParameters{}), gravity, mass_kg.cwiseInverse(),
-                               &force, 0.25, position, velocity);
+  ClothSweep<>(kPair).step_euler(every_lane(SpringParameters{}), gravity, mass_kg.cwiseInverse(),
+                                 &force, 0.25, position, velocity);
 
   EXPECT_EQ(velocity.lane(0).col(0), Eigen::Vector3d(5, 5, 3));  // 3 + (4 / 0.5 - 8 e_z) / 4
   EXPECT_EQ(velocity.lane(0).col(1), Eigen::Vector3d(3.5, 3.5, 1.5));

@@ -39,9 +39,9 @@ inline Parameters random_parameters(const EffectDescription& effect, Uniform& un
   return values;
 }
 
-inline std::vector<LaneValue> every_lane(const Parameters& values) {
-  std::vector<LaneValue> lanes;
-  for (const double value : values) lanes.push_back(LaneValue::Constant(value));
+inline std::vector<LaneValue<>> every_lane(const Parameters& values) {
+  std::vector<LaneValue<>> lanes;
+  for (const double value : values) lanes.push_back(LaneValue<>::Constant(value));
   return lanes;
 }
 
@@ -57,9 +57,9 @@ struct State {
 
 inline Eigen::Matrix3Xd force_n(const EffectEntry& entry, const State& state,
                                 const Parameters& parameters) {
-  const LaneVectors position_m = clothfit::every_lane(state.position_m);
-  const LaneVectors velocity_m_per_s = clothfit::every_lane(state.velocity_m_per_s);
-  LaneVectors force = LaneVectors::zero(36);
+  const LaneVectors<> position_m = clothfit::every_lane(state.position_m);
+  const LaneVectors<> velocity_m_per_s = clothfit::every_lane(state.velocity_m_per_s);
+  LaneVectors<> force = LaneVectors<>::zero(36);
   entry.make()->add_force({square_mesh(6), position_m, velocity_m_per_s, state.mass_kg, 0.3},
                           every_lane(parameters), force);
   return force.lane(0);
@@ -110,9 +110,9 @@ inline void expect_to_add_to_what_is_there(const EffectEntry& entry, Uniform& un
   const State state(uniform);
   const Parameters parameters = random_parameters(entry.describe(), uniform);
   const Eigen::Matrix3Xd there_n = uniform.vectors(36, 1);
-  const LaneVectors position_m = clothfit::every_lane(state.position_m);
-  const LaneVectors velocity_m_per_s = clothfit::every_lane(state.velocity_m_per_s);
-  LaneVectors sum_n = clothfit::every_lane(there_n);
+  const LaneVectors<> position_m = clothfit::every_lane(state.position_m);
+  const LaneVectors<> velocity_m_per_s = clothfit::every_lane(state.velocity_m_per_s);
+  LaneVectors<> sum_n = clothfit::every_lane(there_n);
 
   entry.make()->add_force({square_mesh(6), position_m, velocity_m_per_s, state.mass_kg, 0.3},
                           every_lane(parameters), sum_n);
@@ -124,8 +124,8 @@ inline void expect_to_add_to_what_is_there(const EffectEntry& entry, Uniform& un
 inline void expect_lanes_to_know_nothing_of_each_other(const EffectEntry& entry, Uniform& uniform) {
   const EffectDescription effect = entry.describe();
   const Eigen::VectorXd mass_kg = square_cloth(6).mass_kg;
-  LaneVectors position = LaneVectors::zero(36), velocity = position, together = position;
-  std::vector<LaneValue> values(effect.parameters.size());
+  LaneVectors<> position = LaneVectors<>::zero(36), velocity = position, together = position;
+  std::vector<LaneValue<>> values(effect.parameters.size());
   std::vector<State> states;
   std::vector<Parameters> parameters;
   for (int l = 0; l < kLanes; ++l) {

@@ -42,15 +42,15 @@ inline Eigen::Vector3d torque(const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd&
 }
 
 /// The same vectors in every lane.
-inline LaneVectors every_lane(const Eigen::Matrix3Xd& values) {
-  LaneVectors lanes = LaneVectors::zero(static_cast<int>(values.cols()));
+inline LaneVectors<> every_lane(const Eigen::Matrix3Xd& values) {
+  LaneVectors<> lanes = LaneVectors<>::zero(static_cast<int>(values.cols()));
   for (int l = 0; l < kLanes; ++l) lanes.set_lane(l, values);
   return lanes;
 }
 
 /// The same springs in every lane.
-inline LaneSprings every_lane(const SpringParameters& springs) {
-  LaneSprings lanes;
+inline LaneSprings<> every_lane(const SpringParameters& springs) {
+  LaneSprings<> lanes;
   for (size_t type = 0; type < kSpringTypes; ++type) {
     lanes.natural_length_m[type].setConstant(springs.natural_length_m[type]);
     lanes.stiffness_n_per_m[type].setConstant(springs.stiffness_n_per_m[type]);
@@ -59,7 +59,7 @@ inline LaneSprings every_lane(const SpringParameters& springs) {
   return lanes;
 }
 
-inline void set_lane(int l, const SpringParameters& springs, LaneSprings& lanes) {
+inline void set_lane(int l, const SpringParameters& springs, LaneSprings<>& lanes) {
   for (size_t type = 0; type < kSpringTypes; ++type) {
     lanes.natural_length_m[type][l] = springs.natural_length_m[type];
     lanes.stiffness_n_per_m[type][l] = springs.stiffness_n_per_m[type];
@@ -71,9 +71,9 @@ inline void set_lane(int l, const SpringParameters& springs, LaneSprings& lanes)
 inline Eigen::Matrix3Xd spring_forces_n(const Mesh& mesh, const SpringParameters& springs,
                                         const Eigen::Matrix3Xd& position_m,
                                         const Eigen::Matrix3Xd& velocity_m_per_s) {
-  LaneVectors force_n = LaneVectors::zero(static_cast<int>(position_m.cols()));
-  ClothSweep(mesh).add_spring_forces(every_lane(springs), every_lane(position_m),
-                                     every_lane(velocity_m_per_s), force_n);
+  LaneVectors<> force_n = LaneVectors<>::zero(static_cast<int>(position_m.cols()));
+  ClothSweep<>(mesh).add_spring_forces(every_lane(springs), every_lane(position_m),
+                                       every_lane(velocity_m_per_s), force_n);
   return force_n.lane(0);
 }
 
@@ -90,7 +90,7 @@ inline LaneParameters every_lane(const ParameterSet& set, const StrainLimit& str
   lanes.gravity_m_per_s2.z.setConstant(set.gravity_m_per_s2.z());
   for (const std::vector<double>& effect : set.effects) {
     lanes.effects.emplace_back();
-    for (const double value : effect) lanes.effects.back().push_back(LaneValue::Constant(value));
+    for (const double value : effect) lanes.effects.back().push_back(LaneValue<>::Constant(value));
   }
   return lanes;
 }
@@ -118,7 +118,7 @@ class SteppedCloth {
     stepper_.step(parameters_, held_target_m_, steps_ * time_step_s, time_step_s, state_);
     ++steps_;
   }
-  const LimitOutcome& limit_outcome() const { return stepper_.limit_outcome(); }
+  const LimitOutcome<>& limit_outcome() const { return stepper_.limit_outcome(); }
   Eigen::Matrix3Xd position_m() const { return state_.position_m.lane(0); }
   Eigen::Matrix3Xd velocity_m_per_s() const { return state_.velocity_m_per_s.lane(0); }
 
@@ -127,7 +127,7 @@ class SteppedCloth {
   LaneParameters parameters_;
   EulerStepper stepper_;
   LaneState state_;
-  LaneVectors held_target_m_;
+  LaneVectors<> held_target_m_;
   int steps_ = 0;
 };
 

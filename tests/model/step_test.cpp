@@ -191,8 +191,8 @@ TEST(Step, ActsOnEveryLaneByItsOwnParameters) {
   Uniform uniform(4);
   std::vector<ParameterSet> sets;
   LaneParameters together;
-  together.effects = {{LaneValue::Zero()}};
-  LaneState state{LaneVectors::zero(25), LaneVectors::zero(25)};
+  together.effects = {{LaneValue<>::Zero()}};
+  LaneState state{LaneVectors<>::zero(25), LaneVectors<>::zero(25)};
   for (int l = 0; l < kLanes; ++l) {
     sets.push_back({.springs = spring_parameters(random_fabric(uniform), cloth.mesh),
                     .gravity_m_per_s2 = uniform.vectors(1, 10).col(0),
@@ -206,7 +206,7 @@ TEST(Step, ActsOnEveryLaneByItsOwnParameters) {
     state.position_m.set_lane(l, sets.back().start_position_m);
   }
   EulerStepper stepper(cloth);
-  const LaneVectors target = stepper.held().locate(state.position_m);
+  const LaneVectors<> target = stepper.held().locate(state.position_m);
 
   for (int n = 0; n < 100; ++n) stepper.step(together, target, n * 1e-4, 1e-4, state);
 

@@ -20,16 +20,16 @@ namespace {
 /// Two springs of type structural_t, 1 m apart: between vertices 0 and 2, and between 1 and 3.
 constexpr Mesh kPair{.columns = 2, .rows = 2, .width_m = 1, .height_m = 0.1};
 
-LaneLimits no_limits() {
-  LaneLimits limits;
-  for (LaneValue& longest : limits.longest_m) longest.setConstant(INFINITY);
+LaneLimits<> no_limits() {
+  LaneLimits<> limits;
+  for (LaneValue<>& longest : limits.longest_m) longest.setConstant(INFINITY);
   limits.tolerated_m = limits.longest_m;
   return limits;
 }
 
 /// Every type's springs limited to (1 + `critical`) times their flat length.
-LaneLimits limits_of(const Mesh& mesh, double critical, double tolerance = 0) {
-  LaneLimits limits;
+LaneLimits<> limits_of(const Mesh& mesh, double critical, double tolerance = 0) {
+  LaneLimits<> limits;
   for (size_t type = 0; type < kSpringTypes; ++type) {
     limits.longest_m[type].setConstant((1 + critical) * flat_lengths(mesh)[type]);
     limits.tolerated_m[type].setConstant((1 + critical + tolerance) * flat_lengths(mesh)[type]);
@@ -56,7 +56,7 @@ double largest_excess(const Mesh& mesh, const Eigen::Matrix3Xd& position_m, doub
 
 TEST(StrainLimit, SetsASpringToExactlyItsCriticalElongation) {
   // Given a spring of 0.1 m drawn out to 0.15 m between masses of 1 kg and 3 kg,
-  LaneLimits limits = no_limits();
+  LaneLimits<> limits = no_limits();
   limits.longest_m[structural_t].setConstant(0.11);
   Eigen::VectorXd mass_kg(4);
   mass_kg << 1, 1, 3, 1;
@@ -64,10 +64,10 @@ TEST(StrainLimit, SetsASpringToExactlyItsCriticalElongation) {
   p.col(2) << 0, 0.09, 0.12;
   p.col(1) << 1, 0, 0;
   p.col(3) << 1, 0.05, 0;  // and another that is shorter than it may be,
-  LaneVectors position = every_lane(p);
+  LaneVectors<> position = every_lane(p);
 
-  const LimitOutcome outcome =
-      StrainLimiter(kPair, mass_kg.cwiseInverse()).limit_positions(limits, position);
+  const LimitOutcome<> outcome =
+      StrainLimiter<>(kPair, mass_kg.cwiseInverse()).limit_positions(limits, position);
 
   // then it is 0.11 m long, along the same line, and the light end moved three times as far.
   const Eigen::Matrix3Xd moved = position.lane(0);
@@ -80,7 +80,7 @@ TEST(StrainLimit, SetsASpringToExactlyItsCriticalElongation) {
 }
 
 TEST(StrainLimit, MovesTheFreeEndAloneWhenTheOtherIsHeld) {
-  LaneLimits limits = no_limits();
+  LaneLimits<> limits = no_limits();
   limits.longest_m[structural_t].setConstant(0.11);
   Eigen::VectorXd inverse_mass(4);
   inverse_mass << 0, 0, 1, 0;  // the second pair is held at both ends
@@ -88,9 +88,9 @@ TEST(StrainLimit, MovesTheFreeEndAloneWhenTheOtherIsHeld) {
   p(1, 2) = 0.15;
   p.col(1) << 1, 0, 0;
   p.col(3) << 1, 0.2, 0;
-  LaneVectors position = every_lane(p);
+  LaneVectors<> position = every_lane(p);
 
-  StrainLimiter(kPair, inverse_mass).limit_positions(limits, position);
+  StrainLimiter<>(kPair, inverse_mass).limit_positions(limits, position);
 
   Eigen::Matrix3Xd expected = p;
   expected(1, 2) = 0.11;
@@ -103,16 +103,16 @@ TEST(StrainLimit, LeavesClothWithinItsLimitsAsItIs) {
   const Eigen::Matrix3Xd p = flat_positions(mesh) + uniform.vectors(81, 0.002);
   ASSERT_LT(largest_excess(mesh, p, 0.2), 0);
   const Eigen::VectorXd inverse_mass = Eigen::VectorXd::Ones(81);
-  LaneVectors position = every_lane(p), velocity = every_lane(uniform.vectors(81, 1));
+  LaneVectors<> position = every_lane(p), velocity = every_lane(uniform.vectors(81, 1));
   const Eigen::Matrix3Xd v = velocity.lane(0);
-  StrainLimiter limiter(mesh, inverse_mass);
+  StrainLimiter<> limiter(mesh, inverse_mass);
 
-  const LimitOutcome once = limiter.limit_positions(limits_of(mesh, 0.2), position);
-  const LimitOutcome consistent =
+  const LimitOutcome<> once = limiter.limit_positions(limits_of(mesh, 0.2), position);
+  const LimitOutcome<> consistent =
       limiter.limit_consistently(limits_of(mesh, 0.2), 10, 1e-3, position, velocity);
-  const LimitOutcome never = limiter.limit_positions(no_limits(), position);
+  const LimitOutcome<> never = limiter.limit_positions(no_limits(), position);
 
-  for (const LimitOutcome& outcome : {once, consistent, never}) {
+  for (const LimitOutcome<>& outcome : {once, consistent, never}) {
     EXPECT_TRUE((outcome.too_long == 0).all());
     EXPECT_TRUE((outcome.unmet == 0).all());
   }
@@ -127,9 +127,9 @@ TEST(StrainLimit, KeepsTheCentreOfMassAndMomentum) {
     const Mesh mesh = square_mesh(9);
     const Eigen::VectorXd mass_kg = masses_by_area(mesh, 0.025);
     const Eigen::Matrix3Xd p = stretched(mesh, 1.3, uniform), v = uniform.vectors(81, 1);
-    LaneVectors position = every_lane(p), velocity = every_lane(v);
+    LaneVectors<> position = every_lane(p), velocity = every_lane(v);
 
-    StrainLimiter(mesh, mass_kg.cwiseInverse())
+    StrainLimiter<>(mesh, mass_kg.cwiseInverse())
         .limit_consistently(limits_of(mesh, 0.1), 20, 1e-3, position, velocity);
 
     const Eigen::Matrix3Xd moved = position.lane(0);
@@ -155,11 +155,11 @@ TEST(StrainLimit, SweepsUntilNoSpringIsLongerThanToleratedOrSaysSo) {
         p.col(0) << 0, 0, 0;
         p.col(vertices - 1) << 0.4, 0, 0;
         inverse_mass[0] = inverse_mass[vertices - 1] = 0;
-        LaneVectors once = every_lane(p), position = once, velocity = every_lane(at_rest(p));
-        StrainLimiter limiter(mesh, inverse_mass);
+        LaneVectors<> once = every_lane(p), position = once, velocity = every_lane(at_rest(p));
+        StrainLimiter<> limiter(mesh, inverse_mass);
 
         limiter.limit_positions(limits_of(mesh, critical), once);
-        const LimitOutcome outcome = limiter.limit_consistently(
+        const LimitOutcome<> outcome = limiter.limit_consistently(
             limits_of(mesh, critical, 1e-3), StrainLimit{}.most_sweeps, 1e-3, position, velocity);
 
         // then one sweep leaves springs that are too long, and many none, or that is said.
@@ -182,10 +182,10 @@ TEST(StrainLimit, SaysWhenHeldPointsAreTooFarApart) {
   inverse_mass[0] = inverse_mass[4] = 0;
   Eigen::Matrix3Xd p = flat_positions(mesh);
   p.row(0) *= 1.125;  // the corners are 12.5 % apart, the springs between may stretch by 10 %
-  LaneVectors position = every_lane(p), velocity = every_lane(at_rest(p));
+  LaneVectors<> position = every_lane(p), velocity = every_lane(at_rest(p));
 
-  const LimitOutcome outcome =
-      StrainLimiter(mesh, inverse_mass)
+  const LimitOutcome<> outcome =
+      StrainLimiter<>(mesh, inverse_mass)
           .limit_consistently(limits_of(mesh, 0.1, 1e-3), 50, 1e-3, position, velocity);
 
   EXPECT_TRUE((outcome.unmet == 1).all());
@@ -195,7 +195,7 @@ TEST(StrainLimit, SaysWhenHeldPointsAreTooFarApart) {
 
 /// One sweep over plain vectors in the published order; returns whether it shortened a spring.
 bool reference_sweep(const Mesh& mesh, const Eigen::VectorXd& inverse_mass,
-                     const LaneLimits& limits, Eigen::Index lane, double steps_per_s,
+                     const LaneLimits<>& limits, Eigen::Index lane, double steps_per_s,
                      Eigen::Matrix3Xd& p, Eigen::Matrix3Xd& v) {
   bool shortened = false;
   const SpringNet net = make_springs(mesh);
@@ -234,7 +234,7 @@ bool reference_sweep(const Mesh& mesh, const Eigen::VectorXd& inverse_mass,
 }
 
 bool reference_is_tolerable(const Mesh& mesh, const Eigen::VectorXd& inverse_mass,
-                            const LaneLimits& limits, Eigen::Index lane,
+                            const LaneLimits<>& limits, Eigen::Index lane,
                             const Eigen::Matrix3Xd& p) {
   const SpringNet net = make_springs(mesh);
   for (size_t type = 0; type < kSpringTypes; ++type) {
@@ -259,22 +259,22 @@ TEST_P(StrainLimitOn, AgreesWithPlainArithmeticToTheLastBit) {
     // Given lanes that are stretched unlike, the first of them not at all,
     Eigen::VectorXd inverse_mass = masses_by_area(mesh, 0.025).cwiseInverse();
     inverse_mass[0] = inverse_mass[2] = 0;
-    LaneLimits limits = limits_of(mesh, 0.1, 2e-3);
-    LaneVectors position = LaneVectors::zero(mesh.vertex_count()), velocity = position;
+    LaneLimits<> limits = limits_of(mesh, 0.1, 2e-3);
+    LaneVectors<> position = LaneVectors<>::zero(mesh.vertex_count()), velocity = position;
     std::vector<Eigen::Matrix3Xd> p, v;
     for (int l = 0; l < kLanes; ++l) {
       p.push_back(l == 0 ? flat_positions(mesh) : stretched(mesh, 1 + 0.05 * l, uniform));
       v.push_back(uniform.vectors(mesh.vertex_count(), 1));
-      for (LaneValue& longest : limits.longest_m) longest[l] *= 1 + 0.001 * l;
+      for (LaneValue<>& longest : limits.longest_m) longest[l] *= 1 + 0.001 * l;
       position.set_lane(l, p.back());
       velocity.set_lane(l, v.back());
     }
-    const LaneVectors start = position;
+    const LaneVectors<> start = position;
 
     // when they are limited until all are done,
-    StrainLimiter limiter(mesh, inverse_mass);
+    StrainLimiter<> limiter(mesh, inverse_mass);
     limiter.limit_consistently(limits, 40, 1e-3, position, velocity);
-    LaneVectors once = start;
+    LaneVectors<> once = start;
     limiter.limit_positions(limits, once);
 
     // then each is where it would be alone, bit for bit.

@@ -33,8 +33,8 @@ struct Flight {
 
 Eigen::Matrix3Xd forces_n(const Flight& flight, const Eigen::Matrix3Xd& position_m,
                           const Eigen::Matrix3Xd& velocity_m_per_s) {
-  const LaneVectors p = every_lane(position_m), v = every_lane(velocity_m_per_s);
-  LaneVectors force = LaneVectors::zero(flight.cloth.mesh.vertex_count());
+  const LaneVectors<> p = every_lane(position_m), v = every_lane(velocity_m_per_s);
+  LaneVectors<> force = LaneVectors<>::zero(flight.cloth.mesh.vertex_count());
   flight.cloth.effects.front()->add_force({flight.cloth.mesh, p, v, flight.cloth.mass_kg, 0},
                                           effect_contract::every_lane(flight.set.effects.front()),
                                           force);
