@@ -67,8 +67,8 @@ using EffectValues = std::vector<LaneValue<L>>;
 template <class L = ExactLanes>
 using EffectMemory = LaneArray<L>;
 
-/// What an effect does to simulations in lanes of kind L. Each does some of three things; what it
-/// does not do, it leaves as it is.
+/// What an effect does to simulations in lanes of kind L (with DualLanes: to their derivatives
+/// too). Each does some of three things; what it does not do, it leaves as it is.
 template <class L>
 class LaneEffect {
  public:
@@ -101,17 +101,21 @@ struct EffectRates {
 /// One physical effect beyond springs, dampers along them, and gravity.
 class Effect : public LaneEffect<ExactLanes>,
                public LaneEffect<FastLanes>,
-               public LaneEffect<SingleLane> {
+               public LaneEffect<SingleLane>,
+               public LaneEffect<DualLanes> {
  public:
   using LaneEffect<ExactLanes>::add_force;
   using LaneEffect<FastLanes>::add_force;
   using LaneEffect<SingleLane>::add_force;
+  using LaneEffect<DualLanes>::add_force;
   using LaneEffect<ExactLanes>::change_force;
   using LaneEffect<FastLanes>::change_force;
   using LaneEffect<SingleLane>::change_force;
+  using LaneEffect<DualLanes>::change_force;
   using LaneEffect<ExactLanes>::shift_supports;
   using LaneEffect<FastLanes>::shift_supports;
   using LaneEffect<SingleLane>::shift_supports;
+  using LaneEffect<DualLanes>::shift_supports;
 
   virtual bool changes_force() const { return false; }
   virtual bool shifts_supports() const { return false; }

@@ -82,6 +82,10 @@ class SpringLawEffect final : public Effect {
                  EffectMemory<FastLanes>& memory, LaneVectors<FastLanes>& force_n) const override {
     add(scene, parameters, memory, force_n);
   }
+  void add_force(const EffectScene<DualLanes>& scene, const EffectValues<DualLanes>& parameters,
+                 EffectMemory<DualLanes>& memory, LaneVectors<DualLanes>& force_n) const override {
+    add(scene, parameters, memory, force_n);
+  }
   void add_force(const EffectScene<SingleLane>& scene, const EffectValues<SingleLane>& parameters,
                  EffectMemory<SingleLane>& memory,
                  LaneVectors<SingleLane>& force_n) const override {

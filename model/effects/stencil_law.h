@@ -38,6 +38,10 @@ class StencilLawEffect final : public Effect {
                  EffectMemory<FastLanes>&, LaneVectors<FastLanes>& force_n) const override {
     add(scene, parameters, force_n);
   }
+  void add_force(const EffectScene<DualLanes>& scene, const EffectValues<DualLanes>& parameters,
+                 EffectMemory<DualLanes>&, LaneVectors<DualLanes>& force_n) const override {
+    add(scene, parameters, force_n);
+  }
   void add_force(const EffectScene<SingleLane>& scene, const EffectValues<SingleLane>& parameters,
                  EffectMemory<SingleLane>&, LaneVectors<SingleLane>& force_n) const override {
     add(scene, parameters, force_n);

@@ -47,6 +47,13 @@ class SupportLawEffect final : public Effect {
                       LaneVectors<FastLanes>& target_m) const override {
     shift(scene, parameters, support_force_n, memory, target_m);
   }
+  void shift_supports(const EffectScene<DualLanes>& scene,
+                      const EffectValues<DualLanes>& parameters,
+                      const LaneVectors<DualLanes>& support_force_n,
+                      EffectMemory<DualLanes>& memory,
+                      LaneVectors<DualLanes>& target_m) const override {
+    shift(scene, parameters, support_force_n, memory, target_m);
+  }
   void shift_supports(const EffectScene<SingleLane>& scene,
                       const EffectValues<SingleLane>& parameters,
                       const LaneVectors<SingleLane>& support_force_n,

@@ -159,6 +159,10 @@ class VertexLawEffect final : public Effect {
                  EffectMemory<FastLanes>&, LaneVectors<FastLanes>& force_n) const override {
     add(scene, parameters, force_n);
   }
+  void add_force(const EffectScene<DualLanes>& scene, const EffectValues<DualLanes>& parameters,
+                 EffectMemory<DualLanes>&, LaneVectors<DualLanes>& force_n) const override {
+    add(scene, parameters, force_n);
+  }
   void add_force(const EffectScene<SingleLane>& scene, const EffectValues<SingleLane>& parameters,
                  EffectMemory<SingleLane>&, LaneVectors<SingleLane>& force_n) const override {
     add(scene, parameters, force_n);
@@ -206,6 +210,10 @@ class InertiaLawEffect final : public Effect {
   }
   void change_force(const EffectScene<FastLanes>& scene, const EffectValues<FastLanes>& parameters,
                     LaneVectors<FastLanes>& force_n) const override {
+    change(scene, parameters, force_n);
+  }
+  void change_force(const EffectScene<DualLanes>& scene, const EffectValues<DualLanes>& parameters,
+                    LaneVectors<DualLanes>& force_n) const override {
     change(scene, parameters, force_n);
   }
   void change_force(const EffectScene<SingleLane>& scene,
