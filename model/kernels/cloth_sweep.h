@@ -16,6 +16,26 @@ struct LaneSprings {
   std::array<LaneValue<L>, kSpringTypes> damping_ns_per_m;
 };
 
+/// Factors on the constants of single springs, the same in every lane. By type and by the vertex
+/// that a spring leaves to the right or down (of shear_up: [i, j], which it leaves for
+/// [i+1, j-1]); where no spring leaves, the number counts for nothing.
+template <class L = ExactLanes>
+struct SpringFactors {
+  using PerVertex = Eigen::Array<typename L::Number, Eigen::Dynamic, 1>;
+  std::array<PerVertex, kSpringTypes> stiffness;
+  std::array<PerVertex, kSpringTypes> natural_length;
+
+  /// Entries that vectors over vertices may read beyond the last one.
+  static constexpr int kPadding = 8;
+
+  static SpringFactors ones(const Mesh& mesh) {
+    SpringFactors factors;
+    factors.stiffness.fill(PerVertex::Ones(mesh.vertex_count() + kPadding));
+    factors.natural_length = factors.stiffness;
+    return factors;
+  }
+};
+
 /// The hot loop: the springs' forces on every vertex in every lane, and the Euler step that they
 /// drive. Spring and dashpot pull with
 ///
@@ -30,10 +50,11 @@ struct LaneSprings {
 /// its forces are known: no spring of a later one reaches back to it. So each number is read and
 /// written once per step, and each spring is computed once.
 ///
-/// Strict IEEE double: no contraction, only operations that are rounded correctly (1 / l by
+/// In `double` strict IEEE: no contraction, only operations that are rounded correctly (1 / l by
 /// Newton's method, to 3e-16), sums in an order that does not depend on the vector length. So the
-/// bits are the same on every instruction set. Compiled for several; the processor's best is taken
-/// when the program starts.
+/// bits are the same on every instruction set. In `float` products may be fused with sums and 1 / l
+/// starts from the processor's estimate (4e-7), so they differ between processors. Compiled for
+/// several instruction sets; the processor's best is taken when the program starts.
 ///
 /// Holds scratch memory: one object per thread.
 template <class L = ExactLanes>
@@ -41,16 +62,18 @@ class ClothSweep {
  public:
   explicit ClothSweep(const Mesh& mesh);
 
-  /// Adds the springs' forces (N) to `force_n`.
+  /// Adds the springs' forces (N) to `force_n`. `factors`: null for springs of a type all alike.
   void add_spring_forces(const LaneSprings<L>& springs, const LaneVectors<L>& position_m,
-                         const LaneVectors<L>& velocity_m_per_s, LaneVectors<L>& force_n);
+                         const LaneVectors<L>& velocity_m_per_s, LaneVectors<L>& force_n,
+                         const SpringFactors<L>* factors = nullptr);
 
   /// The paper's Euler scheme, velocities first, positions with the new velocities
   /// [louchet1995, equation 2]:  V += h (g + F / m),  P += h V,  with F the springs' forces and,
   /// where given, `effect_force_n`.
   void step_euler(const LaneSprings<L>& springs, const LaneVector<L>& gravity,
                   const Eigen::VectorXd& inverse_mass_per_kg, const LaneVectors<L>* effect_force_n,
-                  double time_step_s, LaneVectors<L>& position_m, LaneVectors<L>& velocity_m_per_s);
+                  double time_step_s, LaneVectors<L>& position_m, LaneVectors<L>& velocity_m_per_s,
+                  const SpringFactors<L>* factors = nullptr);
 
  private:
   Mesh mesh_;

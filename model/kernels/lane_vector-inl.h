@@ -10,6 +10,7 @@
 
 #include <array>
 #include <cstddef>
+#include <type_traits>
 
 #include "model/lanes.h"
 
@@ -19,67 +20,132 @@ namespace {
 namespace HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
-using Tag = hn::CappedTag<double, kLanes>;
-using Vector = hn::Vec<Tag>;
 
+/// As many lanes of `L` as a vector of this instruction set holds.
+template <class L>
+using Tag = hn::CappedTag<typename L::Number, L::kCount>;
+
+/// A number in each lane of a vector; Vector3: a vector in each.
+template <class L>
+using Vector = hn::Vec<Tag<L>>;
+
+template <class V>
 struct Vector3 {
-  Vector x, y, z;
+  V x, y, z;
 };
 
-template <class Number>
-HWY_INLINE Vector3 load(const std::array<Number*, 3>& from, std::ptrdiff_t at) {
-  const Tag d;
+template <class D, class Number>
+HWY_INLINE Vector3<hn::Vec<D>> load(D d, const std::array<Number*, 3>& from, std::ptrdiff_t at) {
   return {hn::LoadU(d, from[0] + at), hn::LoadU(d, from[1] + at), hn::LoadU(d, from[2] + at)};
 }
 
-HWY_INLINE void store(const Vector3& v, const std::array<double*, 3>& to, std::ptrdiff_t at) {
-  const Tag d;
+template <class D>
+HWY_INLINE void store(const Vector3<hn::Vec<D>>& v, D d, const std::array<hn::TFromD<D>*, 3>& to,
+                      std::ptrdiff_t at) {
   hn::StoreU(v.x, d, to[0] + at);
   hn::StoreU(v.y, d, to[1] + at);
   hn::StoreU(v.z, d, to[2] + at);
 }
 
-HWY_INLINE Vector3 zero() {
-  const Vector none = hn::Zero(Tag());
-  return {none, none, none};
+template <class D>
+HWY_INLINE Vector3<hn::Vec<D>> zero(D d) {
+  return {hn::Zero(d), hn::Zero(d), hn::Zero(d)};
 }
 
-HWY_INLINE Vector3 operator+(const Vector3& a, const Vector3& b) {
+template <class V>
+HWY_INLINE Vector3<V> operator+(const Vector3<V>& a, const Vector3<V>& b) {
   return {hn::Add(a.x, b.x), hn::Add(a.y, b.y), hn::Add(a.z, b.z)};
 }
 
-HWY_INLINE Vector3 operator-(const Vector3& a, const Vector3& b) {
+template <class V>
+HWY_INLINE Vector3<V> operator-(const Vector3<V>& a, const Vector3<V>& b) {
   return {hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), hn::Sub(a.z, b.z)};
 }
 
-HWY_INLINE Vector3 operator*(const Vector& a, const Vector3& b) {
+template <class V>
+HWY_INLINE Vector3<V> operator*(const V& a, const Vector3<V>& b) {
   return {hn::Mul(a, b.x), hn::Mul(a, b.y), hn::Mul(a, b.z)};
 }
 
+/// `double` is for exact results, where a product is rounded before it is added to; `float` is for
+/// speed, where it need not be.
+template <class V>
+constexpr bool kMayContract = std::is_same_v<hn::TFromD<hn::DFromV<V>>, float>;
+
+/// a b + c.
+template <class V>
+HWY_INLINE V mul_add(const V& a, const V& b, const V& c) {
+  if constexpr (kMayContract<V>)
+    return hn::MulAdd(a, b, c);
+  else
+    return hn::Add(hn::Mul(a, b), c);
+}
+
+/// c - a b.
+template <class V>
+HWY_INLINE V minus_product(const V& c, const V& a, const V& b) {
+  if constexpr (kMayContract<V>)
+    return hn::NegMulAdd(a, b, c);
+  else
+    return hn::Sub(c, hn::Mul(a, b));
+}
+
+template <class V>
+HWY_INLINE Vector3<V> mul_add(const V& a, const Vector3<V>& b, const Vector3<V>& c) {
+  return {mul_add(a, b.x, c.x), mul_add(a, b.y, c.y), mul_add(a, b.z, c.z)};
+}
+
+template <class V>
+HWY_INLINE Vector3<V> minus_product(const Vector3<V>& c, const V& a, const Vector3<V>& b) {
+  return {minus_product(c.x, a, b.x), minus_product(c.y, a, b.y), minus_product(c.z, a, b.z)};
+}
+
 /// `a` where `mask` holds, else `b`.
-HWY_INLINE Vector3 select(const hn::Mask<Tag>& mask, const Vector3& a, const Vector3& b) {
+template <class M, class V>
+HWY_INLINE Vector3<V> select(const M& mask, const Vector3<V>& a, const Vector3<V>& b) {
   return {hn::IfThenElse(mask, a.x, b.x), hn::IfThenElse(mask, a.y, b.y),
           hn::IfThenElse(mask, a.z, b.z)};
 }
 
-HWY_INLINE Vector dot(const Vector3& a, const Vector3& b) {
-  return hn::Add(hn::Add(hn::Mul(a.x, b.x), hn::Mul(a.y, b.y)), hn::Mul(a.z, b.z));
+template <class V>
+HWY_INLINE V dot(const Vector3<V>& a, const Vector3<V>& b) {
+  return mul_add(a.z, b.z, mul_add(a.y, b.y, hn::Mul(a.x, b.x)));
 }
 
 /// 1 / sqrt(x) to 3e-16 for x from 1e-290 on; below that, its value there. A guess from the bits of
 /// the exponent, then Newton's steps: only operations that IEEE 754 rounds correctly, so that the
 /// bits are the same everywhere, and none that go through the divider, which would take longer than
 /// all the rest of a spring.
-HWY_INLINE Vector inverse_square_root(Vector x) {
-  const Tag d;
-  const hn::RebindToSigned<Tag> bits;
+template <class V, std::enable_if_t<!kMayContract<V>>* = nullptr>
+HWY_INLINE V inverse_square_root(V x) {
+  const hn::DFromV<V> d;
+  const hn::RebindToSigned<decltype(d)> bits;
   x = hn::Max(x, hn::Set(d, 1e-290));
-  const Vector half = hn::Mul(hn::Set(d, 0.5), x);
-  Vector y = hn::BitCast(d, hn::Sub(hn::Set(bits, 0x5fe6eb50c7b537a9),  // off by at most 3.5 %
-                                    hn::ShiftRight<1>(hn::BitCast(bits, x))));
+  const V half = hn::Mul(hn::Set(d, 0.5), x);
+  V y = hn::BitCast(d, hn::Sub(hn::Set(bits, 0x5fe6eb50c7b537a9),  // off by at most 3.5 %
+                               hn::ShiftRight<1>(hn::BitCast(bits, x))));
   for (int n = 0; n < 4; ++n)  // 2e-3, 5e-6, 4e-11, rounding
     y = hn::Mul(y, hn::Sub(hn::Set(d, 1.5), hn::Mul(half, hn::Mul(y, y))));
   return y;
+}
+
+/// The same in `float`, to 4e-7 for normal x > 0: the processor's estimate and a Newton step.
+template <class V, std::enable_if_t<kMayContract<V>>* = nullptr>
+HWY_INLINE V inverse_square_root(V x) {
+  const hn::DFromV<V> d;
+  const V y = hn::ApproximateReciprocalSqrt(x);
+  const V half_y = hn::Mul(hn::Set(d, 0.5f), y);
+  return hn::MulAdd(half_y, hn::NegMulAdd(hn::Mul(x, y), y, hn::Set(d, 1.0f)), y);
+}
+
+/// |a|^2; in `float` at least 1e-30, so that it has an inverse square root.
+template <class V>
+HWY_INLINE V squared_length(const Vector3<V>& a) {
+  if constexpr (kMayContract<V>)
+    return mul_add(a.z, a.z,
+                   mul_add(a.y, a.y, mul_add(a.x, a.x, hn::Set(hn::DFromV<V>(), 1e-30f))));
+  else
+    return dot(a, a);
 }
 
 }  // namespace HWY_NAMESPACE

@@ -1,5 +1,8 @@
 #include "model/kernels/strain_limit.h"
 
+#include <algorithm>
+#include <bit>
+
 // This source is compiled once for each instruction set, in a namespace of its own.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "model/kernels/strain_limit.cpp"
@@ -19,20 +22,41 @@ struct SpringReach {
 inline constexpr SpringReach kReach[kSpringTypes] = {{1, 0},  {0, 1}, {1, 1},
                                                      {1, -1}, {2, 0}, {0, 2}};
 
-/// What one pass works on; element (vertex * kLanes + lane) of each array is one vertex in one
-/// lane.
+constexpr std::ptrdiff_t offset_of(const Mesh& mesh, size_t type) {
+  return static_cast<std::ptrdiff_t>(kReach[type].down) * mesh.columns + kReach[type].right;
+}
+
+/// What the passes over the springs work on; element (vertex * kCount + lane) of each array is one
+/// vertex in one lane.
+template <class L>
 struct LimitArrays {
+  using Number = typename L::Number;
   Mesh mesh;
-  const LaneLimits<>& limits;
-  const std::array<std::vector<SpringShares>, kSpringTypes>& shares;
-  std::array<double*, 3> position_m;
-  std::array<double*, 3> velocity_m_per_s;  ///< null: not corrected
-  double steps_per_s = 0;
-  LaneValue<> active = LaneValue<>::Ones();     ///< 1 in lanes to work on, else 0
-  LaneValue<> shortened = LaneValue<>::Zero();  ///< counts the springs that a sweep has shortened
-  LaneValue<> intolerable =
-      LaneValue<>::Zero();  ///< set to 1 where a spring is longer than tolerated
+  const LaneLimits<L>& limits;
+  const std::array<SpringShares<Number>, kSpringTypes>& shares;
+  const std::array<std::array<VertexSet, 2>, kSpringTypes>& groups;
+  std::array<VertexSet, kSpringTypes>& too_long;
+  VertexSet& moved;
+  std::array<Number*, 3> position_m;
+  std::array<Number*, 3> velocity_m_per_s;  ///< null: not corrected
+  Number steps_per_s = 0;
+  LaneValue<L> active = LaneValue<L>::Ones();     ///< 1 in lanes to work on, else 0
+  LaneValue<L> shortened = LaneValue<L>::Zero();  ///< counts the springs that a sweep has shortened
+  LaneValue<L> intolerable =
+      LaneValue<L>::Zero();  ///< set to 1 where a spring is longer than tolerated
 };
+
+inline void insert(VertexSet& set, std::ptrdiff_t vertex) {
+  set[static_cast<size_t>(vertex / 64)] |= std::uint64_t{1} << (vertex % 64);
+}
+
+/// Word `w` of the set of vertices v with v + offset in `set`.
+inline std::uint64_t word_before(const VertexSet& set, size_t w, std::ptrdiff_t offset) {
+  const size_t at = w + static_cast<size_t>(offset / 64);
+  const auto shift = static_cast<int>(offset % 64);
+  const auto word = [&](size_t n) { return n < set.size() ? set[n] : 0; };
+  return shift == 0 ? word(at) : word(at) >> shift | word(at + 1) << (64 - shift);
+}
 
 }  // namespace clothfit
 #endif
@@ -47,55 +71,102 @@ enum class Pass {
   check   ///< only looks for springs that are longer than tolerated
 };
 
-/// The springs of one type in the lanes from `lane` on.
-template <Pass pass>
-HWY_INLINE void visit(LimitArrays& arrays, size_t type, std::ptrdiff_t lane) {
-  using Mask = hn::Mask<Tag>;
-  const Tag d;
-  const auto [down, right] = kReach[type];
-  const std::ptrdiff_t columns = arrays.mesh.columns, rows = arrays.mesh.rows;
-  const std::ptrdiff_t other = (down * columns + right) * kLanes;
-  const std::array<double*, 3> position = arrays.position_m, velocity = arrays.velocity_m_per_s;
-  const bool correct_velocity = velocity[0] != nullptr;
-  const Vector one = hn::Set(d, 1.0);
-  const Vector steps_per_s = hn::Set(d, arrays.steps_per_s);
-  const Vector longest = hn::LoadU(d, arrays.limits.longest_m[type].data() + lane);
-  const Vector tolerated = hn::LoadU(d, arrays.limits.tolerated_m[type].data() + lane);
-  const Vector allowed = pass == Pass::sweep ? longest : tolerated;
-  const Vector allowed2 = hn::Mul(allowed, allowed);
-  const Mask active = hn::Gt(hn::LoadU(d, arrays.active.data() + lane), hn::Zero(d));
-  Vector shortened = hn::LoadU(d, arrays.shortened.data() + lane);
-  Vector intolerable = hn::LoadU(d, arrays.intolerable.data() + lane);
+/// Finds the springs that are longer than `longest_m` in a lane from `lane` on.
+template <class L>
+HWY_INLINE void look(LimitArrays<L>& arrays, std::ptrdiff_t lane) {
+  using V = Vector<L>;
+  const Tag<L> d;
+  const std::ptrdiff_t vertices = arrays.mesh.vertex_count();
+  const std::array<const typename L::Number*, 3> position = {
+      arrays.position_m[0], arrays.position_m[1], arrays.position_m[2]};
+  std::ptrdiff_t offset[kSpringTypes];
+  V allowed2[kSpringTypes];
+  for (size_t type = 0; type < kSpringTypes; ++type) {
+    offset[type] = offset_of(arrays.mesh, type);
+    const V longest = hn::LoadU(d, arrays.limits.longest_m[type].data() + lane);
+    allowed2[type] = hn::Mul(longest, longest);
+  }
+  // Which of the pairs that are `offset` apart are springs is looked up in `groups` later.
+  const auto look_at = [&](std::ptrdiff_t vertex, const Vector3<V>& from, size_t type) HWY_ATTR {
+    const Vector3<V> along = load(d, position, (vertex + offset[type]) * L::kCount + lane) - from;
+    const bool any = !hn::AllFalse(d, hn::Gt(squared_length(along), allowed2[type]));
+    return static_cast<std::uint64_t>(any) << (vertex % 64);
+  };
+  for (std::ptrdiff_t first = 0; first < vertices; first += 64) {
+    std::uint64_t found[kSpringTypes] = {};
+    const std::ptrdiff_t end = std::min(first + 64, vertices);
+    const std::ptrdiff_t inner_end = std::min(end, vertices - 2 * arrays.mesh.columns);
+    std::ptrdiff_t vertex = first;
+    for (; vertex < inner_end; ++vertex) {
+      const Vector3<V> from = load(d, position, vertex * L::kCount + lane);
+#pragma GCC unroll 6
+      for (size_t type = 0; type < kSpringTypes; ++type) found[type] |= look_at(vertex, from, type);
+    }
+    for (; vertex < end; ++vertex) {
+      const Vector3<V> from = load(d, position, vertex * L::kCount + lane);
+      for (size_t type = 0; type < kSpringTypes; ++type)
+        if (vertex + offset[type] < vertices) found[type] |= look_at(vertex, from, type);
+    }
+    for (size_t type = 0; type < kSpringTypes; ++type)
+      arrays.too_long[type][static_cast<size_t>(first / 64)] |= found[type];
+  }
+}
 
-  const int reach = down > 0 ? down : right;
-  for (int group = 0; group < 2; ++group) {
-    for (std::ptrdiff_t i = 0; i + down < rows; ++i) {
-      if (down > 0 && i / reach % 2 != group) continue;
-      for (std::ptrdiff_t j = right < 0 ? 1 : 0; j < columns && j + right < columns; ++j) {
-        if (down == 0 && j / reach % 2 != group) continue;
-        const std::ptrdiff_t vertex = i * columns + j, self = vertex * kLanes + lane;
-        const Vector3 along = load(position, self + other) - load(position, self);
-        const Vector length2 = dot(along, along);
+/// The springs of one type in the lanes from `lane` on.
+template <class L, Pass pass>
+HWY_INLINE void visit(LimitArrays<L>& arrays, size_t type, std::ptrdiff_t lane) {
+  using V = Vector<L>;
+  using Mask = hn::Mask<Tag<L>>;
+  using Number = typename L::Number;
+  const Tag<L> d;
+  const std::ptrdiff_t offset = offset_of(arrays.mesh, type);
+  const std::array<Number*, 3> position = arrays.position_m, velocity = arrays.velocity_m_per_s;
+  const bool correct_velocity = velocity[0] != nullptr;
+  const V one = hn::Set(d, Number{1});
+  const V steps_per_s = hn::Set(d, arrays.steps_per_s);
+  const V longest = hn::LoadU(d, arrays.limits.longest_m[type].data() + lane);
+  const V tolerated = hn::LoadU(d, arrays.limits.tolerated_m[type].data() + lane);
+  const V allowed = pass == Pass::sweep ? longest : tolerated;
+  const V allowed2 = hn::Mul(allowed, allowed);
+  const Mask active = hn::Gt(hn::LoadU(d, arrays.active.data() + lane), hn::Zero(d));
+  const Number* const first_share = arrays.shares[type].first.data();
+  const Number* const second_share = arrays.shares[type].second.data();
+  V shortened = hn::LoadU(d, arrays.shortened.data() + lane);
+  V intolerable = hn::LoadU(d, arrays.intolerable.data() + lane);
+
+  for (const VertexSet& group : arrays.groups[type]) {
+    for (size_t w = 0; w + 1 < group.size(); ++w) {
+      // The springs of a group share no vertex: none of them makes another worth a visit.
+      std::uint64_t left = group[w] & (arrays.too_long[type][w] | arrays.moved[w] |
+                                       word_before(arrays.moved, w, offset));
+      for (; left != 0; left &= left - 1) {
+        const std::ptrdiff_t vertex = static_cast<std::ptrdiff_t>(w) * 64 + std::countr_zero(left);
+        const std::ptrdiff_t self = vertex * L::kCount + lane, other = self + offset * L::kCount;
+        const Vector3<V> a = load(d, position, self), b = load(d, position, other);
+        const Vector3<V> along = b - a;
+        const V length2 = squared_length(along);
         const Mask exceeds = hn::And(active, hn::Gt(length2, allowed2));
         if (hn::AllFalse(d, exceeds)) continue;
-        const SpringShares& shares = arrays.shares[type][static_cast<size_t>(vertex)];
-        if (shares.first == 0 && shares.second == 0) continue;
         if (pass == Pass::check) {
           intolerable = hn::IfThenElse(exceeds, one, intolerable);
           continue;
         }
         shortened = hn::Add(shortened, hn::IfThenElseZero(exceeds, one));
-        const Vector excess = hn::Sub(one, hn::Mul(longest, inverse_square_root(length2)));
-        const auto move = [&](const std::array<double*, 3>& of, const Vector& share) HWY_ATTR {
+        insert(arrays.moved, vertex);
+        insert(arrays.moved, vertex + offset);
+        const V excess = minus_product(one, longest, inverse_square_root(length2));
+        const auto move = [&](const std::array<Number*, 3>& of, const Vector3<V>& from,
+                              const Vector3<V>& to, const V& share) HWY_ATTR {
           // Lanes that do not exceed keep their bits.
-          const Vector3 first = hn::Mul(share, hn::Set(d, shares.first)) * along;
-          const Vector3 second = hn::Mul(share, hn::Set(d, shares.second)) * along;
-          const Vector3 a = load(of, self), b = load(of, self + other);
-          store(select(exceeds, a + first, a), of, self);
-          store(select(exceeds, b - second, b), of, self + other);
+          const V first = hn::Mul(share, hn::Set(d, first_share[vertex]));
+          const V second = hn::Mul(share, hn::Set(d, second_share[vertex]));
+          store(select(exceeds, mul_add(first, along, from), from), d, of, self);
+          store(select(exceeds, minus_product(to, second, along), to), d, of, other);
         };
-        move(position, excess);
-        if (correct_velocity) move(velocity, hn::Mul(steps_per_s, excess));
+        move(position, a, b, excess);
+        if (correct_velocity)
+          move(velocity, load(d, velocity, self), load(d, velocity, other),
+               hn::Mul(steps_per_s, excess));
       }
     }
   }
@@ -103,19 +174,42 @@ HWY_INLINE void visit(LimitArrays& arrays, size_t type, std::ptrdiff_t lane) {
   hn::StoreU(intolerable, d, arrays.intolerable.data() + lane);
 }
 
-template <Pass pass>
-HWY_INLINE void visit_all(LimitArrays& arrays) {
-  const Tag d;
-  for (std::ptrdiff_t lane = 0; lane < kLanes; lane += static_cast<std::ptrdiff_t>(hn::Lanes(d)))
-    for (size_t type = 0; type < kSpringTypes; ++type) visit<pass>(arrays, type, lane);
+template <class L, class Act>
+HWY_INLINE void for_all_lanes(const Act& act) {
+  const Tag<L> d;
+  for (std::ptrdiff_t lane = 0; lane < L::kCount; lane += static_cast<std::ptrdiff_t>(hn::Lanes(d)))
+    act(lane);
 }
 
-void sweep_springs(LimitArrays& arrays) {
-  visit_all<Pass::sweep>(arrays);
+template <class L>
+HWY_INLINE void look(LimitArrays<L>& arrays) {
+  for_all_lanes<L>([&](std::ptrdiff_t lane) HWY_ATTR { look(arrays, lane); });
 }
 
-void check_springs(LimitArrays& arrays) {
-  visit_all<Pass::check>(arrays);
+template <class L, Pass pass>
+HWY_INLINE void visit(LimitArrays<L>& arrays) {
+  for_all_lanes<L>([&](std::ptrdiff_t lane) HWY_ATTR {
+    for (size_t type = 0; type < kSpringTypes; ++type) visit<L, pass>(arrays, type, lane);
+  });
+}
+
+void look_exact(LimitArrays<ExactLanes>& arrays) {
+  look(arrays);
+}
+void look_fast(LimitArrays<FastLanes>& arrays) {
+  look(arrays);
+}
+void sweep_exact(LimitArrays<ExactLanes>& arrays) {
+  visit<ExactLanes, Pass::sweep>(arrays);
+}
+void sweep_fast(LimitArrays<FastLanes>& arrays) {
+  visit<FastLanes, Pass::sweep>(arrays);
+}
+void check_exact(LimitArrays<ExactLanes>& arrays) {
+  visit<ExactLanes, Pass::check>(arrays);
+}
+void check_fast(LimitArrays<FastLanes>& arrays) {
+  visit<FastLanes, Pass::check>(arrays);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -126,68 +220,121 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace clothfit {
 namespace {
-HWY_EXPORT(sweep_springs);
-HWY_EXPORT(check_springs);
+
+HWY_EXPORT(look_exact);
+HWY_EXPORT(look_fast);
+HWY_EXPORT(sweep_exact);
+HWY_EXPORT(sweep_fast);
+HWY_EXPORT(check_exact);
+HWY_EXPORT(check_fast);
+
+/// Forgets what has moved and finds the springs that are too long.
+void look(LimitArrays<ExactLanes>& arrays) {
+  HWY_DYNAMIC_DISPATCH(look_exact)(arrays);
+}
+void look(LimitArrays<FastLanes>& arrays) {
+  HWY_DYNAMIC_DISPATCH(look_fast)(arrays);
+}
+void sweep(LimitArrays<ExactLanes>& arrays) {
+  HWY_DYNAMIC_DISPATCH(sweep_exact)(arrays);
+}
+void sweep(LimitArrays<FastLanes>& arrays) {
+  HWY_DYNAMIC_DISPATCH(sweep_fast)(arrays);
+}
+void check(LimitArrays<ExactLanes>& arrays) {
+  HWY_DYNAMIC_DISPATCH(check_exact)(arrays);
+}
+void check(LimitArrays<FastLanes>& arrays) {
+  HWY_DYNAMIC_DISPATCH(check_fast)(arrays);
+}
+
+template <class L>
+void begin(LimitArrays<L>& arrays) {
+  std::ranges::fill(arrays.moved, 0);
+  for (VertexSet& set : arrays.too_long) std::ranges::fill(set, 0);
+  look(arrays);
+}
+
 }  // namespace
 
-template <>
-StrainLimiter<ExactLanes>::StrainLimiter(const Mesh& mesh,
-                                         const Eigen::VectorXd& inverse_mass_per_kg)
+template <class L>
+StrainLimiter<L>::StrainLimiter(const Mesh& mesh, const Eigen::VectorXd& inverse_mass_per_kg)
     : mesh_(mesh) {
+  using Number = typename L::Number;
+  const auto vertices = static_cast<size_t>(mesh.vertex_count());
+  moved_.resize(vertices / 64 + 2);
   for (size_t type = 0; type < kSpringTypes; ++type) {
     const auto [down, right] = kReach[type];
-    shares_[type].resize(static_cast<size_t>(mesh.vertex_count()));
+    shares_[type].first.resize(vertices);
+    shares_[type].second.resize(vertices);
+    too_long_[type].resize(moved_.size());
+    for (VertexSet& group : groups_[type]) group.resize(moved_.size());
     for (int i = 0; i + down < mesh.rows; ++i) {
       for (int j = right < 0 ? 1 : 0; j < mesh.columns && j + right < mesh.columns; ++j) {
-        const double first = inverse_mass_per_kg[mesh.vertex(i, j)];
+        const int vertex = mesh.vertex(i, j);
+        const double first = inverse_mass_per_kg[vertex];
         const double second = inverse_mass_per_kg[mesh.vertex(i + down, j + right)];
-        if (first + second > 0)
-          shares_[type][static_cast<size_t>(mesh.vertex(i, j))] = {first / (first + second),
-                                                                   second / (first + second)};
+        if (!(first + second > 0)) continue;
+        shares_[type].first[static_cast<size_t>(vertex)] =
+            static_cast<Number>(first / (first + second));
+        shares_[type].second[static_cast<size_t>(vertex)] =
+            static_cast<Number>(second / (first + second));
+        const int place = down > 0 ? i / down : j / right;
+        insert(groups_[type][static_cast<size_t>(place % 2)], vertex);
       }
     }
   }
 }
 
-template <>
-LimitOutcome<> StrainLimiter<ExactLanes>::limit_positions(const LaneLimits<>& limits,
-                                                          LaneVectors<>& position_m) {
-  LimitArrays arrays{.mesh = mesh_,
-                     .limits = limits,
-                     .shares = shares_,
-                     .position_m = position_m.data(),
-                     .velocity_m_per_s = {}};
-  HWY_DYNAMIC_DISPATCH(sweep_springs)(arrays);
+template <class L>
+LimitOutcome<L> StrainLimiter<L>::limit_positions(const LaneLimits<L>& limits,
+                                                  LaneVectors<L>& position_m) {
+  LimitArrays<L> arrays{.mesh = mesh_,
+                        .limits = limits,
+                        .shares = shares_,
+                        .groups = groups_,
+                        .too_long = too_long_,
+                        .moved = moved_,
+                        .position_m = position_m.data(),
+                        .velocity_m_per_s = {}};
+  begin(arrays);
+  sweep(arrays);
   return {.too_long = arrays.shortened};
 }
 
-template <>
-LimitOutcome<> StrainLimiter<ExactLanes>::limit_consistently(const LaneLimits<>& limits,
-                                                             int most_sweeps, double time_step_s,
-                                                             LaneVectors<>& position_m,
-                                                             LaneVectors<>& velocity_m_per_s) {
-  LimitArrays arrays{.mesh = mesh_,
-                     .limits = limits,
-                     .shares = shares_,
-                     .position_m = position_m.data(),
-                     .velocity_m_per_s = velocity_m_per_s.data(),
-                     .steps_per_s = 1 / time_step_s};
-  LimitOutcome<> outcome;
+template <class L>
+LimitOutcome<L> StrainLimiter<L>::limit_consistently(const LaneLimits<L>& limits, int most_sweeps,
+                                                     double time_step_s, LaneVectors<L>& position_m,
+                                                     LaneVectors<L>& velocity_m_per_s) {
+  LimitArrays<L> arrays{.mesh = mesh_,
+                        .limits = limits,
+                        .shares = shares_,
+                        .groups = groups_,
+                        .too_long = too_long_,
+                        .moved = moved_,
+                        .position_m = position_m.data(),
+                        .velocity_m_per_s = velocity_m_per_s.data(),
+                        .steps_per_s = static_cast<typename L::Number>(1 / time_step_s)};
+  begin(arrays);
+  LimitOutcome<L> outcome;
   for (int n = 0; n < most_sweeps; ++n) {
     arrays.shortened.setZero();
-    HWY_DYNAMIC_DISPATCH(sweep_springs)(arrays);
+    sweep(arrays);
     if (n == 0) outcome.too_long = arrays.shortened;
     // A correction may lengthen springs that were visited before: look at all of them again.
-    arrays.active = (arrays.shortened > 0).select(arrays.active, 0.0);
+    arrays.active = (arrays.shortened > 0).select(arrays.active, 0);
     if (!(arrays.active > 0).any()) return outcome;
     arrays.intolerable.setZero();
-    HWY_DYNAMIC_DISPATCH(check_springs)(arrays);
+    check(arrays);
     arrays.active = arrays.intolerable;
     if (!(arrays.active > 0).any()) return outcome;
   }
   outcome.unmet = arrays.active;
   return outcome;
 }
+
+template class StrainLimiter<ExactLanes>;
+template class StrainLimiter<FastLanes>;
 
 }  // namespace clothfit
 #endif

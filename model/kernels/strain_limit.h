@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <vector>
 
 #include "model/lanes.h"
@@ -29,10 +30,16 @@ struct LaneLimits {
       tolerated_m;  ///< `consistent` sweeps until none exceeds this
 };
 
-/// Shares of a correction that the first and the second end of a spring take.
+/// Shares of a correction that the first and the second ends of a type's springs take, by the
+/// vertex that a spring leaves.
+template <class Number>
 struct SpringShares {
-  double first = 0, second = 0;
+  std::vector<Number> first, second;
 };
+
+/// A set of vertices: bit v % 64 of word v / 64. A word more than that, so that one can read past
+/// the last vertex.
+using VertexSet = std::vector<std::uint64_t>;
 
 /// What a limit found, in every lane.
 template <class L = ExactLanes>
@@ -52,8 +59,11 @@ struct LimitOutcome {
 /// (columns) 0, 1, 4, 5, 8, ..., then the others. The springs of one such group share no vertex, so
 /// their order among themselves does not matter.
 ///
-/// Strict IEEE double, the same bits on every instruction set. A lane's result does not depend on
-/// what the others carry.
+/// Most springs are within their limits at most times, so one look finds those that are not, and
+/// the sweeps then visit these and what hangs on a vertex that has moved since.
+///
+/// In `double` strict IEEE, the same bits on every instruction set. A lane's result does not depend
+/// on what the others carry. Holds scratch memory: one object per thread.
 template <class L = ExactLanes>
 class StrainLimiter {
  public:
@@ -72,8 +82,11 @@ class StrainLimiter {
 
  private:
   Mesh mesh_;
-  std::array<std::vector<SpringShares>, kSpringTypes>
-      shares_;  ///< by the vertex that a spring leaves
+  std::array<SpringShares<typename L::Number>, kSpringTypes> shares_;
+  /// The vertices that the springs of each group leave; springs held at both ends left out.
+  std::array<std::array<VertexSet, 2>, kSpringTypes> groups_;
+  std::array<VertexSet, kSpringTypes> too_long_;  ///< at the first look, in any lane
+  VertexSet moved_;                               ///< since then, in any lane
 };
 
 }  // namespace clothfit
