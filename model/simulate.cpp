@@ -12,9 +12,6 @@
 namespace clothfit {
 namespace {
 
-/// A vertex further than this many cloth diagonals from where its lane started has diverged.
-constexpr double kSceneSize = 100;
-
 /// One group of lanes on its way through time.
 template <class L>
 class LaneRun {
@@ -80,11 +77,6 @@ class LaneRun {
   LaneVectors<L> held_target_m_;
 };
 
-bool left_the_scene(const Eigen::Matrix3Xd& now, const Eigen::Matrix3Xd& start, const Mesh& mesh) {
-  const double limit = kSceneSize * std::hypot(mesh.width_m, mesh.height_m);
-  return !((now - start).cwiseAbs().maxCoeff() < limit) || !now.allFinite();
-}
-
 /// Calls `run(group, first)` for every group of up to kLanes parameter sets.
 template <class Run>
 void for_lane_groups(std::span<const ParameterSet> parameters, const Run& run) {
@@ -96,6 +88,12 @@ void for_lane_groups(std::span<const ParameterSet> parameters, const Run& run) {
 }
 
 }  // namespace
+
+bool left_the_scene(const Eigen::Matrix3Xd& now, const Eigen::Matrix3Xd& start, const Mesh& mesh) {
+  constexpr double kSceneSize = 100;
+  const double limit = kSceneSize * std::hypot(mesh.width_m, mesh.height_m);
+  return !((now - start).cwiseAbs().maxCoeff() < limit) || !now.allFinite();
+}
 
 int Schedule::substeps(int frame) const {
   const auto f = static_cast<size_t>(frame);

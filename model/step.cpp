@@ -1,5 +1,7 @@
 #include "model/step.h"
 
+#include <ceres/jet.h>
+
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cassert>
@@ -99,16 +101,11 @@ void HeldPlacement<L>::add_pulls(const LaneVectors<L>& force_n,
   add(force_n.z, gravity_m_per_s2.z, pull_n.z);
 }
 
-namespace {
-
-/// Inverse masses, 0 where a held point has a say.
-Eigen::VectorXd movable(const Cloth& cloth, const std::vector<int>& touched) {
+Eigen::VectorXd movable_inverse_mass(const Cloth& cloth, const std::vector<int>& touched) {
   Eigen::VectorXd inverse_mass_per_kg = cloth.mass_kg.cwiseInverse();
   for (const int vertex : touched) inverse_mass_per_kg[vertex] = 0;
   return inverse_mass_per_kg;
 }
-
-}  // namespace
 
 template <class L>
 void set_lane(int lane, const SpringParameters& springs, const StrainLimit& strain_limit,
@@ -153,7 +150,7 @@ EulerStepper<L>::EulerStepper(const Cloth& cloth)
       inverse_mass_per_kg_(cloth.mass_kg.cwiseInverse()),
       held_(cloth),
       sweep_(cloth.mesh),
-      limiter_(cloth.mesh, movable(cloth, held_.touched())),
+      limiter_(cloth.mesh, movable_inverse_mass(cloth, held_.touched())),
       force_n_(LaneVectors<L>::zero(cloth.mesh.vertex_count())),
       pull_n_(LaneVectors<L>::zero(held_.count())),
       target_m_(pull_n_) {
@@ -163,11 +160,10 @@ EulerStepper<L>::EulerStepper(const Cloth& cloth)
   }
 }
 
-/// Velocities and positions from forces that are known in full.
 template <class L>
 void move_by_forces(const LaneVectors<L>& force_n, const LaneVector<L>& gravity_m_per_s2,
                     const Eigen::VectorXd& inverse_mass_per_kg, double time_step_s,
-                    LaneState<L>& state) {
+                    LaneVectors<L>& position_m, LaneVectors<L>& velocity_m_per_s) {
   using Number = typename L::Number;
   const auto h = static_cast<Number>(time_step_s);
   const auto move_along = [&](const LaneArray<L>& force, const LaneValue<L>& gravity,
@@ -178,9 +174,9 @@ void move_by_forces(const LaneVectors<L>& force_n, const LaneVector<L>& gravity_
       position.col(k) += h * velocity.col(k);
     }
   };
-  move_along(force_n.x, gravity_m_per_s2.x, state.velocity_m_per_s.x, state.position_m.x);
-  move_along(force_n.y, gravity_m_per_s2.y, state.velocity_m_per_s.y, state.position_m.y);
-  move_along(force_n.z, gravity_m_per_s2.z, state.velocity_m_per_s.z, state.position_m.z);
+  move_along(force_n.x, gravity_m_per_s2.x, velocity_m_per_s.x, position_m.x);
+  move_along(force_n.y, gravity_m_per_s2.y, velocity_m_per_s.y, position_m.y);
+  move_along(force_n.z, gravity_m_per_s2.z, velocity_m_per_s.z, position_m.z);
 }
 
 template <class L>
@@ -212,7 +208,8 @@ void EulerStepper<L>::step(const LaneParameters<L>& parameters, const LaneVector
         cloth_.effects[e]->shift_supports(scene, parameters.effects[e], pull_n_,
                                           state.effect_memory[e], target_m_);
     }
-    move_by_forces(force_n_, parameters.gravity_m_per_s2, inverse_mass_per_kg_, time_step_s, state);
+    move_by_forces(force_n_, parameters.gravity_m_per_s2, inverse_mass_per_kg_, time_step_s,
+                   state.position_m, state.velocity_m_per_s);
   }
   held_.place(shifts_supports_ ? target_m_ : held_target_m, time_step_s, state.position_m,
               state.velocity_m_per_s);
@@ -234,11 +231,16 @@ void EulerStepper<L>::step(const LaneParameters<L>& parameters, const LaneVector
   template struct LaneState<L>;                                                                 \
   template class HeldPlacement<L>;                                                              \
   template void set_lane(int, const SpringParameters&, const StrainLimit&, LaneParameters<L>&); \
-  template LaneParameters<L> lane_parameters(const Cloth&, std::span<const ParameterSet>);
+  template LaneParameters<L> lane_parameters(const Cloth&, std::span<const ParameterSet>);      \
+  template void move_by_forces(const LaneVectors<L>&, const LaneVector<L>&,                     \
+                               const Eigen::VectorXd&, double, LaneVectors<L>&, LaneVectors<L>&);
 CLOTHFIT_INSTANTIATE(ExactLanes)
 CLOTHFIT_INSTANTIATE(FastLanes)
 CLOTHFIT_INSTANTIATE(SingleLane)
 #undef CLOTHFIT_INSTANTIATE
+template struct LaneState<DualLanes>;
 template class EulerStepper<ExactLanes>;
+template class EulerStepper<FastLanes>;
+template class EulerStepper<SingleLane>;
 
 }  // namespace clothfit

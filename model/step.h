@@ -75,6 +75,16 @@ class HeldPlacement {
   LaneArray<L> missing_m_;      ///< scratch: one coordinate of what each held point lacks
 };
 
+/// Inverse masses, 0 at the vertices that a held point touches: the strain limit must not move
+/// them.
+Eigen::VectorXd movable_inverse_mass(const Cloth& cloth, const std::vector<int>& touched);
+
+/// Velocities and positions from forces that are known in full: V += h (g + F / m), P += h V.
+template <class L>
+void move_by_forces(const LaneVectors<L>& force_n, const LaneVector<L>& gravity_m_per_s2,
+                    const Eigen::VectorXd& inverse_mass_per_kg, double time_step_s,
+                    LaneVectors<L>& position_m, LaneVectors<L>& velocity_m_per_s);
+
 /// Steps the simulations in all lanes through time. Holds scratch memory: one object per thread.
 template <class L = ExactLanes>
 class EulerStepper {

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <bit>
 
+#include "model/kernels/spring_reach.h"
+
 // This source is compiled once for each instruction set, in a namespace of its own.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "model/kernels/strain_limit.cpp"
@@ -15,15 +17,8 @@
 #define CLOTHFIT_MODEL_KERNELS_STRAIN_LIMIT_ONCE
 namespace clothfit {
 
-/// Where the springs of a type begin and end: from [i, j] to [i + down, j + right].
-struct SpringReach {
-  int down = 0, right = 0;
-};
-inline constexpr SpringReach kReach[kSpringTypes] = {{1, 0},  {0, 1}, {1, 1},
-                                                     {1, -1}, {2, 0}, {0, 2}};
-
-constexpr std::ptrdiff_t offset_of(const Mesh& mesh, size_t type) {
-  return static_cast<std::ptrdiff_t>(kReach[type].down) * mesh.columns + kReach[type].right;
+inline std::ptrdiff_t offset_of(const Mesh& mesh, size_t type) {
+  return kSpringReach[type].offset(mesh);
 }
 
 /// What the passes over the springs work on; element (vertex * kCount + lane) of each array is one
@@ -39,6 +34,7 @@ struct LimitArrays {
   VertexSet& moved;
   std::array<Number*, 3> position_m;
   std::array<Number*, 3> velocity_m_per_s;  ///< null: not corrected
+  std::vector<LimitMove>* moves = nullptr;  ///< of a single lane, where they are asked for
   Number steps_per_s = 0;
   LaneValue<L> active = LaneValue<L>::Ones();     ///< 1 in lanes to work on, else 0
   LaneValue<L> shortened = LaneValue<L>::Zero();  ///< counts the springs that a sweep has shortened
@@ -154,7 +150,20 @@ HWY_INLINE void visit(LimitArrays<L>& arrays, size_t type, std::ptrdiff_t lane) 
         shortened = hn::Add(shortened, hn::IfThenElseZero(exceeds, one));
         insert(arrays.moved, vertex);
         insert(arrays.moved, vertex + offset);
-        const V excess = minus_product(one, longest, inverse_square_root(length2));
+        const V inverse = inverse_square_root(length2);
+        const V excess = minus_product(one, longest, inverse);
+        if constexpr (L::kCount == 1) {
+          if (arrays.moves != nullptr)
+            arrays.moves->push_back(
+                {.type = static_cast<int>(type),
+                 .first = static_cast<int>(vertex),
+                 .second = static_cast<int>(vertex + offset),
+                 .first_share = first_share[vertex],
+                 .second_share = second_share[vertex],
+                 .along_m = {hn::GetLane(along.x), hn::GetLane(along.y), hn::GetLane(along.z)},
+                 .excess = hn::GetLane(excess),
+                 .inverse_length_per_m = hn::GetLane(inverse)});
+        }
         const auto move = [&](const std::array<Number*, 3>& of, const Vector3<V>& from,
                               const Vector3<V>& to, const V& share) HWY_ATTR {
           // Lanes that do not exceed keep their bits.
@@ -199,17 +208,26 @@ void look_exact(LimitArrays<ExactLanes>& arrays) {
 void look_fast(LimitArrays<FastLanes>& arrays) {
   look(arrays);
 }
+void look_single(LimitArrays<SingleLane>& arrays) {
+  look(arrays);
+}
 void sweep_exact(LimitArrays<ExactLanes>& arrays) {
   visit<ExactLanes, Pass::sweep>(arrays);
 }
 void sweep_fast(LimitArrays<FastLanes>& arrays) {
   visit<FastLanes, Pass::sweep>(arrays);
 }
+void sweep_single(LimitArrays<SingleLane>& arrays) {
+  visit<SingleLane, Pass::sweep>(arrays);
+}
 void check_exact(LimitArrays<ExactLanes>& arrays) {
   visit<ExactLanes, Pass::check>(arrays);
 }
 void check_fast(LimitArrays<FastLanes>& arrays) {
   visit<FastLanes, Pass::check>(arrays);
+}
+void check_single(LimitArrays<SingleLane>& arrays) {
+  visit<SingleLane, Pass::check>(arrays);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -223,10 +241,13 @@ namespace {
 
 HWY_EXPORT(look_exact);
 HWY_EXPORT(look_fast);
+HWY_EXPORT(look_single);
 HWY_EXPORT(sweep_exact);
 HWY_EXPORT(sweep_fast);
+HWY_EXPORT(sweep_single);
 HWY_EXPORT(check_exact);
 HWY_EXPORT(check_fast);
+HWY_EXPORT(check_single);
 
 /// Forgets what has moved and finds the springs that are too long.
 void look(LimitArrays<ExactLanes>& arrays) {
@@ -235,17 +256,26 @@ void look(LimitArrays<ExactLanes>& arrays) {
 void look(LimitArrays<FastLanes>& arrays) {
   HWY_DYNAMIC_DISPATCH(look_fast)(arrays);
 }
+void look(LimitArrays<SingleLane>& arrays) {
+  HWY_DYNAMIC_DISPATCH(look_single)(arrays);
+}
 void sweep(LimitArrays<ExactLanes>& arrays) {
   HWY_DYNAMIC_DISPATCH(sweep_exact)(arrays);
 }
 void sweep(LimitArrays<FastLanes>& arrays) {
   HWY_DYNAMIC_DISPATCH(sweep_fast)(arrays);
 }
+void sweep(LimitArrays<SingleLane>& arrays) {
+  HWY_DYNAMIC_DISPATCH(sweep_single)(arrays);
+}
 void check(LimitArrays<ExactLanes>& arrays) {
   HWY_DYNAMIC_DISPATCH(check_exact)(arrays);
 }
 void check(LimitArrays<FastLanes>& arrays) {
   HWY_DYNAMIC_DISPATCH(check_fast)(arrays);
+}
+void check(LimitArrays<SingleLane>& arrays) {
+  HWY_DYNAMIC_DISPATCH(check_single)(arrays);
 }
 
 template <class L>
@@ -264,7 +294,7 @@ StrainLimiter<L>::StrainLimiter(const Mesh& mesh, const Eigen::VectorXd& inverse
   const auto vertices = static_cast<size_t>(mesh.vertex_count());
   moved_.resize(vertices / 64 + 2);
   for (size_t type = 0; type < kSpringTypes; ++type) {
-    const auto [down, right] = kReach[type];
+    const auto [down, right] = kSpringReach[type];
     shares_[type].first.resize(vertices);
     shares_[type].second.resize(vertices);
     too_long_[type].resize(moved_.size());
@@ -288,7 +318,8 @@ StrainLimiter<L>::StrainLimiter(const Mesh& mesh, const Eigen::VectorXd& inverse
 
 template <class L>
 LimitOutcome<L> StrainLimiter<L>::limit_positions(const LaneLimits<L>& limits,
-                                                  LaneVectors<L>& position_m) {
+                                                  LaneVectors<L>& position_m,
+                                                  std::vector<LimitMove>* moves) {
   LimitArrays<L> arrays{.mesh = mesh_,
                         .limits = limits,
                         .shares = shares_,
@@ -296,7 +327,8 @@ LimitOutcome<L> StrainLimiter<L>::limit_positions(const LaneLimits<L>& limits,
                         .too_long = too_long_,
                         .moved = moved_,
                         .position_m = position_m.data(),
-                        .velocity_m_per_s = {}};
+                        .velocity_m_per_s = {},
+                        .moves = moves};
   begin(arrays);
   sweep(arrays);
   return {.too_long = arrays.shortened};
@@ -305,7 +337,8 @@ LimitOutcome<L> StrainLimiter<L>::limit_positions(const LaneLimits<L>& limits,
 template <class L>
 LimitOutcome<L> StrainLimiter<L>::limit_consistently(const LaneLimits<L>& limits, int most_sweeps,
                                                      double time_step_s, LaneVectors<L>& position_m,
-                                                     LaneVectors<L>& velocity_m_per_s) {
+                                                     LaneVectors<L>& velocity_m_per_s,
+                                                     std::vector<LimitMove>* moves) {
   LimitArrays<L> arrays{.mesh = mesh_,
                         .limits = limits,
                         .shares = shares_,
@@ -314,6 +347,7 @@ LimitOutcome<L> StrainLimiter<L>::limit_consistently(const LaneLimits<L>& limits
                         .moved = moved_,
                         .position_m = position_m.data(),
                         .velocity_m_per_s = velocity_m_per_s.data(),
+                        .moves = moves,
                         .steps_per_s = static_cast<typename L::Number>(1 / time_step_s)};
   begin(arrays);
   LimitOutcome<L> outcome;
@@ -335,6 +369,7 @@ LimitOutcome<L> StrainLimiter<L>::limit_consistently(const LaneLimits<L>& limits
 
 template class StrainLimiter<ExactLanes>;
 template class StrainLimiter<FastLanes>;
+template class StrainLimiter<SingleLane>;
 
 }  // namespace clothfit
 #endif
