@@ -181,48 +181,55 @@ void move_by_forces(const LaneVectors<L>& force_n, const LaneVector<L>& gravity_
 
 template <class L>
 void EulerStepper<L>::step(const LaneParameters<L>& parameters, const LaneVectors<L>& held_target_m,
-                           double time_s, double time_step_s, LaneState<L>& state) {
-  const bool any_effect = !cloth_.effects.empty();
-  const EffectScene<L> scene{cloth_,           parameters.springs,     parameters.gravity_m_per_s2,
-                             state.position_m, state.velocity_m_per_s, time_s,
+                           double time_s, double time_step_s, LaneState<L>& state,
+                           const StepExtras<L>& extras) {
+  LaneVectors<L>&position_m = state.position_m, &velocity_m_per_s = state.velocity_m_per_s;
+  const size_t effects = cloth_.effects.size();
+  const EffectScene<L> scene{cloth_,     parameters.springs, parameters.gravity_m_per_s2,
+                             position_m, velocity_m_per_s,   time_s,
                              time_step_s};
-  if (any_effect) {
+  const bool any_force = effects > 0 || extras.force_n != nullptr;
+  if (extras.force_n != nullptr)
+    force_n_ = *extras.force_n;
+  else
     force_n_.set_zero();
-    for (size_t e = 0; e < cloth_.effects.size(); ++e)
-      cloth_.effects[e]->add_force(scene, parameters.effects[e], state.effect_memory[e], force_n_);
-  }
-  if (shifts_supports_) target_m_ = held_target_m;
+  for (size_t e = 0; e < effects; ++e)
+    cloth_.effects[e]->add_force(scene, parameters.effects[e], state.effect_memory[e], force_n_);
+
+  const LaneVectors<L>* target_m = &held_target_m;
   if (!changes_force_ && !shifts_supports_) {
     sweep_.step_euler(parameters.springs, parameters.gravity_m_per_s2, inverse_mass_per_kg_,
-                      any_effect ? &force_n_ : nullptr, time_step_s, state.position_m,
-                      state.velocity_m_per_s);
+                      any_force ? &force_n_ : nullptr, time_step_s, position_m, velocity_m_per_s,
+                      extras.factors);
   } else {
-    sweep_.add_spring_forces(parameters.springs, state.position_m, state.velocity_m_per_s,
-                             force_n_);
-    for (size_t e = 0; e < cloth_.effects.size(); ++e)
+    sweep_.add_spring_forces(parameters.springs, position_m, velocity_m_per_s, force_n_,
+                             extras.factors);
+    for (size_t e = 0; e < effects; ++e)
       cloth_.effects[e]->change_force(scene, parameters.effects[e], force_n_);
     if (shifts_supports_) {
+      target_m_ = held_target_m;
+      target_m = &target_m_;
       pull_n_.set_zero();
       held_.add_pulls(force_n_, parameters.gravity_m_per_s2, pull_n_);
-      for (size_t e = 0; e < cloth_.effects.size(); ++e)
+      for (size_t e = 0; e < effects; ++e)
         cloth_.effects[e]->shift_supports(scene, parameters.effects[e], pull_n_,
                                           state.effect_memory[e], target_m_);
     }
     move_by_forces(force_n_, parameters.gravity_m_per_s2, inverse_mass_per_kg_, time_step_s,
-                   state.position_m, state.velocity_m_per_s);
+                   position_m, velocity_m_per_s);
   }
-  held_.place(shifts_supports_ ? target_m_ : held_target_m, time_step_s, state.position_m,
-              state.velocity_m_per_s);
+  if (extras.driven_velocity_m_per_s != nullptr) *extras.driven_velocity_m_per_s = velocity_m_per_s;
+  held_.place(*target_m, time_step_s, position_m, velocity_m_per_s);
   switch (cloth_.strain_limit.mode) {
     case StrainLimitMode::off:
       break;
     case StrainLimitMode::positions:
-      limit_outcome_ = limiter_.limit_positions(parameters.limits, state.position_m);
+      limit_outcome_ = limiter_.limit_positions(parameters.limits, position_m, extras.moves);
       break;
     case StrainLimitMode::consistent:
       limit_outcome_ =
           limiter_.limit_consistently(parameters.limits, cloth_.strain_limit.most_sweeps,
-                                      time_step_s, state.position_m, state.velocity_m_per_s);
+                                      time_step_s, position_m, velocity_m_per_s, extras.moves);
       break;
   }
 }

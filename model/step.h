@@ -85,6 +85,16 @@ void move_by_forces(const LaneVectors<L>& force_n, const LaneVector<L>& gravity_
                     const Eigen::VectorXd& inverse_mass_per_kg, double time_step_s,
                     LaneVectors<L>& position_m, LaneVectors<L>& velocity_m_per_s);
 
+/// What a step may be given beyond parameters, and asked for; each may be null.
+template <class L = ExactLanes>
+struct StepExtras {
+  const SpringFactors<L>* factors = nullptr;
+  const LaneVectors<L>* force_n = nullptr;  ///< on every vertex, beside all others
+  std::vector<LimitMove>* moves = nullptr;  ///< a single simulation's strain limit adds its moves
+  /// Set to the velocities as forces have made them, before held points are placed.
+  LaneVectors<L>* driven_velocity_m_per_s = nullptr;
+};
+
 /// Steps the simulations in all lanes through time. Holds scratch memory: one object per thread.
 template <class L = ExactLanes>
 class EulerStepper {
@@ -99,7 +109,7 @@ class EulerStepper {
   /// `held_target_m` belongs to t + h. Vertices that a held point touches are not moved by the
   /// strain limit.
   void step(const LaneParameters<L>& parameters, const LaneVectors<L>& held_target_m, double time_s,
-            double time_step_s, LaneState<L>& state);
+            double time_step_s, LaneState<L>& state, const StepExtras<L>& extras = {});
 
   /// What the last step's strain limit found.
   const LimitOutcome<L>& limit_outcome() const { return limit_outcome_; }

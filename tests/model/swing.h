@@ -1,0 +1,51 @@
+#pragma once
+
+#include "model/tangents.h"
+#include "tests/model/random_cloth.h"
+
+namespace clothfit {
+
+/// A swinging cloth with one point held at a vertex, one between vertices, one that is moved.
+struct Swing {
+  Cloth cloth = square_cloth(6);
+  ParameterSet set;
+  Schedule schedule{.frame_time_s = {0, 0.03, 0.05, 0.1}, .time_step_s = 5e-4};
+
+  explicit Swing(Uniform& uniform) {
+    cloth.held = {held_at(cloth.mesh, 0, 0), held_at(cloth.mesh, 0.31, 0.02),
+                  held_at(cloth.mesh, 0.4, 0.4)};
+    cloth.held.back().motion = [](double time_s) {
+      return Eigen::Vector3d(0.4 - 0.3 * time_s, 0.39, 0.1 * time_s);
+    };
+    set = {.springs = spring_parameters(random_fabric(uniform), cloth.mesh),
+           .gravity_m_per_s2 = {0.3, 9.0, -2.0},
+           .start_position_m = crumpled(cloth.mesh, 0.1, uniform),
+           .start_velocity_m_per_s = uniform.vectors(36, 0.5)};
+  }
+};
+
+inline Direction random_direction(const Cloth& cloth, Uniform& uniform) {
+  Direction d;
+  for (size_t type = 0; type < kSpringTypes; ++type) {
+    d.natural_length_m[type] = uniform(-0.01, 0.01);
+    d.stiffness_n_per_m[type] = uniform(-5, 5);
+    d.damping_ns_per_m[type] = uniform(-0.01, 0.01);
+    d.critical_elongation[type] = uniform(-0.01, 0.01);
+  }
+  d.gravity_m_per_s2 = uniform.vectors(1, 1);
+  for (const EffectDescription& effect : cloth.effect_descriptions) {
+    d.effects.emplace_back();
+    for (const EffectParameter& p : effect.parameters)
+      d.effects.back().push_back(p.typical * uniform(-1, 1));
+  }
+  d.start_position_m = uniform.vectors(cloth.mesh.vertex_count(), 0.01);
+  d.start_velocity_m_per_s = uniform.vectors(cloth.mesh.vertex_count(), 0.1);
+  const Eigen::Vector3d drift = uniform.vectors(1, 0.1);
+  d.held_motion.resize(cloth.held.size());
+  for (size_t h = 0; h < cloth.held.size(); ++h)
+    if (cloth.held[h].motion)
+      d.held_motion[h] = [drift](double time_s) -> Eigen::Vector3d { return time_s * drift; };
+  return d;
+}
+
+}  // namespace clothfit
