@@ -1,42 +1,18 @@
 #include "model/stability.h"
 
-#include <Eigen/Eigenvalues>
-#include <algorithm>
+#include <array>
 #include <cmath>
 
+#include "model/network_bound.h"
+
 namespace clothfit {
-namespace {
-
-constexpr double kFoldedMargin = 1.25;
-
-/// Bound on the eigenvalues of M^-1 L for the spring network with weights `k` per type.
-double network_bound(const Cloth& cloth, const std::array<double, kSpringTypes>& k) {
-  const Eigen::Matrix3Xd flat = flat_positions(cloth.mesh);
-  std::vector<Eigen::Matrix3d> stiffness(static_cast<size_t>(cloth.mesh.vertex_count()),
-                                         Eigen::Matrix3d::Zero());
-  for (size_t type = 0; type < kSpringTypes; ++type) {
-    for (const Spring& spring : cloth.springs[type]) {
-      const Eigen::Vector3d u = (flat.col(spring.b) - flat.col(spring.a)).normalized();
-      stiffness[static_cast<size_t>(spring.a)] += k[type] * u * u.transpose();
-      stiffness[static_cast<size_t>(spring.b)] += k[type] * u * u.transpose();
-    }
-  }
-  double bound = 0;
-  for (size_t v = 0; v < stiffness.size(); ++v) {
-    const double largest =
-        Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(stiffness[v], Eigen::EigenvaluesOnly)
-            .eigenvalues()
-            .maxCoeff();
-    bound = std::max(bound, 2 * largest / cloth.mass_kg[static_cast<Eigen::Index>(v)]);
-  }
-  return bound;
-}
-
-}  // namespace
-
 double stable_time_step_s(const Cloth& cloth, const ParameterSet& parameters) {
-  double omega2 = kFoldedMargin * network_bound(cloth, parameters.springs.stiffness_n_per_m);
-  double gamma = kFoldedMargin * network_bound(cloth, parameters.springs.damping_ns_per_m);
+  const auto bound = [&](const std::array<double, kSpringTypes>& constant) {
+    return network_bound(
+        cloth, [&](SpringType type, const Spring&) { return constant[static_cast<size_t>(type)]; });
+  };
+  double omega2 = bound(parameters.springs.stiffness_n_per_m);
+  double gamma = bound(parameters.springs.damping_ns_per_m);
   double acceleration_ratio = 1;
   for (size_t e = 0; e < cloth.effects.size(); ++e) {
     const EffectRates rates =

@@ -21,8 +21,9 @@ struct Stencil {
 
 /// An effect between a few vertices each, such as bending. A Law has
 ///   static constexpr int kParameters, kVertices;
-///   template <class Visit> static void for_stencils(const Cloth&, const Visit&);  //
-///   visit(Stencil) template <class Real> static std::array<Vector3<Real>, kVertices> forces(
+///   // calls visit(Stencil<kVertices>) for every place where it acts; a vertex may stand in it
+///   twice template <class Visit> static void for_stencils(const Cloth&, const Visit&); template
+///   <class Real> static std::array<Vector3<Real>, kVertices> forces(
 ///       const std::array<Vector3<Real>, kVertices>& position_m,
 ///       const std::array<double, 4>& constants, const std::array<Real, kParameters>&);  // N
 ///   static EffectRates rates(const Cloth&, const SpringParameters&, const std::vector<double>&);
@@ -67,12 +68,14 @@ class StencilLawEffect final : public Effect {
         Eigen::Matrix<double, 3, kCount> j;
         j << forces[on].x.v.transpose(), forces[on].y.v.transpose(), forces[on].z.v.transpose();
         for (int of = 0; of < Law::kVertices; ++of)
-          derivatives.by_motion.push_back(
-              {stencil.vertex[on], stencil.vertex[static_cast<size_t>(of)],
-               j.template middleCols<3>(3 * of), Eigen::Matrix3d::Zero()});
+          if (const Eigen::Matrix3d block = j.template middleCols<3>(3 * of); !block.isZero(0))
+            derivatives.by_motion.push_back({stencil.vertex[on],
+                                             stencil.vertex[static_cast<size_t>(of)], block,
+                                             Eigen::Matrix3d::Zero()});
         for (int n = 0; n < Law::kParameters; ++n)
-          derivatives.by_parameter.push_back(
-              {stencil.vertex[on], ParameterNumber::own(n), j.col(kOwn + n)});
+          if (!j.col(kOwn + n).isZero(0))
+            derivatives.by_parameter.push_back(
+                {stencil.vertex[on], ParameterNumber::own(n), j.col(kOwn + n)});
       }
     });
   }

@@ -8,6 +8,8 @@
 
 #include "model/effects/registry.h"
 #include "model/simulate.h"
+#include "model/stability.h"
+#include "tests/model/effect_derivatives.h"
 #include "tests/model/mechanics.h"
 #include "tests/model/random_cloth.h"
 
@@ -18,6 +20,7 @@ struct EffectTraits {
   bool isotropic = false;     ///< its force turns with the scene; it prefers no direction of space
   bool only_damps = false;    ///< its power is never positive
   bool proportional = false;  ///< its force is proportional to its first parameter
+  bool internal = false;      ///< its forces sum to zero and exert no torque
   bool adds_force = true;     ///< it adds a force that depends on nothing but the present state
 };
 
@@ -190,6 +193,42 @@ inline void expect_to_turn_with_the_scene(const EffectEntry& entry, Uniform& uni
   EXPECT_LT((force_n(entry, turned, parameters) - expected_n).norm(), 1e-13 * expected_n.norm());
 }
 
+inline void expect_neither_push_nor_torque(const EffectEntry& entry, Uniform& uniform) {
+  const State state(uniform);
+  const Eigen::Matrix3Xd f = force_n(entry, state, random_parameters(entry.describe(), uniform));
+
+  EXPECT_GT(f.norm(), 0);
+  // Sums of 36 numbers: rounding, a few times the largest.
+  const double largest = f.cwiseAbs().maxCoeff();
+  EXPECT_LT(f.rowwise().sum().norm(), 1e-14 * largest);
+  EXPECT_LT(torque(state.position_m, f).norm(), 1e-14 * largest);
+}
+
+/// Tangents, the adjoint and the implicit integrator rest on these.
+inline void expect_true_derivatives(const EffectEntry& entry, Uniform& uniform) {
+  const EffectDescription effect = entry.describe();
+  EXPECT_EQ(derivative_mismatch(*entry.make(), effect, random_parameters(effect, uniform), uniform),
+            "");
+}
+
+/// The rates that an effect gives must bound what it does to a step, up to a fit's bounds.
+inline void expect_the_stable_step_to_be_stable(const EffectEntry& entry, Uniform& uniform) {
+  Cloth cloth = square_cloth(6);
+  cloth.held = {held_at(cloth.mesh, 0, 0), held_at(cloth.mesh, 0.31, 0.02)};
+  cloth.add_effect(entry.name, "test");
+  ParameterSet set{.springs = spring_parameters(cotton(), cloth.mesh),
+                   .effects = {{}},
+                   .start_position_m = crumpled(cloth.mesh, 0.3, uniform)};
+  for (const EffectParameter& p : entry.describe().parameters)
+    set.effects[0].push_back(uniform(0, 1) < 0.5 ? p.lower : p.upper);
+
+  const double time_step_s = 0.9 * stable_time_step_s(cloth, set);
+  const SimulateResult result =
+      simulate(cloth, {&set, 1}, {.frame_time_s = {0, 0.3}, .time_step_s = time_step_s}).front();
+
+  EXPECT_TRUE(result.usable()) << testing::PrintToString(set.effects[0]);
+}
+
 inline void expect_to_damp_only(const EffectEntry& entry, Uniform& uniform) {
   const State state(uniform);
   const Parameters parameters = random_parameters(entry.describe(), uniform);
@@ -217,7 +256,8 @@ inline void expect_proportional(const EffectEntry& entry, Uniform& uniform) {
 
 /// What every effect must keep, so that diagnosis can ask "is this physics missing?" of each alike:
 /// it describes itself, its bounds hold its neutral value, at which it does nothing to the last
-/// bit; lanes are separate; and what its traits claim is true.
+/// bit; lanes are separate; its derivatives are those of what it does; the step that its rates
+/// allow is stable; and what its traits claim is true.
 inline void expect_effect_contract(const std::string& name, const EffectTraits& traits) {
   const EffectEntry& entry = find_effect(name, "test");
   effect_contract::expect_a_complete_description(entry);
@@ -230,6 +270,9 @@ inline void expect_effect_contract(const std::string& name, const EffectTraits& 
       effect_contract::expect_every_kind_of_lanes_to_agree(entry, uniform);
     }
     effect_contract::expect_lanes_to_know_nothing_of_each_other(entry, uniform);
+    effect_contract::expect_true_derivatives(entry, uniform);
+    effect_contract::expect_the_stable_step_to_be_stable(entry, uniform);
+    if (traits.internal) effect_contract::expect_neither_push_nor_torque(entry, uniform);
     if (traits.isotropic) effect_contract::expect_to_turn_with_the_scene(entry, uniform);
     if (traits.only_damps) effect_contract::expect_to_damp_only(entry, uniform);
     if (traits.proportional) effect_contract::expect_proportional(entry, uniform);

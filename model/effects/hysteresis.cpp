@@ -1,0 +1,52 @@
+#include "model/effects/hysteresis.h"
+
+#include "model/effects/spring_law.h"
+#include "model/network_bound.h"
+
+namespace clothfit::hysteresis {
+namespace {
+
+struct Law {
+  static constexpr int kParameters = 2, kMemory = 1;
+
+  template <class Real>
+  static Real tension(const SpringSight<Real>& at, const std::array<Real, 2>& p,
+                      std::array<Real, 1>& memory) {
+    const auto& [ratio, yield] = p;
+    Real& plastic = memory[0];
+    const Real e = (at.length_m - at.natural_length_m) / at.natural_length_m;
+    plastic = select(e - plastic > yield, e - yield, plastic);
+    plastic = select(e - plastic < -yield, e + yield, plastic);
+    return ratio * at.stiffness_n_per_m * at.natural_length_m * (e - plastic);
+  }
+
+  static EffectRates rates(const Cloth& cloth, const SpringParameters& springs,
+                           const std::vector<double>& p) {
+    return {.frequency2_per_s2 = network_bound(cloth, [&](SpringType type, const Spring&) {
+              return p[0] * springs.stiffness_n_per_m[static_cast<size_t>(type)];
+            })};
+  }
+};
+
+}  // namespace
+
+EffectDescription describe() {
+  return {.name = "hysteresis",
+          .summary = "dry friction inside the fabric, T = ratio k l0 (e - p), |e - p| <= yield",
+          .parameters =
+              {{.name = "ratio", .unit = "1", .neutral = 0, .lower = 0, .upper = 5, .typical = 0.1},
+               {.name = "yield",
+                .unit = "1",
+                .neutral = 0.005,
+                .lower = 1e-4,
+                .upper = 0.1,
+                .typical = 0.002,
+                .scale = ParameterScale::logarithmic}},
+          .test = EffectTest::profiled};
+}
+
+std::unique_ptr<Effect> make() {
+  return std::make_unique<SpringLawEffect<Law>>();
+}
+
+}  // namespace clothfit::hysteresis

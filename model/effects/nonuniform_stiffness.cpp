@@ -1,0 +1,95 @@
+#include "model/effects/nonuniform_stiffness.h"
+
+#include <algorithm>
+
+#include "model/effects/spring_law.h"
+#include "model/network_bound.h"
+
+namespace clothfit::nonuniform_stiffness {
+namespace {
+
+enum Parameter : size_t {
+  patch,
+  patch_s,
+  patch_t,
+  patch_radius,
+  edge,
+  edge_width,
+  gradient_s,
+  gradient_t
+};
+
+template <class Real>
+Real bump(const Real& square) {
+  const Real rest = select(square < Real(1.0), Real(1.0) - square, Real(0.0));
+  return rest * rest * rest;
+}
+
+/// What the stiffness of a spring whose middle is at (s, t) is multiplied by.
+template <class Real>
+Real factor(double s, double t, const std::array<Real, 8>& p) {
+  const Real from_s = (Real(s) - p[patch_s]) / p[patch_radius],
+             from_t = (Real(t) - p[patch_t]) / p[patch_radius];
+  const Real from_border = Real(std::min({s, 1 - s, t, 1 - t})) / p[edge_width];
+  return (Real(1.0) + p[patch] * bump(from_s * from_s + from_t * from_t)) *
+         (Real(1.0) + p[edge] * bump(from_border * from_border)) *
+         (Real(1.0) + p[gradient_s] * Real(2 * s - 1)) *
+         (Real(1.0) + p[gradient_t] * Real(2 * t - 1));
+}
+
+struct Law {
+  static constexpr int kParameters = 8, kMemory = 0;
+
+  template <class Real>
+  static Real tension(const SpringSight<Real>& at, const std::array<Real, 8>& p,
+                      std::array<Real, 0>&) {
+    return (factor(at.s, at.t, p) - Real(1.0)) *
+           (at.stiffness_n_per_m * (at.length_m - at.natural_length_m) +
+            at.damping_ns_per_m * at.stretching_m_per_s);
+  }
+
+  static EffectRates rates(const Cloth& cloth, const SpringParameters& springs,
+                           const std::vector<double>& parameters) {
+    std::array<double, 8> p;
+    std::ranges::copy(parameters, p.begin());
+    const auto bound = [&](const std::array<double, kSpringTypes>& constant) {
+      return network_bound(cloth, [&](SpringType type, const Spring& spring) {
+        const auto [s, t] = middle_of(cloth.mesh, spring);
+        return std::max(0.0, factor(s, t, p) - 1) * constant[static_cast<size_t>(type)];
+      });
+    };
+    return {.damping_per_s = bound(springs.damping_ns_per_m),
+            .frequency2_per_s2 = bound(springs.stiffness_n_per_m)};
+  }
+};
+
+}  // namespace
+
+EffectDescription describe() {
+  const auto amplitude = [](const char* name, double upper) {
+    return EffectParameter{
+        .name = name, .unit = "1", .neutral = 0, .lower = -0.9, .upper = upper, .typical = 0.1};
+  };
+  const auto place = [](const char* name, double neutral, double lower, double upper) {
+    return EffectParameter{.name = name,
+                           .unit = "1",
+                           .neutral = neutral,
+                           .lower = lower,
+                           .upper = upper,
+                           .typical = 0.05};
+  };
+  return {
+      .name = "nonuniform_stiffness",
+      .summary = "stiffness that varies over the cloth, T = (f(s, t) - 1) (k (l - l0) + c dl/dt)",
+      .parameters = {amplitude("patch", 5), place("patch_s", 0.5, 0, 1),
+                     place("patch_t", 0.5, 0, 1), place("patch_radius", 0.3, 0.1, 1),
+                     amplitude("edge", 5), place("edge_width", 0.15, 0.05, 0.5),
+                     amplitude("gradient_s", 0.9), amplitude("gradient_t", 0.9)},
+      .test = EffectTest::profiled};
+}
+
+std::unique_ptr<Effect> make() {
+  return std::make_unique<SpringLawEffect<Law>>();
+}
+
+}  // namespace clothfit::nonuniform_stiffness

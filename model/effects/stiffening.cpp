@@ -1,0 +1,65 @@
+#include "model/effects/stiffening.h"
+
+#include <algorithm>
+
+#include "model/effects/spring_law.h"
+#include "model/network_bound.h"
+
+namespace clothfit::stiffening {
+namespace {
+
+struct Law {
+  static constexpr int kParameters = 3, kMemory = 0;
+
+  template <class Real>
+  static Real tension(const SpringSight<Real>& at, const std::array<Real, 3>& p,
+                      std::array<Real, 0>&) {
+    const auto& [stretched, compressed, strain] = p;
+    const Real e = (at.length_m - at.natural_length_m) / at.natural_length_m;
+    const auto longer = e > Real(0.0);
+    const Real size = select(longer, e, -e);
+    return at.stiffness_n_per_m * at.natural_length_m * select(longer, stretched, compressed) *
+           size * size / (size + strain);
+  }
+
+  static EffectRates rates(const Cloth& cloth, const SpringParameters& springs,
+                           const std::vector<double>& p) {
+    const double stiffer = std::max({0.0, p[0], -p[1]});
+    return {.frequency2_per_s2 = network_bound(cloth, [&](SpringType type, const Spring&) {
+              return stiffer * springs.stiffness_n_per_m[static_cast<size_t>(type)];
+            })};
+  }
+};
+
+}  // namespace
+
+EffectDescription describe() {
+  return {.name = "stiffening",
+          .summary = "a tension curve that bends, T = k l0 amplitude e^2 / (|e| + strain)",
+          .parameters = {{.name = "stretched",
+                          .unit = "1",
+                          .neutral = 0,
+                          .lower = -0.9,
+                          .upper = 10,
+                          .typical = 0.3},
+                         {.name = "compressed",
+                          .unit = "1",
+                          .neutral = 0,
+                          .lower = -3,
+                          .upper = 0.95,
+                          .typical = 0.1},
+                         {.name = "strain",
+                          .unit = "1",
+                          .neutral = 0.02,
+                          .lower = 1e-3,
+                          .upper = 0.2,
+                          .typical = 0.01,
+                          .scale = ParameterScale::logarithmic}},
+          .test = EffectTest::profiled};
+}
+
+std::unique_ptr<Effect> make() {
+  return std::make_unique<SpringLawEffect<Law>>();
+}
+
+}  // namespace clothfit::stiffening

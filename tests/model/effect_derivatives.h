@@ -1,0 +1,226 @@
+#pragma once
+
+#include <Eigen/Dense>
+#include <sstream>
+#include <string>
+
+#include "model/cloth.h"
+#include "model/effects/linearisation.h"
+#include "tests/model/random_cloth.h"
+
+namespace clothfit {
+
+/// The three things that an effect may do.
+enum class EffectDeed { add_force, change_force, shift_supports };
+
+/// What an effect does to one simulation as a map between plain vectors, so that its linearisation
+/// can be held against differences.
+///
+/// In:  positions, velocities, forces (on vertices; for `shift_supports` pulls on held points),
+///      memory, parameters by ParameterNumber.
+/// Out: forces or shifts, memory after the step.
+class EffectMap {
+ public:
+  EffectMap(const Effect& effect, const Cloth& cloth, int own_parameters, EffectDeed deed)
+      : effect_(effect),
+        cloth_(cloth),
+        deed_(deed),
+        vertices_(cloth.mesh.vertex_count()),
+        acted_on_(deed == EffectDeed::shift_supports ? static_cast<int>(cloth.held.size())
+                                                     : vertices_),
+        memory_(effect.memory_size(cloth)),
+        own_(own_parameters) {}
+
+  int inputs() const { return first_parameter() + ParameterNumber::own(own_); }
+  int outputs() const { return 3 * acted_on_ + memory_; }
+  int first_velocity() const { return 3 * vertices_; }
+  int first_force() const { return 6 * vertices_; }
+  int first_memory() const { return first_force() + 3 * acted_on_; }
+  int first_parameter() const { return first_memory() + memory_; }
+
+  Eigen::VectorXd operator()(const Eigen::VectorXd& in) const {
+    const Arguments at(*this, in);
+    LaneVectors<SingleLane> result =
+        deed_ == EffectDeed::change_force ? at.force_n : LaneVectors<SingleLane>::zero(acted_on_);
+    EffectMemory<SingleLane> memory = at.memory;
+    switch (deed_) {
+      case EffectDeed::add_force:
+        effect_.add_force(at.scene(cloth_), at.own, memory, result);
+        break;
+      case EffectDeed::change_force:
+        effect_.change_force(at.scene(cloth_), at.own, result);
+        break;
+      case EffectDeed::shift_supports:
+        effect_.shift_supports(at.scene(cloth_), at.own, at.force_n, memory, result);
+        break;
+    }
+    Eigen::VectorXd out(outputs());
+    out << result.lane(0).reshaped(), memory.matrix().transpose();
+    return out;
+  }
+
+  /// What the effect says its derivative is, outputs x inputs.
+  Eigen::MatrixXd stated_jacobian(const Eigen::VectorXd& in) const {
+    const Arguments at(*this, in);
+    EffectLinearisation d;
+    switch (deed_) {
+      case EffectDeed::add_force:
+        effect_.linearise_force(at.scene(cloth_), at.own, at.memory, d);
+        break;
+      case EffectDeed::change_force:
+        effect_.linearise_change(at.scene(cloth_), at.own, at.force_n, d);
+        break;
+      case EffectDeed::shift_supports:
+        effect_.linearise_supports(at.scene(cloth_), at.own, at.force_n, at.memory, d);
+        break;
+    }
+    Eigen::MatrixXd j = Eigen::MatrixXd::Zero(outputs(), inputs());
+    for (const auto& b : d.by_motion) {
+      j.block<3, 3>(3 * b.on, 3 * b.of) += b.by_position;
+      j.block<3, 3>(3 * b.on, first_velocity() + 3 * b.of) += b.by_velocity;
+    }
+    for (const auto& b : d.by_parameter)
+      j.block<3, 1>(3 * b.on, first_parameter() + b.parameter) += b.derivative;
+    for (const auto& b : d.by_memory)
+      j.block<3, 1>(3 * b.on, first_memory() + b.number) += b.derivative;
+    for (const auto& b : d.by_force)
+      j.block<3, 3>(3 * b.on, first_force() + 3 * b.on) += b.derivative;
+
+    std::vector<bool> changes(static_cast<size_t>(memory_), false);
+    const auto row = [&](int number) {
+      changes[static_cast<size_t>(number)] = true;
+      return j.row(3 * acted_on_ + number);
+    };
+    for (const auto& b : d.memory_by_motion) {
+      row(b.number).segment<3>(3 * b.of) += b.by_position;
+      row(b.number).segment<3>(first_velocity() + 3 * b.of) += b.by_velocity;
+    }
+    for (const auto& b : d.memory_by_parameter)
+      row(b.number)[first_parameter() + b.parameter] += b.derivative;
+    for (const auto& b : d.memory_by_memory) row(b.number)[first_memory() + b.of] += b.derivative;
+    for (const auto& b : d.memory_by_force)
+      row(b.number).segment<3>(first_force() + 3 * b.of) += b.derivative;
+    for (int m = 0; m < memory_; ++m)  // without an entry a number stays as it is
+      if (!changes[static_cast<size_t>(m)]) j(3 * acted_on_ + m, first_memory() + m) = 1;
+    return j;
+  }
+
+ private:
+  struct Arguments {
+    LaneVectors<SingleLane> position_m, velocity_m_per_s, force_n;
+    LaneSprings<SingleLane> springs;
+    LaneVector<SingleLane> gravity_m_per_s2;
+    EffectMemory<SingleLane> memory;
+    EffectValues<SingleLane> own;
+
+    Arguments(const EffectMap& map, const Eigen::VectorXd& in)
+        : position_m(vectors(in, 0, map.vertices_)),
+          velocity_m_per_s(vectors(in, map.first_velocity(), map.vertices_)),
+          force_n(vectors(in, map.first_force(), map.acted_on_)),
+          memory(in.segment(map.first_memory(), map.memory_).transpose().array()) {
+      const auto parameter = [&](int number) {
+        return LaneValue<SingleLane>::Constant(in[map.first_parameter() + number]);
+      };
+      for (int type = 0; type < kSpringTypes; ++type) {
+        const auto t = static_cast<size_t>(type);
+        springs.natural_length_m[t] = parameter(ParameterNumber::natural_length(type));
+        springs.stiffness_n_per_m[t] = parameter(ParameterNumber::stiffness(type));
+        springs.damping_ns_per_m[t] = parameter(ParameterNumber::damping(type));
+      }
+      gravity_m_per_s2 = {parameter(ParameterNumber::gravity(0)),
+                          parameter(ParameterNumber::gravity(1)),
+                          parameter(ParameterNumber::gravity(2))};
+      for (int p = 0; p < map.own_; ++p) own.push_back(parameter(ParameterNumber::own(p)));
+    }
+    static LaneVectors<SingleLane> vectors(const Eigen::VectorXd& in, int first, int count) {
+      LaneVectors<SingleLane> result = LaneVectors<SingleLane>::zero(count);
+      result.set_lane(0, in.segment(first, 3 * count).reshaped(3, count));
+      return result;
+    }
+    EffectScene<SingleLane> scene(const Cloth& cloth) const {
+      return {cloth, springs, gravity_m_per_s2, position_m, velocity_m_per_s, 0.3, 1e-3};
+    }
+  };
+
+  const Effect& effect_;
+  const Cloth& cloth_;
+  EffectDeed deed_;
+  int vertices_, acted_on_, memory_, own_;
+};
+
+/// Where a stated derivative differs from central differences; nothing where it agrees.
+///
+/// `in` is where to compare, `size` how much each input changes by to matter. Steps are 1e-5 of
+/// that: the differences' own error is some 1e-10 of the third derivative and, from rounding, 1e-11
+/// of the output. Laws of springs and surfaces that are nearly folded to nothing bend a few
+/// thousand times as much as smooth ones: 1e-6 of a column's largest entry is granted.
+inline std::string derivative_mismatch(const EffectMap& map, const Eigen::VectorXd& in,
+                                       const Eigen::VectorXd& size) {
+  const Eigen::MatrixXd stated = map.stated_jacobian(in);
+  const double output = map(in).cwiseAbs().maxCoeff();
+  for (Eigen::Index n = 0; n < in.size(); ++n) {
+    Eigen::VectorXd up = in, down = in;
+    up[n] += 1e-5 * size[n];
+    down[n] -= 1e-5 * size[n];
+    const Eigen::VectorXd seen = (map(up) - map(down)) / (up[n] - down[n]) * size[n];
+    const Eigen::VectorXd said = stated.col(n) * size[n];
+    Eigen::Index worst = 0;
+    const double difference = (seen - said).cwiseAbs().maxCoeff(&worst);
+    if (difference <= 1e-6 * seen.cwiseAbs().maxCoeff() + 1e-9 * output) continue;
+    std::ostringstream text;
+    text << "output " << worst << " by input " << n << " (velocities from " << map.first_velocity()
+         << ", forces " << map.first_force() << ", memory " << map.first_memory() << ", parameters "
+         << map.first_parameter() << "): stated " << stated(worst, n) << ", differences "
+         << seen[worst] / size[n];
+    return text.str();
+  }
+  return "";
+}
+
+/// Compares everything that an effect says of its derivatives with differences, in a moving,
+/// crumpled cloth that is held at two points.
+inline std::string derivative_mismatch(const Effect& effect, const EffectDescription& description,
+                                       const std::vector<double>& own, Uniform& uniform) {
+  Cloth cloth = square_cloth(5);
+  cloth.held = {held_at(cloth.mesh, 0, 0), held_at(cloth.mesh, 0.31, 0.02)};
+  const int vertices = cloth.mesh.vertex_count();
+  const SpringParameters springs = spring_parameters(cotton(), cloth.mesh);
+
+  for (const EffectDeed deed :
+       {EffectDeed::add_force, EffectDeed::change_force, EffectDeed::shift_supports}) {
+    if (deed == EffectDeed::change_force && !effect.changes_force()) continue;
+    if (deed == EffectDeed::shift_supports && !effect.shifts_supports()) continue;
+    const EffectMap map(effect, cloth, static_cast<int>(own.size()), deed);
+    Eigen::VectorXd in(map.inputs()), size(map.inputs());
+    size.setOnes();  // m/s, N
+    size.head(3 * vertices).setConstant(cloth.mesh.spacing_s_m());
+    size.segment(map.first_memory(), map.first_parameter() - map.first_memory()).setConstant(1e-2);
+    for (double& value : in) value = uniform(-1, 1);
+    in.array() *= size.array();
+    in.head(3 * vertices) = crumpled(cloth.mesh, 0.3, uniform).reshaped();
+    const auto set = [&](int parameter, double value, double change) {
+      in[map.first_parameter() + parameter] = value;
+      size[map.first_parameter() + parameter] = change;
+    };
+    for (int type = 0; type < kSpringTypes; ++type) {
+      const auto t = static_cast<size_t>(type);
+      set(ParameterNumber::natural_length(type), springs.natural_length_m[t],
+          springs.natural_length_m[t]);
+      set(ParameterNumber::stiffness(type), springs.stiffness_n_per_m[t],
+          springs.stiffness_n_per_m[t]);
+      set(ParameterNumber::damping(type), springs.damping_ns_per_m[t], 1e-2);
+    }
+    for (int axis = 0; axis < 3; ++axis)
+      set(ParameterNumber::gravity(axis), uniform(-9.81, 9.81), 9.81);
+    for (size_t p = 0; p < own.size(); ++p)
+      set(ParameterNumber::own(static_cast<int>(p)), own[p], description.parameters[p].typical);
+
+    const std::string mismatch = derivative_mismatch(map, in, size);
+    if (mismatch.empty()) continue;
+    constexpr const char* kDeeds[] = {"add_force", "change_force", "shift_supports"};
+    return std::string(kDeeds[static_cast<size_t>(deed)]) + ": " + mismatch;
+  }
+  return "";
+}
+
+}  // namespace clothfit
