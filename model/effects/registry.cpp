@@ -4,6 +4,9 @@
 #include <array>
 
 #include "data/input_error.h"
+#include "model/effects/added_air_mass.h"
+#include "model/effects/gust.h"
+#include "model/effects/quadratic_drag.h"
 #include "model/effects/viscous_damping.h"
 #include "model/effects/wind.h"
 
@@ -13,6 +16,9 @@ namespace {
 // A visible table: self-registering statics would be dropped by the linker from a static library.
 constexpr std::array kEffects = {
     // alphabetical
+    EffectEntry{"added_air_mass", added_air_mass::describe, added_air_mass::make},
+    EffectEntry{"gust", gust::describe, gust::make},
+    EffectEntry{"quadratic_drag", quadratic_drag::describe, quadratic_drag::make},
     EffectEntry{"viscous_damping", viscous_damping::describe, viscous_damping::make},
     EffectEntry{"wind", wind::describe, wind::make},
 };
