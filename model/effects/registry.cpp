@@ -5,6 +5,9 @@
 
 #include "data/input_error.h"
 #include "model/effects/added_air_mass.h"
+#include "model/effects/frame_acceleration.h"
+#include "model/effects/gravity_scale.h"
+#include "model/effects/gravity_tilt.h"
 #include "model/effects/gust.h"
 #include "model/effects/quadratic_drag.h"
 #include "model/effects/viscous_damping.h"
@@ -17,6 +20,9 @@ namespace {
 constexpr std::array kEffects = {
     // alphabetical
     EffectEntry{"added_air_mass", added_air_mass::describe, added_air_mass::make},
+    EffectEntry{"frame_acceleration", frame_acceleration::describe, frame_acceleration::make},
+    EffectEntry{"gravity_scale", gravity_scale::describe, gravity_scale::make},
+    EffectEntry{"gravity_tilt", gravity_tilt::describe, gravity_tilt::make},
     EffectEntry{"gust", gust::describe, gust::make},
     EffectEntry{"quadratic_drag", quadratic_drag::describe, quadratic_drag::make},
     EffectEntry{"viscous_damping", viscous_damping::describe, viscous_damping::make},
