@@ -9,6 +9,7 @@
 #include "model/effects/gravity_scale.h"
 #include "model/effects/gravity_tilt.h"
 #include "model/effects/gust.h"
+#include "model/effects/nonuniform_mass.h"
 #include "model/effects/quadratic_drag.h"
 #include "model/effects/viscous_damping.h"
 #include "model/effects/wind.h"
@@ -24,6 +25,7 @@ constexpr std::array kEffects = {
     EffectEntry{"gravity_scale", gravity_scale::describe, gravity_scale::make},
     EffectEntry{"gravity_tilt", gravity_tilt::describe, gravity_tilt::make},
     EffectEntry{"gust", gust::describe, gust::make},
+    EffectEntry{"nonuniform_mass", nonuniform_mass::describe, nonuniform_mass::make},
     EffectEntry{"quadratic_drag", quadratic_drag::describe, quadratic_drag::make},
     EffectEntry{"viscous_damping", viscous_damping::describe, viscous_damping::make},
     EffectEntry{"wind", wind::describe, wind::make},
