@@ -11,6 +11,9 @@
 #include "model/effects/gust.h"
 #include "model/effects/nonuniform_mass.h"
 #include "model/effects/quadratic_drag.h"
+#include "model/effects/support_drift.h"
+#include "model/effects/support_motion.h"
+#include "model/effects/support_slip.h"
 #include "model/effects/viscous_damping.h"
 #include "model/effects/wind.h"
 
@@ -27,6 +30,9 @@ constexpr std::array kEffects = {
     EffectEntry{"gust", gust::describe, gust::make},
     EffectEntry{"nonuniform_mass", nonuniform_mass::describe, nonuniform_mass::make},
     EffectEntry{"quadratic_drag", quadratic_drag::describe, quadratic_drag::make},
+    EffectEntry{"support_drift", support_drift::describe, support_drift::make},
+    EffectEntry{"support_motion", support_motion::describe, support_motion::make},
+    EffectEntry{"support_slip", support_slip::describe, support_slip::make},
     EffectEntry{"viscous_damping", viscous_damping::describe, viscous_damping::make},
     EffectEntry{"wind", wind::describe, wind::make},
 };
