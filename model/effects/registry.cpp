@@ -5,6 +5,8 @@
 
 #include "data/input_error.h"
 #include "model/effects/added_air_mass.h"
+#include "model/effects/contact_plane.h"
+#include "model/effects/contact_sphere.h"
 #include "model/effects/frame_acceleration.h"
 #include "model/effects/gravity_scale.h"
 #include "model/effects/gravity_tilt.h"
@@ -24,6 +26,8 @@ namespace {
 constexpr std::array kEffects = {
     // alphabetical
     EffectEntry{"added_air_mass", added_air_mass::describe, added_air_mass::make},
+    EffectEntry{"contact_plane", contact_plane::describe, contact_plane::make},
+    EffectEntry{"contact_sphere", contact_sphere::describe, contact_sphere::make},
     EffectEntry{"frame_acceleration", frame_acceleration::describe, frame_acceleration::make},
     EffectEntry{"gravity_scale", gravity_scale::describe, gravity_scale::make},
     EffectEntry{"gravity_tilt", gravity_tilt::describe, gravity_tilt::make},
