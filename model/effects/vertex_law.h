@@ -23,6 +23,7 @@ struct VertexSight {
   double mass_kg = 0;
   double flat_area_m2 = 0;
   double s = 0, t = 0;  ///< place on the cloth, shares of its width and height
+  const Mesh* mesh = nullptr;
   double time_s = 0;
 };
 
@@ -46,6 +47,20 @@ Vector3<RealOf<L>> vector_area(const LaneVectors<L>& position_m, const AreaStenc
   return RealOf<L>(0.25) * cross(along_s, along_t);
 }
 
+/// The area that belongs to vertex [i, j] in the flat cloth.
+inline double flat_area_m2(const Mesh& mesh, int i, int j) {
+  return mesh.spacing_s_m() * mesh.spacing_t_m() * (i % (mesh.rows - 1) == 0 ? 0.5 : 1.0) *
+         (j % (mesh.columns - 1) == 0 ? 0.5 : 1.0);
+}
+
+/// The largest area per mass of any vertex, stretched as far as cloth stretches (m2/kg).
+inline double largest_area_per_mass(const Cloth& cloth) {
+  constexpr double kStretched = 1.5;  // of the flat area
+  const Eigen::VectorXd area_m2 =
+      masses_by_area(cloth.mesh, cloth.mesh.width_m * cloth.mesh.height_m);
+  return kStretched * area_m2.cwiseQuotient(cloth.mass_kg).maxCoeff();
+}
+
 /// Calls `visit(vertex, stencil, sight)` for every vertex, with what a law sees there.
 template <class L, class Visit>
 void for_vertices(const EffectScene<L>& scene, const Visit& visit) {
@@ -53,8 +68,8 @@ void for_vertices(const EffectScene<L>& scene, const Visit& visit) {
   const Mesh& mesh = cloth.mesh;
   VertexSight<RealOf<L>> sight;
   sight.gravity_m_per_s2 = real_of<L>(scene.gravity_m_per_s2);
+  sight.mesh = &mesh;
   sight.time_s = scene.time_s;
-  const double cell_m2 = mesh.spacing_s_m() * mesh.spacing_t_m();
   for (int i = 0; i < mesh.rows; ++i) {
     for (int j = 0; j < mesh.columns; ++j) {
       const int k = mesh.vertex(i, j);
@@ -63,8 +78,7 @@ void for_vertices(const EffectScene<L>& scene, const Visit& visit) {
       sight.velocity_m_per_s = vector_at<L>(scene.velocity_m_per_s, k);
       sight.area_m2 = vector_area<L>(scene.position_m, stencil);
       sight.mass_kg = cloth.mass_kg[k];
-      sight.flat_area_m2 = cell_m2 * (i % (mesh.rows - 1) == 0 ? 0.5 : 1.0) *
-                           (j % (mesh.columns - 1) == 0 ? 0.5 : 1.0);
+      sight.flat_area_m2 = flat_area_m2(mesh, i, j);
       sight.s = static_cast<double>(j) / (mesh.columns - 1);
       sight.t = static_cast<double>(i) / (mesh.rows - 1);
       visit(k, stencil, sight);
@@ -91,6 +105,7 @@ struct VertexDual {
             .flat_area_m2 = at.flat_area_m2,
             .s = at.s,
             .t = at.t,
+            .mesh = at.mesh,
             .time_s = at.time_s};
   }
   static std::array<Number, parameters> parameters_of(const EffectValues<SingleLane>& values) {

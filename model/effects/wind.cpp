@@ -17,11 +17,7 @@ struct Law {
 
   static EffectRates rates(const Cloth& cloth, const SpringParameters&,
                            const std::vector<double>& parameters) {
-    constexpr double kStretched = 1.5;  // of the flat area
-    const Mesh& mesh = cloth.mesh;
-    const Eigen::VectorXd area_m2 = masses_by_area(mesh, mesh.width_m * mesh.height_m);
-    return {.damping_per_s =
-                parameters[0] * kStretched * area_m2.cwiseQuotient(cloth.mass_kg).maxCoeff()};
+    return {.damping_per_s = parameters[0] * largest_area_per_mass(cloth)};
   }
 };
 

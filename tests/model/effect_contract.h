@@ -153,10 +153,13 @@ inline void expect_to_add_to_what_is_there(const EffectEntry& entry, Uniform& un
 inline void expect_every_kind_of_lanes_to_agree(const EffectEntry& entry, Uniform& uniform) {
   const State state(uniform);
   const Parameters parameters = random_parameters(entry.describe(), uniform);
-  const Eigen::Matrix3Xd exact_n = force_n(entry, state, parameters);
+  const auto effect = entry.make();
+  // What changes a force must have one to change.
+  const Eigen::Matrix3Xd there_n = uniform.vectors(36, effect->changes_force() ? 1 : 0);
+  const Eigen::Matrix3Xd exact_n = force_n(*effect, state, parameters, there_n);
 
-  EXPECT_EQ(force_n<SingleLane>(entry, state, parameters), exact_n);
-  EXPECT_LT((force_n<FastLanes>(entry, state, parameters) - exact_n).norm(),
+  EXPECT_EQ(force_n<SingleLane>(*effect, state, parameters, there_n), exact_n);
+  EXPECT_LT((force_n<FastLanes>(*effect, state, parameters, there_n) - exact_n).norm(),
             1e-4 * exact_n.norm() + 1e-30);
 }
 
@@ -266,7 +269,8 @@ inline void expect_effect_contract(const std::string& name, const EffectTraits& 
     Uniform uniform(seed);
     effect_contract::expect_nothing_at_neutral(entry, uniform);
     if (traits.adds_force) {
-      effect_contract::expect_to_add_to_what_is_there(entry, uniform);
+      if (!entry.make()->changes_force())
+        effect_contract::expect_to_add_to_what_is_there(entry, uniform);
       effect_contract::expect_every_kind_of_lanes_to_agree(entry, uniform);
     }
     effect_contract::expect_lanes_to_know_nothing_of_each_other(entry, uniform);

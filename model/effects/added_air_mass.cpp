@@ -1,0 +1,41 @@
+#include "model/effects/added_air_mass.h"
+
+#include "model/effects/vertex_law.h"
+
+namespace clothfit::added_air_mass {
+namespace {
+struct Law {
+  static constexpr int kParameters = 1;
+
+  template <class Real>
+  static Vector3<Real> change(const VertexSight<Real>& at, const Vector3<Real>& force_n,
+                              const std::array<Real, 1>& mu_kg_per_m2) {
+    const Vector3<Real> n = direction(at.area_m2);
+    const Real mass(at.mass_kg);
+    const Real air = mu_kg_per_m2[0] * dot(at.area_m2, n);
+    const Real along = dot(n, force_n + mass * at.gravity_m_per_s2);
+    return force_n - air / (mass + air) * along * n;
+  }
+
+  /// More inertia only slows accelerations.
+  static EffectRates rates(const Cloth&, const SpringParameters&, const std::vector<double>&) {
+    return {};
+  }
+};
+
+}  // namespace
+
+EffectDescription describe() {
+  return {
+      .name = "added_air_mass",
+      .summary =
+          "inertia of air along the surface's normal, F' = F - mu A / (m + mu A) n [n . (F + m g)]",
+      .parameters = {
+          {.name = "mu", .unit = "kg/m2", .neutral = 0, .lower = 0, .upper = 2, .typical = 0.02}}};
+}
+
+std::unique_ptr<Effect> make() {
+  return std::make_unique<InertiaLawEffect<Law>>();
+}
+
+}  // namespace clothfit::added_air_mass

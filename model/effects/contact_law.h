@@ -1,0 +1,81 @@
+#pragma once
+
+#include <array>
+#include <cmath>
+
+#include "model/effects/effect.h"
+#include "model/effects/number.h"
+#include "model/effects/vertex_law.h"
+
+namespace clothfit {
+
+/// What a vertex feels of an obstacle.
+///
+///   F = N n - friction N v_t / sqrt(v_t^2 + (friction N / (rate m))^2)
+///   N = A max(stiffness depth - damping v_n, 0) where depth > 0, else 0
+///
+/// depth (m): how far the vertex is inside the obstacle; n: the obstacle's outward unit normal
+/// there; v_n = n . v and v_t = v - v_n n: of the vertex against the obstacle, which rests; A: the
+/// area that belongs to the vertex in the flat cloth; m its mass. The obstacle pushes, never pulls.
+///
+/// Source: penalty of the depth with a dashpot, Coulomb's friction. Friction is smoothed where
+/// sliding changes its sign, at the speed below which it would damp faster than `rate`: there it is
+/// viscous, -rate m v_t. So steps stay stable whatever presses, and cloth that should stick creeps,
+/// on a slope of angle a at g sin(a) / rate times 1 / sqrt(1 - (tan(a) / friction)^2).
+struct Contact {
+  static constexpr int kParameters = 3;  ///< stiffness, damping, friction come first
+  static constexpr double kFrictionRate_per_s = 2000;
+
+  template <class Real>
+  static Vector3<Real> force(const Real& depth_m, const Vector3<Real>& normal,
+                             const Vector3<Real>& velocity_m_per_s, double area_m2, double mass_kg,
+                             const Real& stiffness_pa_per_m, const Real& damping_pa_s_per_m,
+                             const Real& friction) {
+    using std::sqrt;
+    const Real none(0.0);
+    const Real leaving = dot(normal, velocity_m_per_s);
+    Real pressure = stiffness_pa_per_m * depth_m - damping_pa_s_per_m * leaving;
+    pressure = select(pressure > none, pressure, none);
+    const Real press_n = Real(area_m2) * select(depth_m > none, pressure, none);
+
+    const Vector3<Real> sliding = velocity_m_per_s - leaving * normal;
+    const Real most_n = friction * press_n;
+    const Real viscous_speed = Real(1 / (kFrictionRate_per_s * mass_kg)) * most_n;
+    const Real square = dot(sliding, sliding) + viscous_speed * viscous_speed;
+    // Where the root's derivative is infinite it must not be taken.
+    const auto some = square > Real(1e-30);
+    const Real drag = select(some, most_n / sqrt(select(some, square, Real(1.0))), none);
+    return press_n * normal - drag * sliding;
+  }
+
+  /// `parameters`: stiffness, damping, friction, and whatever follows.
+  static EffectRates rates(const Cloth& cloth, const std::vector<double>& parameters) {
+    const auto [stiffness, damping, friction] =
+        std::array{parameters[0], parameters[1], parameters[2]};
+    // Friction grows with what presses, so that it adds to the force by which motion along the
+    // normal is answered.
+    const double most = (1 + friction) * largest_area_per_mass(cloth);
+    const bool rubs = friction > 0 && (stiffness > 0 || damping > 0);
+    return {.damping_per_s = most * damping + (rubs ? kFrictionRate_per_s : 0),
+            .frequency2_per_s2 = most * stiffness};
+  }
+
+  static std::vector<EffectParameter> parameters() {
+    return {
+        {.name = "stiffness",
+         .unit = "Pa/m",
+         .neutral = 0,
+         .lower = 0,
+         .upper = 1e5,
+         .typical = 1000},
+        {.name = "damping", .unit = "Pa s/m", .neutral = 0, .lower = 0, .upper = 100, .typical = 1},
+        {.name = "friction",
+         .unit = "ratio",
+         .neutral = 0,
+         .lower = 0,
+         .upper = 2,
+         .typical = 0.1}};
+  }
+};
+
+}  // namespace clothfit

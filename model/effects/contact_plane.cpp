@@ -1,0 +1,46 @@
+#include "model/effects/contact_plane.h"
+
+#include "model/effects/contact_law.h"
+#include "model/effects/vertex_law.h"
+
+namespace clothfit::contact_plane {
+namespace {
+struct Law {
+  static constexpr int kParameters = Contact::kParameters + 4;
+
+  template <class Real>
+  static Vector3<Real> force(const VertexSight<Real>& at, const std::array<Real, kParameters>& p) {
+    const Vector3<Real> n = direction(Vector3<Real>{p[3], p[4], p[5]});
+    return Contact::force(p[6] - dot(n, at.position_m), n, at.velocity_m_per_s, at.flat_area_m2,
+                          at.mass_kg, p[0], p[1], p[2]);
+  }
+
+  static EffectRates rates(const Cloth& cloth, const SpringParameters&,
+                           const std::vector<double>& parameters) {
+    return Contact::rates(cloth, parameters);
+  }
+};
+
+}  // namespace
+
+EffectDescription describe() {
+  EffectDescription effect{.name = "contact_plane",
+                           .summary = "a plane that the cloth cannot pass, depth = offset - n . x",
+                           .parameters = Contact::parameters(),
+                           .test = EffectTest::finite};
+  effect.parameters.push_back(
+      {.name = "n_x", .unit = "ratio", .neutral = 0, .lower = -1, .upper = 1, .typical = 0.02});
+  effect.parameters.push_back(
+      {.name = "n_y", .unit = "ratio", .neutral = 0, .lower = -1, .upper = 1, .typical = 0.02});
+  effect.parameters.push_back(
+      {.name = "n_z", .unit = "ratio", .neutral = 1, .lower = -1, .upper = 1, .typical = 0.02});
+  effect.parameters.push_back(
+      {.name = "offset", .unit = "m", .neutral = 0, .lower = -10, .upper = 10, .typical = 0.01});
+  return effect;
+}
+
+std::unique_ptr<Effect> make() {
+  return std::make_unique<VertexLawEffect<Law>>();
+}
+
+}  // namespace clothfit::contact_plane

@@ -1,0 +1,52 @@
+#include "model/effects/contact_sphere.h"
+
+#include "model/effects/contact_law.h"
+#include "model/effects/vertex_law.h"
+
+namespace clothfit::contact_sphere {
+namespace {
+struct Law {
+  static constexpr int kParameters = Contact::kParameters + 4;
+
+  template <class Real>
+  static Vector3<Real> force(const VertexSight<Real>& at, const std::array<Real, kParameters>& p) {
+    const Vector3<Real> from_centre = at.position_m - Vector3<Real>{p[3], p[4], p[5]};
+    const Vector3<Real> n = direction(from_centre);
+    return Contact::force(p[6] - dot(n, from_centre), n, at.velocity_m_per_s, at.flat_area_m2,
+                          at.mass_kg, p[0], p[1], p[2]);
+  }
+
+  static EffectRates rates(const Cloth& cloth, const SpringParameters&,
+                           const std::vector<double>& parameters) {
+    return Contact::rates(cloth, parameters);
+  }
+};
+
+}  // namespace
+
+EffectDescription describe() {
+  EffectDescription effect{
+      .name = "contact_sphere",
+      .summary = "a ball that the cloth cannot pass, depth = radius - |x - centre|",
+      .parameters = Contact::parameters(),
+      .test = EffectTest::finite};
+  effect.parameters.push_back(
+      {.name = "centre_x", .unit = "m", .neutral = 0, .lower = -10, .upper = 10, .typical = 0.01});
+  effect.parameters.push_back(
+      {.name = "centre_y", .unit = "m", .neutral = 0, .lower = -10, .upper = 10, .typical = 0.01});
+  effect.parameters.push_back(
+      {.name = "centre_z", .unit = "m", .neutral = 0, .lower = -10, .upper = 10, .typical = 0.01});
+  effect.parameters.push_back({.name = "radius",
+                               .unit = "m",
+                               .neutral = 0.15,
+                               .lower = 0.005,
+                               .upper = 5,
+                               .typical = 0.005});
+  return effect;
+}
+
+std::unique_ptr<Effect> make() {
+  return std::make_unique<VertexLawEffect<Law>>();
+}
+
+}  // namespace clothfit::contact_sphere

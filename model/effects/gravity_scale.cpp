@@ -1,0 +1,37 @@
+#include "model/effects/gravity_scale.h"
+
+#include "model/effects/vertex_law.h"
+
+namespace clothfit::gravity_scale {
+namespace {
+struct Law {
+  static constexpr int kParameters = 1;
+
+  template <class Real>
+  static Vector3<Real> force(const VertexSight<Real>& at, const std::array<Real, 1>& excess) {
+    return Real(at.mass_kg) * excess[0] * at.gravity_m_per_s2;
+  }
+
+  static EffectRates rates(const Cloth&, const SpringParameters&, const std::vector<double>&) {
+    return {};
+  }
+};
+
+}  // namespace
+
+EffectDescription describe() {
+  return {.name = "gravity_scale",
+          .summary = "gravity stronger or weaker than stated, F = excess m g",
+          .parameters = {{.name = "excess",
+                          .unit = "ratio",
+                          .neutral = 0,
+                          .lower = -0.5,
+                          .upper = 0.5,
+                          .typical = 0.01}}};
+}
+
+std::unique_ptr<Effect> make() {
+  return std::make_unique<VertexLawEffect<Law>>();
+}
+
+}  // namespace clothfit::gravity_scale

@@ -1,0 +1,45 @@
+#include "model/effects/gravity_tilt.h"
+
+#include "model/effects/vertex_law.h"
+
+namespace clothfit::gravity_tilt {
+namespace {
+struct Law {
+  static constexpr int kParameters = 2;
+
+  template <class Real>
+  static Vector3<Real> force(const VertexSight<Real>& at, const std::array<Real, 2>& angle_rad) {
+    const Vector3<Real> w{Real(0.5) * angle_rad[0], Real(0.5) * angle_rad[1], Real(0.0)};
+    const Vector3<Real> once = cross(w, at.gravity_m_per_s2);
+    return Real(2 * at.mass_kg) / (Real(1.0) + dot(w, w)) * (once + cross(w, once));
+  }
+
+  static EffectRates rates(const Cloth&, const SpringParameters&, const std::vector<double>&) {
+    return {};
+  }
+};
+
+}  // namespace
+
+EffectDescription describe() {
+  return {.name = "gravity_tilt",
+          .summary = "gravity turned about the axes x and y, F = m (R g - g)",
+          .parameters = {{.name = "about_x",
+                          .unit = "rad",
+                          .neutral = 0,
+                          .lower = -0.3,
+                          .upper = 0.3,
+                          .typical = 0.01},
+                         {.name = "about_y",
+                          .unit = "rad",
+                          .neutral = 0,
+                          .lower = -0.3,
+                          .upper = 0.3,
+                          .typical = 0.01}}};
+}
+
+std::unique_ptr<Effect> make() {
+  return std::make_unique<VertexLawEffect<Law>>();
+}
+
+}  // namespace clothfit::gravity_tilt

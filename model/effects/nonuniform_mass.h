@@ -1,0 +1,26 @@
+#pragma once
+
+#include <memory>
+
+#include "model/effects/effect.h"
+
+/// Mass that is not spread as stated. At a vertex that carries r times its stated mass the sum F of
+/// all forces but the weight becomes F / r, so that it moves by g + F / (r m), with
+///
+///   r = (1 + hem H) (1 + gradient_s (s - 1/2)) (1 + gradient_t (t - 1/2)) (1 + patch B)
+///
+/// H: the share of the vertex's cell in the flat cloth that lies within hem_width of the border, so
+/// that the hem's mass is the same on every mesh. s, t: place on the cloth as shares of its width
+/// and height. B = (1 - u^2)^3 for u < 1, else 0, with u the distance from (patch_s, patch_t) over
+/// patch_radius in the flat cloth. Ours.
+///
+/// The total is not kept: what a hem or a patch weighs comes on top of the stated mass; gradients
+/// leave it alone. Forces that other effects state per mass belong to the stated mass. Neutral:
+/// hem, gradient_s, gradient_t, patch at 0; hem_width, patch_s, patch_t and patch_radius matter
+/// only where hem or patch do.
+namespace clothfit::nonuniform_mass {
+
+EffectDescription describe();
+std::unique_ptr<Effect> make();
+
+}  // namespace clothfit::nonuniform_mass

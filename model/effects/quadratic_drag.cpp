@@ -1,0 +1,49 @@
+#include "model/effects/quadratic_drag.h"
+
+#include "model/effects/vertex_law.h"
+
+namespace clothfit::quadratic_drag {
+namespace {
+struct Law {
+  static constexpr int kParameters = 2;
+
+  template <class Real>
+  static Vector3<Real> force(const VertexSight<Real>& at, const std::array<Real, 2>& c) {
+    using std::sqrt;
+    const Vector3<Real> n = direction(at.area_m2);
+    const Vector3<Real>& v = at.velocity_m_per_s;
+    const Real normal = dot(n, v);
+    const Real normal_speed = select(normal > Real(0.0), normal, -normal);
+    const Vector3<Real> tangential = v - normal * n;
+    // Where the root's derivative is infinite it must not be taken.
+    const Real square = dot(tangential, tangential);
+    const auto some = square > Real(1e-30);
+    const Real tangential_speed = select(some, sqrt(select(some, square, Real(1.0))), Real(0.0));
+    const Real half_area = Real(-0.5) * dot(at.area_m2, n);
+    return half_area * (c[0] * normal_speed * normal * n + c[1] * tangential_speed * tangential);
+  }
+
+  static EffectRates rates(const Cloth& cloth, const SpringParameters&,
+                           const std::vector<double>& parameters) {
+    constexpr double kFastest_m_per_s = 20;  // of the tip of a cracking cloth
+    return {.damping_per_s = std::max(parameters[0], parameters[1]) * kFastest_m_per_s *
+                             largest_area_per_mass(cloth)};
+  }
+};
+
+}  // namespace
+
+EffectDescription describe() {
+  return {
+      .name = "quadratic_drag",
+      .summary = "drag with the square of the speed, F = -A/2 (c_n |v_n| v_n + c_t |v_t| v_t)",
+      .parameters = {
+          {.name = "c_n", .unit = "kg/m3", .neutral = 0, .lower = 0, .upper = 10, .typical = 0.1},
+          {.name = "c_t", .unit = "kg/m3", .neutral = 0, .lower = 0, .upper = 2, .typical = 0.02}}};
+}
+
+std::unique_ptr<Effect> make() {
+  return std::make_unique<VertexLawEffect<Law>>();
+}
+
+}  // namespace clothfit::quadratic_drag

@@ -1,0 +1,50 @@
+#include "model/effects/support_drift.h"
+
+#include "model/effects/support_law.h"
+
+namespace clothfit::support_drift {
+namespace {
+struct Law {
+  static constexpr int kParameters = 3, kMemory = 0;
+
+  template <class Real>
+  static Vector3<Real> shift(const SupportSight<Real>& at, const std::array<Real, 3>& p,
+                             std::array<Real, 0>&) {
+    return Real(at.end_time_s) * Vector3<Real>{p[0], p[1], p[2]};
+  }
+
+  static EffectRates rates(const Cloth&, const SpringParameters&, const std::vector<double>&) {
+    return {};
+  }
+};
+
+}  // namespace
+
+EffectDescription describe() {
+  return {.name = "support_drift",
+          .summary = "held points drift, shift = velocity t",
+          .parameters = {{.name = "velocity_x",
+                          .unit = "m/s",
+                          .neutral = 0,
+                          .lower = -0.2,
+                          .upper = 0.2,
+                          .typical = 0.002},
+                         {.name = "velocity_y",
+                          .unit = "m/s",
+                          .neutral = 0,
+                          .lower = -0.2,
+                          .upper = 0.2,
+                          .typical = 0.002},
+                         {.name = "velocity_z",
+                          .unit = "m/s",
+                          .neutral = 0,
+                          .lower = -0.2,
+                          .upper = 0.2,
+                          .typical = 0.002}}};
+}
+
+std::unique_ptr<Effect> make() {
+  return std::make_unique<SupportLawEffect<Law>>();
+}
+
+}  // namespace clothfit::support_drift

@@ -1,0 +1,15 @@
+#pragma once
+
+#include <memory>
+
+#include "model/effects/effect.h"
+
+/// The held points drift, all alike, beside what is known of their motion: shift(t) = velocity t,
+/// with t the recording's time (s). Parameters: velocity_x, velocity_y, velocity_z (m/s), neutral
+/// at 0. Ours.
+namespace clothfit::support_drift {
+
+EffectDescription describe();
+std::unique_ptr<Effect> make();
+
+}  // namespace clothfit::support_drift

@@ -1,0 +1,60 @@
+#include "model/effects/support_slip.h"
+
+#include "model/effects/support_law.h"
+
+namespace clothfit::support_slip {
+namespace {
+struct Law {
+  static constexpr int kParameters = 2, kMemory = 3;
+
+  template <class Real>
+  static Vector3<Real> shift(const SupportSight<Real>& at, const std::array<Real, 2>& p,
+                             std::array<Real, 3>& crept_m) {
+    using std::sqrt;
+    const Real square = dot(at.pull_n, at.pull_n);
+    // Where the root's derivative is infinite it must not be taken.
+    const auto some = square > Real(1e-30);
+    const Real pull = sqrt(select(some, square, Real(1.0)));
+    const Real excess = select(some, pull - p[1], Real(0.0));
+    const Real speed = p[0] * select(excess > Real(0.0), excess, Real(0.0));
+    const Vector3<Real> creep = Real(at.time_step_s) * speed / pull * at.pull_n;
+    crept_m = {crept_m[0] + creep.x, crept_m[1] + creep.y, crept_m[2] + creep.z};
+    return {crept_m[0], crept_m[1], crept_m[2]};
+  }
+
+  /// A support that creeps eases the springs that pull it: their pull falls at the rate mobility
+  /// times stiffness.
+  static EffectRates rates(const Cloth& cloth, const SpringParameters& springs,
+                           const std::vector<double>& parameters) {
+    if (cloth.held.empty()) return {};
+    double stiffness_n_per_m = 0;  // of all springs that may meet at a vertex
+    for (const double k : springs.stiffness_n_per_m) stiffness_n_per_m += 2 * k;
+    return {.damping_per_s = parameters[0] * stiffness_n_per_m};
+  }
+};
+
+}  // namespace
+
+EffectDescription describe() {
+  return {.name = "support_slip",
+          .summary = "held points creep where the cloth pulls, at mobility max(|F| - threshold, 0)",
+          .parameters = {{.name = "mobility",
+                          .unit = "m/(N s)",
+                          .neutral = 0,
+                          .lower = 0,
+                          .upper = 0.1,
+                          .typical = 0.005},
+                         {.name = "threshold",
+                          .unit = "N",
+                          .neutral = 0.1,
+                          .lower = 0,
+                          .upper = 10,
+                          .typical = 0.02}},
+          .test = EffectTest::finite};
+}
+
+std::unique_ptr<Effect> make() {
+  return std::make_unique<SupportLawEffect<Law>>();
+}
+
+}  // namespace clothfit::support_slip

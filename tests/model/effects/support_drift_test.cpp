@@ -1,0 +1,40 @@
+// Supports that drift.
+
+#include "model/effects/support_drift.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/model/cloth_with_effect.h"
+
+namespace clothfit {
+namespace {
+
+TEST(SupportDrift, KeepsTheContractOfEffects) {
+  expect_effect_contract("support_drift", {});
+}
+
+TEST(SupportDrift, IsAStartOfTheClothTheOtherWaySeenFromTheSupports) {
+  // Galilei: cloth at rest under supports that leave with v is cloth that leaves with -v.
+  const Eigen::Vector3d v(0.1, -0.2, 0.05);
+  Uniform uniform(6);
+  Cloth bare = square_cloth(6);
+  bare.held = {held_at(bare.mesh, 0, 0), held_at(bare.mesh, 0.31, 0.02)};
+  const Eigen::Matrix3Xd start = crumpled(bare.mesh, 0.2, uniform);
+  const int steps = 1500;
+  const double h = 2e-4;
+  const ClothWithEffect drifting(bare, "support_drift", {v.x(), v.y(), v.z()}, start);
+  ClothWithEffect resting(bare, "support_drift", {0, 0, 0}, start);
+  resting.set.start_velocity_m_per_s = (-v).replicate(1, 36);
+
+  const Eigen::Matrix3Xd world = drifting.after(steps, h).position_m;
+
+  EXPECT_LT((world.col(0) - start.col(0) - steps * h * v).norm(), 1e-14);
+  // Rounding of 1500 steps, which crumpled cloth makes larger.
+  EXPECT_LT((world.colwise() - (steps * h * v) - resting.after(steps, h).position_m)
+                .cwiseAbs()
+                .maxCoeff(),
+            1e-9);
+}
+
+}  // namespace
+}  // namespace clothfit

@@ -1,0 +1,64 @@
+// Supports that creep where the cloth pulls.
+
+#include "model/effects/support_slip.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/model/cloth_with_effect.h"
+
+namespace clothfit {
+namespace {
+
+constexpr double kWeight_n = 0.025 * 9.81;  // square_cloth's
+
+/// A cloth of two columns that hangs by its two upper corners, each of which carries half of it.
+/// Without shear springs nothing pulls the corners together.
+ClothWithEffect hung_by_two(double mobility, double threshold) {
+  Cloth bare = square_cloth(2);
+  bare.held = {held_at(bare.mesh, 0, 0), held_at(bare.mesh, 0.4, 0)};
+  ClothWithEffect cloth(bare, "support_slip", {mobility, threshold}, hung_flat(bare.mesh));
+  cloth.set.springs.stiffness_n_per_m[shear_down] = 0;
+  cloth.set.springs.stiffness_n_per_m[shear_up] = 0;
+  return cloth;
+}
+
+TEST(SupportSlip, KeepsTheContractOfEffects) {
+  expect_effect_contract("support_slip", {});
+}
+
+TEST(SupportSlip, HangingClothComesDownAtMobilityTimesTheExcessOfItsWeight) {
+  for (const auto& [mobility, threshold] : {std::pair{0.02, 0.0}, {0.05, 0.08}}) {
+    SCOPED_TRACE(testing::Message() << mobility << ", " << threshold);
+
+    // The springs' swing dies out as e^(-5 t), the supports' own ease only adds to that.
+    const auto state = hung_by_two(mobility, threshold).after(8000, 1e-3);
+
+    const Eigen::Vector3d expected(0, 0, -mobility * (kWeight_n / 2 - threshold));
+    EXPECT_LT((state.velocity_m_per_s.colwise() - expected).cwiseAbs().maxCoeff(), 1e-11);
+  }
+}
+
+TEST(SupportSlip, HoldsUpToTheThreshold) {
+  // Twice the weight is the most that a load gives that is let go from a slack spring; below that
+  // nothing creeps.
+  const auto state = hung_by_two(0.05, 1.01 * kWeight_n).after(1000, 1e-3);
+
+  EXPECT_EQ(state.position_m.leftCols(2), hung_by_two(0, 0).set.start_position_m.leftCols(2));
+}
+
+TEST(SupportSlip, TurnsWithTheScene) {
+  Uniform uniform(7);
+  const Eigen::Matrix3d turn = uniform.rotation();
+  const ClothWithEffect here = hung_by_two(0.05, 0.03);
+  ClothWithEffect there = here;
+  there.set.start_position_m = turn * here.set.start_position_m;
+  there.set.gravity_m_per_s2 = turn * here.set.gravity_m_per_s2;
+
+  const Eigen::Matrix3Xd expected = turn * here.after(500, 1e-3).position_m;
+
+  EXPECT_GT((expected - there.set.start_position_m).leftCols(2).norm(), 1e-3);
+  EXPECT_LT((there.after(500, 1e-3).position_m - expected).cwiseAbs().maxCoeff(), 1e-12);
+}
+
+}  // namespace
+}  // namespace clothfit
