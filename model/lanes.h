@@ -3,6 +3,8 @@
 #include <Eigen/Core>
 #include <array>
 
+#include "model/aligned_array.h"
+
 namespace clothfit {
 
 /// Several simulations run side by side, one parameter set each: number l of every group of `count`
@@ -22,7 +24,7 @@ inline constexpr int kLanes = ExactLanes::kCount;
 
 /// One coordinate of every vertex in every lane: lanes x vertices, lane index fastest.
 template <class L = ExactLanes>
-using LaneArray = Eigen::Array<typename L::Number, L::kCount, Eigen::Dynamic>;
+using LaneArray = AlignedArray<typename L::Number, L::kCount>;
 
 /// A number in every lane.
 template <class L = ExactLanes>
