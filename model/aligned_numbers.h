@@ -1,28 +1,29 @@
 #pragma once
 
 #include <cstddef>
+#include <new>
 #include <vector>
 
 namespace clothfit {
 
-/// Numbers, zero at first, that begin where a cache line does: a vector of lanes then never lies
-/// across two, which would cost as much as two (a quarter of a time step).
+/// Gives memory that begins where a cache line does: a vector of lanes then never lies across two,
+/// which would cost as much as two (a quarter of a time step).
 template <class Number>
-class AlignedNumbers {
- public:
-  AlignedNumbers() = default;
-  explicit AlignedNumbers(std::size_t count) : lines_((count + kPerLine - 1) / kPerLine, Line{}) {}
+struct CacheLineAllocator {
+  using value_type = Number;
+  static constexpr std::align_val_t kLine{64};
 
-  Number* data() { return reinterpret_cast<Number*>(lines_.data()); }
-  const Number* data() const { return reinterpret_cast<const Number*>(lines_.data()); }
-
- private:
-  static constexpr std::size_t kLineBytes = 64;
-  static constexpr std::size_t kPerLine = kLineBytes / sizeof(Number);
-  struct alignas(kLineBytes) Line {
-    Number numbers[kPerLine];
-  };
-  std::vector<Line> lines_;
+  CacheLineAllocator() = default;
+  template <class Other>
+  CacheLineAllocator(const CacheLineAllocator<Other>&) {}
+  Number* allocate(std::size_t count) {
+    return static_cast<Number*>(::operator new(count * sizeof(Number), kLine));
+  }
+  void deallocate(Number* numbers, std::size_t) { ::operator delete(numbers, kLine); }
+  bool operator==(const CacheLineAllocator&) const { return true; }
 };
+
+template <class Number>
+using AlignedNumbers = std::vector<Number, CacheLineAllocator<Number>>;
 
 }  // namespace clothfit

@@ -50,7 +50,8 @@ struct ParameterSet {
   SpringParameters springs;
   Eigen::Vector3d gravity_m_per_s2{0, 0, -9.81};
   std::vector<std::vector<double>> effects;  ///< parameters of each effect of the cloth
-  Eigen::Matrix3Xd start_position_m;         ///< 3 x vertices, world; velocities start at zero
+  Eigen::Matrix3Xd start_position_m;         ///< 3 x vertices, world
+  Eigen::Matrix3Xd start_velocity_m_per_s;   ///< the same; empty: at rest
 };
 
 }  // namespace clothfit

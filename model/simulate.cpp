@@ -12,49 +12,25 @@
 namespace clothfit {
 namespace {
 
-/// A vertex further than this many cloth diagonals from where its lane started has diverged.
-constexpr double kSceneSize = 100;
-
-/// The parameter sets of one group of lanes; missing ones repeat the last, so that every lane
-/// computes something finite.
-std::vector<const ParameterSet*> fill_lanes(std::span<const ParameterSet> group) {
-  std::vector<const ParameterSet*> lanes(kLanes);
-  for (size_t l = 0; l < kLanes; ++l) lanes[l] = &group[std::min(l, group.size() - 1)];
-  return lanes;
-}
-
-LaneParameters lane_parameters(const Cloth& cloth, std::span<const ParameterSet* const> lanes) {
-  LaneParameters result;
-  result.effects.resize(cloth.effects.size());
-  for (size_t e = 0; e < cloth.effects.size(); ++e)
-    result.effects[e].resize(cloth.effect_descriptions[e].parameters.size());
-  for (int l = 0; l < kLanes; ++l) {
-    const ParameterSet& set = *lanes[static_cast<size_t>(l)];
-    set_lane(l, set.springs, cloth.strain_limit, result);
-    result.gravity_m_per_s2.x[l] = set.gravity_m_per_s2.x();
-    result.gravity_m_per_s2.y[l] = set.gravity_m_per_s2.y();
-    result.gravity_m_per_s2.z[l] = set.gravity_m_per_s2.z();
-    for (size_t e = 0; e < cloth.effects.size(); ++e)
-      for (size_t p = 0; p < result.effects[e].size(); ++p)
-        result.effects[e][p][l] = set.effects[e][p];
-  }
-  return result;
-}
-
 /// One group of lanes on its way through time.
+template <class L>
 class LaneRun {
  public:
   LaneRun(const Cloth& cloth, std::span<const ParameterSet> group)
-      : cloth_(cloth), stepper_(cloth), parameters_(lane_parameters(cloth, fill_lanes(group))) {
-    const int vertices = cloth.mesh.vertex_count();
-    state_ = {LaneVectors<>::zero(vertices), LaneVectors<>::zero(vertices)};
-    const auto lanes = fill_lanes(group);
-    for (int l = 0; l < kLanes; ++l)
-      state_.position_m.set_lane(l, lanes[static_cast<size_t>(l)]->start_position_m);
+      : cloth_(cloth),
+        stepper_(cloth),
+        parameters_(lane_parameters<L>(cloth, group)),
+        state_(LaneState<L>::of(cloth)) {
+    for (int l = 0; l < L::kCount; ++l) {
+      const ParameterSet& set = group[std::min(static_cast<size_t>(l), group.size() - 1)];
+      state_.position_m.set_lane(l, set.start_position_m);
+      if (set.start_velocity_m_per_s.cols() > 0)
+        state_.velocity_m_per_s.set_lane(l, set.start_velocity_m_per_s);
+    }
     held_target_m_ = stepper_.held().locate(state_.position_m);
   }
 
-  const LaneState& state() const { return state_; }
+  const LaneState<L>& state() const { return state_; }
 
   /// Advances from `from_s` to `to_s` in `steps` equal steps, held points where they are at the end
   /// of each step.
@@ -69,7 +45,7 @@ class LaneRun {
   /// Lets `steps` steps pass while time stands still at `time_s`. Held points glide from where they
   /// are to where they belong over the first fifth: a jump would hit the cloth like a hammer.
   void settle(double time_s, double time_step_s, int steps) {
-    const LaneVectors<> from = held_target_m_;
+    const LaneVectors<L> from = held_target_m_;
     for (int n = 0; n < steps; ++n) {
       held_target_m_ = from;
       aim_held_points(time_s, std::min(1.0, 5.0 * (n + 1) / steps));
@@ -84,7 +60,10 @@ class LaneRun {
       if (!cloth_.held[h].motion) continue;
       const Eigen::Vector3d target = cloth_.held[h].motion(time_s);
       const auto column = static_cast<Eigen::Index>(h);
-      const auto move = [share](auto place, double goal) { place += share * (goal - place); };
+      const auto move = [share](auto place, double goal) {
+        place += static_cast<typename L::Number>(share) *
+                 (static_cast<typename L::Number>(goal) - place);
+      };
       move(held_target_m_.x.col(column), target.x());
       move(held_target_m_.y.col(column), target.y());
       move(held_target_m_.z.col(column), target.z());
@@ -92,16 +71,11 @@ class LaneRun {
   }
 
   const Cloth& cloth_;
-  EulerStepper stepper_;
-  LaneParameters parameters_;
-  LaneState state_;
-  LaneVectors<> held_target_m_;
+  EulerStepper<L> stepper_;
+  LaneParameters<L> parameters_;
+  LaneState<L> state_;
+  LaneVectors<L> held_target_m_;
 };
-
-bool left_the_scene(const Eigen::Matrix3Xd& now, const Eigen::Matrix3Xd& start, const Mesh& mesh) {
-  const double limit = kSceneSize * std::hypot(mesh.width_m, mesh.height_m);
-  return !((now - start).cwiseAbs().maxCoeff() < limit) || !now.allFinite();
-}
 
 /// Calls `run(group, first)` for every group of up to kLanes parameter sets.
 template <class Run>
@@ -114,6 +88,12 @@ void for_lane_groups(std::span<const ParameterSet> parameters, const Run& run) {
 }
 
 }  // namespace
+
+bool left_the_scene(const Eigen::Matrix3Xd& now, const Eigen::Matrix3Xd& start, const Mesh& mesh) {
+  constexpr double kSceneSize = 100;
+  const double limit = kSceneSize * std::hypot(mesh.width_m, mesh.height_m);
+  return !((now - start).cwiseAbs().maxCoeff() < limit) || !now.allFinite();
+}
 
 int Schedule::substeps(int frame) const {
   const auto f = static_cast<size_t>(frame);
@@ -128,7 +108,7 @@ std::vector<SimulateResult> simulate(const Cloth& cloth, std::span<const Paramet
   std::vector<SimulateResult> results(parameters.size());
   const size_t frames = schedule.frame_time_s.size();
   for_lane_groups(parameters, [&](std::span<const ParameterSet> group, size_t first) {
-    LaneRun run(cloth, group);
+    LaneRun<ExactLanes> run(cloth, group);
     for (size_t l = 0; l < group.size(); ++l) results[first + l].position_m.reserve(frames);
     for (size_t frame = 0; frame < frames; ++frame) {
       if (frame > 0)
@@ -171,7 +151,7 @@ std::vector<Eigen::Matrix3Xd> relax(const Cloth& cloth, std::span<const Paramete
   const int steps = std::max(1, static_cast<int>(std::ceil(duration_s / time_step_s)));
   std::vector<Eigen::Matrix3Xd> shapes(parameters.size());
   for_lane_groups(damped, [&](std::span<const ParameterSet> group, size_t first) {
-    LaneRun run(heavy, group);
+    LaneRun<ExactLanes> run(heavy, group);
     run.settle(time_s, duration_s / steps, steps);
     for (size_t l = 0; l < group.size(); ++l)
       shapes[first + l] = run.state().position_m.lane(static_cast<int>(l));

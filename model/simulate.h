@@ -26,6 +26,10 @@ struct SimulateResult {
   bool usable() const { return reason == StopReason::reached_end; }
 };
 
+/// Whether a run has diverged: a vertex is not finite or further than a hundred cloth diagonals
+/// from where it started. All 3 x vertices.
+bool left_the_scene(const Eigen::Matrix3Xd& now, const Eigen::Matrix3Xd& start, const Mesh& mesh);
+
 /// Simulates every parameter set, kLanes at a time, groups of lanes in parallel. A result does not
 /// depend on the number of sets, their order or the number of threads.
 std::vector<SimulateResult> simulate(const Cloth& cloth, std::span<const ParameterSet> parameters,

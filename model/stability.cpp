@@ -35,10 +35,18 @@ double network_bound(const Cloth& cloth, const std::array<double, kSpringTypes>&
 }  // namespace
 
 double stable_time_step_s(const Cloth& cloth, const ParameterSet& parameters) {
-  const double omega2 = kFoldedMargin * network_bound(cloth, parameters.springs.stiffness_n_per_m);
+  double omega2 = kFoldedMargin * network_bound(cloth, parameters.springs.stiffness_n_per_m);
   double gamma = kFoldedMargin * network_bound(cloth, parameters.springs.damping_ns_per_m);
-  for (size_t e = 0; e < cloth.effects.size(); ++e)
-    gamma += cloth.effects[e]->damping_rate_per_s(cloth.mesh, cloth.mass_kg, parameters.effects[e]);
+  double acceleration_ratio = 1;
+  for (size_t e = 0; e < cloth.effects.size(); ++e) {
+    const EffectRates rates =
+        cloth.effects[e]->rates(cloth, parameters.springs, parameters.effects[e]);
+    omega2 += rates.frequency2_per_s2;
+    gamma += rates.damping_per_s;
+    acceleration_ratio *= rates.acceleration_ratio;
+  }
+  omega2 *= acceleration_ratio;
+  gamma *= acceleration_ratio;
   // h^2 omega2 + 2 h gamma - 4 = 0, in the form that survives omega2 = 0.
   const double root = std::sqrt(gamma * gamma + 4 * omega2);
   return gamma + root > 0 ? 4 / (gamma + root) : INFINITY;

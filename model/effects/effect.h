@@ -1,19 +1,25 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "model/fabric.h"
+#include "model/kernels/cloth_sweep.h"
 #include "model/lanes.h"
 #include "model/mesh.h"
 
 namespace clothfit {
 
+struct Cloth;
+struct EffectLinearisation;
+
 /// How a fit walks along a parameter.
 enum class ParameterScale { linear, logarithmic };
 
-/// A parameter of an effect. At `neutral` the effect leaves the trajectory bit-equal. Three named
-/// NAME_x, NAME_y, NAME_z are a vector's, which a recording may declare as NAME: [x, y, z].
+/// A parameter of an effect. Three named NAME_x, NAME_y, NAME_z are a vector's, which a recording
+/// may declare as NAME: [x, y, z].
 struct EffectParameter {
   std::string name;
   std::string unit;
@@ -24,34 +30,116 @@ struct EffectParameter {
   ParameterScale scale = ParameterScale::linear;
 };
 
+/// How it is tested whether data ask for an effect.
+enum class EffectTest {
+  smooth,    ///< by the derivative at the neutral value
+  profiled,  ///< some parameters matter only away from neutral: over a grid of their values
+  finite     ///< no derivative at neutral: by fits at trial amplitudes
+};
+
+/// At the neutral values of all its parameters an effect leaves the trajectory bit-equal;
+/// parameters that say how, not how much, have a neutral value too, at which alone nothing need
+/// vanish.
 struct EffectDescription {
   std::string name;
   std::string summary;  ///< one line for a person, with the equation
   std::vector<EffectParameter> parameters;
+  EffectTest test = EffectTest::smooth;
 };
 
 /// What an effect may look at: the state at the beginning of a step.
+template <class L = ExactLanes>
 struct EffectScene {
-  const Mesh& mesh;
-  const LaneVectors<>& position_m;
-  const LaneVectors<>& velocity_m_per_s;
-  const Eigen::VectorXd& mass_kg;  ///< per vertex
+  const Cloth& cloth;
+  const LaneSprings<L>& springs;
+  const LaneVector<L>& gravity_m_per_s2;
+  const LaneVectors<L>& position_m;
+  const LaneVectors<L>& velocity_m_per_s;
   double time_s = 0;
+  double time_step_s = 0;
+};
+
+/// One effect's parameters in every lane, in the description's order.
+template <class L = ExactLanes>
+using EffectValues = std::vector<LaneValue<L>>;
+
+/// What an effect remembers from step to step, zero at the start: lanes x numbers.
+template <class L = ExactLanes>
+using EffectMemory = LaneArray<L>;
+
+/// What an effect does to simulations in lanes of kind L (with DualLanes: to their derivatives
+/// too). Each does some of three things; what it does not do, it leaves as it is.
+template <class L>
+class LaneEffect {
+ public:
+  virtual ~LaneEffect() = default;
+
+  /// Adds the effect's force to `force_n` and moves its memory on.
+  virtual void add_force(const EffectScene<L>& /*scene*/, const EffectValues<L>& /*parameters*/,
+                         EffectMemory<L>& /*memory*/, LaneVectors<L>& /*force_n*/) const {}
+
+  /// Changes the sum of all forces but the weight, for inertia that is not the vertices' mass: the
+  /// step moves a vertex by g + F / m.
+  virtual void change_force(const EffectScene<L>& /*scene*/, const EffectValues<L>& /*parameters*/,
+                            LaneVectors<L>& /*force_n*/) const {}
+
+  /// Shifts where the held points are placed at the end of the step. `support_force_n`: what the
+  /// cloth, its weight included, pulls each held point with.
+  virtual void shift_supports(const EffectScene<L>& /*scene*/,
+                              const EffectValues<L>& /*parameters*/,
+                              const LaneVectors<L>& /*support_force_n*/,
+                              EffectMemory<L>& /*memory*/, LaneVectors<L>& /*target_m*/) const {}
+};
+
+/// Bounds that a stable time step follows from.
+struct EffectRates {
+  double damping_per_s = 0;       ///< rate at which velocities are damped, at most
+  double frequency2_per_s2 = 0;   ///< added to the square of the largest angular frequency
+  double acceleration_ratio = 1;  ///< acceleration for a given force over that without the effect
 };
 
 /// One physical effect beyond springs, dampers along them, and gravity.
-class Effect {
+class Effect : public LaneEffect<ExactLanes>,
+               public LaneEffect<FastLanes>,
+               public LaneEffect<SingleLane>,
+               public LaneEffect<DualLanes> {
  public:
-  virtual ~Effect() = default;
+  using LaneEffect<ExactLanes>::add_force;
+  using LaneEffect<FastLanes>::add_force;
+  using LaneEffect<SingleLane>::add_force;
+  using LaneEffect<DualLanes>::add_force;
+  using LaneEffect<ExactLanes>::change_force;
+  using LaneEffect<FastLanes>::change_force;
+  using LaneEffect<SingleLane>::change_force;
+  using LaneEffect<DualLanes>::change_force;
+  using LaneEffect<ExactLanes>::shift_supports;
+  using LaneEffect<FastLanes>::shift_supports;
+  using LaneEffect<SingleLane>::shift_supports;
+  using LaneEffect<DualLanes>::shift_supports;
 
-  /// Adds the effect's force to `force_n`. `parameters[p]` holds parameter p in every lane.
-  virtual void add_force(const EffectScene& scene, const std::vector<LaneValue<>>& parameters,
-                         LaneVectors<>& force_n) const = 0;
+  virtual bool changes_force() const { return false; }
+  virtual bool shifts_supports() const { return false; }
+  virtual int memory_size(const Cloth& /*cloth*/) const { return 0; }
 
-  /// Upper bound of the rate (1/s) at which the effect damps a velocity, for the choice of a stable
-  /// time step. `parameters` in the description's order.
-  virtual double damping_rate_per_s(const Mesh& mesh, const Eigen::VectorXd& mass_kg,
-                                    const std::vector<double>& parameters) const = 0;
+  /// The derivatives of `add_force`, `change_force` and `shift_supports` in one simulation, at what
+  /// these are given.
+  virtual void linearise_force(const EffectScene<SingleLane>& /*scene*/,
+                               const EffectValues<SingleLane>& /*parameters*/,
+                               const EffectMemory<SingleLane>& /*memory*/,
+                               EffectLinearisation& /*derivatives*/) const {}
+  virtual void linearise_change(const EffectScene<SingleLane>& /*scene*/,
+                                const EffectValues<SingleLane>& /*parameters*/,
+                                const LaneVectors<SingleLane>& /*force_n*/,
+                                EffectLinearisation& /*derivatives*/) const {}
+  virtual void linearise_supports(const EffectScene<SingleLane>& /*scene*/,
+                                  const EffectValues<SingleLane>& /*parameters*/,
+                                  const LaneVectors<SingleLane>& /*support_force_n*/,
+                                  const EffectMemory<SingleLane>& /*memory*/,
+                                  EffectLinearisation& /*derivatives*/) const {}
+
+  /// `parameters` in the description's order.
+  virtual EffectRates rates(const Cloth& cloth, const SpringParameters& springs,
+                            const std::vector<double>& parameters) const = 0;
 };
 
 }  // namespace clothfit

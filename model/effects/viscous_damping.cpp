@@ -1,25 +1,21 @@
 #include "model/effects/viscous_damping.h"
 
+#include "model/effects/vertex_law.h"
+
 namespace clothfit::viscous_damping {
 namespace {
 
-class ViscousDamping final : public Effect {
- public:
-  void add_force(const EffectScene& scene, const std::vector<LaneValue<>>& parameters,
-                 LaneVectors<>& force_n) const override {
-    const LaneValue<>& rate_per_s = parameters[0];
-    const LaneVectors<>& v = scene.velocity_m_per_s;
-    for (Eigen::Index k = 0; k < scene.mass_kg.size(); ++k) {
-      const LaneValue<> c = rate_per_s * scene.mass_kg[k];
-      force_n.x.col(k) -= c * v.x.col(k);
-      force_n.y.col(k) -= c * v.y.col(k);
-      force_n.z.col(k) -= c * v.z.col(k);
-    }
+struct Law {
+  static constexpr int kParameters = 1;
+
+  template <class Real>
+  static Vector3<Real> force(const VertexSight<Real>& at, const std::array<Real, 1>& rate_per_s) {
+    return Real(-at.mass_kg) * rate_per_s[0] * at.velocity_m_per_s;
   }
 
-  double damping_rate_per_s(const Mesh&, const Eigen::VectorXd&,
-                            const std::vector<double>& parameters) const override {
-    return parameters[0];
+  static EffectRates rates(const Cloth&, const SpringParameters&,
+                           const std::vector<double>& parameters) {
+    return {.damping_per_s = parameters[0]};
   }
 };
 
@@ -38,7 +34,7 @@ EffectDescription describe() {
 }
 
 std::unique_ptr<Effect> make() {
-  return std::make_unique<ViscousDamping>();
+  return std::make_unique<VertexLawEffect<Law>>();
 }
 
 }  // namespace clothfit::viscous_damping

@@ -1,58 +1,27 @@
 #include "model/effects/wind.h"
 
-#include <algorithm>
+#include "model/effects/vertex_law.h"
 
 namespace clothfit::wind {
 namespace {
 
-LaneVector<> difference(const LaneVectors<>& position, int to, int from) {
-  return {position.x.col(to) - position.x.col(from), position.y.col(to) - position.y.col(from),
-          position.z.col(to) - position.z.col(from)};
-}
+struct Law {
+  static constexpr int kParameters = 4;
 
-/// The vector area of the surface that belongs to vertex [i, j]: normal to it, as long as the area
-/// is large. From differences to the neighbours on both sides, or the one there is at an edge; in a
-/// flat cloth it is a cell's area inside, half of one at an edge, a quarter at a corner.
-LaneVector<> vector_area(const Mesh& mesh, const LaneVectors<>& position, int i, int j) {
-  const LaneVector<> along_s =
-      difference(position, mesh.vertex(i, std::min(j + 1, mesh.columns - 1)),
-                 mesh.vertex(i, std::max(j - 1, 0)));
-  const LaneVector<> along_t = difference(position, mesh.vertex(std::min(i + 1, mesh.rows - 1), j),
-                                          mesh.vertex(std::max(i - 1, 0), j));
-  return {0.25 * (along_s.y * along_t.z - along_s.z * along_t.y),
-          0.25 * (along_s.z * along_t.x - along_s.x * along_t.z),
-          0.25 * (along_s.x * along_t.y - along_s.y * along_t.x)};
-}
-
-class Wind final : public Effect {
- public:
-  void add_force(const EffectScene& scene, const std::vector<LaneValue<>>& parameters,
-                 LaneVectors<>& force_n) const override {
-    const LaneValue<>&c = parameters[0], &qx = parameters[1], &qy = parameters[2],
-          &qz = parameters[3];
-    const LaneVectors<>& velocity = scene.velocity_m_per_s;
-    for (int i = 0; i < scene.mesh.rows; ++i) {
-      for (int j = 0; j < scene.mesh.columns; ++j) {
-        const int k = scene.mesh.vertex(i, j);
-        const LaneVector<> area = vector_area(scene.mesh, scene.position_m, i, j);
-        const LaneValue<> size = (area.x * area.x + area.y * area.y + area.z * area.z).sqrt();
-        const LaneValue<> flow = area.x * (qx - c * velocity.x.col(k)) +
-                                 area.y * (qy - c * velocity.y.col(k)) +
-                                 area.z * (qz - c * velocity.z.col(k));
-        // A vertex whose surface is folded to nothing catches no wind.
-        const LaneValue<> pressure = (size > 0).select(flow / size, 0.0);
-        force_n.x.col(k) += pressure * area.x;
-        force_n.y.col(k) += pressure * area.y;
-        force_n.z.col(k) += pressure * area.z;
-      }
-    }
+  template <class Real>
+  static Vector3<Real> force(const VertexSight<Real>& at, const std::array<Real, 4>& p) {
+    const Vector3<Real> q{p[1], p[2], p[3]};
+    // A vertex whose surface is folded to nothing catches no wind.
+    return dot(at.area_m2, q - p[0] * at.velocity_m_per_s) * direction(at.area_m2);
   }
 
-  double damping_rate_per_s(const Mesh& mesh, const Eigen::VectorXd& mass_kg,
-                            const std::vector<double>& parameters) const override {
+  static EffectRates rates(const Cloth& cloth, const SpringParameters&,
+                           const std::vector<double>& parameters) {
     constexpr double kStretched = 1.5;  // of the flat area
+    const Mesh& mesh = cloth.mesh;
     const Eigen::VectorXd area_m2 = masses_by_area(mesh, mesh.width_m * mesh.height_m);
-    return parameters[0] * kStretched * area_m2.cwiseQuotient(mass_kg).maxCoeff();
+    return {.damping_per_s =
+                parameters[0] * kStretched * area_m2.cwiseQuotient(cloth.mass_kg).maxCoeff()};
   }
 };
 
@@ -83,7 +52,7 @@ EffectDescription describe() {
 }
 
 std::unique_ptr<Effect> make() {
-  return std::make_unique<Wind>();
+  return std::make_unique<VertexLawEffect<Law>>();
 }
 
 }  // namespace clothfit::wind

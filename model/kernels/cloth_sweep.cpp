@@ -287,6 +287,14 @@ void add_forces_exact(const SweepArrays<ExactLanes>& arrays,
 void add_forces_fast(const SweepArrays<FastLanes>& arrays, const std::array<float*, 3>& force_n) {
   add_forces(arrays, force_n);
 }
+void add_forces_single(const SweepArrays<SingleLane>& arrays,
+                       const std::array<double*, 3>& force_n) {
+  add_forces(arrays, force_n);
+}
+void step_euler_single(const SweepArrays<SingleLane>& arrays,
+                       const EulerArrays<SingleLane>& euler) {
+  step_euler(arrays, euler);
+}
 void step_euler_exact(const SweepArrays<ExactLanes>& arrays, const EulerArrays<ExactLanes>& euler) {
   step_euler(arrays, euler);
 }
@@ -306,6 +314,8 @@ namespace {
 HWY_EXPORT(add_forces_exact);
 HWY_EXPORT(add_forces_fast);
 HWY_EXPORT(step_euler_exact);
+HWY_EXPORT(add_forces_single);
+HWY_EXPORT(step_euler_single);
 HWY_EXPORT(step_euler_fast);
 
 void add_forces(const SweepArrays<ExactLanes>& arrays, const std::array<double*, 3>& force_n) {
@@ -319,6 +329,12 @@ void step_euler(const SweepArrays<ExactLanes>& arrays, const EulerArrays<ExactLa
 }
 void step_euler(const SweepArrays<FastLanes>& arrays, const EulerArrays<FastLanes>& euler) {
   HWY_DYNAMIC_DISPATCH(step_euler_fast)(arrays, euler);
+}
+void add_forces(const SweepArrays<SingleLane>& arrays, const std::array<double*, 3>& force_n) {
+  HWY_DYNAMIC_DISPATCH(add_forces_single)(arrays, force_n);
+}
+void step_euler(const SweepArrays<SingleLane>& arrays, const EulerArrays<SingleLane>& euler) {
+  HWY_DYNAMIC_DISPATCH(step_euler_single)(arrays, euler);
 }
 
 }  // namespace
@@ -363,6 +379,7 @@ void ClothSweep<L>::step_euler(const LaneSprings<L>& springs, const LaneVector<L
 
 template class ClothSweep<ExactLanes>;
 template class ClothSweep<FastLanes>;
+template class ClothSweep<SingleLane>;
 
 }  // namespace clothfit
 #endif

@@ -137,6 +137,14 @@ HWY_INLINE void inverse_square_roots(const V (&x)[n], V (&y)[n]) {
   }
 }
 
+template <class V>
+HWY_INLINE V inverse_square_root(const V& x) {
+  const V xs[1] = {x};
+  V ys[1];
+  inverse_square_roots(xs, ys);
+  return ys[0];
+}
+
 /// 2 / sqrt(x) in `float` to 4e-7 for normal x > 0: the processor's estimate and a Newton step.
 template <class V, size_t n>
 HWY_INLINE void twice_inverse_square_roots(const V (&x)[n], V (&y)[n]) {

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <bit>
 
+#include "model/kernels/spring_reach.h"
+
 // This source is compiled once for each instruction set, in a namespace of its own.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "model/kernels/strain_limit.cpp"
@@ -15,15 +17,8 @@
 #define CLOTHFIT_MODEL_KERNELS_STRAIN_LIMIT_ONCE
 namespace clothfit {
 
-/// Where the springs of a type begin and end: from [i, j] to [i + down, j + right].
-struct SpringReach {
-  int down = 0, right = 0;
-};
-inline constexpr SpringReach kReach[kSpringTypes] = {{1, 0},  {0, 1}, {1, 1},
-                                                     {1, -1}, {2, 0}, {0, 2}};
-
-constexpr std::ptrdiff_t offset_of(const Mesh& mesh, size_t type) {
-  return static_cast<std::ptrdiff_t>(kReach[type].down) * mesh.columns + kReach[type].right;
+inline std::ptrdiff_t offset_of(const Mesh& mesh, size_t type) {
+  return kSpringReach[type].offset(mesh);
 }
 
 /// What the passes over the springs work on; element (vertex * kCount + lane) of each array is one
@@ -39,6 +34,7 @@ struct LimitArrays {
   VertexSet& moved;
   std::array<Number*, 3> position_m;
   std::array<Number*, 3> velocity_m_per_s;  ///< null: not corrected
+  std::vector<LimitMove>* moves = nullptr;  ///< of a single lane, where they are asked for
   Number steps_per_s = 0;
   LaneValue<L> active = LaneValue<L>::Ones();     ///< 1 in lanes to work on, else 0
   LaneValue<L> shortened = LaneValue<L>::Zero();  ///< counts the springs that a sweep has shortened
@@ -115,6 +111,7 @@ HWY_INLINE void look(LimitArrays<L>& arrays, std::ptrdiff_t lane) {
 /// The springs of one type in the lanes from `lane` on.
 template <class L>
 struct TypeLimit {
+  int type;
   std::ptrdiff_t offset;  ///< from a spring's first end to its second, in vertices
   Vector<L> longest, longest2;
   const typename L::Number* first_share;
@@ -150,8 +147,21 @@ HWY_INLINE void shorten(LimitArrays<L>& arrays, const TypeLimit<L>& type, std::p
     const V half = hn::Mul(hn::Set(d, 0.5f), type.longest);
     for (size_t s = 0; s < n; ++s) excess[s] = minus_product(one, half, excess[s]);
   } else {
-    inverse_square_roots(length2, excess);
-    for (size_t s = 0; s < n; ++s) excess[s] = minus_product(one, type.longest, excess[s]);
+    V inverse[n];
+    inverse_square_roots(length2, inverse);
+    for (size_t s = 0; s < n; ++s) excess[s] = minus_product(one, type.longest, inverse[s]);
+    if constexpr (L::kCount == 1) {
+      for (size_t s = 0; s < n && arrays.moves != nullptr; ++s)
+        arrays.moves->push_back({.type = type.type,
+                                 .first = vertices[s],
+                                 .second = static_cast<int>(vertices[s] + type.offset),
+                                 .first_share = type.first_share[vertices[s]],
+                                 .second_share = type.second_share[vertices[s]],
+                                 .along_m = {hn::GetLane(along[s].x), hn::GetLane(along[s].y),
+                                             hn::GetLane(along[s].z)},
+                                 .excess = hn::GetLane(excess[s]),
+                                 .inverse_length_per_m = hn::GetLane(inverse[s])});
+    }
   }
   const auto move = [&](size_t s, const std::array<Number*, 3>& of, const V& share) HWY_ATTR {
     // Lanes that do not exceed keep their bits.
@@ -181,7 +191,7 @@ HWY_INLINE void visit(LimitArrays<L>& arrays, size_t type, std::ptrdiff_t lane) 
   const V tolerated = hn::LoadU(d, arrays.limits.tolerated_m[type].data() + lane);
   const V allowed = pass == Pass::sweep ? longest : tolerated;
   const V allowed2 = hn::Mul(allowed, allowed);
-  const TypeLimit<L> limit{offset, longest, allowed2, arrays.shares[type].first.data(),
+  const TypeLimit<L> limit{static_cast<int>(type), offset, longest, allowed2, arrays.shares[type].first.data(),
                            arrays.shares[type].second.data()};
   const Mask active = hn::Gt(hn::LoadU(d, arrays.active.data() + lane), hn::Zero(d));
   V shortened = hn::LoadU(d, arrays.shortened.data() + lane);
@@ -245,17 +255,26 @@ void look_exact(LimitArrays<ExactLanes>& arrays) {
 void look_fast(LimitArrays<FastLanes>& arrays) {
   look(arrays);
 }
+void look_single(LimitArrays<SingleLane>& arrays) {
+  look(arrays);
+}
 void sweep_exact(LimitArrays<ExactLanes>& arrays) {
   visit<ExactLanes, Pass::sweep>(arrays);
 }
 void sweep_fast(LimitArrays<FastLanes>& arrays) {
   visit<FastLanes, Pass::sweep>(arrays);
 }
+void sweep_single(LimitArrays<SingleLane>& arrays) {
+  visit<SingleLane, Pass::sweep>(arrays);
+}
 void check_exact(LimitArrays<ExactLanes>& arrays) {
   visit<ExactLanes, Pass::check>(arrays);
 }
 void check_fast(LimitArrays<FastLanes>& arrays) {
   visit<FastLanes, Pass::check>(arrays);
+}
+void check_single(LimitArrays<SingleLane>& arrays) {
+  visit<SingleLane, Pass::check>(arrays);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -269,10 +288,13 @@ namespace {
 
 HWY_EXPORT(look_exact);
 HWY_EXPORT(look_fast);
+HWY_EXPORT(look_single);
 HWY_EXPORT(sweep_exact);
 HWY_EXPORT(sweep_fast);
+HWY_EXPORT(sweep_single);
 HWY_EXPORT(check_exact);
 HWY_EXPORT(check_fast);
+HWY_EXPORT(check_single);
 
 /// Forgets what has moved and finds the springs that are too long.
 void look(LimitArrays<ExactLanes>& arrays) {
@@ -281,17 +303,26 @@ void look(LimitArrays<ExactLanes>& arrays) {
 void look(LimitArrays<FastLanes>& arrays) {
   HWY_DYNAMIC_DISPATCH(look_fast)(arrays);
 }
+void look(LimitArrays<SingleLane>& arrays) {
+  HWY_DYNAMIC_DISPATCH(look_single)(arrays);
+}
 void sweep(LimitArrays<ExactLanes>& arrays) {
   HWY_DYNAMIC_DISPATCH(sweep_exact)(arrays);
 }
 void sweep(LimitArrays<FastLanes>& arrays) {
   HWY_DYNAMIC_DISPATCH(sweep_fast)(arrays);
 }
+void sweep(LimitArrays<SingleLane>& arrays) {
+  HWY_DYNAMIC_DISPATCH(sweep_single)(arrays);
+}
 void check(LimitArrays<ExactLanes>& arrays) {
   HWY_DYNAMIC_DISPATCH(check_exact)(arrays);
 }
 void check(LimitArrays<FastLanes>& arrays) {
   HWY_DYNAMIC_DISPATCH(check_fast)(arrays);
+}
+void check(LimitArrays<SingleLane>& arrays) {
+  HWY_DYNAMIC_DISPATCH(check_single)(arrays);
 }
 
 template <class L>
@@ -310,7 +341,7 @@ StrainLimiter<L>::StrainLimiter(const Mesh& mesh, const Eigen::VectorXd& inverse
   const auto vertices = static_cast<size_t>(mesh.vertex_count());
   moved_.resize(vertices / 64 + 2);
   for (size_t type = 0; type < kSpringTypes; ++type) {
-    const auto [down, right] = kReach[type];
+    const auto [down, right] = kSpringReach[type];
     shares_[type].first.resize(vertices);
     shares_[type].second.resize(vertices);
     too_long_[type].resize(moved_.size());
@@ -334,7 +365,8 @@ StrainLimiter<L>::StrainLimiter(const Mesh& mesh, const Eigen::VectorXd& inverse
 
 template <class L>
 LimitOutcome<L> StrainLimiter<L>::limit_positions(const LaneLimits<L>& limits,
-                                                  LaneVectors<L>& position_m) {
+                                                  LaneVectors<L>& position_m,
+                                                  std::vector<LimitMove>* moves) {
   LimitArrays<L> arrays{.mesh = mesh_,
                         .limits = limits,
                         .shares = shares_,
@@ -342,7 +374,8 @@ LimitOutcome<L> StrainLimiter<L>::limit_positions(const LaneLimits<L>& limits,
                         .too_long = too_long_,
                         .moved = moved_,
                         .position_m = position_m.data(),
-                        .velocity_m_per_s = {}};
+                        .velocity_m_per_s = {},
+                        .moves = moves};
   begin(arrays);
   sweep(arrays);
   return {.too_long = arrays.shortened};
@@ -351,7 +384,8 @@ LimitOutcome<L> StrainLimiter<L>::limit_positions(const LaneLimits<L>& limits,
 template <class L>
 LimitOutcome<L> StrainLimiter<L>::limit_consistently(const LaneLimits<L>& limits, int most_sweeps,
                                                      double time_step_s, LaneVectors<L>& position_m,
-                                                     LaneVectors<L>& velocity_m_per_s) {
+                                                     LaneVectors<L>& velocity_m_per_s,
+                                                     std::vector<LimitMove>* moves) {
   LimitArrays<L> arrays{.mesh = mesh_,
                         .limits = limits,
                         .shares = shares_,
@@ -360,6 +394,7 @@ LimitOutcome<L> StrainLimiter<L>::limit_consistently(const LaneLimits<L>& limits
                         .moved = moved_,
                         .position_m = position_m.data(),
                         .velocity_m_per_s = velocity_m_per_s.data(),
+                        .moves = moves,
                         .steps_per_s = static_cast<typename L::Number>(1 / time_step_s)};
   begin(arrays);
   LimitOutcome<L> outcome;
@@ -381,6 +416,7 @@ LimitOutcome<L> StrainLimiter<L>::limit_consistently(const LaneLimits<L>& limits
 
 template class StrainLimiter<ExactLanes>;
 template class StrainLimiter<FastLanes>;
+template class StrainLimiter<SingleLane>;
 
 }  // namespace clothfit
 #endif

@@ -41,6 +41,17 @@ struct SpringShares {
 /// the last vertex.
 using VertexSet = std::vector<std::uint64_t>;
 
+/// One spring that a limit has shortened: its ends have moved by shares of `excess` times `along`
+/// towards each other.
+struct LimitMove {
+  int type = 0;
+  int first = 0, second = 0;  ///< vertices
+  double first_share = 0, second_share = 0;
+  Eigen::Vector3d along_m;  ///< from the first to the second, before
+  double excess = 0;        ///< 1 - longest / length
+  double inverse_length_per_m = 0;
+};
+
 /// What a limit found, in every lane.
 template <class L = ExactLanes>
 struct LimitOutcome {
@@ -70,15 +81,18 @@ class StrainLimiter {
   /// `inverse_mass_per_kg` is 0 where a vertex must not move.
   StrainLimiter(const Mesh& mesh, const Eigen::VectorXd& inverse_mass_per_kg);
 
-  /// One sweep over positions alone; `unmet` is not looked at.
-  LimitOutcome<L> limit_positions(const LaneLimits<L>& limits, LaneVectors<L>& position_m);
+  /// One sweep over positions alone; `unmet` is not looked at. A single simulation may ask for its
+  /// moves in the order in which they were made, here and below.
+  LimitOutcome<L> limit_positions(const LaneLimits<L>& limits, LaneVectors<L>& position_m,
+                                  std::vector<LimitMove>* moves = nullptr);
 
   /// Sweeps until no spring of a lane is longer than tolerated, at most `most_sweeps` times; what a
   /// vertex is moved by, over the time step, is added to its velocity. Held points that are further
   /// apart than the springs between them may reach leave the limit unmet.
   LimitOutcome<L> limit_consistently(const LaneLimits<L>& limits, int most_sweeps,
                                      double time_step_s, LaneVectors<L>& position_m,
-                                     LaneVectors<L>& velocity_m_per_s);
+                                     LaneVectors<L>& velocity_m_per_s,
+                                     std::vector<LimitMove>* moves = nullptr);
 
  private:
   Mesh mesh_;

@@ -20,22 +20,15 @@ namespace {
 /// A cloth with other springs in every lane.
 struct LaneCloth {
   Cloth cloth;
-  LaneParameters parameters;
-  LaneState state;
+  LaneParameters<> parameters;
+  LaneState<> state;
 
   explicit LaneCloth(int vertices_per_side)
-      : cloth(swinging_cloth(vertices_per_side)),
-        state{LaneVectors<>::zero(cloth.mesh.vertex_count()),
-              LaneVectors<>::zero(cloth.mesh.vertex_count())} {
+      : cloth(swinging_cloth(vertices_per_side)), state(LaneState<>::of(cloth)) {
     const std::vector<ParameterSet> sets = cotton_sets(cloth, kLanes);
-    for (int l = 0; l < kLanes; ++l) {
-      const ParameterSet& set = sets[static_cast<size_t>(l)];
-      set_lane(l, set.springs, cloth.strain_limit, parameters);
-      parameters.gravity_m_per_s2.x[l] = set.gravity_m_per_s2.x();
-      parameters.gravity_m_per_s2.y[l] = set.gravity_m_per_s2.y();
-      parameters.gravity_m_per_s2.z[l] = set.gravity_m_per_s2.z();
-      state.position_m.set_lane(l, set.start_position_m);
-    }
+    parameters = lane_parameters<ExactLanes>(cloth, sets);
+    for (int l = 0; l < kLanes; ++l)
+      state.position_m.set_lane(l, sets[static_cast<size_t>(l)].start_position_m);
   }
 
   void count(benchmark::State& run) const {
@@ -60,7 +53,7 @@ BENCHMARK(add_spring_forces)->Arg(9)->Arg(17)->Arg(33);
 
 void step(benchmark::State& run) {
   LaneCloth lanes(static_cast<int>(run.range(0)));
-  EulerStepper stepper(lanes.cloth);
+  EulerStepper<> stepper(lanes.cloth);
   const LaneVectors<> target = stepper.held().locate(lanes.state.position_m);
   for ([[maybe_unused]] const auto _ : run) {
     stepper.step(lanes.parameters, target, 0, 1e-4, lanes.state);
@@ -74,7 +67,7 @@ void step_with_viscous_damping(benchmark::State& run) {
   LaneCloth lanes(static_cast<int>(run.range(0)));
   lanes.cloth.add_effect("viscous_damping", "benchmark");
   lanes.parameters.effects = {{LaneValue<>::Constant(0.1)}};
-  EulerStepper stepper(lanes.cloth);
+  EulerStepper<> stepper(lanes.cloth);
   const LaneVectors<> target = stepper.held().locate(lanes.state.position_m);
   for ([[maybe_unused]] const auto _ : run) {
     stepper.step(lanes.parameters, target, 0, 1e-4, lanes.state);
@@ -95,7 +88,7 @@ void step_with_strain_limit(benchmark::State& run) {
     springs.critical_elongation.fill(0.05);
     set_lane(l, springs, lanes.cloth.strain_limit, lanes.parameters);
   }
-  EulerStepper stepper(lanes.cloth);
+  EulerStepper<> stepper(lanes.cloth);
   const LaneVectors<> target = stepper.held().locate(lanes.state.position_m);
   double too_long = 0;
   for ([[maybe_unused]] const auto _ : run) {

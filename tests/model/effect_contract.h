@@ -18,6 +18,7 @@ struct EffectTraits {
   bool isotropic = false;     ///< its force turns with the scene; it prefers no direction of space
   bool only_damps = false;    ///< its power is never positive
   bool proportional = false;  ///< its force is proportional to its first parameter
+  bool adds_force = true;     ///< it adds a force that depends on nothing but the present state
 };
 
 namespace effect_contract {
@@ -39,30 +40,55 @@ inline Parameters random_parameters(const EffectDescription& effect, Uniform& un
   return values;
 }
 
-inline std::vector<LaneValue<>> every_lane(const Parameters& values) {
-  std::vector<LaneValue<>> lanes;
-  for (const double value : values) lanes.push_back(LaneValue<>::Constant(value));
+template <class L = ExactLanes>
+EffectValues<L> every_lane(const Parameters& values) {
+  EffectValues<L> lanes;
+  for (const double value : values)
+    lanes.push_back(LaneValue<L>::Constant(static_cast<typename L::Number>(value)));
   return lanes;
 }
 
+/// A moving, crumpled cloth of cotton.
 struct State {
-  Eigen::VectorXd mass_kg;
+  Cloth cloth = square_cloth(6);
   Eigen::Matrix3Xd position_m, velocity_m_per_s;
 
   explicit State(Uniform& uniform)
-      : mass_kg(square_cloth(6).mass_kg),
-        position_m(crumpled(square_mesh(6), 0.5, uniform)),
+      : position_m(crumpled(square_mesh(6), 0.5, uniform)),
         velocity_m_per_s(uniform.vectors(36, 3.0)) {}
 };
 
-inline Eigen::Matrix3Xd force_n(const EffectEntry& entry, const State& state,
-                                const Parameters& parameters) {
-  const LaneVectors<> position_m = clothfit::every_lane(state.position_m);
-  const LaneVectors<> velocity_m_per_s = clothfit::every_lane(state.velocity_m_per_s);
-  LaneVectors<> force = LaneVectors<>::zero(36);
-  entry.make()->add_force({square_mesh(6), position_m, velocity_m_per_s, state.mass_kg, 0.3},
-                          every_lane(parameters), force);
+/// The force on every vertex, 3 x vertices (N), as lanes of kind L compute it; `there_n` is what
+/// other forces have added before.
+template <class L = ExactLanes>
+Eigen::Matrix3Xd force_n(const Effect& effect, const State& state, const Parameters& parameters,
+                         const Eigen::Matrix3Xd& there_n) {
+  const auto lanes_of = [](const Eigen::Matrix3Xd& values) {
+    LaneVectors<L> lanes = LaneVectors<L>::zero(static_cast<int>(values.cols()));
+    for (int l = 0; l < L::kCount; ++l) lanes.set_lane(l, values);
+    return lanes;
+  };
+  LaneParameters<L> lanes;
+  for (int l = 0; l < L::kCount; ++l)
+    set_lane(l, spring_parameters(cotton(), state.cloth.mesh), {}, lanes);
+  lanes.gravity_m_per_s2 = {LaneValue<L>::Zero(), LaneValue<L>::Zero(),
+                            LaneValue<L>::Constant(typename L::Number(-9.81))};
+  const LaneVectors<L> position_m = lanes_of(state.position_m),
+                       velocity_m_per_s = lanes_of(state.velocity_m_per_s);
+  const EffectScene<L> scene{
+      state.cloth, lanes.springs, lanes.gravity_m_per_s2, position_m, velocity_m_per_s, 0.3, 1e-3};
+  EffectMemory<L> memory = EffectMemory<L>::Zero(L::kCount, effect.memory_size(state.cloth));
+  LaneVectors<L> force = lanes_of(there_n);
+  const EffectValues<L> values = every_lane<L>(parameters);
+  effect.add_force(scene, values, memory, force);
+  effect.change_force(scene, values, force);
   return force.lane(0);
+}
+
+template <class L = ExactLanes>
+Eigen::Matrix3Xd force_n(const EffectEntry& entry, const State& state,
+                         const Parameters& parameters) {
+  return force_n<L>(*entry.make(), state, parameters, at_rest(state.position_m));
 }
 
 inline void expect_a_complete_description(const EffectEntry& entry) {
@@ -97,8 +123,10 @@ inline void expect_nothing_at_neutral(const EffectEntry& entry, Uniform& uniform
   set.effects = {neutral(entry.describe())};
   const SimulateResult at_neutral = simulate(with, {&set, 1}, schedule).front();
   EXPECT_EQ(at_neutral.position_m, without.position_m);
-  EXPECT_EQ(with.effects.front()->damping_rate_per_s(with.mesh, with.mass_kg, set.effects.front()),
-            0);
+  const EffectRates rates = with.effects.front()->rates(with, set.springs, set.effects.front());
+  EXPECT_EQ(rates.damping_per_s, 0);
+  EXPECT_EQ(rates.frequency2_per_s2, 0);
+  EXPECT_EQ(rates.acceleration_ratio, 1);
 
   // when they are not, then it does.
   set.effects = {random_parameters(entry.describe(), uniform)};
@@ -110,38 +138,42 @@ inline void expect_to_add_to_what_is_there(const EffectEntry& entry, Uniform& un
   const State state(uniform);
   const Parameters parameters = random_parameters(entry.describe(), uniform);
   const Eigen::Matrix3Xd there_n = uniform.vectors(36, 1);
-  const LaneVectors<> position_m = clothfit::every_lane(state.position_m);
-  const LaneVectors<> velocity_m_per_s = clothfit::every_lane(state.velocity_m_per_s);
-  LaneVectors<> sum_n = clothfit::every_lane(there_n);
 
-  entry.make()->add_force({square_mesh(6), position_m, velocity_m_per_s, state.mass_kg, 0.3},
-                          every_lane(parameters), sum_n);
+  const Eigen::Matrix3Xd sum_n = force_n(*entry.make(), state, parameters, there_n);
 
-  EXPECT_LT((sum_n.lane(0) - there_n - force_n(entry, state, parameters)).cwiseAbs().maxCoeff(),
-            1e-14);
+  const Eigen::Matrix3Xd alone_n = force_n(entry, state, parameters);
+  EXPECT_LT((sum_n - there_n - alone_n).cwiseAbs().maxCoeff(),
+            1e-15 * std::max(1.0, alone_n.cwiseAbs().maxCoeff()) * 4);
+}
+
+/// One law, three kinds of lanes: a single simulation to the bit, float to its rounding.
+inline void expect_every_kind_of_lanes_to_agree(const EffectEntry& entry, Uniform& uniform) {
+  const State state(uniform);
+  const Parameters parameters = random_parameters(entry.describe(), uniform);
+  const Eigen::Matrix3Xd exact_n = force_n(entry, state, parameters);
+
+  EXPECT_EQ(force_n<SingleLane>(entry, state, parameters), exact_n);
+  EXPECT_LT((force_n<FastLanes>(entry, state, parameters) - exact_n).norm(),
+            1e-4 * exact_n.norm() + 1e-30);
 }
 
 inline void expect_lanes_to_know_nothing_of_each_other(const EffectEntry& entry, Uniform& uniform) {
   const EffectDescription effect = entry.describe();
-  const Eigen::VectorXd mass_kg = square_cloth(6).mass_kg;
-  LaneVectors<> position = LaneVectors<>::zero(36), velocity = position, together = position;
-  std::vector<LaneValue<>> values(effect.parameters.size());
-  std::vector<State> states;
-  std::vector<Parameters> parameters;
-  for (int l = 0; l < kLanes; ++l) {
-    states.emplace_back(uniform);
-    parameters.push_back(random_parameters(effect, uniform));
-    position.set_lane(l, states.back().position_m);
-    velocity.set_lane(l, states.back().velocity_m_per_s);
-    for (size_t p = 0; p < values.size(); ++p) values[p][l] = parameters.back()[p];
-  }
+  Cloth cloth = square_cloth(5);
+  cloth.held = {held_at(cloth.mesh, 0, 0)};
+  cloth.add_effect(entry.name, "test");
+  std::vector<ParameterSet> sets;
+  for (int l = 0; l < kLanes; ++l)
+    sets.push_back({.springs = spring_parameters(cotton(), cloth.mesh),
+                    .effects = {random_parameters(effect, uniform)},
+                    .start_position_m = crumpled(cloth.mesh, 0.3, uniform)});
+  const Schedule schedule{.frame_time_s = {0, 0.02}, .time_step_s = 1e-4};
 
-  entry.make()->add_force({square_mesh(6), position, velocity, mass_kg, 0.3}, values, together);
+  const std::vector<SimulateResult> together = simulate(cloth, sets, schedule);
 
-  for (int l = 0; l < kLanes; ++l) {
-    const auto lane = static_cast<size_t>(l);
-    EXPECT_EQ(together.lane(l), force_n(entry, states[lane], parameters[lane])) << "lane " << l;
-  }
+  for (size_t l = 0; l < sets.size(); ++l)
+    EXPECT_EQ(together[l].position_m, simulate(cloth, {&sets[l], 1}, schedule).front().position_m)
+        << "lane " << l;
 }
 
 inline void expect_to_turn_with_the_scene(const EffectEntry& entry, Uniform& uniform) {
@@ -167,8 +199,9 @@ inline void expect_to_damp_only(const EffectEntry& entry, Uniform& uniform) {
 
   EXPECT_LT(power_w, 0);
   // and no faster than it tells those who choose the time step: -F.v <= rate m v^2.
-  EXPECT_LE(-power_w, entry.make()->damping_rate_per_s(square_mesh(6), state.mass_kg, parameters) *
-                          2 * kinetic_energy_j(state.mass_kg, state.velocity_m_per_s) *
+  const SpringParameters springs = spring_parameters(cotton(), state.cloth.mesh);
+  EXPECT_LE(-power_w, entry.make()->rates(state.cloth, springs, parameters).damping_per_s * 2 *
+                          kinetic_energy_j(state.cloth.mass_kg, state.velocity_m_per_s) *
                           (1 + 1e-12));
 }
 
@@ -192,7 +225,10 @@ inline void expect_effect_contract(const std::string& name, const EffectTraits& 
     SCOPED_TRACE(testing::Message() << name << ", seed " << seed);
     Uniform uniform(seed);
     effect_contract::expect_nothing_at_neutral(entry, uniform);
-    effect_contract::expect_to_add_to_what_is_there(entry, uniform);
+    if (traits.adds_force) {
+      effect_contract::expect_to_add_to_what_is_there(entry, uniform);
+      effect_contract::expect_every_kind_of_lanes_to_agree(entry, uniform);
+    }
     effect_contract::expect_lanes_to_know_nothing_of_each_other(entry, uniform);
     if (traits.isotropic) effect_contract::expect_to_turn_with_the_scene(entry, uniform);
     if (traits.only_damps) effect_contract::expect_to_damp_only(entry, uniform);

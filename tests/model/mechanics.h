@@ -81,53 +81,48 @@ inline Eigen::Matrix3Xd at_rest(const Eigen::Matrix3Xd& position_m) {
   return Eigen::Matrix3Xd::Zero(3, position_m.cols());
 }
 
-/// The same parameter set in every lane, for tests that call `step` themselves.
-inline LaneParameters every_lane(const ParameterSet& set, const StrainLimit& strain_limit = {}) {
-  LaneParameters lanes;
-  for (int l = 0; l < kLanes; ++l) set_lane(l, set.springs, strain_limit, lanes);
-  lanes.gravity_m_per_s2.x.setConstant(set.gravity_m_per_s2.x());
-  lanes.gravity_m_per_s2.y.setConstant(set.gravity_m_per_s2.y());
-  lanes.gravity_m_per_s2.z.setConstant(set.gravity_m_per_s2.z());
-  for (const std::vector<double>& effect : set.effects) {
-    lanes.effects.emplace_back();
-    for (const double value : effect) lanes.effects.back().push_back(LaneValue<>::Constant(value));
-  }
-  return lanes;
-}
-
 /// One simulation, step by step; held points without a motion stay where they start.
+template <class L = ExactLanes>
 class SteppedCloth {
  public:
   SteppedCloth(const Cloth& cloth, const ParameterSet& set,
                const Eigen::Matrix3Xd& velocity_m_per_s)
       : cloth_(cloth),
-        parameters_(every_lane(set, cloth.strain_limit)),
+        parameters_(lane_parameters<L>(cloth, {&set, 1})),
         stepper_(cloth),
-        state_{every_lane(set.start_position_m), every_lane(velocity_m_per_s)},
-        held_target_m_(stepper_.held().locate(state_.position_m)) {}
+        state_(LaneState<L>::of(cloth)) {
+    for (int l = 0; l < L::kCount; ++l) {
+      state_.position_m.set_lane(l, set.start_position_m);
+      state_.velocity_m_per_s.set_lane(l, velocity_m_per_s);
+    }
+    held_target_m_ = stepper_.held().locate(state_.position_m);
+  }
 
   void step(double time_step_s) {
     const double end_s = (steps_ + 1) * time_step_s;
     for (size_t h = 0; h < cloth_.held.size(); ++h) {
       if (!cloth_.held[h].motion) continue;
       const Eigen::Vector3d target = cloth_.held[h].motion(end_s);
-      held_target_m_.x.col(static_cast<Eigen::Index>(h)).setConstant(target.x());
-      held_target_m_.y.col(static_cast<Eigen::Index>(h)).setConstant(target.y());
-      held_target_m_.z.col(static_cast<Eigen::Index>(h)).setConstant(target.z());
+      held_target_m_.x.col(static_cast<Eigen::Index>(h))
+          .setConstant(static_cast<typename L::Number>(target.x()));
+      held_target_m_.y.col(static_cast<Eigen::Index>(h))
+          .setConstant(static_cast<typename L::Number>(target.y()));
+      held_target_m_.z.col(static_cast<Eigen::Index>(h))
+          .setConstant(static_cast<typename L::Number>(target.z()));
     }
     stepper_.step(parameters_, held_target_m_, steps_ * time_step_s, time_step_s, state_);
     ++steps_;
   }
-  const LimitOutcome<>& limit_outcome() const { return stepper_.limit_outcome(); }
+  const LimitOutcome<L>& limit_outcome() const { return stepper_.limit_outcome(); }
   Eigen::Matrix3Xd position_m() const { return state_.position_m.lane(0); }
   Eigen::Matrix3Xd velocity_m_per_s() const { return state_.velocity_m_per_s.lane(0); }
 
  private:
   const Cloth& cloth_;
-  LaneParameters parameters_;
-  EulerStepper stepper_;
-  LaneState state_;
-  LaneVectors<> held_target_m_;
+  LaneParameters<L> parameters_;
+  EulerStepper<L> stepper_;
+  LaneState<L> state_;
+  LaneVectors<L> held_target_m_;
   int steps_ = 0;
 };
 

@@ -159,7 +159,7 @@ TEST(Simulate, HeldPointsAreWhereTheirMotionHasThemAtEveryFrame) {
 
   for (size_t f = 1; f < 5; ++f) {
     SCOPED_TRACE(f);
-    const LaneVectors<> at = HeldPlacement(cloth).locate(every_lane(result.position_m[f]));
+    const LaneVectors<> at = HeldPlacement<>(cloth).locate(every_lane(result.position_m[f]));
     EXPECT_LT((at.lane(0).col(0) - motion(schedule.frame_time_s[f])).norm(), 1e-14);
     EXPECT_LT((at.lane(0).col(1) - Eigen::Vector3d(0.4, 0, 0)).norm(), 1e-15);
     EXPECT_LT((at.lane(0).col(2) - Eigen::Vector3d(0.23, 0.31, 0)).norm(), 1e-15);

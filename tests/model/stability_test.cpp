@@ -35,7 +35,7 @@ struct Pair {
 
   /// Largest extension within `steps` steps, as a multiple of the first.
   double growth(double time_step_s, int steps) const {
-    SteppedCloth run(cloth, set, at_rest(set.start_position_m));
+    SteppedCloth<> run(cloth, set, at_rest(set.start_position_m));
     double largest_m = 0;
     for (int n = 0; n < steps; ++n) {
       run.step(time_step_s);
@@ -50,7 +50,7 @@ struct Pair {
 /// Elastic plus kinetic energy after `steps` steps without gravity, as a multiple of the first;
 /// infinite if it is no number any more.
 double energy_growth(const Cloth& cloth, const ParameterSet& set, double time_step_s, int steps) {
-  SteppedCloth run(cloth, set, at_rest(set.start_position_m));
+  SteppedCloth<> run(cloth, set, at_rest(set.start_position_m));
   for (int n = 0; n < steps; ++n) run.step(time_step_s);
   const double growth = (elastic_energy_j(cloth.springs, set.springs, run.position_m()) +
                          kinetic_energy_j(cloth.mass_kg, run.velocity_m_per_s())) /
@@ -135,7 +135,7 @@ TEST(StableTimeStep, CountsTheDampingOfEffects) {
 
   const double h = stable_time_step_s(pair.cloth, pair.set);
   const auto speed_after = [&](double time_step_s) {
-    SteppedCloth run(pair.cloth, pair.set, drift);
+    SteppedCloth<> run(pair.cloth, pair.set, drift);
     for (int n = 0; n < 200; ++n) run.step(time_step_s);
     return run.velocity_m_per_s()(0, 0);
   };
@@ -222,7 +222,7 @@ TEST(StableTimeStep, KeepsHeldSwingingClothBounded) {
                      .start_position_m = flat_positions(cloth.mesh)};
 
     const double h = stable_time_step_s(cloth, set);
-    SteppedCloth run(cloth, set, at_rest(set.start_position_m));
+    SteppedCloth<> run(cloth, set, at_rest(set.start_position_m));
     double fastest = 0;
     for (int n = 0; n < 4000; ++n) {
       run.step(0.95 * h);

@@ -55,7 +55,7 @@ TEST(Step, MovesTwoMassesOnASpringByTheClosedFormOfTheScheme) {
   const std::complex<double> a1 = (x1 - x0 * z2) / (z1 - z2), a2 = x0 - a1;
 
   // when it is stepped, then the extension is a1 z1^n + a2 z2^n.
-  SteppedCloth run(cloth, set, at_rest(set.start_position_m));
+  SteppedCloth<> run(cloth, set, at_rest(set.start_position_m));
   double smallest_m = x0;
   for (int n = 1; n <= 500; ++n) {
     run.step(h);
@@ -75,7 +75,7 @@ TEST(Step, FallsFreelyByTheClosedFormOfTheScheme) {
   set.gravity_m_per_s2 = {0.3, -0.2, -9.81};
   const double h = 1e-3;
 
-  SteppedCloth run(cloth, set, at_rest(set.start_position_m));
+  SteppedCloth<> run(cloth, set, at_rest(set.start_position_m));
   for (int n = 1; n <= 400; ++n) run.step(h);
 
   // V_n = n h g, P_n = P_0 + h^2 g n (n + 1) / 2; a sheet at rest feels nothing of its springs.
@@ -96,7 +96,7 @@ TEST(Step, KeepsMomentumAndAngularMomentumWithoutGravity) {
     set.gravity_m_per_s2 = kWeightless;
     const Eigen::Matrix3Xd v0 = uniform.vectors(cloth.mesh.vertex_count(), 0.5);
 
-    SteppedCloth run(cloth, set, v0);
+    SteppedCloth<> run(cloth, set, v0);
     for (int n = 0; n < 2000; ++n) run.step(1e-4);
 
     // Each pair of forces sums to zero and acts along the line between its ends at the time it is
@@ -122,7 +122,7 @@ double energy_error_j(double time_step_s) {
     return elastic_energy_j(cloth.springs, set.springs, p) + kinetic_energy_j(cloth.mass_kg, v) -
            set.gravity_m_per_s2.dot(p * cloth.mass_kg);
   };
-  SteppedCloth run(cloth, set, at_rest(set.start_position_m));
+  SteppedCloth<> run(cloth, set, at_rest(set.start_position_m));
   const double start_j = energy_j(set.start_position_m, at_rest(set.start_position_m));
   double worst_j = 0;
   for (int n = 0; n < std::lround(0.1 / time_step_s); ++n) {
@@ -150,7 +150,7 @@ TEST(Step, DampingTakesEnergyAway) {
   for (double& c : set.springs.damping_ns_per_m) c *= 10;
   const double start_j = elastic_energy_j(cloth.springs, set.springs, set.start_position_m);
 
-  SteppedCloth run(cloth, set, at_rest(set.start_position_m));
+  SteppedCloth<> run(cloth, set, at_rest(set.start_position_m));
   double before_j = start_j;
   for (int block = 0; block < 10; ++block) {
     for (int n = 0; n < 500; ++n) run.step(5e-5);
@@ -171,7 +171,7 @@ TEST(Step, TrajectoryConvergesWithTheFirstPowerOfTheStep) {
   };
   const ParameterSet set = cotton_set(cloth, waved(cloth.mesh));
   const auto end_m = [&](double time_step_s) {
-    SteppedCloth run(cloth, set, at_rest(set.start_position_m));
+    SteppedCloth<> run(cloth, set, at_rest(set.start_position_m));
     for (int n = 0; n < std::lround(0.2 / time_step_s); ++n) run.step(time_step_s);
     return run.position_m();
   };
@@ -190,22 +190,17 @@ TEST(Step, ActsOnEveryLaneByItsOwnParameters) {
   cloth.add_effect("viscous_damping", "test");
   Uniform uniform(4);
   std::vector<ParameterSet> sets;
-  LaneParameters together;
-  together.effects = {{LaneValue<>::Zero()}};
-  LaneState state{LaneVectors<>::zero(25), LaneVectors<>::zero(25)};
   for (int l = 0; l < kLanes; ++l) {
     sets.push_back({.springs = spring_parameters(random_fabric(uniform), cloth.mesh),
                     .gravity_m_per_s2 = uniform.vectors(1, 10).col(0),
                     .effects = {{uniform(0, 2)}},
                     .start_position_m = crumpled(cloth.mesh, 0.3, uniform)});
-    set_lane(l, sets.back().springs, together.springs);
-    together.gravity_m_per_s2.x[l] = sets.back().gravity_m_per_s2.x();
-    together.gravity_m_per_s2.y[l] = sets.back().gravity_m_per_s2.y();
-    together.gravity_m_per_s2.z[l] = sets.back().gravity_m_per_s2.z();
-    together.effects[0][0][l] = sets.back().effects[0][0];
-    state.position_m.set_lane(l, sets.back().start_position_m);
   }
-  EulerStepper stepper(cloth);
+  const LaneParameters<> together = lane_parameters<ExactLanes>(cloth, sets);
+  LaneState<> state = LaneState<>::of(cloth);
+  for (int l = 0; l < kLanes; ++l)
+    state.position_m.set_lane(l, sets[static_cast<size_t>(l)].start_position_m);
+  EulerStepper<> stepper(cloth);
   const LaneVectors<> target = stepper.held().locate(state.position_m);
 
   for (int n = 0; n < 100; ++n) stepper.step(together, target, n * 1e-4, 1e-4, state);
@@ -213,7 +208,7 @@ TEST(Step, ActsOnEveryLaneByItsOwnParameters) {
   for (int l = 0; l < kLanes; ++l) {
     SCOPED_TRACE(l);
     const ParameterSet& set = sets[static_cast<size_t>(l)];
-    SteppedCloth alone(cloth, set, at_rest(set.start_position_m));
+    SteppedCloth<> alone(cloth, set, at_rest(set.start_position_m));
     for (int n = 0; n < 100; ++n) alone.step(1e-4);
     EXPECT_EQ(state.position_m.lane(l), alone.position_m());
     EXPECT_EQ(state.velocity_m_per_s.lane(l), alone.velocity_m_per_s());
@@ -261,18 +256,17 @@ TEST(HeldPlacement, PutsAVertexExactlyWhereItBelongs) {
                 held_at(cloth.mesh, 0.2, 0.3)};
   Uniform uniform(6);
   const Eigen::Matrix3Xd p = crumpled(cloth.mesh, 0.3, uniform), v = uniform.vectors(25, 1);
-  LaneState state{every_lane(p), every_lane(v)};
+  LaneVectors<> position_m = every_lane(p), velocity_m_per_s = every_lane(v);
   const Eigen::Matrix3Xd target = p(Eigen::all, {0, 4, 17}) + uniform.vectors(3, 0.01);
   const double h = 1e-3;
 
-  HeldPlacement(cloth).place(every_lane(target), h, state);
+  HeldPlacement<>(cloth).place(every_lane(target), h, position_m, velocity_m_per_s);
 
-  const Eigen::Matrix3Xd moved = state.position_m.lane(0) - p;
+  const Eigen::Matrix3Xd moved = position_m.lane(0) - p;
   // One rounding of a coordinate below half a metre.
-  EXPECT_LT((state.position_m.lane(0)(Eigen::all, {0, 4, 17}) - target).cwiseAbs().maxCoeff(),
-            1e-16);
+  EXPECT_LT((position_m.lane(0)(Eigen::all, {0, 4, 17}) - target).cwiseAbs().maxCoeff(), 1e-16);
   EXPECT_EQ((moved.colwise().norm().array() > 0).count(), 3);  // and nothing else moves
-  EXPECT_LT((state.velocity_m_per_s.lane(0) - (v + moved / h)).cwiseAbs().maxCoeff(), 1e-12);
+  EXPECT_LT((velocity_m_per_s.lane(0) - (v + moved / h)).cwiseAbs().maxCoeff(), 1e-12);
 }
 
 TEST(HeldPlacement, MovesTheClothByTheSmallestCorrectionInTheNormOfTheMasses) {
@@ -288,15 +282,15 @@ TEST(HeldPlacement, MovesTheClothByTheSmallestCorrectionInTheNormOfTheMasses) {
   }
   const Eigen::Matrix3Xd p = crumpled(cloth.mesh, 0.3, uniform), v = uniform.vectors(25, 1);
   const Eigen::Matrix3Xd target = p * a.transpose() + uniform.vectors(4, 0.02);
-  LaneState state{every_lane(p), every_lane(v)};
+  LaneVectors<> position_m = every_lane(p), velocity_m_per_s = every_lane(v);
   const double h = 2e-3;
 
   // when they are placed,
-  HeldPlacement(cloth).place(every_lane(target), h, state);
-  const Eigen::Matrix3Xd moved = state.position_m.lane(0) - p;
+  HeldPlacement<>(cloth).place(every_lane(target), h, position_m, velocity_m_per_s);
+  const Eigen::Matrix3Xd moved = position_m.lane(0) - p;
 
   // then they are where they belong,
-  EXPECT_LT((state.position_m.lane(0) * a.transpose() - target).cwiseAbs().maxCoeff(), 1e-15);
+  EXPECT_LT((position_m.lane(0) * a.transpose() - target).cwiseAbs().maxCoeff(), 1e-15);
   // the correction d minimises d' M d / 2 subject to A d = r, that is M d = A' lambda for some
   // lambda (the conditions of Karush, Kuhn and Tucker),
   const Eigen::MatrixXd pushed = (moved * cloth.mass_kg.asDiagonal()).transpose();
@@ -305,7 +299,7 @@ TEST(HeldPlacement, MovesTheClothByTheSmallestCorrectionInTheNormOfTheMasses) {
   EXPECT_LT((at * lambda - pushed).norm(), 1e-14 * pushed.norm());
   EXPECT_GT(moved.norm(), 0.01);
   // and the velocities change with the positions.
-  EXPECT_LT((state.velocity_m_per_s.lane(0) - (v + moved / h)).cwiseAbs().maxCoeff(), 1e-12);
+  EXPECT_LT((velocity_m_per_s.lane(0) - (v + moved / h)).cwiseAbs().maxCoeff(), 1e-12);
 }
 
 TEST(HeldPlacement, LetsTwoPointsInTheSamePlaceShare) {
@@ -314,16 +308,16 @@ TEST(HeldPlacement, LetsTwoPointsInTheSamePlaceShare) {
     Cloth cloth = square_cloth(5);
     cloth.held = {held_at(cloth.mesh, s, 0.2), held_at(cloth.mesh, s, 0.2)};
     const Eigen::Matrix3Xd p = flat_positions(cloth.mesh);
-    LaneState state{every_lane(p), every_lane(at_rest(p))};
-    HeldPlacement held(cloth);
+    LaneVectors<> position_m = every_lane(p), velocity_m_per_s = every_lane(at_rest(p));
+    HeldPlacement<> held(cloth);
     Eigen::Matrix3Xd target(3, 2);
     target.col(0) << s, 0.2, 0.01;
     target.col(1) << s, 0.2, 0.03;
 
-    held.place(every_lane(target), 1e-3, state);
+    held.place(every_lane(target), 1e-3, position_m, velocity_m_per_s);
 
     // They cannot both have their way: the least squares solution is between.
-    EXPECT_LT((held.locate(state.position_m).lane(0).colwise() - Eigen::Vector3d(s, 0.2, 0.02))
+    EXPECT_LT((held.locate(position_m).lane(0).colwise() - Eigen::Vector3d(s, 0.2, 0.02))
                   .cwiseAbs()
                   .maxCoeff(),
               1e-15);
@@ -337,8 +331,8 @@ TEST(HeldPlacement, TwoPointsInTheSamePlaceDoNotDisturbARun) {
   twice.held.push_back(twice.held.front());
   const ParameterSet set = cotton_set(once, hung_flat(once.mesh));
 
-  SteppedCloth one(once, set, at_rest(set.start_position_m));
-  SteppedCloth two(twice, set, at_rest(set.start_position_m));
+  SteppedCloth<> one(once, set, at_rest(set.start_position_m));
+  SteppedCloth<> two(twice, set, at_rest(set.start_position_m));
   for (int n = 0; n < 500; ++n) {
     one.step(2e-4);
     two.step(2e-4);
@@ -359,7 +353,7 @@ TEST(HeldPlacement, AMovingPointPassesItsVelocityToTheDashpots) {
   set.springs.damping_ns_per_m[structural_t] = c;
 
   // when it has moved for one step, and for a second one,
-  SteppedCloth run(cloth, set, at_rest(set.start_position_m));
+  SteppedCloth<> run(cloth, set, at_rest(set.start_position_m));
   run.step(h);
   const Eigen::Matrix3Xd after_one = run.velocity_m_per_s();
   run.step(h);

@@ -318,7 +318,7 @@ Swing swing(StrainLimitMode mode) {
   ParameterSet set{.springs = spring_parameters(soft, cloth.mesh),
                    .start_position_m = flat_positions(cloth.mesh)};
   set.springs.critical_elongation.fill(0.1);
-  SteppedCloth run(cloth, set, at_rest(set.start_position_m));
+  SteppedCloth<> run(cloth, set, at_rest(set.start_position_m));
   Swing result;
   for (int n = 0; n < 1000; ++n) {
     run.step(5e-4);

@@ -24,7 +24,7 @@ struct Fall {
     set.start_position_m = attitude * flat_positions(cloth.mesh);
   }
   Eigen::Matrix3Xd velocity_m_per_s(double time_step_s, int steps) const {
-    SteppedCloth run(cloth, set, at_rest(set.start_position_m));
+    SteppedCloth<> run(cloth, set, at_rest(set.start_position_m));
     for (int n = 0; n < steps; ++n) run.step(time_step_s);
     return run.velocity_m_per_s();
   }
@@ -70,7 +70,7 @@ TEST(ViscousDamping, LetsADriftDieOutGeometrically) {
   const Eigen::Vector3d drift(1, -2, 0.5);
   const double h = 2e-3;
 
-  SteppedCloth run(fall.cloth, fall.set, drift.replicate(1, 25));
+  SteppedCloth<> run(fall.cloth, fall.set, drift.replicate(1, 25));
   for (int n = 0; n < 300; ++n) run.step(h);
 
   const Eigen::Vector3d expected = drift * std::pow(1 - h * 3, 300);

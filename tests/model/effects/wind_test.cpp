@@ -25,7 +25,7 @@ struct Flight {
     set.start_position_m = attitude * flat_positions(cloth.mesh);
   }
   Eigen::Matrix3Xd velocity_m_per_s(double time_step_s, int steps) const {
-    SteppedCloth run(cloth, set, at_rest(set.start_position_m));
+    SteppedCloth<> run(cloth, set, at_rest(set.start_position_m));
     for (int n = 0; n < steps; ++n) run.step(time_step_s);
     return run.velocity_m_per_s();
   }
@@ -33,12 +33,13 @@ struct Flight {
 
 Eigen::Matrix3Xd forces_n(const Flight& flight, const Eigen::Matrix3Xd& position_m,
                           const Eigen::Matrix3Xd& velocity_m_per_s) {
-  const LaneVectors<> p = every_lane(position_m), v = every_lane(velocity_m_per_s);
-  LaneVectors<> force = LaneVectors<>::zero(flight.cloth.mesh.vertex_count());
-  flight.cloth.effects.front()->add_force({flight.cloth.mesh, p, v, flight.cloth.mass_kg, 0},
-                                          effect_contract::every_lane(flight.set.effects.front()),
-                                          force);
-  return force.lane(0);
+  Uniform unused(0);
+  effect_contract::State state(unused);
+  state.cloth = flight.cloth;
+  state.position_m = position_m;
+  state.velocity_m_per_s = velocity_m_per_s;
+  return effect_contract::force_n(*flight.cloth.effects.front(), state, flight.set.effects.front(),
+                                  at_rest(position_m));
 }
 
 TEST(Wind, KeepsTheContractOfEffects) {
@@ -122,8 +123,10 @@ TEST(Wind, StillAirOnlyTakesEnergyAway) {
 
   EXPECT_LT(power_w, -1e-4);
   // and no faster than it tells those who choose the time step: -F.v <= rate m v^2.
-  const double rate_per_s = flight.cloth.effects.front()->damping_rate_per_s(
-      flight.cloth.mesh, flight.cloth.mass_kg, flight.set.effects.front());
+  const double rate_per_s =
+      flight.cloth.effects.front()
+          ->rates(flight.cloth, flight.set.springs, flight.set.effects.front())
+          .damping_per_s;
   EXPECT_LE(-power_w, rate_per_s * 2 * kinetic_energy_j(flight.cloth.mass_kg, v));
 }
 

@@ -1,0 +1,81 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "model/mesh.h"
+
+namespace clothfit {
+
+/// The parameters that a simulation depends on have numbers: the springs' constants, gravity, then
+/// the effect's own.
+struct ParameterNumber {
+  static constexpr int natural_length(int type) { return type; }
+  static constexpr int stiffness(int type) { return kSpringTypes + type; }
+  static constexpr int damping(int type) { return 2 * kSpringTypes + type; }
+  static constexpr int gravity(int axis) { return 3 * kSpringTypes + axis; }
+  static constexpr int own(int parameter) { return 3 * kSpringTypes + 3 + parameter; }
+};
+
+/// The derivatives of what an effect does to one simulation, as lists of small blocks that
+/// tangents, the adjoint and the implicit integrator multiply by. `on` names what is acted on: a
+/// vertex where forces are, a held point where the supports are. Several blocks in the same place
+/// add up.
+struct EffectLinearisation {
+  struct ByMotion {
+    int on, of;  ///< of: vertex
+    Eigen::Matrix3d by_position, by_velocity;
+  };
+  struct ByParameter {
+    int on, parameter;  ///< a ParameterNumber
+    Eigen::Vector3d derivative;
+  };
+  struct ByMemory {
+    int on, number;
+    Eigen::Vector3d derivative;
+  };
+  /// By the force on the same vertex, or the pull on the same held point.
+  struct ByForce {
+    int on;
+    Eigen::Matrix3d derivative;
+  };
+  std::vector<ByMotion> by_motion;
+  std::vector<ByParameter> by_parameter;
+  std::vector<ByMemory> by_memory;
+  std::vector<ByForce> by_force;
+
+  // What the effect remembers after the step; without an entry a number stays as it is.
+  struct MemoryByMotion {
+    int number, of;
+    Eigen::RowVector3d by_position, by_velocity;
+  };
+  struct MemoryByParameter {
+    int number, parameter;
+    double derivative;
+  };
+  struct MemoryByMemory {
+    int number, of;
+    double derivative;
+  };
+  struct MemoryByForce {
+    int number, of;  ///< of: held point
+    Eigen::RowVector3d derivative;
+  };
+  std::vector<MemoryByMotion> memory_by_motion;
+  std::vector<MemoryByParameter> memory_by_parameter;
+  std::vector<MemoryByMemory> memory_by_memory;
+  std::vector<MemoryByForce> memory_by_force;
+
+  void clear() {
+    by_motion.clear();
+    by_parameter.clear();
+    by_memory.clear();
+    by_force.clear();
+    memory_by_motion.clear();
+    memory_by_parameter.clear();
+    memory_by_memory.clear();
+    memory_by_force.clear();
+  }
+};
+
+}  // namespace clothfit

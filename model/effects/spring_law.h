@@ -1,0 +1,202 @@
+#pragma once
+
+#include <ceres/jet.h>
+
+#include <array>
+
+#include "model/cloth.h"
+#include "model/effects/effect.h"
+#include "model/effects/linearisation.h"
+#include "model/effects/number.h"
+
+namespace clothfit {
+
+/// What a law sees of a spring.
+template <class Real>
+struct SpringSight {
+  Real length_m, stretching_m_per_s;  ///< l and dl/dt
+  Real natural_length_m, stiffness_n_per_m, damping_ns_per_m;
+  SpringType type = structural_t;
+  double s = 0, t = 0;  ///< its middle's place on the cloth, shares of its width and height
+  double time_step_s = 0;
+};
+
+/// The middle of a spring in shares of the cloth's width and height.
+inline std::array<double, 2> middle_of(const Mesh& mesh, const Spring& spring) {
+  const auto middle = [](int a, int b, int count) { return 0.5 * (a + b) / (count - 1); };
+  return {middle(spring.a % mesh.columns, spring.b % mesh.columns, mesh.columns),
+          middle(spring.a / mesh.columns, spring.b / mesh.columns, mesh.rows)};
+}
+
+/// Calls `visit(number, spring, along, rate, direction, sight)` for every spring, type by type:
+/// position and velocity of its end b relative to a, and its direction, zero where it has no length
+/// (there it pulls at nothing).
+template <class L, class Visit>
+void for_springs(const EffectScene<L>& scene, const Visit& visit) {
+  using Real = RealOf<L>;
+  using std::sqrt;
+  const Cloth& cloth = scene.cloth;
+  SpringSight<Real> sight;
+  sight.time_step_s = scene.time_step_s;
+  int number = 0;
+  for (int type = 0; type < kSpringTypes; ++type) {
+    const auto t = static_cast<size_t>(type);
+    sight.type = static_cast<SpringType>(type);
+    sight.natural_length_m = real_of<L>(scene.springs.natural_length_m[t]);
+    sight.stiffness_n_per_m = real_of<L>(scene.springs.stiffness_n_per_m[t]);
+    sight.damping_ns_per_m = real_of<L>(scene.springs.damping_ns_per_m[t]);
+    for (const Spring& spring : cloth.springs[t]) {
+      const Vector3<Real> along =
+          vector_at<L>(scene.position_m, spring.b) - vector_at<L>(scene.position_m, spring.a);
+      const Vector3<Real> rate = vector_at<L>(scene.velocity_m_per_s, spring.b) -
+                                 vector_at<L>(scene.velocity_m_per_s, spring.a);
+      sight.length_m = sqrt(dot(along, along));
+      const Vector3<Real> u = direction(along);
+      sight.stretching_m_per_s = dot(u, rate);
+      const auto [place_s, place_t] = middle_of(cloth.mesh, spring);
+      sight.s = place_s;
+      sight.t = place_t;
+      visit(number++, spring, rate, u, sight);
+    }
+  }
+}
+
+/// An effect inside the springs: tension beyond k (l - l0) + c dl/dt. A Law has
+///   static constexpr int kParameters, kMemory;   // kMemory numbers are remembered per spring
+///   template <class Real> static Real tension(const SpringSight<Real>&,
+///       const std::array<Real, kParameters>&, std::array<Real, kMemory>& memory);  // N
+///   static EffectRates rates(const Cloth&, const SpringParameters&, const std::vector<double>&);
+/// Lanes, tangents and the adjoint follow from these.
+template <class Law>
+class SpringLawEffect final : public Effect {
+ public:
+  int memory_size(const Cloth& cloth) const override {
+    return Law::kMemory * static_cast<int>(cloth.spring_count());
+  }
+  void add_force(const EffectScene<ExactLanes>& scene, const EffectValues<ExactLanes>& parameters,
+                 EffectMemory<ExactLanes>& memory,
+                 LaneVectors<ExactLanes>& force_n) const override {
+    add(scene, parameters, memory, force_n);
+  }
+  void add_force(const EffectScene<FastLanes>& scene, const EffectValues<FastLanes>& parameters,
+                 EffectMemory<FastLanes>& memory, LaneVectors<FastLanes>& force_n) const override {
+    add(scene, parameters, memory, force_n);
+  }
+  void add_force(const EffectScene<DualLanes>& scene, const EffectValues<DualLanes>& parameters,
+                 EffectMemory<DualLanes>& memory, LaneVectors<DualLanes>& force_n) const override {
+    add(scene, parameters, memory, force_n);
+  }
+  void add_force(const EffectScene<SingleLane>& scene, const EffectValues<SingleLane>& parameters,
+                 EffectMemory<SingleLane>& memory,
+                 LaneVectors<SingleLane>& force_n) const override {
+    add(scene, parameters, memory, force_n);
+  }
+
+  void linearise_force(const EffectScene<SingleLane>& scene,
+                       const EffectValues<SingleLane>& parameters,
+                       const EffectMemory<SingleLane>& memory,
+                       EffectLinearisation& derivatives) const override {
+    // What a tension depends on: five numbers of the spring, the parameters, the memory.
+    constexpr int kOwn = 5, kMemory = kOwn + Law::kParameters, kCount = kMemory + Law::kMemory;
+    using Dual = ceres::Jet<double, kCount>;
+    std::array<Dual, Law::kParameters> p;
+    for (int n = 0; n < Law::kParameters; ++n)
+      p[static_cast<size_t>(n)] = Dual(parameters[static_cast<size_t>(n)][0], kOwn + n);
+    for_springs<SingleLane>(
+        scene, [&](int number, const Spring& spring, const Vector3<double>& rate_m_per_s,
+                   const Vector3<double>& direction, const SpringSight<double>& sight) {
+          SpringSight<Dual> at;
+          at.length_m = Dual(sight.length_m, 0);
+          at.stretching_m_per_s = Dual(sight.stretching_m_per_s, 1);
+          at.natural_length_m = Dual(sight.natural_length_m, 2);
+          at.stiffness_n_per_m = Dual(sight.stiffness_n_per_m, 3);
+          at.damping_ns_per_m = Dual(sight.damping_ns_per_m, 4);
+          at.type = sight.type;
+          at.s = sight.s;
+          at.t = sight.t;
+          at.time_step_s = sight.time_step_s;
+          std::array<Dual, Law::kMemory> remembered;
+          const int first = number * Law::kMemory;
+          for (int m = 0; m < Law::kMemory; ++m)
+            remembered[static_cast<size_t>(m)] = Dual(memory(0, first + m), kMemory + m);
+          const Dual tension = Law::tension(at, p, remembered);
+
+          // dl = u . dL,  d(dl/dt) = u . dV + (V - u (u . V)) . dL / l,  du = (dL - u u . dL) / l
+          const Eigen::Vector3d u(direction.x, direction.y, direction.z);
+          const Eigen::Vector3d rate(rate_m_per_s.x, rate_m_per_s.y, rate_m_per_s.z);
+          const double inverse_length = sight.length_m > 0 ? 1 / sight.length_m : 0;
+          const Eigen::RowVector3d turning =
+              ((rate - u * u.dot(rate)) * inverse_length).transpose();
+          const Eigen::RowVector3d along = u.transpose();
+          const auto by_position = [&](const Dual& of) -> Eigen::RowVector3d {
+            return of.v[0] * along + of.v[1] * turning;
+          };
+          const Eigen::Matrix3d force_by_position =
+              u * by_position(tension) +
+              tension.a * inverse_length * (Eigen::Matrix3d::Identity() - u * along);
+          const Eigen::Matrix3d force_by_velocity = tension.v[1] * u * along;
+          const int a = spring.a, b = spring.b;
+          derivatives.by_motion.push_back({a, b, force_by_position, force_by_velocity});
+          derivatives.by_motion.push_back({a, a, -force_by_position, -force_by_velocity});
+          derivatives.by_motion.push_back({b, a, force_by_position, force_by_velocity});
+          derivatives.by_motion.push_back({b, b, -force_by_position, -force_by_velocity});
+
+          const int type = sight.type;
+          const auto parameter_number = [&](int n) {
+            return n == 0   ? ParameterNumber::natural_length(type)
+                   : n == 1 ? ParameterNumber::stiffness(type)
+                   : n == 2 ? ParameterNumber::damping(type)
+                            : ParameterNumber::own(n - 3);
+          };
+          for (int n = 0; n < 3 + Law::kParameters; ++n) {
+            const double by_parameter = tension.v[2 + n];
+            if (by_parameter == 0) continue;
+            derivatives.by_parameter.push_back({a, parameter_number(n), by_parameter * u});
+            derivatives.by_parameter.push_back({b, parameter_number(n), -by_parameter * u});
+          }
+          for (int m = 0; m < Law::kMemory; ++m) {
+            const double by_memory = tension.v[kMemory + m];
+            derivatives.by_memory.push_back({a, first + m, by_memory * u});
+            derivatives.by_memory.push_back({b, first + m, -by_memory * u});
+            const Dual& next = remembered[static_cast<size_t>(m)];
+            derivatives.memory_by_motion.push_back(
+                {first + m, b, by_position(next), next.v[1] * along});
+            derivatives.memory_by_motion.push_back(
+                {first + m, a, -by_position(next), -next.v[1] * along});
+            for (int n = 0; n < 3 + Law::kParameters; ++n)
+              if (next.v[2 + n] != 0)
+                derivatives.memory_by_parameter.push_back(
+                    {first + m, parameter_number(n), next.v[2 + n]});
+            for (int of = 0; of < Law::kMemory; ++of)
+              derivatives.memory_by_memory.push_back({first + m, first + of, next.v[kMemory + of]});
+          }
+        });
+  }
+
+  EffectRates rates(const Cloth& cloth, const SpringParameters& springs,
+                    const std::vector<double>& parameters) const override {
+    return Law::rates(cloth, springs, parameters);
+  }
+
+ private:
+  template <class L>
+  static void add(const EffectScene<L>& scene, const EffectValues<L>& parameters,
+                  EffectMemory<L>& memory, LaneVectors<L>& force_n) {
+    using Real = RealOf<L>;
+    const auto p = reals_of<L, Law::kParameters>(parameters);
+    for_springs<L>(scene, [&](int number, const Spring& spring, const Vector3<Real>&,
+                              const Vector3<Real>& u, const SpringSight<Real>& sight) {
+      std::array<Real, Law::kMemory> remembered;
+      for (int m = 0; m < Law::kMemory; ++m)
+        remembered[static_cast<size_t>(m)] =
+            real_of<L>(LaneValue<L>(memory.col(number * Law::kMemory + m)));
+      const Vector3<Real> pull = Law::tension(sight, p, remembered) * u;
+      for (int m = 0; m < Law::kMemory; ++m)
+        set_real<L>(memory, number * Law::kMemory + m, remembered[static_cast<size_t>(m)]);
+      add_at<L>(force_n, spring.a, pull);
+      set_at<L>(force_n, spring.b, vector_at<L>(force_n, spring.b) - pull);
+    });
+  }
+};
+
+}  // namespace clothfit

@@ -1,0 +1,135 @@
+#pragma once
+
+#include <ceres/jet.h>
+
+#include <array>
+
+#include "model/cloth.h"
+#include "model/effects/effect.h"
+#include "model/effects/linearisation.h"
+#include "model/effects/number.h"
+
+namespace clothfit {
+
+/// What a law sees of a held point.
+template <class Real>
+struct SupportSight {
+  Vector3<Real> pull_n;   ///< of the cloth, its weight included
+  int number = 0;         ///< which held point
+  double end_time_s = 0;  ///< when it will be where the law places it
+  double time_step_s = 0;
+};
+
+/// An effect on the places of the held points. A Law has
+///   static constexpr int kParameters, kMemory;   // kMemory numbers are remembered per held point
+///   template <class Real> static Vector3<Real> shift(const SupportSight<Real>&,
+///       const std::array<Real, kParameters>&, std::array<Real, kMemory>& memory);  // m
+///   static EffectRates rates(const Cloth&, const SpringParameters&, const std::vector<double>&);
+/// Lanes, tangents and the adjoint follow from these.
+template <class Law>
+class SupportLawEffect final : public Effect {
+ public:
+  bool shifts_supports() const override { return true; }
+  int memory_size(const Cloth& cloth) const override {
+    return Law::kMemory * static_cast<int>(cloth.held.size());
+  }
+  void shift_supports(const EffectScene<ExactLanes>& scene,
+                      const EffectValues<ExactLanes>& parameters,
+                      const LaneVectors<ExactLanes>& support_force_n,
+                      EffectMemory<ExactLanes>& memory,
+                      LaneVectors<ExactLanes>& target_m) const override {
+    shift(scene, parameters, support_force_n, memory, target_m);
+  }
+  void shift_supports(const EffectScene<FastLanes>& scene,
+                      const EffectValues<FastLanes>& parameters,
+                      const LaneVectors<FastLanes>& support_force_n,
+                      EffectMemory<FastLanes>& memory,
+                      LaneVectors<FastLanes>& target_m) const override {
+    shift(scene, parameters, support_force_n, memory, target_m);
+  }
+  void shift_supports(const EffectScene<DualLanes>& scene,
+                      const EffectValues<DualLanes>& parameters,
+                      const LaneVectors<DualLanes>& support_force_n,
+                      EffectMemory<DualLanes>& memory,
+                      LaneVectors<DualLanes>& target_m) const override {
+    shift(scene, parameters, support_force_n, memory, target_m);
+  }
+  void shift_supports(const EffectScene<SingleLane>& scene,
+                      const EffectValues<SingleLane>& parameters,
+                      const LaneVectors<SingleLane>& support_force_n,
+                      EffectMemory<SingleLane>& memory,
+                      LaneVectors<SingleLane>& target_m) const override {
+    shift(scene, parameters, support_force_n, memory, target_m);
+  }
+
+  void linearise_supports(const EffectScene<SingleLane>& scene,
+                          const EffectValues<SingleLane>& parameters,
+                          const LaneVectors<SingleLane>& support_force_n,
+                          const EffectMemory<SingleLane>& memory,
+                          EffectLinearisation& derivatives) const override {
+    constexpr int kOwn = 3, kMemory = kOwn + Law::kParameters, kCount = kMemory + Law::kMemory;
+    using Dual = ceres::Jet<double, kCount>;
+    std::array<Dual, Law::kParameters> p;
+    for (int n = 0; n < Law::kParameters; ++n)
+      p[static_cast<size_t>(n)] = Dual(parameters[static_cast<size_t>(n)][0], kOwn + n);
+    for (int h = 0; h < static_cast<int>(scene.cloth.held.size()); ++h) {
+      const Vector3<double> pull = vector_at<SingleLane>(support_force_n, h);
+      std::array<Dual, Law::kMemory> remembered;
+      const int first = h * Law::kMemory;
+      for (int m = 0; m < Law::kMemory; ++m)
+        remembered[static_cast<size_t>(m)] = Dual(memory(0, first + m), kMemory + m);
+      const Vector3<Dual> shift = Law::shift(
+          SupportSight<Dual>{.pull_n = {Dual(pull.x, 0), Dual(pull.y, 1), Dual(pull.z, 2)},
+                             .number = h,
+                             .end_time_s = scene.time_s + scene.time_step_s,
+                             .time_step_s = scene.time_step_s},
+          p, remembered);
+      Eigen::Matrix<double, 3, kCount> j;
+      j << shift.x.v.transpose(), shift.y.v.transpose(), shift.z.v.transpose();
+      derivatives.by_force.push_back({h, j.template leftCols<3>()});
+      for (int n = 0; n < Law::kParameters; ++n)
+        derivatives.by_parameter.push_back({h, ParameterNumber::own(n), j.col(kOwn + n)});
+      for (int m = 0; m < Law::kMemory; ++m) {
+        derivatives.by_memory.push_back({h, first + m, j.col(kMemory + m)});
+        const Dual& next = remembered[static_cast<size_t>(m)];
+        derivatives.memory_by_force.push_back(
+            {first + m, h, next.v.template head<3>().transpose()});
+        for (int n = 0; n < Law::kParameters; ++n)
+          derivatives.memory_by_parameter.push_back(
+              {first + m, ParameterNumber::own(n), next.v[kOwn + n]});
+        for (int of = 0; of < Law::kMemory; ++of)
+          derivatives.memory_by_memory.push_back({first + m, first + of, next.v[kMemory + of]});
+      }
+    }
+  }
+
+  EffectRates rates(const Cloth& cloth, const SpringParameters& springs,
+                    const std::vector<double>& parameters) const override {
+    return Law::rates(cloth, springs, parameters);
+  }
+
+ private:
+  template <class L>
+  static void shift(const EffectScene<L>& scene, const EffectValues<L>& parameters,
+                    const LaneVectors<L>& support_force_n, EffectMemory<L>& memory,
+                    LaneVectors<L>& target_m) {
+    using Real = RealOf<L>;
+    const auto p = reals_of<L, Law::kParameters>(parameters);
+    for (int h = 0; h < static_cast<int>(scene.cloth.held.size()); ++h) {
+      std::array<Real, Law::kMemory> remembered;
+      for (int m = 0; m < Law::kMemory; ++m)
+        remembered[static_cast<size_t>(m)] =
+            real_of<L>(LaneValue<L>(memory.col(h * Law::kMemory + m)));
+      add_at<L>(target_m, h,
+                Law::shift(SupportSight<Real>{.pull_n = vector_at<L>(support_force_n, h),
+                                              .number = h,
+                                              .end_time_s = scene.time_s + scene.time_step_s,
+                                              .time_step_s = scene.time_step_s},
+                           p, remembered));
+      for (int m = 0; m < Law::kMemory; ++m)
+        set_real<L>(memory, h * Law::kMemory + m, remembered[static_cast<size_t>(m)]);
+    }
+  }
+};
+
+}  // namespace clothfit

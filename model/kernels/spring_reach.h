@@ -1,0 +1,27 @@
+#pragma once
+
+#include <cstddef>
+
+#include "model/mesh.h"
+
+namespace clothfit {
+
+/// Where the springs of a type lead from the vertex that they leave to the right or down: from
+/// [i, j] to [i + down, j + right]. (Types 0 to 5; of shear_up this is [i+1, j-1] to [i, j] read
+/// backwards.)
+struct SpringReach {
+  int down = 0, right = 0;
+
+  /// How many vertices further on, in row-major order, they end; positive.
+  std::ptrdiff_t offset(const Mesh& mesh) const {
+    return static_cast<std::ptrdiff_t>(down) * mesh.columns + right;
+  }
+  bool leaves(const Mesh& mesh, int i, int j) const {
+    return i + down < mesh.rows && j + right >= 0 && j + right < mesh.columns;
+  }
+};
+
+inline constexpr SpringReach kSpringReach[kSpringTypes] = {{1, 0},  {0, 1}, {1, 1},
+                                                           {1, -1}, {2, 0}, {0, 2}};
+
+}  // namespace clothfit

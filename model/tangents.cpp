@@ -1,0 +1,96 @@
+#include "model/tangents.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace clothfit {
+namespace {
+
+/// One simulation and its derivatives along up to kLanes directions.
+TangentResult run_group(const Cloth& cloth, const ParameterSet& set,
+                        std::span<const Direction> directions, const Schedule& schedule) {
+  TangentStepper stepper(cloth);
+  const DualParameters parameters = DualParameters::of(cloth, set, directions);
+  LaneState<DualLanes> state = LaneState<DualLanes>::of(cloth);
+  state.position_m.value.set_lane(0, set.start_position_m);
+  if (set.start_velocity_m_per_s.cols() > 0)
+    state.velocity_m_per_s.value.set_lane(0, set.start_velocity_m_per_s);
+  for (size_t d = 0; d < directions.size(); ++d) {
+    const auto lane = static_cast<int>(d);
+    if (directions[d].start_position_m.cols() > 0)
+      state.position_m.tangent.set_lane(lane, directions[d].start_position_m);
+    if (directions[d].start_velocity_m_per_s.cols() > 0)
+      state.velocity_m_per_s.tangent.set_lane(lane, directions[d].start_velocity_m_per_s);
+  }
+  LaneVectors<DualLanes> target_m = stepper.locate(state.position_m);
+  const auto aim = [&](double time_s) {
+    for (size_t h = 0; h < cloth.held.size(); ++h) {
+      if (!cloth.held[h].motion) continue;
+      const auto column = static_cast<Eigen::Index>(h);
+      const Eigen::Vector3d place = cloth.held[h].motion(time_s);
+      target_m.value.x(0, column) = place.x();
+      target_m.value.y(0, column) = place.y();
+      target_m.value.z(0, column) = place.z();
+      for (size_t d = 0; d < directions.size(); ++d) {
+        const auto& motion = directions[d].held_motion;
+        const Eigen::Vector3d change =
+            motion.empty() || !motion[h] ? Eigen::Vector3d::Zero() : motion[h](time_s);
+        const auto lane = static_cast<Eigen::Index>(d);
+        target_m.tangent.x(lane, column) = change.x();
+        target_m.tangent.y(lane, column) = change.y();
+        target_m.tangent.z(lane, column) = change.z();
+      }
+    }
+  };
+
+  TangentResult result;
+  result.position_tangent.resize(directions.size());
+  const size_t frames = schedule.frame_time_s.size();
+  for (size_t frame = 0; frame < frames; ++frame) {
+    if (frame > 0 && result.run.usable()) {
+      const double from_s = schedule.frame_time_s[frame - 1];
+      const int steps = schedule.substeps(static_cast<int>(frame));
+      const double h = (schedule.frame_time_s[frame] - from_s) / steps;
+      for (int n = 0; n < steps; ++n) {
+        aim(from_s + (n + 1) * h);
+        stepper.step(parameters, target_m, from_s + n * h, h, state);
+      }
+    }
+    Eigen::Matrix3Xd now = state.position_m.value.lane(0);
+    if (result.run.usable() && left_the_scene(now, set.start_position_m, cloth.mesh)) {
+      result.run.reason = StopReason::diverged;
+      result.run.diverged_frame = static_cast<int>(frame);
+    }
+    if (!result.run.usable()) now.setConstant(NAN);
+    result.run.position_m.push_back(std::move(now));
+    for (size_t d = 0; d < directions.size(); ++d) {
+      Eigen::Matrix3Xd tangent = state.position_m.tangent.lane(static_cast<int>(d));
+      if (!result.run.usable()) tangent.setConstant(NAN);
+      result.position_tangent[d].push_back(std::move(tangent));
+    }
+  }
+  return result;
+}
+
+}  // namespace
+
+TangentResult simulate_with_tangents(const Cloth& cloth, const ParameterSet& parameters,
+                                     std::span<const Direction> directions,
+                                     const Schedule& schedule) {
+  const size_t groups = std::max<size_t>(1, (directions.size() + kLanes - 1) / kLanes);
+  std::vector<TangentResult> results(groups);
+  tbb::parallel_for(size_t{0}, groups, [&](size_t g) {
+    const size_t first = g * kLanes;
+    results[g] = run_group(
+        cloth, parameters,
+        directions.subspan(first, std::min<size_t>(kLanes, directions.size() - first)), schedule);
+  });
+  TangentResult result = std::move(results.front());
+  for (size_t g = 1; g < groups; ++g)
+    std::ranges::move(results[g].position_tangent, std::back_inserter(result.position_tangent));
+  return result;
+}
+
+}  // namespace clothfit

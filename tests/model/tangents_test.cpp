@@ -1,0 +1,205 @@
+// Derivatives of whole simulations: against differences, and to the bits of simulate(). What single
+// effects contribute is held against differences in effect_contract.h too.
+
+#include "model/tangents.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/model/mechanics.h"
+#include "tests/model/random_cloth.h"
+
+namespace clothfit {
+namespace {
+
+/// A swinging cloth with one point held at a vertex, one between vertices, one that is moved.
+struct Swing {
+  Cloth cloth = square_cloth(6);
+  ParameterSet set;
+  Schedule schedule{.frame_time_s = {0, 0.03, 0.05, 0.1}, .time_step_s = 5e-4};
+
+  explicit Swing(Uniform& uniform) {
+    cloth.held = {held_at(cloth.mesh, 0, 0), held_at(cloth.mesh, 0.31, 0.02),
+                  held_at(cloth.mesh, 0.4, 0.4)};
+    cloth.held.back().motion = [](double time_s) {
+      return Eigen::Vector3d(0.4 - 0.3 * time_s, 0.39, 0.1 * time_s);
+    };
+    set = {.springs = spring_parameters(random_fabric(uniform), cloth.mesh),
+           .gravity_m_per_s2 = {0.3, 9.0, -2.0},
+           .start_position_m = crumpled(cloth.mesh, 0.1, uniform),
+           .start_velocity_m_per_s = uniform.vectors(36, 0.5)};
+  }
+};
+
+Direction random_direction(const Cloth& cloth, Uniform& uniform) {
+  Direction d;
+  for (size_t type = 0; type < kSpringTypes; ++type) {
+    d.natural_length_m[type] = uniform(-0.01, 0.01);
+    d.stiffness_n_per_m[type] = uniform(-5, 5);
+    d.damping_ns_per_m[type] = uniform(-0.01, 0.01);
+    d.critical_elongation[type] = uniform(-0.01, 0.01);
+  }
+  d.gravity_m_per_s2 = uniform.vectors(1, 1);
+  for (const EffectDescription& effect : cloth.effect_descriptions) {
+    d.effects.emplace_back();
+    for (const EffectParameter& p : effect.parameters)
+      d.effects.back().push_back(p.typical * uniform(-1, 1));
+  }
+  d.start_position_m = uniform.vectors(cloth.mesh.vertex_count(), 0.01);
+  d.start_velocity_m_per_s = uniform.vectors(cloth.mesh.vertex_count(), 0.1);
+  const Eigen::Vector3d drift = uniform.vectors(1, 0.1);
+  d.held_motion.resize(cloth.held.size());
+  for (size_t h = 0; h < cloth.held.size(); ++h)
+    if (cloth.held[h].motion)
+      d.held_motion[h] = [drift](double time_s) -> Eigen::Vector3d { return time_s * drift; };
+  return d;
+}
+
+/// The simulation a small way along the direction.
+std::vector<Eigen::Matrix3Xd> moved(const Cloth& cloth, ParameterSet set, const Direction& d,
+                                    double by, const Schedule& schedule) {
+  for (size_t type = 0; type < kSpringTypes; ++type) {
+    set.springs.natural_length_m[type] += by * d.natural_length_m[type];
+    set.springs.stiffness_n_per_m[type] += by * d.stiffness_n_per_m[type];
+    set.springs.damping_ns_per_m[type] += by * d.damping_ns_per_m[type];
+    set.springs.critical_elongation[type] += by * d.critical_elongation[type];
+  }
+  set.gravity_m_per_s2 += by * d.gravity_m_per_s2;
+  for (size_t e = 0; e < d.effects.size(); ++e)
+    for (size_t p = 0; p < d.effects[e].size(); ++p) set.effects[e][p] += by * d.effects[e][p];
+  set.start_position_m += by * d.start_position_m;
+  set.start_velocity_m_per_s += by * d.start_velocity_m_per_s;
+  Cloth there = cloth;
+  for (size_t h = 0; h < d.held_motion.size(); ++h)
+    if (d.held_motion[h])
+      there.held[h].motion = [of = cloth.held[h].motion, change = d.held_motion[h],
+                              by](double time_s) -> Eigen::Vector3d {
+        return of(time_s) + by * change(time_s);
+      };
+  return simulate(there, {&set, 1}, schedule).front().position_m;
+}
+
+/// Largest difference between tangents and central differences, relative to the tangents' size.
+double error_of_tangents(const Cloth& cloth, const ParameterSet& set, const Direction& direction,
+                         const Schedule& schedule, double by) {
+  const TangentResult result = simulate_with_tangents(cloth, set, {&direction, 1}, schedule);
+  const auto ahead = moved(cloth, set, direction, by, schedule);
+  const auto behind = moved(cloth, set, direction, -by, schedule);
+  double worst = 0;
+  for (size_t f = 1; f < schedule.frame_time_s.size(); ++f) {
+    const Eigen::Matrix3Xd& tangent = result.position_tangent[0][f];
+    const Eigen::Matrix3Xd difference = (ahead[f] - behind[f]) / (2 * by);
+    worst = std::max(worst, (tangent - difference).norm() / tangent.norm());
+  }
+  return worst;
+}
+
+TEST(Tangents, AgreeWithCentralDifferences) {
+  for (const unsigned seed : {1u, 2u, 3u}) {
+    SCOPED_TRACE(testing::Message() << "seed " << seed);
+    Uniform uniform(seed);
+    const Swing swing(uniform);
+    const Direction direction = random_direction(swing.cloth, uniform);
+
+    // Differences of 1e-5 are off by 1e-10 from their curvature and 1e-11 from rounding, of what
+    // some hundred steps of a crumpled cloth make of it.
+    EXPECT_LT(error_of_tangents(swing.cloth, swing.set, direction, swing.schedule, 1e-5), 1e-6);
+  }
+}
+
+TEST(Tangents, AgreeWithCentralDifferencesAtTheStrainLimit) {
+  for (const StrainLimitMode mode : {StrainLimitMode::positions, StrainLimitMode::consistent}) {
+    for (const unsigned seed : {1u, 2u, 3u}) {
+      SCOPED_TRACE(testing::Message() << "mode " << static_cast<int>(mode) << ", seed " << seed);
+      Uniform uniform(seed);
+      Swing swing(uniform);
+      swing.cloth.strain_limit.mode = mode;
+      swing.set.springs.critical_elongation.fill(0.03);
+      swing.schedule.frame_time_s = {0, 0.002, 0.004};
+      const Direction direction = random_direction(swing.cloth, uniform);
+
+      Cloth unlimited = swing.cloth;
+      unlimited.strain_limit.mode = StrainLimitMode::off;
+      ASSERT_NE(simulate(unlimited, {&swing.set, 1}, swing.schedule).front().position_m,
+                simulate(swing.cloth, {&swing.set, 1}, swing.schedule).front().position_m);
+
+      // Steps so small that no spring reaches or leaves its limit within them.
+      EXPECT_LT(error_of_tangents(swing.cloth, swing.set, direction, swing.schedule, 1e-7), 1e-6);
+    }
+  }
+}
+
+TEST(Tangents, AgreeWithCentralDifferencesUnderWindAndDamping) {
+  for (const unsigned seed : {1u, 2u}) {
+    SCOPED_TRACE(testing::Message() << "seed " << seed);
+    Uniform uniform(seed);
+    Swing swing(uniform);
+    swing.cloth.add_effect("wind", "test");
+    swing.cloth.add_effect("viscous_damping", "test");
+    swing.set.effects = {{0.1, 0.2, -0.3, 0.4}, {0.7}};
+    const Direction direction = random_direction(swing.cloth, uniform);
+
+    EXPECT_LT(error_of_tangents(swing.cloth, swing.set, direction, swing.schedule, 1e-5), 1e-6);
+  }
+}
+
+TEST(Tangents, CarryASimulationOfTheSameBits) {
+  for (const StrainLimitMode mode :
+       {StrainLimitMode::off, StrainLimitMode::positions, StrainLimitMode::consistent}) {
+    SCOPED_TRACE(static_cast<int>(mode));
+    Uniform uniform(4);
+    Swing swing(uniform);
+    swing.cloth.strain_limit.mode = mode;
+    swing.set.springs.critical_elongation.fill(0.03);
+    swing.cloth.add_effect("wind", "test");
+    swing.set.effects = {{0.1, 0.2, -0.3, 0.4}};
+
+    const TangentResult result =
+        simulate_with_tangents(swing.cloth, swing.set,
+                               std::vector{random_direction(swing.cloth, uniform)}, swing.schedule);
+
+    EXPECT_EQ(result.run.position_m,
+              simulate(swing.cloth, {&swing.set, 1}, swing.schedule).front().position_m);
+  }
+}
+
+TEST(Tangents, DoNotDependOnTheOtherDirections) {
+  Uniform uniform(5);
+  const Swing swing(uniform);
+  std::vector<Direction> directions;
+  for (int d = 0; d < 11; ++d) directions.push_back(random_direction(swing.cloth, uniform));
+
+  const TangentResult together =
+      simulate_with_tangents(swing.cloth, swing.set, directions, swing.schedule);
+
+  ASSERT_EQ(together.position_tangent.size(), 11u);
+  for (size_t d = 0; d < 11; ++d)
+    EXPECT_EQ(together.position_tangent[d],
+              simulate_with_tangents(swing.cloth, swing.set, {&directions[d], 1}, swing.schedule)
+                  .position_tangent[0]);
+}
+
+TEST(Tangents, AreLinearInTheDirection) {
+  Uniform uniform(6);
+  const Swing swing(uniform);
+  const Direction once = random_direction(swing.cloth, uniform);
+  Direction twice = once;
+  for (size_t type = 0; type < kSpringTypes; ++type) {
+    twice.natural_length_m[type] *= 2;
+    twice.stiffness_n_per_m[type] *= 2;
+    twice.damping_ns_per_m[type] *= 2;
+  }
+  twice.gravity_m_per_s2 *= 2;
+  twice.start_position_m *= 2;
+  twice.start_velocity_m_per_s *= 2;
+  for (auto& motion : twice.held_motion)
+    if (motion) motion = [of = motion](double time_s) -> Eigen::Vector3d { return 2 * of(time_s); };
+
+  const TangentResult result = simulate_with_tangents(
+      swing.cloth, swing.set, std::vector<Direction>{once, twice}, swing.schedule);
+
+  for (size_t f = 0; f < 4; ++f)  // doubling is exact
+    EXPECT_EQ(result.position_tangent[1][f], 2 * result.position_tangent[0][f]);
+}
+
+}  // namespace
+}  // namespace clothfit
