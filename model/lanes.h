@@ -3,6 +3,8 @@
 #include <Eigen/Core>
 #include <array>
 
+#include "model/aligned_array.h"
+
 namespace ceres {
 template <typename T, int N>
 struct Jet;
@@ -30,7 +32,7 @@ using DualLanes = Lanes<ceres::Jet<double, kLanes>, 1>;
 
 /// One coordinate of every vertex in every lane: lanes x vertices, lane index fastest.
 template <class L = ExactLanes>
-using LaneArray = Eigen::Array<typename L::Number, L::kCount, Eigen::Dynamic>;
+using LaneArray = AlignedArray<typename L::Number, L::kCount>;
 
 /// A number in every lane.
 template <class L = ExactLanes>

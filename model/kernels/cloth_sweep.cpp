@@ -25,7 +25,7 @@ struct SweepArrays {
   const SpringFactors<L>* factors;  ///< or null
   std::array<const Number*, 3> position_m;
   std::array<const Number*, 3> velocity_m_per_s;
-  Number* scratch;  ///< kScratchRows rows of columns x kCount
+  Number* scratch;  ///< of scratch_size
 };
 
 template <class L>
@@ -39,9 +39,21 @@ struct EulerArrays {
   double time_step_s;
 };
 
-/// Three coordinates of the forces that arrive from one row above, and twice three of those from
-/// two rows above: one for the row at hand, one for the next.
-constexpr int kScratchRows = 9;
+/// Forces that arrive from one row above, and twice those from two rows above: one for the row at
+/// hand, one for the next. A vertex before the first takes what an absent spring sends to the left.
+constexpr int kScratchVectors = 3;
+
+template <class L>
+constexpr std::ptrdiff_t scratch_size(const Mesh& mesh) {
+  return std::ptrdiff_t{3} * kScratchVectors * (mesh.columns + 1) * L::kCount;
+}
+
+template <class L>
+std::array<typename L::Number*, 3> scratch_rows(const SweepArrays<L>& arrays, int n) {
+  const std::ptrdiff_t width = (arrays.mesh.columns + 1) * L::kCount;
+  typename L::Number* const x = arrays.scratch + 3 * n * width + L::kCount;
+  return {x, x + width, x + 2 * width};
+}
 
 }  // namespace
 }  // namespace clothfit
@@ -55,7 +67,20 @@ namespace HWY_NAMESPACE {
 template <class L>
 struct SpringConstants {
   Vector<L> stiffness, damping, natural_length;
+  Vector<L> quarter_damping, half_rest;  ///< of `float`: c / 4, k l0 / 2
 };
+
+template <class L>
+HWY_INLINE SpringConstants<L> spring_constants(const Vector<L>& stiffness, const Vector<L>& damping,
+                                               const Vector<L>& natural_length) {
+  SpringConstants<L> spring{stiffness, damping, natural_length, damping, stiffness};
+  if constexpr (kMayContract<Vector<L>>) {
+    const Tag<L> d;
+    spring.quarter_damping = hn::Mul(hn::Set(d, 0.25f), damping);
+    spring.half_rest = hn::Mul(hn::Set(d, 0.5f), hn::Mul(stiffness, natural_length));
+  }
+  return spring;
+}
 
 /// What a spring exerts: `strength` times `along`.
 template <class V>
@@ -79,26 +104,120 @@ HWY_INLINE Vector3<V> force(const Pull<V>& pull) {
   return pull.strength * pull.along;
 }
 
-/// The pull of a spring to a vertex at `along` that moves with `rate`, both relative to its own.
-template <class L>
-HWY_INLINE Pull<Vector<L>> pull(const SpringConstants<L>& spring, const Vector3<Vector<L>>& along,
-                                const Vector3<Vector<L>>& rate) {
+/// The pulls of several springs from a vertex to those at `along`, which move with `rate`, both
+/// relative to its own. Step by step for all of them: a spring's operations wait for each other, so
+/// that a processor that looks ahead a spring or two would find little to do.
+template <class L, size_t n>
+HWY_INLINE void set_strengths(const SpringConstants<L> (&springs)[n],
+                              const Vector3<Vector<L>> (&rate)[n], Pull<Vector<L>> (&pulls)[n]) {
   using V = Vector<L>;
-  const V length2 = squared_length(along);
-  const V inverse = inverse_square_root(length2);
+  V length2[n], inverse[n], stretching[n];
+  for (size_t s = 0; s < n; ++s) length2[s] = squared_length(pulls[s].along);
+  for (size_t s = 0; s < n; ++s) stretching[s] = dot(pulls[s].along, rate[s]);
   if constexpr (kMayContract<V>) {
-    // (k (l - l0) + c dl/dt) / l in fewer operations.
-    const V stretching = hn::Mul(dot(along, rate), inverse);
-    const V against =
-        hn::MulSub(spring.damping, stretching, hn::Mul(spring.stiffness, spring.natural_length));
-    return {hn::MulAdd(against, inverse, spring.stiffness), along};
+    // (k (l - l0) + c dl/dt) / l in fewer operations; `inverse` is 2 / l.
+    twice_inverse_square_roots(length2, inverse);
+    for (size_t s = 0; s < n; ++s) stretching[s] = hn::Mul(stretching[s], inverse[s]);
+    for (size_t s = 0; s < n; ++s)
+      stretching[s] = hn::MulSub(springs[s].quarter_damping, stretching[s], springs[s].half_rest);
+    for (size_t s = 0; s < n; ++s)
+      pulls[s].strength = hn::MulAdd(stretching[s], inverse[s], springs[s].stiffness);
   } else {
-    const V length = hn::Mul(length2, inverse);
-    const V stretching = hn::Mul(dot(along, rate), inverse);
-    const V tension = hn::Add(hn::Mul(spring.stiffness, hn::Sub(length, spring.natural_length)),
-                              hn::Mul(spring.damping, stretching));
-    return {hn::Mul(tension, inverse), along};
+    inverse_square_roots(length2, inverse);
+    for (size_t s = 0; s < n; ++s) {
+      stretching[s] = hn::Mul(stretching[s], inverse[s]);
+      const V length = hn::Mul(length2[s], inverse[s]);
+      const V elastic = hn::Mul(springs[s].stiffness, hn::Sub(length, springs[s].natural_length));
+      const V tension = hn::Add(elastic, hn::Mul(springs[s].damping, stretching[s]));
+      pulls[s].strength = hn::Mul(tension, inverse[s]);
+    }
   }
+}
+
+/// The springs that leave a vertex, in the order in which their pulls are added to its force.
+constexpr SpringType kLeaving[kSpringTypes] = {structural_s, flexion_s,    flexion_t,
+                                               shear_up,     structural_t, shear_down};
+
+/// One row of a sweep, with `kBelow` rows below it, or more.
+template <class L, int kBelow, bool kFactors, class Sink>
+HWY_INLINE void sweep_row(const SweepArrays<L>& arrays,
+                          const SpringConstants<L> (&constants)[kSpringTypes], std::ptrdiff_t i,
+                          std::ptrdiff_t lane, const Sink& sink) {
+  using Number = typename L::Number;
+  using V = Vector<L>;
+  const Tag<L> d;
+  const std::ptrdiff_t columns = arrays.mesh.columns, width = columns * L::kCount;
+  // Copies, because the compiler must take a store for one that may change what `arrays` holds.
+  const std::array<const Number*, 3> positions = arrays.position_m;
+  const std::array<const Number*, 3> velocities = arrays.velocity_m_per_s;
+  const std::array<Number*, 3> from_above = scratch_rows(arrays, 0);
+  const std::array<Number*, 3> from_two_above = scratch_rows(arrays, i % 2 == 0 ? 1 : 2);
+
+  // Those of kLeaving that this row has, and the constants of their types.
+  constexpr size_t kCount = kBelow == 2 ? 6 : kBelow == 1 ? 5 : 2;
+  constexpr size_t kTwoDown = 2, kDownLeft = kBelow == 2 ? 3 : 2, kDown = kDownLeft + 1,
+                   kDownRight = kDownLeft + 2;
+  SpringType types[kCount];
+  SpringConstants<L> springs[kCount];
+  for (size_t s = 0; s < kCount; ++s) {
+    types[s] = kLeaving[kBelow == 1 && s >= kTwoDown ? s + 1 : s];
+    springs[s] = constants[types[s]];
+  }
+  const Pull<V> none{hn::Zero(d), zero(d)};
+  // What the vertices just passed sent to the right, and below to the right.
+  Pull<V> right = none, right_two = none, right_two_next = none, down_right = none;
+  Vector3<V> to_below = zero(d);  // what the vertex below the one just passed has got so far
+  for (std::ptrdiff_t j = 0; j < columns; ++j) {
+    const std::ptrdiff_t at = j * L::kCount + lane, self = i * width + at;
+    const std::ptrdiff_t vertex = i * columns + j;
+    // A spring that the cloth's edge leaves no room for ends where it begins: it pulls with zero.
+    const std::ptrdiff_t one_right = j + 1 < columns ? L::kCount : 0;
+    std::ptrdiff_t to[kCount];
+    to[0] = self + one_right;
+    to[1] = self + (j + 2 < columns ? 2 * L::kCount : 0);
+    if constexpr (kBelow == 2) to[kTwoDown] = self + 2 * width;
+    if constexpr (kBelow >= 1) {
+      to[kDownLeft] = self + (j > 0 ? width - L::kCount : 0);
+      to[kDown] = self + width;
+      to[kDownRight] = self + (j + 1 < columns ? width + L::kCount : 0);
+    }
+    const Vector3<V> position = load(d, positions, self), velocity = load(d, velocities, self);
+    Pull<V> pulls[kCount];
+    Vector3<V> rate[kCount];
+    for (size_t s = 0; s < kCount; ++s) {
+      pulls[s].along = load(d, positions, to[s]) - position;
+      rate[s] = load(d, velocities, to[s]) - velocity;
+    }
+    if constexpr (kFactors) {
+      SpringConstants<L> scaled[kCount];
+      for (size_t s = 0; s < kCount; ++s) {
+        const auto of_spring = [&](const auto& factors)
+                                   HWY_ATTR { return hn::Set(d, factors[types[s]][vertex]); };
+        scaled[s] = spring_constants<L>(
+            hn::Mul(springs[s].stiffness, of_spring(arrays.factors->stiffness)), springs[s].damping,
+            hn::Mul(springs[s].natural_length, of_spring(arrays.factors->natural_length)));
+      }
+      set_strengths<L>(scaled, rate, pulls);
+    } else {
+      set_strengths<L>(springs, rate, pulls);
+    }
+
+    Vector3<V> sum = zero(d) - (load(d, from_above, at) + load(d, from_two_above, at));
+    sum = sum - right;
+    sum = sum - right_two;
+    right_two = right_two_next;
+    for (size_t s = 0; s < kCount; ++s) sum = sum + pulls[s];
+    right = pulls[0];
+    right_two_next = pulls[1];
+    if constexpr (kBelow == 2) store(force(pulls[kTwoDown]), d, from_two_above, at);
+    if constexpr (kBelow >= 1) {
+      store(to_below + pulls[kDownLeft], d, from_above, at - L::kCount);
+      to_below = force(pulls[kDown]) + down_right;
+      down_right = pulls[kDownRight];
+    }
+    sink(vertex, self, sum, velocity, position);
+  }
+  if constexpr (kBelow >= 1) store(to_below, d, from_above, (columns - 1) * L::kCount + lane);
 }
 
 /// Calls `sink(vertex, element, force, velocity, position)` for every vertex in row-major order,
@@ -106,88 +225,21 @@ HWY_INLINE Pull<Vector<L>> pull(const SpringConstants<L>& spring, const Vector3<
 /// one reaches back to it.
 template <class L, bool kFactors, class Sink>
 HWY_INLINE void sweep(const SweepArrays<L>& arrays, const Sink& sink) {
-  using Number = typename L::Number;
-  using V = Vector<L>;
   const Tag<L> d;
-  constexpr std::ptrdiff_t kLanes = L::kCount;
-  const std::ptrdiff_t columns = arrays.mesh.columns, rows = arrays.mesh.rows;
-  const std::ptrdiff_t width = columns * kLanes;
-  // Copies, because the compiler must take a store for one that may change what `arrays` holds.
-  const std::array<const Number*, 3> positions = arrays.position_m;
-  const std::array<const Number*, 3> velocities = arrays.velocity_m_per_s;
-  Number* const scratch = arrays.scratch;
-  const auto scratch_rows = [&](int n) HWY_ATTR {
-    return std::array<Number*, 3>{scratch + n * width, scratch + (n + 1) * width,
-                                  scratch + (n + 2) * width};
-  };
-  std::fill_n(scratch, kScratchRows * width, Number{0});
-  const std::array<Number*, 3> from_above = scratch_rows(0);
-  const Pull<V> none{hn::Zero(d), zero(d)};
-
-  for (std::ptrdiff_t lane = 0; lane < kLanes; lane += static_cast<std::ptrdiff_t>(hn::Lanes(d))) {
+  const std::ptrdiff_t rows = arrays.mesh.rows;
+  std::fill_n(arrays.scratch, scratch_size<L>(arrays.mesh), typename L::Number{0});
+  for (std::ptrdiff_t lane = 0; lane < L::kCount;
+       lane += static_cast<std::ptrdiff_t>(hn::Lanes(d))) {
     SpringConstants<L> constants[kSpringTypes];
     for (size_t type = 0; type < kSpringTypes; ++type)
-      constants[type] = {hn::LoadU(d, arrays.springs.stiffness_n_per_m[type].data() + lane),
-                         hn::LoadU(d, arrays.springs.damping_ns_per_m[type].data() + lane),
-                         hn::LoadU(d, arrays.springs.natural_length_m[type].data() + lane)};
-    for (std::ptrdiff_t i = 0; i < rows; ++i) {
-      const std::array<Number*, 3> from_two_above = scratch_rows(i % 2 == 0 ? 3 : 6);
-      const bool one_below = i + 1 < rows, two_below = i + 2 < rows;
-      // What the vertices just passed sent to the right, and below to the right.
-      Pull<V> right = none, right_two = none, right_two_next = none, down_right = none;
-      Vector3<V> to_below = zero(d);  // what the vertex below the one just passed has got so far
-      for (std::ptrdiff_t j = 0; j < columns; ++j) {
-        const std::ptrdiff_t at = j * kLanes + lane, self = i * width + at;
-        const std::ptrdiff_t vertex = i * columns + j;
-        const Vector3<V> position = load(d, positions, self), velocity = load(d, velocities, self);
-        const auto pull_to = [&](size_t type, std::ptrdiff_t offset) HWY_ATTR {
-          SpringConstants<L> spring = constants[type];
-          if constexpr (kFactors) {
-            const SpringFactors<L>& factors = *arrays.factors;
-            spring.stiffness =
-                hn::Mul(spring.stiffness, hn::Set(d, factors.stiffness[type][vertex]));
-            spring.natural_length =
-                hn::Mul(spring.natural_length, hn::Set(d, factors.natural_length[type][vertex]));
-          }
-          return pull(spring, load(d, positions, self + offset) - position,
-                      load(d, velocities, self + offset) - velocity);
-        };
-        Vector3<V> sum = zero(d) - (load(d, from_above, at) + load(d, from_two_above, at));
-        sum = sum - right;
-        sum = sum - right_two;
-        right_two = right_two_next;
-        if (j + 1 < columns) {
-          right = pull_to(structural_s, kLanes);
-          sum = sum + right;
-        }
-        if (j + 2 < columns) {
-          right_two_next = pull_to(flexion_s, 2 * kLanes);
-          sum = sum + right_two_next;
-        }
-        if (two_below) {
-          const Pull<V> down_two = pull_to(flexion_t, 2 * width);
-          sum = sum + down_two;
-          store(force(down_two), d, from_two_above, at);
-        }
-        if (one_below) {
-          if (j > 0) {
-            const Pull<V> down_left = pull_to(shear_up, width - kLanes);
-            sum = sum + down_left;
-            store(to_below + down_left, d, from_above, at - kLanes);
-          }
-          const Pull<V> down = pull_to(structural_t, width);
-          sum = sum + down;
-          to_below = force(down) + down_right;
-          if (j + 1 < columns) {
-            down_right = pull_to(shear_down, width + kLanes);
-            sum = sum + down_right;
-          } else {
-            store(to_below, d, from_above, at);
-          }
-        }
-        sink(vertex, self, sum, velocity, position);
-      }
-    }
+      constants[type] =
+          spring_constants<L>(hn::LoadU(d, arrays.springs.stiffness_n_per_m[type].data() + lane),
+                              hn::LoadU(d, arrays.springs.damping_ns_per_m[type].data() + lane),
+                              hn::LoadU(d, arrays.springs.natural_length_m[type].data() + lane));
+    std::ptrdiff_t i = 0;
+    for (; i + 2 < rows; ++i) sweep_row<L, 2, kFactors>(arrays, constants, i, lane, sink);
+    for (; i + 1 < rows; ++i) sweep_row<L, 1, kFactors>(arrays, constants, i, lane, sink);
+    sweep_row<L, 0, kFactors>(arrays, constants, i, lane, sink);
   }
 }
 
@@ -289,7 +341,7 @@ void step_euler(const SweepArrays<SingleLane>& arrays, const EulerArrays<SingleL
 
 template <class L>
 ClothSweep<L>::ClothSweep(const Mesh& mesh)
-    : mesh_(mesh), scratch_(static_cast<size_t>(kScratchRows * mesh.columns) * L::kCount) {}
+    : mesh_(mesh), scratch_(static_cast<size_t>(scratch_size<L>(mesh))) {}
 
 template <class L>
 void ClothSweep<L>::add_spring_forces(const LaneSprings<L>& springs,

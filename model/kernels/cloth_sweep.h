@@ -1,8 +1,8 @@
 #pragma once
 
 #include <array>
-#include <vector>
 
+#include "model/aligned_numbers.h"
 #include "model/lanes.h"
 #include "model/mesh.h"
 
@@ -77,7 +77,7 @@ class ClothSweep {
 
  private:
   Mesh mesh_;
-  std::vector<typename L::Number> scratch_;  ///< forces on vertices that are not reached yet
+  AlignedNumbers<typename L::Number> scratch_;  ///< forces on vertices that are not reached yet
 };
 
 }  // namespace clothfit

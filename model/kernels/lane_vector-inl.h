@@ -116,26 +116,44 @@ HWY_INLINE V dot(const Vector3<V>& a, const Vector3<V>& b) {
 /// the exponent, then Newton's steps: only operations that IEEE 754 rounds correctly, so that the
 /// bits are the same everywhere, and none that go through the divider, which would take longer than
 /// all the rest of a spring.
-template <class V, std::enable_if_t<!kMayContract<V>>* = nullptr>
-HWY_INLINE V inverse_square_root(V x) {
+///
+/// Several at once, each step for all of them: those of one wait for each other.
+template <class V, size_t n>
+HWY_INLINE void inverse_square_roots(const V (&x)[n], V (&y)[n]) {
   const hn::DFromV<V> d;
   const hn::RebindToSigned<decltype(d)> bits;
-  x = hn::Max(x, hn::Set(d, 1e-290));
-  const V half = hn::Mul(hn::Set(d, 0.5), x);
-  V y = hn::BitCast(d, hn::Sub(hn::Set(bits, 0x5fe6eb50c7b537a9),  // off by at most 3.5 %
-                               hn::ShiftRight<1>(hn::BitCast(bits, x))));
-  for (int n = 0; n < 4; ++n)  // 2e-3, 5e-6, 4e-11, rounding
-    y = hn::Mul(y, hn::Sub(hn::Set(d, 1.5), hn::Mul(half, hn::Mul(y, y))));
-  return y;
+  V half[n], square[n];
+  for (size_t s = 0; s < n; ++s) {
+    const V normal = hn::Max(x[s], hn::Set(d, 1e-290));
+    half[s] = hn::Mul(hn::Set(d, 0.5), normal);
+    y[s] = hn::BitCast(d, hn::Sub(hn::Set(bits, 0x5fe6eb50c7b537a9),  // off by at most 3.5 %
+                                  hn::ShiftRight<1>(hn::BitCast(bits, normal))));
+  }
+  for (int step = 0; step < 4; ++step) {  // 2e-3, 5e-6, 4e-11, rounding
+    for (size_t s = 0; s < n; ++s) square[s] = hn::Mul(y[s], y[s]);
+    for (size_t s = 0; s < n; ++s) square[s] = hn::Mul(half[s], square[s]);
+    for (size_t s = 0; s < n; ++s) square[s] = hn::Sub(hn::Set(d, 1.5), square[s]);
+    for (size_t s = 0; s < n; ++s) y[s] = hn::Mul(y[s], square[s]);
+  }
 }
 
-/// The same in `float`, to 4e-7 for normal x > 0: the processor's estimate and a Newton step.
-template <class V, std::enable_if_t<kMayContract<V>>* = nullptr>
-HWY_INLINE V inverse_square_root(V x) {
+template <class V>
+HWY_INLINE V inverse_square_root(const V& x) {
+  const V xs[1] = {x};
+  V ys[1];
+  inverse_square_roots(xs, ys);
+  return ys[0];
+}
+
+/// 2 / sqrt(x) in `float` to 4e-7 for normal x > 0: the processor's estimate and a Newton step.
+template <class V, size_t n>
+HWY_INLINE void twice_inverse_square_roots(const V (&x)[n], V (&y)[n]) {
   const hn::DFromV<V> d;
-  const V y = hn::ApproximateReciprocalSqrt(x);
-  const V half_y = hn::Mul(hn::Set(d, 0.5f), y);
-  return hn::MulAdd(half_y, hn::NegMulAdd(hn::Mul(x, y), y, hn::Set(d, 1.0f)), y);
+  V square[n];
+  for (size_t s = 0; s < n; ++s) y[s] = hn::ApproximateReciprocalSqrt(x[s]);
+  for (size_t s = 0; s < n; ++s) square[s] = hn::Mul(x[s], y[s]);
+  for (size_t s = 0; s < n; ++s) square[s] = hn::NegMulAdd(square[s], y[s], hn::Set(d, 3.0f));
+  for (size_t s = 0; s < n; ++s) y[s] = hn::Mul(y[s], square[s]);
 }
 
 /// |a|^2; in `float` at least 1e-30, so that it has an inverse square root.

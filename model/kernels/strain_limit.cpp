@@ -109,6 +109,75 @@ HWY_INLINE void look(LimitArrays<L>& arrays, std::ptrdiff_t lane) {
 }
 
 /// The springs of one type in the lanes from `lane` on.
+template <class L>
+struct TypeLimit {
+  int type;
+  std::ptrdiff_t offset;  ///< from a spring's first end to its second, in vertices
+  Vector<L> longest, longest2;
+  const typename L::Number* first_share;
+  const typename L::Number* second_share;
+};
+
+/// The springs among `vertices`, `n` of them that share no vertex, are shortened where they exceed.
+template <class L, size_t n>
+HWY_INLINE void shorten(LimitArrays<L>& arrays, const TypeLimit<L>& type, std::ptrdiff_t lane,
+                        const hn::Mask<Tag<L>>& active, const std::int32_t* vertices,
+                        Vector<L>& shortened) {
+  using V = Vector<L>;
+  using Number = typename L::Number;
+  const Tag<L> d;
+  const std::array<Number*, 3> position = arrays.position_m, velocity = arrays.velocity_m_per_s;
+  const V one = hn::Set(d, Number{1});
+  std::ptrdiff_t self[n], other[n];
+  Vector3<V> along[n];
+  hn::Mask<Tag<L>> exceeds[n];
+  V length2[n], excess[n];
+  for (size_t s = 0; s < n; ++s) {
+    self[s] = vertices[s] * L::kCount + lane;
+    other[s] = self[s] + type.offset * L::kCount;
+    along[s] = load(d, position, other[s]) - load(d, position, self[s]);
+    length2[s] = squared_length(along[s]);
+    exceeds[s] = hn::And(active, hn::Gt(length2[s], type.longest2));
+    shortened = hn::Add(shortened, hn::IfThenElseZero(exceeds[s], one));
+    insert(arrays.moved, vertices[s]);
+    insert(arrays.moved, vertices[s] + type.offset);
+  }
+  if constexpr (kMayContract<V>) {
+    twice_inverse_square_roots(length2, excess);
+    const V half = hn::Mul(hn::Set(d, 0.5f), type.longest);
+    for (size_t s = 0; s < n; ++s) excess[s] = minus_product(one, half, excess[s]);
+  } else {
+    V inverse[n];
+    inverse_square_roots(length2, inverse);
+    for (size_t s = 0; s < n; ++s) excess[s] = minus_product(one, type.longest, inverse[s]);
+    if constexpr (L::kCount == 1) {
+      for (size_t s = 0; s < n && arrays.moves != nullptr; ++s)
+        arrays.moves->push_back({.type = type.type,
+                                 .first = vertices[s],
+                                 .second = static_cast<int>(vertices[s] + type.offset),
+                                 .first_share = type.first_share[vertices[s]],
+                                 .second_share = type.second_share[vertices[s]],
+                                 .along_m = {hn::GetLane(along[s].x), hn::GetLane(along[s].y),
+                                             hn::GetLane(along[s].z)},
+                                 .excess = hn::GetLane(excess[s]),
+                                 .inverse_length_per_m = hn::GetLane(inverse[s])});
+    }
+  }
+  const auto move = [&](size_t s, const std::array<Number*, 3>& of, const V& share) HWY_ATTR {
+    // Lanes that do not exceed keep their bits.
+    const V first = hn::Mul(share, hn::Set(d, type.first_share[vertices[s]]));
+    const V second = hn::Mul(share, hn::Set(d, type.second_share[vertices[s]]));
+    const Vector3<V> a = load(d, of, self[s]), b = load(d, of, other[s]);
+    store(select(exceeds[s], mul_add(first, along[s], a), a), d, of, self[s]);
+    store(select(exceeds[s], minus_product(b, second, along[s]), b), d, of, other[s]);
+  };
+  for (size_t s = 0; s < n; ++s) move(s, position, excess[s]);
+  if (velocity[0] != nullptr) {
+    const V steps_per_s = hn::Set(d, arrays.steps_per_s);
+    for (size_t s = 0; s < n; ++s) move(s, velocity, hn::Mul(steps_per_s, excess[s]));
+  }
+}
+
 template <class L, Pass pass>
 HWY_INLINE void visit(LimitArrays<L>& arrays, size_t type, std::ptrdiff_t lane) {
   using V = Vector<L>;
@@ -116,17 +185,15 @@ HWY_INLINE void visit(LimitArrays<L>& arrays, size_t type, std::ptrdiff_t lane) 
   using Number = typename L::Number;
   const Tag<L> d;
   const std::ptrdiff_t offset = offset_of(arrays.mesh, type);
-  const std::array<Number*, 3> position = arrays.position_m, velocity = arrays.velocity_m_per_s;
-  const bool correct_velocity = velocity[0] != nullptr;
-  const V one = hn::Set(d, Number{1});
-  const V steps_per_s = hn::Set(d, arrays.steps_per_s);
+  const std::array<const Number*, 3> position = {arrays.position_m[0], arrays.position_m[1],
+                                                 arrays.position_m[2]};
   const V longest = hn::LoadU(d, arrays.limits.longest_m[type].data() + lane);
   const V tolerated = hn::LoadU(d, arrays.limits.tolerated_m[type].data() + lane);
   const V allowed = pass == Pass::sweep ? longest : tolerated;
   const V allowed2 = hn::Mul(allowed, allowed);
+  const TypeLimit<L> limit{static_cast<int>(type), offset, longest, allowed2, arrays.shares[type].first.data(),
+                           arrays.shares[type].second.data()};
   const Mask active = hn::Gt(hn::LoadU(d, arrays.active.data() + lane), hn::Zero(d));
-  const Number* const first_share = arrays.shares[type].first.data();
-  const Number* const second_share = arrays.shares[type].second.data();
   V shortened = hn::LoadU(d, arrays.shortened.data() + lane);
   V intolerable = hn::LoadU(d, arrays.intolerable.data() + lane);
 
@@ -135,47 +202,27 @@ HWY_INLINE void visit(LimitArrays<L>& arrays, size_t type, std::ptrdiff_t lane) 
       // The springs of a group share no vertex: none of them makes another worth a visit.
       std::uint64_t left = group[w] & (arrays.too_long[type][w] | arrays.moved[w] |
                                        word_before(arrays.moved, w, offset));
+      // Those that do exceed are listed first, without a branch that would be hard to foresee, and
+      // then shortened several at once.
+      std::int32_t found[64 + 1];
+      size_t count = 0;
       for (; left != 0; left &= left - 1) {
-        const std::ptrdiff_t vertex = static_cast<std::ptrdiff_t>(w) * 64 + std::countr_zero(left);
-        const std::ptrdiff_t self = vertex * L::kCount + lane, other = self + offset * L::kCount;
-        const Vector3<V> a = load(d, position, self), b = load(d, position, other);
-        const Vector3<V> along = b - a;
-        const V length2 = squared_length(along);
-        const Mask exceeds = hn::And(active, hn::Gt(length2, allowed2));
-        if (hn::AllFalse(d, exceeds)) continue;
-        if (pass == Pass::check) {
-          intolerable = hn::IfThenElse(exceeds, one, intolerable);
-          continue;
-        }
-        shortened = hn::Add(shortened, hn::IfThenElseZero(exceeds, one));
-        insert(arrays.moved, vertex);
-        insert(arrays.moved, vertex + offset);
-        const V inverse = inverse_square_root(length2);
-        const V excess = minus_product(one, longest, inverse);
-        if constexpr (L::kCount == 1) {
-          if (arrays.moves != nullptr)
-            arrays.moves->push_back(
-                {.type = static_cast<int>(type),
-                 .first = static_cast<int>(vertex),
-                 .second = static_cast<int>(vertex + offset),
-                 .first_share = first_share[vertex],
-                 .second_share = second_share[vertex],
-                 .along_m = {hn::GetLane(along.x), hn::GetLane(along.y), hn::GetLane(along.z)},
-                 .excess = hn::GetLane(excess),
-                 .inverse_length_per_m = hn::GetLane(inverse)});
-        }
-        const auto move = [&](const std::array<Number*, 3>& of, const Vector3<V>& from,
-                              const Vector3<V>& to, const V& share) HWY_ATTR {
-          // Lanes that do not exceed keep their bits.
-          const V first = hn::Mul(share, hn::Set(d, first_share[vertex]));
-          const V second = hn::Mul(share, hn::Set(d, second_share[vertex]));
-          store(select(exceeds, mul_add(first, along, from), from), d, of, self);
-          store(select(exceeds, minus_product(to, second, along), to), d, of, other);
-        };
-        move(position, a, b, excess);
-        if (correct_velocity)
-          move(velocity, load(d, velocity, self), load(d, velocity, other),
-               hn::Mul(steps_per_s, excess));
+        const int vertex = static_cast<int>(w) * 64 + std::countr_zero(left);
+        const std::ptrdiff_t self = std::ptrdiff_t{vertex} * L::kCount + lane;
+        const Vector3<V> along =
+            load(d, position, self + offset * L::kCount) - load(d, position, self);
+        const Mask exceeds = hn::And(active, hn::Gt(squared_length(along), allowed2));
+        if constexpr (pass == Pass::check)
+          intolerable = hn::IfThenElse(exceeds, hn::Set(d, Number{1}), intolerable);
+        found[count] = vertex;
+        count += hn::AllFalse(d, exceeds) ? 0 : 1;
+      }
+      if constexpr (pass == Pass::sweep) {
+        constexpr size_t kAtOnce = 4;
+        size_t n = 0;
+        for (; n + kAtOnce <= count; n += kAtOnce)
+          shorten<L, kAtOnce>(arrays, limit, lane, active, found + n, shortened);
+        for (; n < count; ++n) shorten<L, 1>(arrays, limit, lane, active, found + n, shortened);
       }
     }
   }
