@@ -195,8 +195,12 @@ ModelDescription model_of_recording(const ModelRequest& request, const fs::path&
   const Recording recording =
       complete_recording(given, ObservationKind::automatic, {}, steps, progress);
   const FitInput input = read_fit_input(recording, ObservationKind::automatic);
-  const GridSize mesh =
-      request.mesh.value_or(GridSize{recording.cloth.mesh_columns, recording.cloth.mesh_rows});
+  GridSize mesh{recording.cloth.mesh_columns, recording.cloth.mesh_rows};
+  if (!request.fit.empty()) {  // a fit's stiffness belongs to the mesh that it was found on
+    const FitResult fit = read_fit_result(fit_file(request.fit));
+    mesh = {fit.mesh_columns, fit.mesh_rows};
+  }
+  if (request.mesh) mesh = *request.mesh;
   const FitProblem problem = make_problem(input, options, mesh.columns, mesh.rows);
   return describe_model(problem, recording, problem.space.start());
 }

@@ -1,9 +1,12 @@
 #include "fit/simulation.h"
 
+#include <fmt/format.h>
+
 #include <Eigen/Geometry>
 #include <algorithm>
 
 #include "calib/rigid3.h"
+#include "data/input_error.h"
 #include "fit/cloth_setup.h"
 #include "fit/drive.h"
 #include "model/stability.h"
@@ -66,6 +69,15 @@ HeldPath sample(const HeldVertexWeights& held, const std::vector<double>& time_s
   return path;
 }
 
+/// A parameter that fits look for on one side of its neutral value has no meaning on the other: a
+/// drag below 0 would drive the cloth.
+void require_possible(const std::string& effect, const EffectParameter& parameter, double value,
+                      const std::string& where) {
+  if (parameter.lower < parameter.neutral || value >= parameter.neutral) return;
+  throw InputError(where, fmt::format("{}.{} = {}", effect, parameter.name, value),
+                   fmt::format("{} or more ({})", parameter.neutral, parameter.unit));
+}
+
 }  // namespace
 
 Simulation make_simulation(const ModelDescription& model) {
@@ -93,6 +105,7 @@ Simulation make_simulation(const ModelDescription& model) {
     std::vector<double> numbers;
     for (const EffectParameter& parameter : description.parameters) {
       const auto value = given.find(parameter.name);
+      if (value != given.end()) require_possible(effect.name, parameter, value->second, where);
       numbers.push_back(value != given.end() ? value->second : parameter.neutral);
     }
     set.effects.push_back(std::move(numbers));
