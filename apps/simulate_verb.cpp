@@ -23,6 +23,7 @@
 #include "data/output_folder.h"
 #include "fit/simulation.h"
 #include "model/divergence.h"
+#include "model/fabric_conversion.h"
 #include "model/stability.h"
 
 namespace clothfit {
@@ -182,7 +183,6 @@ Json named_value(const std::string& name, const std::string& unit, double value)
 
 Json describe_run(const ModelDescription& model, const Simulation& simulation,
                   const StepChoice& choice, double stretch, const std::vector<std::string>& files) {
-  const Fabric& fabric = simulation.fabric;
   const Mesh& mesh = simulation.cloth.mesh;
   Json parameters = Json::array();
   parameters.push_back(
@@ -190,12 +190,10 @@ Json describe_run(const ModelDescription& model, const Simulation& simulation,
   for (const FabricParameterName& parameter : kFabricParameters)
     parameters.push_back(
         named_value(parameter.name, parameter.unit, model.fabric.at(parameter.name)));
-  const double k4_warp = 4 * fabric.flexion_warp_n_per_m, k4_weft = 4 * fabric.flexion_weft_n_per_m;
-  const Json continuum = {
-      named_value("c11_weft", "N/m", fabric.tension_weft_n_per_m + fabric.shear_n_per_m + k4_weft),
-      named_value("c22_warp", "N/m", fabric.tension_warp_n_per_m + fabric.shear_n_per_m + k4_warp),
-      named_value("c12", "N/m", fabric.shear_n_per_m),
-      named_value("c33", "N/m", fabric.shear_n_per_m)};
+  const Continuum c = continuum(simulation.fabric);
+  const Json constants = {
+      named_value("c11", "N/m", c.c11_n_per_m), named_value("c22", "N/m", c.c22_n_per_m),
+      named_value("c12", "N/m", c.c12_n_per_m), named_value("c33", "N/m", c.c33_n_per_m)};
   Json effects = Json::array();
   for (std::size_t e = 0; e < simulation.cloth.effect_descriptions.size(); ++e) {
     const EffectDescription& description = simulation.cloth.effect_descriptions[e];
@@ -211,7 +209,7 @@ Json describe_run(const ModelDescription& model, const Simulation& simulation,
           {"mesh", {{"columns", mesh.columns}, {"rows", mesh.rows}}},
           {"parameter_set", "fabric"},
           {"parameters", parameters},
-          {"continuum", continuum},
+          {"continuum", constants},
           {"effects", effects},
           {"integrator", "euler"},
           {"start", to_string(simulation.start)},
