@@ -121,9 +121,8 @@ std::string node_text(const Mesh& mesh, int vertex) {
 /// Why there is no simulation, for a person.
 std::string divergence_text(const Divergence& divergence, const StepChoice& choice,
                             const Mesh& mesh) {
-  std::string text =
-      fmt::format("the run diverged in step {} (frame {}, t = {} s): ", divergence.step,
-                  divergence.frame, significant(divergence.time_s, 6));
+  std::string text = fmt::format("in step {} (frame {}, t = {} s) ", divergence.step,
+                                 divergence.frame, significant(divergence.time_s, 6));
   if (divergence.spring) {
     const Divergence::StretchedSpring& s = *divergence.spring;
     text += fmt::format(
@@ -145,21 +144,21 @@ std::string divergence_text(const Divergence& divergence, const StepChoice& choi
 
 SimulateResult run_or_explain(const Simulation& simulation, const StepChoice& choice) {
   SimulateResult result = run(simulation, choice.time_step_s);
-  if (result.usable()) return result;
   if (interrupted()) throw Cancelled();
-  if (result.diverged_frame == 0) {
-    throw NoResult(
-        fmt::format("no simulation: the cloth did not come to rest; try --time-step {}",
-                    rounded_down(choice.stable() ? choice.longest_s / 2 : choice.stable_s)));
-  }
-  Simulation again = simulation;
-  again.parameters.start_position_m = result.position_m.front();  // relaxed where it starts at rest
+  if (result.usable()) return result;
+  // A start that does not come to rest is looked at as the sheet is let go.
+  const bool never_rested = result.diverged_frame == 0;
+  ParameterSet parameters = simulation.parameters;
+  if (!never_rested) parameters.start_position_m = result.position_m.front();
   const std::optional<Divergence> divergence =
-      find_divergence(again.cloth, again.parameters,
-                      {.frame_time_s = again.frame_time_s, .time_step_s = choice.time_step_s});
-  throw NoResult("no simulation: " + (divergence
-                                          ? divergence_text(*divergence, choice, again.cloth.mesh)
-                                          : std::string("the run diverged")));
+      find_divergence(simulation.cloth, parameters,
+                      {.frame_time_s = simulation.frame_time_s, .time_step_s = choice.time_step_s});
+  std::string text = never_rested ? "no simulation: the cloth did not come to rest"
+                                  : "no simulation: the run diverged";
+  if (never_rested && divergence) text += "; let go instead, it diverges too: ";
+  if (!never_rested && divergence) text += ": ";
+  if (divergence) text += divergence_text(*divergence, choice, simulation.cloth.mesh);
+  throw NoResult(text);
 }
 
 /// Largest length of any spring in any frame, as a multiple of its natural one.
@@ -349,6 +348,7 @@ void add_simulate_verb(CLI::App& program, VerbAction& action) {
   verb->add_option("--set", request.set,
                    "A parameter's value, such as shear=20 or wind.q_y=0.25; may be repeated")
       ->type_name("NAME=NUMBER")
+      ->allow_extra_args(false)
       ->check(check_assignment);
   verb->add_option("--mesh", flags->mesh, "Columns and rows of the mesh (default: the model's)")
       ->type_name("CxR")

@@ -9,13 +9,11 @@
 #include "data/input_error.h"
 #include "fit/cloth_setup.h"
 #include "fit/drive.h"
+#include "fit/refine.h"
 #include "model/stability.h"
 
 namespace clothfit {
 namespace {
-
-/// Margin of the default time step, that of a fit's (RefineOptions::stability_margin).
-constexpr double kStabilityMargin = 1.5;
 
 Fabric fabric_of(const std::map<std::string, double>& values) {
   return {.tension_warp_n_per_m = values.at("tension_warp"),
@@ -161,8 +159,8 @@ ModelDescription describe_model(const FitProblem& problem, const Recording& reco
 
 double default_time_step_s(const Simulation& simulation) {
   const double longest_s = simulation.frame_time_s.back() - simulation.frame_time_s.front();
-  return std::min(stable_time_step_s(simulation.cloth, simulation.parameters) / kStabilityMargin,
-                  longest_s);
+  const double stable_s = stable_time_step_s(simulation.cloth, simulation.parameters);
+  return std::min(stable_s / RefineOptions().stability_margin, longest_s);
 }
 
 SimulateResult run(const Simulation& simulation, double time_step_s) {

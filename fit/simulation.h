@@ -29,8 +29,9 @@ Simulation make_simulation(const ModelDescription& model);
 ModelDescription describe_model(const FitProblem& problem, const Recording& recording,
                                 const Eigen::VectorXd& values);
 
-/// The largest time step that a run takes unless it is told another one: stable with a margin (1.5)
-/// for what the estimate does not see, violently crumpled cloth.
+/// The largest time step that a run takes unless it is told another one: two thirds of the largest
+/// stable one, as fits leave it (RefineOptions::stability_margin), because the estimate does not
+/// see violently crumpled cloth.
 double default_time_step_s(const Simulation& simulation);
 
 /// Positions of the mesh in every frame. A start at rest is relaxed first.

@@ -179,12 +179,12 @@ TEST_F(Simulate, NamesTheSpringStepAndTimeOfADivergenceAndLeavesNothing) {
   const ProgramRun diverged = run({"sheet.yaml", "--time-step", "0.01", "--allow-unstable"});
 
   EXPECT_EQ(diverged.exit_code, 4);
-  EXPECT_THAT(
-      diverged.error,
-      ::testing::ContainsRegex("diverged in step [0-9]+ \\(frame [0-9]+, t = [0-9.]+ s\\): the "
-                               "[a-z]+ spring \\(type [0-5]\\) between nodes \\[[0-9]+, [0-9]+\\] "
-                               "and \\[[0-9]+, [0-9]+\\] is [0-9.e+]+ m long, [0-9.e+]+ times "
-                               "its natural 0\\.[0-9]+ m; try --time-step 0\\.000"));
+  EXPECT_THAT(diverged.error,
+              ::testing::ContainsRegex(
+                  "the run diverged: in step [0-9]+ \\(frame [0-9]+, t = [0-9.]+ s\\) the "
+                  "[a-z]+ spring \\(type [0-5]\\) between nodes \\[[0-9]+, [0-9]+\\] "
+                  "and \\[[0-9]+, [0-9]+\\] is [0-9.e+]+ m long, [0-9.e+]+ times "
+                  "its natural 0\\.[0-9]+ m; try --time-step 0\\.000"));
   EXPECT_THAT(names_in(here_.path()), ElementsAre("sheet.yaml"));
 }
 

@@ -109,6 +109,18 @@ TEST_F(ModelFile, NeedsLittle) {
   EXPECT_EQ(model.strain_limit, StrainLimitKind::off);
 }
 
+TEST_F(ModelFile, OfTheDocumentsIsOne) {
+  std::ifstream in(std::string(CLOTHFIT_SOURCE_DIR) + "/docs/formats.md");
+  const std::string page{std::istreambuf_iterator<char>(in), {}};
+  const std::size_t begin = page.find("format: clothfit-model/1");
+  ASSERT_NE(begin, std::string::npos);
+
+  const ModelDescription model = read(page.substr(begin, page.find("```", begin) - begin));
+
+  EXPECT_EQ(model.name, "curtain");
+  EXPECT_EQ(model.frame_time_s.size(), 121u);
+}
+
 TEST_F(ModelFile, ReadsBackAsWrittenToTheLastBit) {
   ModelDescription model = read(kModel);
   model.fabric["shear"] = 1.0 / 3;
