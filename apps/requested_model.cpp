@@ -274,6 +274,10 @@ ModelDescription requested_model(const ModelRequest& request, const fs::path& st
     add(given_parameters(options), all);
     model.fabric = all.fabric;
     model.effects = all.effects;
+    // A step was chosen for the springs and the mesh that it stands beside.
+    const bool changed =
+        request.mesh || !request.set.empty() || !options.fit.empty() || !request.model.empty();
+    if (changed) model.time_step_s.reset();
     if (request.mesh) {
       model.mesh_columns = request.mesh->columns;
       model.mesh_rows = request.mesh->rows;

@@ -30,7 +30,8 @@ std::string requested_name(const ModelRequest& request);
 
 /// The model with every number: that of a model file or of a fit (`model.yaml` in its folder), or a
 /// recording's cloth, held points, start and frames with the parameters given by `fit`, `model` and
-/// `set`, each taking the place of what was known before. Steps that a recording lacks are run and
+/// `set`, each taking the place of what was known before. A model's
+/// own time step holds for its own springs and mesh only. Steps that a recording lacks are run and
 /// kept under `steps`. Throws InputError, also where a parameter is given by nobody.
 ModelDescription requested_model(const ModelRequest& request, const std::filesystem::path& steps,
                                  const ProgressCallback& progress);

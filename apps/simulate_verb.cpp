@@ -136,9 +136,12 @@ std::string divergence_text(const Divergence& divergence, const StepChoice& choi
   } else {
     text += "the start is not finite";
   }
+  if (divergence.vertex >= 0)
+    return text + "; look at the effects' parameters and the paths of held points";
+  // Half a step that should have been stable: crumpled cloth may need it.
   const double suggested_s = choice.stable() ? choice.longest_s / 2 : choice.stable_s;
-  text += divergence.vertex >= 0 ? "; look at the effects' parameters and the paths of held points"
-                                 : fmt::format("; try --time-step {}", rounded_down(suggested_s));
+  text += fmt::format("; try --time-step {}", rounded_down(suggested_s));
+  if (choice.stable()) text += ", or look at the effects' parameters and the paths of held points";
   return text;
 }
 

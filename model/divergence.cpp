@@ -14,7 +14,8 @@ double length_m(const Eigen::Matrix3Xd& position_m, const Spring& spring) {
   return (position_m.col(spring.b) - position_m.col(spring.a)).norm();
 }
 
-/// The spring that is longest for its natural length; with `start`, of those beyond reason only.
+/// The spring that is longest for its natural length; nothing where only those `beyond_reason`
+/// count and there is none.
 std::optional<Divergence::StretchedSpring> most_stretched(const Cloth& cloth,
                                                           const ParameterSet& parameters,
                                                           const Eigen::Matrix3Xd& position_m,

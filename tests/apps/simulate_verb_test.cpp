@@ -173,6 +173,22 @@ TEST_F(Simulate, RefusesAStepThatIsNotStableAndNamesOneThatIs) {
   EXPECT_THAT(model.error, HasSubstr("sheet.yaml:9: steps of 0.0100 s would be unstable"));
 }
 
+TEST_F(Simulate, ChoosesAStepAnewWhereTheModelsOwnWasForOtherSprings) {
+  write(model_text(kCorners, "[]", "time_step: 0.0002\n"));
+  ASSERT_EQ(run({"sheet.yaml", "--format", "pc2"}).exit_code, 0);
+  EXPECT_EQ(result()["time_step"]["chosen_by"], "model");
+
+  for (const std::vector<std::string>& change :
+       {std::vector<std::string>{"--set", "shear=4000"}, {"--mesh", "25x19"}}) {
+    std::vector<std::string> options = {"sheet.yaml", "--format", "pc2", "--duration", "0.1"};
+    options.insert(options.end(), change.begin(), change.end());
+    const ProgramRun done = run(options);
+    ASSERT_EQ(done.exit_code, 0) << done.error;
+    EXPECT_EQ(result()["time_step"]["chosen_by"], "stability");
+    EXPECT_LT(result()["time_step"]["stable_s"], 0.0002);  // the model's own would not do
+  }
+}
+
 TEST_F(Simulate, NamesTheSpringStepAndTimeOfADivergenceAndLeavesNothing) {
   write(model_text(kCorners));
 
