@@ -7,17 +7,22 @@
 
 namespace clothfit {
 
-/// When a minimisation ends.
-struct StopRule {
-  double gradient_n = 0;  ///< 2-norm of the projected gradient that counts as equilibrium
-  int most_iterations = 0;
-};
-
 enum class MinimiseReason {
   converged,
   iterations_used_up,
-  stalled,  ///< no step that lowers the energy was found: rounding, or a spring of no length
-  not_finite
+  stalled,     ///< no step lowers the energy: rounding, or a spring of no length
+  fell,        ///< the energy has no minimum: springs do not carry the cloth
+  not_finite,  ///< the start is too far out for the arithmetic
+  cancelled
+};
+
+/// When a minimisation ends.
+struct StopRule {
+  double gradient_n = 0;  ///< 2-norm of the held gradient that counts as equilibrium
+  int most_iterations = 0;
+  double lowest_energy_j = 0;  ///< a cloth below this has fallen
+  /// Called before each iteration with the gradient's norm (N); `false` cancels. May be empty.
+  std::function<bool(int iteration, double gradient_n)> go_on;
 };
 
 struct MinimiseResult {
@@ -26,13 +31,18 @@ struct MinimiseResult {
   int evaluations = 0;  ///< of energy and gradient
   int products = 0;     ///< of the second derivative with a vector
   double energy_j = 0;
-  double gradient_n = 0;  ///< 2-norm of the projected gradient
+  double gradient_n = 0;  ///< 2-norm of the held gradient
 };
 
-/// The energy as the minimisers see it: held points are held, and evaluations are counted.
+/// Whether `result`, at its `iterations`, energy and gradient, ends here; if so, sets its reason.
+bool is_over(const StopRule& stop, MinimiseResult& result);
+
+/// The energy as the minimisers see it: held points stay, and evaluations are counted.
 class HeldEnergy {
  public:
+  /// Both must outlive this.
   HeldEnergy(HangingEnergy& energy, const HeldProjection& held) : energy_(energy), held_(held) {}
+
   const FieldLayout& layout() const { return energy_.layout(); }
   const HeldProjection& held() const { return held_; }
   HangingEnergy& unheld() { return energy_; }

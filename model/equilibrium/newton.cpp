@@ -2,128 +2,155 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
+#include "model/equilibrium/lattice_multigrid.h"
 #include "model/equilibrium/line_search.h"
 
 namespace clothfit {
 namespace {
 
-/// The vertices that the preconditioner leaves alone: of every held point the one that weighs most.
+/// Gradient, as a share of the weight, below which the exact second derivative is used.
+constexpr double kNearBalance = 3e-3;
+constexpr int kMostInner = 60;
+constexpr double kEnoughSlope = 0.9;  ///< a Newton step needs no exact line search
+
+/// The vertices that the preconditioner holds: of every held point the one that weighs most. The
+/// others of a point between vertices it takes for free, and the projection mends that.
 std::vector<int> leading_vertices(const HeldProjection& held) {
   std::vector<int> leading;
-  for (const HeldVertexWeights& point : held.held()) {
-    const auto most = std::ranges::max_element(
-        point.weights, {}, [](const HeldVertexWeights::Weight& w) { return std::abs(w.weight); });
-    leading.push_back(most->vertex);
-  }
+  for (const HeldVertexWeights& point : held.held())
+    leading.push_back(
+        std::ranges::max_element(point.weights, {}, &HeldVertexWeights::Weight::weight)->vertex);
   std::ranges::sort(leading);
   leading.erase(std::ranges::unique(leading).begin(), leading.end());
   return leading;
 }
 
+/// The linear system of one step and what solving it needs.
+class NewtonSystem {
+ public:
+  NewtonSystem(HangingEnergy& energy, const HeldProjection& held)
+      : energy_(energy),
+        held_(held),
+        multigrid_(energy.layout(), leading_vertices(held)),
+        mass_kg_(Eigen::ArrayXd::Zero(energy.layout().plane())),
+        residual_(energy.layout()),
+        conditioned_(energy.layout()),
+        search_(energy.layout()),
+        product_(energy.layout()) {
+    const HangingCloth& cloth = energy.cloth();
+    for (int v = 0; v < cloth.mesh.vertex_count(); ++v)
+      mass_kg_[energy.layout().at(v)] = cloth.mass_kg[v];
+  }
+
+  /// Takes the second derivative at `position_m`.
+  void set(const MeshField& position_m, Curvature curvature, double shift_per_s2) {
+    energy_.linearise(position_m, Curvature::clamped, clamped_);
+    if (curvature == Curvature::exact) energy_.linearise(position_m, Curvature::exact, exact_);
+    tangent_ = curvature == Curvature::exact ? &exact_ : &clamped_;
+    shift_n_per_m_ = shift_per_s2 * mass_kg_;
+    multigrid_.set(clamped_, shift_n_per_m_);
+  }
+
+  /// Solves for `direction` until the residual is at most `enough_n`; a direction of negative
+  /// curvature ends it early. Returns the number of products.
+  int solve(const MeshField& gradient, double enough_n, MeshField& direction) {
+    direction.values.setZero();
+    residual_.values = -gradient.values;
+    precondition();
+    search_.values = conditioned_.values;
+    double descent = dot(residual_, conditioned_);
+    for (int n = 1; n <= kMostInner; ++n) {
+      multiply();
+      const double curvature = dot(search_, product_);
+      if (!(curvature > 0)) {
+        if (n == 1) direction.values = search_.values;
+        return n;
+      }
+      const double step = descent / curvature;
+      add_scaled(step, search_, direction);
+      add_scaled(-step, product_, residual_);
+      if (norm(residual_) <= enough_n) return n;
+      precondition();
+      const double next = dot(residual_, conditioned_);
+      scale_and_add(conditioned_, next / descent, search_);
+      descent = next;
+    }
+    return kMostInner;
+  }
+
+ private:
+  void precondition() {
+    multigrid_.apply(residual_, conditioned_);
+    held_.project(conditioned_);
+  }
+  void multiply() {
+    energy_.multiply(*tangent_, search_, product_);
+    const std::ptrdiff_t plane = energy_.layout().plane();
+    for (int axis = 0; axis < 3; ++axis)
+      Eigen::Map<Eigen::ArrayXd>(product_.plane(axis), plane) +=
+          shift_n_per_m_ * Eigen::Map<const Eigen::ArrayXd>(search_.plane(axis), plane);
+    held_.project(product_);
+  }
+
+  HangingEnergy& energy_;
+  const HeldProjection& held_;
+  LatticeMultigrid multigrid_;
+  Eigen::ArrayXd mass_kg_, shift_n_per_m_;
+  EnergyTangent clamped_, exact_;
+  const EnergyTangent* tangent_ = nullptr;
+  MeshField residual_, conditioned_, search_, product_;
+};
+
 }  // namespace
 
+double pendulum_shift_per_s2(const HangingCloth& cloth) {
+  return cloth.gravity_m_per_s2.norm() / cloth.mesh.height_m;
+}
+
 MinimiseResult minimise_by_newton(HeldEnergy& energy, const StopRule& stop,
-                                  const NewtonOptions& options, MeshField& position_m) {
-  MinimiseResult result;
+                                  double first_shift_per_s2, MeshField& position_m) {
   const int evaluations_before = energy.evaluations();
-  HangingEnergy& unheld = energy.unheld();
-  const FieldLayout& layout = energy.layout();
-  const HeldProjection& held = energy.held();
-  const HangingCloth& cloth = unheld.cloth();
-  LatticeMultigrid multigrid(layout, leading_vertices(held));
-  Eigen::ArrayXd mass = Eigen::ArrayXd::Zero(layout.plane());
-  for (int v = 0; v < cloth.mesh.vertex_count(); ++v) mass[layout.at(v)] = cloth.mass_kg[v];
-
-  MeshField gradient(layout), new_gradient(layout), trial(layout), direction(layout),
-      residual(layout), conditioned(layout), search(layout), product(layout);
+  const double weight_n = energy.unheld().cloth().weight_n();
+  const double slowest_per_s2 = pendulum_shift_per_s2(energy.unheld().cloth());
+  // So small that it does not slow the last steps, and large enough for the arithmetic.
+  const double least_shift = 1e-4 * slowest_per_s2, most_shift = 1e12 * slowest_per_s2;
+  NewtonSystem system(energy.unheld(), energy.held());
+  MeshField gradient(energy.layout()), new_gradient(energy.layout()), trial(energy.layout());
+  MeshField direction(energy.layout());
   LinePlace here{.energy_j = energy.energy_and_gradient(position_m, gradient)};
-  result.gradient_n = norm(gradient);
-  const double slowest = cloth.gravity_m_per_s2.norm() / cloth.mesh.height_m;
-  double shift = options.first_shift_per_s2;
-  const double least_shift = 1e-4 * slowest;
-  EnergyTangent tangent, clamped;
-  double last_gradient = result.gradient_n;
-  for (;; ++result.iterations) {
-    result.energy_j = here.energy_j;
-    if (!std::isfinite(here.energy_j) || !std::isfinite(result.gradient_n)) {
-      result.reason = MinimiseReason::not_finite;
-      break;
-    }
-    if (result.gradient_n <= stop.gradient_n) {
-      result.reason = MinimiseReason::converged;
-      break;
-    }
-    if (result.iterations == stop.most_iterations) break;
+  double shift = first_shift_per_s2;
 
+  MinimiseResult result{.energy_j = here.energy_j, .gradient_n = norm(gradient)};
+  while (!is_over(stop, result)) {
+    const double imbalance = result.gradient_n / weight_n;
     shift = std::max(shift, least_shift);
-    unheld.linearise(position_m, Curvature::clamped, clamped);
-    if (options.curvature == Curvature::exact)
-      unheld.linearise(position_m, Curvature::exact, tangent);
-    const EnergyTangent& used = options.curvature == Curvature::exact ? tangent : clamped;
-    multigrid.set(clamped, shift * mass);
-
-    // Preconditioned conjugate gradients on (H + shift M) direction = -gradient.
-    direction.values.setZero();
-    residual.values = -gradient.values;
-    const double enough =
-        std::clamp(0.5 * std::sqrt(result.gradient_n / cloth.weight_n() * 10), 1e-3, 0.3) *
-        result.gradient_n;
-    multigrid.apply(residual, conditioned);
-    held.project(conditioned);
-    search.values = conditioned.values;
-    double rz = dot(residual, conditioned);
-    int inner = 0;
-    bool negative = false;
-    for (; inner < 60; ++inner) {
-      unheld.multiply(used, search, product);
-      ++result.products;
-      for (int axis = 0; axis < 3; ++axis)
-        Eigen::Map<Eigen::ArrayXd>(product.plane(axis), layout.plane()) +=
-            shift * mass * Eigen::Map<const Eigen::ArrayXd>(search.plane(axis), layout.plane());
-      held.project(product);
-      const double curvature = dot(search, product);
-      if (!(curvature > 0)) {
-        negative = true;
-        if (inner == 0) direction.values = search.values;
-        break;
-      }
-      const double step = rz / curvature;
-      add_scaled(step, search, direction);
-      add_scaled(-step, product, residual);
-      if (norm(residual) <= enough) break;
-      multigrid.apply(residual, conditioned);
-      held.project(conditioned);
-      const double next = dot(residual, conditioned);
-      scale_and_add(conditioned, next / rz, search);
-      rz = next;
-    }
+    system.set(position_m, imbalance < kNearBalance ? Curvature::exact : Curvature::clamped, shift);
+    // Solved ever more closely, so that the last steps converge faster than linearly.
+    const double enough = std::clamp(std::sqrt(2.5 * imbalance), 1e-3, 0.3);
+    result.products += system.solve(gradient, enough * result.gradient_n, direction);
     here.slope_n = dot(direction, gradient);
-    const LinePlace found =
-        search_line(energy, position_m, direction, here, 1, 0.9, trial, new_gradient);
-    if (options.verbose)
-      std::printf("   newton %3d E %.10f g/W %.3e shift %.2e inner %d%s step %.3g ev %d\n",
-                  result.iterations, here.energy_j, result.gradient_n / cloth.weight_n(), shift,
-                  inner, negative ? " neg" : "", found.step, energy.evaluations());
+    const LinePlace found = here.slope_n < 0 ? search_line(energy, position_m, direction, here, 1,
+                                                           kEnoughSlope, trial, new_gradient)
+                                             : LinePlace{};
     if (found.step == 0) {
-      if (shift > 1e9 * slowest) {
+      if (shift > most_shift) {
         result.reason = MinimiseReason::stalled;
         break;
       }
       shift *= 10;
       continue;
     }
+    ++result.iterations;
     std::swap(position_m.values, trial.values);
     std::swap(gradient.values, new_gradient.values);
     here.energy_j = found.energy_j;
-    last_gradient = result.gradient_n;
+    result.energy_j = here.energy_j;
     result.gradient_n = norm(gradient);
     if (found.step > 0.5)
       shift *= 0.25;
     else if (found.step < 0.1)
       shift *= 4;
-    static_cast<void>(last_gradient);
   }
   result.evaluations = energy.evaluations() - evaluations_before;
   return result;
