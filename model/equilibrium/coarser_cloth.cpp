@@ -86,11 +86,12 @@ Eigen::Matrix3Xd transfer_shape(const Mesh& from, const Eigen::Matrix3Xd& positi
       const auto corner = [&](int down, int right) {
         return position_m.col(from.vertex(at.i + down, at.j + right));
       };
-      const Eigen::Vector3d along_s =
-          at.right >= at.down ? corner(0, 1) - corner(0, 0) : corner(1, 1) - corner(1, 0);
-      const Eigen::Vector3d along_t =
-          at.right >= at.down ? corner(1, 1) - corner(0, 1) : corner(1, 0) - corner(0, 0);
-      result.col(to.vertex(i, j)) = corner(0, 0) + at.right * along_s + at.down * along_t;
+      // The triangle's third corner lies on the side of the diagonal where the vertex is.
+      const double far = std::min(at.down, at.right), near = 1 - std::max(at.down, at.right);
+      const bool above = at.right >= at.down;
+      result.col(to.vertex(i, j)) =
+          near * corner(0, 0) + far * corner(1, 1) +
+          std::abs(at.right - at.down) * corner(above ? 0 : 1, above ? 1 : 0);
     }
   }
   return result;
