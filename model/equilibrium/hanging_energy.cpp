@@ -381,12 +381,12 @@ void HangingEnergy::linearise(const MeshField& position_m, Curvature curvature,
   });
 }
 
-void HangingEnergy::multiply(const EnergyTangent& tangent, const MeshField& direction,
-                             MeshField& product) {
+void multiply(const EnergyTangent& tangent, const MeshField& direction, MeshField& product,
+              std::vector<std::vector<double>>& scratch) {
   const TangentArrays arrays{
       tangent.position_m.planes(), pointers<const double*>(tangent.transverse_n_per_m),
       pointers<const double*>(tangent.longitudinal_n_per_m3), direction.planes(), product.planes()};
-  for_row_blocks(layout_, scratch_, [&](const RowBlock& block, size_t) {
+  for_row_blocks(direction.layout, scratch, [&](const RowBlock& block, size_t) {
     HWY_DYNAMIC_DISPATCH(multiply_tangent)(block, arrays);
   });
 }

@@ -61,6 +61,12 @@ struct MatrixSprings {
   std::array<std::array<Eigen::ArrayXd, 6>, kSpringTypes> stiffness_n_per_m;
 };
 
+/// The springs' product with `direction`; `scratch` is kept from call to call.
+void multiply(const EnergyTangent& tangent, const MeshField& direction, MeshField& product,
+              std::vector<std::vector<double>>& scratch);
+void multiply(const MatrixSprings& springs, const MeshField& direction, MeshField& product,
+              std::vector<std::vector<double>>& scratch);
+
 /// Energy, gradient and second derivative over the mesh, a row of vertices at a time in the
 /// processor's vectors, blocks of rows in parallel. Strict IEEE arithmetic in a fixed order: the
 /// same bits for any number of threads and on every instruction set, as the time step has them.
@@ -80,7 +86,9 @@ class HangingEnergy {
   void linearise(const MeshField& position_m, Curvature curvature, EnergyTangent& tangent);
 
   /// The second derivative times `direction`.
-  void multiply(const EnergyTangent& tangent, const MeshField& direction, MeshField& product);
+  void multiply(const EnergyTangent& tangent, const MeshField& direction, MeshField& product) {
+    clothfit::multiply(tangent, direction, product, scratch_);
+  }
 
  private:
   HangingCloth cloth_;
@@ -89,9 +97,5 @@ class HangingEnergy {
   std::vector<std::vector<double>> scratch_;  ///< per block of rows
   std::vector<double> block_energy_j_;
 };
-
-/// The springs' product with `direction`; `scratch` is kept from call to call.
-void multiply(const MatrixSprings& springs, const MeshField& direction, MeshField& product,
-              std::vector<std::vector<double>>& scratch);
 
 }  // namespace clothfit

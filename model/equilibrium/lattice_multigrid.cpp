@@ -134,6 +134,8 @@ struct LatticeMultigrid::Level {
   CoarseAxis down, across;  ///< to the next level
 
   MatrixSprings springs;
+  /// The finest level's springs in their shorter form: a third of the memory to walk through.
+  const EnergyTangent* tangent = nullptr;
   MatrixPlanes ground;            ///< what holds each vertex where it is
   MatrixPlanes inverse_diagonal;  ///< zero where fixed
   MeshField right, solution, product, step;
@@ -156,7 +158,10 @@ struct LatticeMultigrid::Level {
   bool coarsest() const { return down.count() == layout.rows && across.count() == layout.columns; }
 
   void multiply_all(const MeshField& v) {
-    clothfit::multiply(springs, v, product, scratch);
+    if (tangent != nullptr)
+      clothfit::multiply(*tangent, v, product, scratch);
+    else
+      clothfit::multiply(springs, v, product, scratch);
     for_segments(layout, [&](std::ptrdiff_t begin, std::ptrdiff_t count) {
       const auto part = [&](const Eigen::ArrayXd& plane) { return plane.data() + begin; };
       const double *xx = part(ground[0]), *yy = part(ground[1]), *zz = part(ground[2]),
@@ -352,6 +357,7 @@ LatticeMultigrid::LatticeMultigrid(const FieldLayout& layout, const std::vector<
 
 void LatticeMultigrid::set(const EnergyTangent& clamped, const Eigen::ArrayXd& shift_n_per_m) {
   Level& finest = *levels_.front();
+  finest.tangent = &clamped;
   const std::ptrdiff_t s = finest.layout.stride;
   const std::array<std::array<std::ptrdiff_t, 2>, kSpringTypes> ends = {
       {{0, s}, {0, 1}, {0, s + 1}, {s, 1}, {0, 2 * s}, {0, 2}}};

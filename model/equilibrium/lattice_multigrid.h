@@ -28,8 +28,8 @@ class LatticeMultigrid {
   LatticeMultigrid(const FieldLayout& layout, const std::vector<int>& fixed);
   ~LatticeMultigrid();
 
-  /// Takes the matrix at hand; `shift_n_per_m` is a plane of the finest layout, added to the
-  /// diagonal, > 0 at every vertex.
+  /// Takes the matrix at hand, which must stay as it is while it is applied; `shift_n_per_m` is a
+  /// plane of the finest layout, added to the diagonal, > 0 at every vertex.
   void set(const EnergyTangent& clamped, const Eigen::ArrayXd& shift_n_per_m);
 
   /// approximately v = (H + shift)^-1 r.

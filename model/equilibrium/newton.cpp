@@ -9,8 +9,9 @@
 namespace clothfit {
 namespace {
 
-/// Gradient, as a share of the weight, below which the exact second derivative is used.
-constexpr double kNearBalance = 3e-3;
+/// Root mean square of what vertices lack, as a share of a vertex's weight, below which the exact
+/// second derivative is used.
+constexpr double kNearBalance = 0.1;
 constexpr int kMostInner = 60;
 constexpr double kEnoughSlope = 0.9;  ///< a Newton step needs no exact line search
 
@@ -112,6 +113,7 @@ MinimiseResult minimise_by_newton(HeldEnergy& energy, const StopRule& stop,
                                   double first_shift_per_s2, MeshField& position_m) {
   const int evaluations_before = energy.evaluations();
   const double weight_n = energy.unheld().cloth().weight_n();
+  const double vertices = energy.unheld().cloth().mesh.vertex_count();
   const double slowest_per_s2 = pendulum_shift_per_s2(energy.unheld().cloth());
   // So small that it does not slow the last steps, and large enough for the arithmetic.
   const double least_shift = 1e-4 * slowest_per_s2, most_shift = 1e12 * slowest_per_s2;
@@ -123,11 +125,12 @@ MinimiseResult minimise_by_newton(HeldEnergy& energy, const StopRule& stop,
 
   MinimiseResult result{.energy_j = here.energy_j, .gradient_n = norm(gradient)};
   while (!is_over(stop, result)) {
-    const double imbalance = result.gradient_n / weight_n;
+    // As a share of the vertices' own weight: what 0.1 means does not depend on the mesh.
+    const double lacking = result.gradient_n * std::sqrt(vertices) / weight_n;
     shift = std::max(shift, least_shift);
-    system.set(position_m, imbalance < kNearBalance ? Curvature::exact : Curvature::clamped, shift);
+    system.set(position_m, lacking < kNearBalance ? Curvature::exact : Curvature::clamped, shift);
     // Solved ever more closely, so that the last steps converge faster than linearly.
-    const double enough = std::clamp(std::sqrt(2.5 * imbalance), 1e-3, 0.3);
+    const double enough = std::clamp(std::sqrt(0.15 * lacking), 1e-3, 0.3);
     result.products += system.solve(gradient, enough * result.gradient_n, direction);
     here.slope_n = dot(direction, gradient);
     const LinePlace found = here.slope_n < 0 ? search_line(energy, position_m, direction, here, 1,

@@ -31,8 +31,7 @@ void turn_towards(const Cloth& cloth, const Eigen::Vector3d& gravity,
     across += cloth.mass_kg[v] * up.dot(from.cross(to));
   }
   if (along == 0 && across == 0) return;
-  const Eigen::Matrix3d turn =
-      Eigen::AngleAxisd(std::atan2(across, along), up).toRotationMatrix();
+  const Eigen::Matrix3d turn = Eigen::AngleAxisd(std::atan2(across, along), up).toRotationMatrix();
   const Eigen::Matrix3Xd from_pivot = position_m.colwise() - pivot;
   position_m = (turn * from_pivot).colwise() + pivot;
 }
