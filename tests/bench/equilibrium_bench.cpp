@@ -16,6 +16,8 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <ctime>
+#include <vector>
 
 #include "model/equilibrium/equilibrium.h"
 #include "model/equilibrium/rest_shapes.h"
@@ -30,6 +32,14 @@ double seconds_of(const Work& work) {
   const auto start = std::chrono::steady_clock::now();
   work();
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+/// Time of the processor, of all threads together: what a busy machine disturbs less.
+template <class Work>
+double processor_seconds_of(const Work& work) {
+  const std::clock_t start = std::clock();
+  work();
+  return static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
 }
 
 template <class Work>
@@ -100,17 +110,24 @@ void time_methods(int vertices_per_side, double size_m, Start start) {
   const Sheet on = sheet(vertices_per_side, size_m, start);
   fmt::print("{0} x {0}, {1} m, {2}:\n", vertices_per_side, size_m,
              start == Start::lying ? "lying" : "hung");
-  double reference_s = 0;
+  double reference_s = 0, reference_cpu_s = 0;
   const auto report = [&](const char* name, EquilibriumMethod method, int times) {
     EquilibriumResult result;
-    const double seconds = best_seconds_of(
-        times, [&] { result = find_equilibrium(on.cloth, on.set, {.method = method}); });
-    if (method == EquilibriumMethod::conjugate_gradient) reference_s = seconds;
+    double cpu_s = 1e300;
+    const double seconds = best_seconds_of(times, [&] {
+      cpu_s = std::min(cpu_s, processor_seconds_of([&] {
+                         result = find_equilibrium(on.cloth, on.set, {.method = method});
+                       }));
+    });
+    if (method == EquilibriumMethod::conjugate_gradient)
+      reference_s = seconds, reference_cpu_s = cpu_s;
+    fmt::print("  {:<20} {:8.3f} s ({:8.3f} s of processor)  {:5.1f} ({:5.1f}) times as fast\n",
+               name, seconds, cpu_s, reference_s / seconds, reference_cpu_s / cpu_s);
     fmt::print(
-        "  {:<20} {:8.3f} s  {:5.1f} times as fast  {:6} steps {:6} evaluations {:5} products on "
-        "the finest  E {:.6f} J  {:.1e}  {}\n",
-        name, seconds, reference_s / seconds, result.iterations, result.evaluations,
-        result.products, result.energy_j, result.imbalance, describe(result.reason));
+        "  {:<20} {} steps, {} evaluations, {} products on the finest; E {:.6f} J, imbalance "
+        "{:.1e}; {}\n",
+        "", result.iterations, result.evaluations, result.products, result.energy_j,
+        result.imbalance, describe(result.reason));
     std::fflush(stdout);
   };
   report("conjugate gradients", EquilibriumMethod::conjugate_gradient, 1);
@@ -119,27 +136,36 @@ void time_methods(int vertices_per_side, double size_m, Start start) {
   fmt::print("\n");
 }
 
+/// The exponent of a power law through (particles, seconds), by least squares of the logarithms.
+double fitted_exponent(const std::vector<double>& particles, const std::vector<double>& seconds) {
+  const auto count = static_cast<Eigen::Index>(particles.size());
+  const Eigen::ArrayXd x = Eigen::Map<const Eigen::ArrayXd>(particles.data(), count).log();
+  const Eigen::ArrayXd y = Eigen::Map<const Eigen::ArrayXd>(seconds.data(), count).log();
+  return ((x - x.mean()) * (y - y.mean())).sum() / (x - x.mean()).square().sum();
+}
+
 void time_growth() {
   fmt::print("growth of multigrid Newton, 1 m, lying:\n");
-  double sum_x = 0, sum_y = 0, sum_xx = 0, sum_xy = 0, first_n = 0, first_s = 0;
-  int count = 0;
+  std::vector<double> particles, seconds, cpu_seconds;
   for (const int side : {32, 45, 63, 89, 126, 173, 245, 347}) {
     const Sheet on = sheet(side, 1, Start::lying);
     EquilibriumResult result;
-    const double seconds = best_seconds_of(3, [&] { result = find_equilibrium(on.cloth, on.set); });
-    const double particles = static_cast<double>(side) * side;
-    const double x = std::log(particles), y = std::log(seconds);
-    sum_x += x, sum_y += y, sum_xx += x * x, sum_xy += x * y, ++count;
-    if (count == 1) first_n = particles, first_s = seconds;
+    double cpu_s = 1e300;
+    seconds.push_back(best_seconds_of(5, [&] {
+      cpu_s = std::min(cpu_s,
+                       processor_seconds_of([&] { result = find_equilibrium(on.cloth, on.set); }));
+    }));
+    cpu_seconds.push_back(cpu_s);
+    particles.push_back(static_cast<double>(side) * side);
     fmt::print(
-        "  {:7.0f} particles {:8.3f} s  {:5.1f} us per particle  exponent so far {:5.2f}  {}\n",
-        particles, seconds, 1e6 * seconds / particles,
-        count > 1 ? std::log(seconds / first_s) / std::log(particles / first_n) : 0.0,
-        describe(result.reason));
+        "  {:7.0f} particles {:7.3f} s ({:7.3f} s of processor)  {:5.1f} us per particle  {} "
+        "products  {}\n",
+        particles.back(), seconds.back(), cpu_s, 1e6 * seconds.back() / particles.back(),
+        result.products, describe(result.reason));
     std::fflush(stdout);
   }
-  fmt::print("  fitted: time ~ particles^{:.2f}\n\n",
-             (count * sum_xy - sum_x * sum_y) / (count * sum_xx - sum_x * sum_x));
+  fmt::print("  time ~ particles^{:.2f}, of the processor particles^{:.2f}\n\n",
+             fitted_exponent(particles, seconds), fitted_exponent(particles, cpu_seconds));
 }
 
 void time_rest_shapes() {
