@@ -67,26 +67,6 @@ Eigen::Matrix3Xd gradient_change(const HangingCloth& cloth, const SpringNet& net
   return change;
 }
 
-/// Columns: the motions that held points allow. Vertices that none touches are free by themselves.
-Sparse free_motions(const HeldProjection& held, int vertices) {
-  Eigen::MatrixXd among_touched(held.touched().size(), 0);
-  const auto rank = held.weights().completeOrthogonalDecomposition().rank();
-  if (rank < held.weights().cols()) among_touched = held.weights().fullPivLu().kernel();
-  Triplets entries;
-  int column = 0;
-  for (int v = 0; v < vertices; ++v)
-    if (!std::ranges::binary_search(held.touched(), v))
-      for (int c = 0; c < 3; ++c) entries.emplace_back(3 * v + c, column++, 1.0);
-  for (Eigen::Index k = 0; k < among_touched.cols(); ++k)
-    for (int c = 0; c < 3; ++c, ++column)
-      for (size_t n = 0; n < held.touched().size(); ++n)
-        entries.emplace_back(3 * held.touched()[n] + c, column,
-                             among_touched(static_cast<Eigen::Index>(n), k));
-  Sparse motions(3 * vertices, column);
-  motions.setFromTriplets(entries.begin(), entries.end());
-  return motions;
-}
-
 }  // namespace
 
 EquilibriumDerivatives equilibrium_derivatives(const HangingCloth& cloth,
@@ -97,7 +77,7 @@ EquilibriumDerivatives equilibrium_derivatives(const HangingCloth& cloth,
   const SpringNet net = make_springs(cloth.mesh);
   const HeldProjection projection(cloth.mesh, held);
   const Sparse second = second_derivative(cloth, net, position_m);
-  const Sparse motions = free_motions(projection, cloth.mesh.vertex_count());
+  const Sparse motions = allowed_motions(projection, cloth.mesh.vertex_count());
   const Sparse reduced = motions.transpose() * second * motions;
 
   EquilibriumDerivatives result;

@@ -56,4 +56,24 @@ void HeldProjection::place(const Eigen::Matrix3Xd& target_m, MeshField& position
                    position_m.at(touched_[n]) + shift.col(static_cast<Eigen::Index>(n)));
 }
 
+Eigen::SparseMatrix<double> allowed_motions(const HeldProjection& held, int vertices) {
+  Eigen::MatrixXd among_touched(held.touched().size(), 0);
+  const Eigen::MatrixXd& weights = held.weights();
+  if (held.count() > 0 && weights.completeOrthogonalDecomposition().rank() < weights.cols())
+    among_touched = weights.fullPivLu().kernel();
+  std::vector<Eigen::Triplet<double>> entries;
+  int column = 0;
+  for (int v = 0; v < vertices; ++v)
+    if (!std::ranges::binary_search(held.touched(), v))
+      for (int c = 0; c < 3; ++c) entries.emplace_back(3 * v + c, column++, 1.0);
+  for (Eigen::Index k = 0; k < among_touched.cols(); ++k)
+    for (int c = 0; c < 3; ++c, ++column)
+      for (size_t n = 0; n < held.touched().size(); ++n)
+        entries.emplace_back(3 * held.touched()[n] + c, column,
+                             among_touched(static_cast<Eigen::Index>(n), k));
+  Eigen::SparseMatrix<double> motions(3 * vertices, column);
+  motions.setFromTriplets(entries.begin(), entries.end());
+  return motions;
+}
+
 }  // namespace clothfit

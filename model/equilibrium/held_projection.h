@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/SparseCore>
 #include <vector>
 
 #include "model/cloth.h"
@@ -39,5 +40,9 @@ class HeldProjection {
   Eigen::MatrixXd lift_;        ///< A' (A A')^-1: touched x held
   Eigen::MatrixXd projection_;  ///< I - A' (A A')^-1 A: touched x touched
 };
+
+/// The motions that held points allow, one per column: 3 vertices x free, coordinate c of vertex v
+/// in row 3 v + c. Vertices that no held point touches move by themselves.
+Eigen::SparseMatrix<double> allowed_motions(const HeldProjection& held, int vertices);
 
 }  // namespace clothfit

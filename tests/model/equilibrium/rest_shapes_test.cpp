@@ -33,6 +33,23 @@ ParameterSet cotton_set(const Cloth& cloth, size_t type, double stiffer) {
   return set;
 }
 
+TEST(RestShapes, AreBalanced) {
+  for (const int corners : {1, 2}) {
+    const Cloth cloth = hung_cloth(8, corners);
+    const ParameterSet set = cotton_set(cloth, 0, 0);
+    const Eigen::Matrix3Xd shape = rest_shapes(cloth, {&set, 1}, 0).front();
+
+    HangingEnergy energy(HangingCloth::of(cloth, set));
+    MeshField gradient(energy.layout());
+    energy.energy_and_gradient(MeshField::of(energy.layout(), shape), gradient);
+    HeldProjection(cloth.mesh, cloth.held).project(gradient);
+
+    // Turning about the vertical leaves the balance as it is, to rounding.
+    EXPECT_LT(norm(gradient), 1.1e-9 * energy.cloth().weight_n()) << corners << " corners";
+    EXPECT_LT(shape.row(2).minCoeff(), -0.3);
+  }
+}
+
 TEST(RestShapes, AreWhereRelaxationEnds) {
   const Cloth cloth = hung_cloth(9, 2);
   ParameterSet set = cotton_set(cloth, 0, 0);
