@@ -5,25 +5,27 @@
 #include <tuple>
 #include <vector>
 
-#include "model/lanes.h"
+#include "data/input_error.h"
+#include "model/step.h"
 
 namespace clothfit {
 namespace {
 
-/// The effects' forces (N), 3 x vertices. Effects work on lanes; one is used.
+/// The effects' forces (N), 3 x vertices; what effects remember moves on.
 Eigen::Matrix3Xd effect_forces_n(const Cloth& cloth, const ParameterSet& parameters, double time_s,
-                                 const ImplicitState& state) {
+                                 double time_step_s, ImplicitState& state) {
+  const LaneParameters<SingleLane> lane = lane_parameters<SingleLane>(cloth, {&parameters, 1});
   const int vertices = cloth.mesh.vertex_count();
-  LaneVectors position = LaneVectors::zero(vertices), velocity = position, force = position;
-  for (int l = 0; l < kLanes; ++l) {
-    position.set_lane(l, state.position_m);
-    velocity.set_lane(l, state.velocity_m_per_s);
-  }
-  const EffectScene scene{cloth.mesh, position, velocity, cloth.mass_kg, time_s};
+  auto position = LaneVectors<SingleLane>::zero(vertices), velocity = position, force = position;
+  position.set_lane(0, state.position_m);
+  velocity.set_lane(0, state.velocity_m_per_s);
+  const EffectScene<SingleLane> scene{
+      cloth, lane.springs, lane.gravity_m_per_s2, position, velocity, time_s, time_step_s};
   for (size_t e = 0; e < cloth.effects.size(); ++e) {
-    std::vector<LaneValue> values;
-    for (const double value : parameters.effects[e]) values.push_back(LaneValue::Constant(value));
-    cloth.effects[e]->add_force(scene, values, force);
+    if (state.effect_memory.size() <= e)
+      state.effect_memory.push_back(
+          EffectMemory<SingleLane>::Zero(1, cloth.effects[e]->memory_size(cloth)));
+    cloth.effects[e]->add_force(scene, lane.effects[e], state.effect_memory[e], force);
   }
   return force.lane(0);
 }
@@ -52,7 +54,14 @@ SpringLoad load_of(double k, double l0, double c, const Eigen::Vector3d& along,
 ImplicitStepper::ImplicitStepper(const Cloth& cloth)
     : cloth_(cloth),
       held_(cloth.mesh, cloth.held),
-      motions_(allowed_motions(held_, cloth.mesh.vertex_count())) {}
+      motions_(allowed_motions(held_, cloth.mesh.vertex_count())) {
+  for (size_t e = 0; e < cloth.effects.size(); ++e)
+    if (cloth.effects[e]->changes_force() || cloth.effects[e]->shifts_supports())
+      throw InputError(
+          "implicit step",
+          "effect '" + cloth.effect_descriptions[e].name + "' acts on inertia or supports",
+          "only effects that add a force; take the Euler scheme");
+}
 
 bool ImplicitStepper::step(const ParameterSet& parameters, const Eigen::Matrix3Xd& held_target_m,
                            double time_s, double time_step_s, ImplicitState& state) {
@@ -60,7 +69,8 @@ bool ImplicitStepper::step(const ParameterSet& parameters, const Eigen::Matrix3X
   const double h = time_step_s;
   const Eigen::Matrix3Xd &p = state.position_m, &v = state.velocity_m_per_s;
   Eigen::Matrix3Xd force_n = parameters.gravity_m_per_s2 * cloth_.mass_kg.transpose();
-  if (!cloth_.effects.empty()) force_n += effect_forces_n(cloth_, parameters, time_s, state);
+  if (!cloth_.effects.empty())
+    force_n += effect_forces_n(cloth_, parameters, time_s, time_step_s, state);
 
   // The matrix M - h D - h^2 K, and the impulse h (f + h K v).
   std::vector<Eigen::Triplet<double>> entries;

@@ -12,6 +12,7 @@ namespace clothfit {
 struct ImplicitState {
   Eigen::Matrix3Xd position_m;
   Eigen::Matrix3Xd velocity_m_per_s;
+  std::vector<EffectMemory<SingleLane>> effect_memory;  ///< empty at the start
 };
 
 /// The implicit scheme for stiff cloth at steps as long as a frame [baraff1998]:
@@ -29,7 +30,8 @@ struct ImplicitState {
 /// Solved by a sparse Cholesky factorisation; keeps its symbolic part from step to step.
 class ImplicitStepper {
  public:
-  /// `cloth` must outlive the stepper.
+  /// `cloth` must outlive the stepper. Throws InputError where an effect changes the cloth's
+  /// inertia or shifts its supports: those belong to the explicit scheme.
   explicit ImplicitStepper(const Cloth& cloth);
 
   /// One step of `time_step_s` > 0. `held_target_m` (3 x held) belongs to its end. False where the

@@ -97,12 +97,17 @@ namespace clothfit {
 namespace {
 namespace HWY_NAMESPACE {
 
+/// Eight neighbouring columns, or as many of them as a vector holds.
+using EightTag = hn::CappedTag<double, 8>;
+using Eight = hn::Vec<EightTag>;
+using Eight3 = Vector3<Eight>;
+
 /// Calls `pull(type, index, reach, j, own)` for every spring that pulls at the block's vertices,
 /// `own` telling whether it starts in the block, and `sink(index, j, force)` for every vertex with
 /// the sum of the pulls on it.
 template <class Pull, class Sink>
 HWY_INLINE void sweep_rows(const RowBlock& block, const Pull& pull, const Sink& sink) {
-  const Tag d;
+  const EightTag d;
   const auto lanes = static_cast<std::ptrdiff_t>(hn::Lanes(d));
   const FieldLayout layout = block.layout;
   const std::ptrdiff_t stride = layout.stride, width = RowBlock::scratch_row(layout);
@@ -114,7 +119,7 @@ HWY_INLINE void sweep_rows(const RowBlock& block, const Pull& pull, const Sink& 
     return WritablePlanes{row, row + width, row + 2 * width};
   };
   const auto read = [&](const WritablePlanes& row, std::ptrdiff_t j)
-                        HWY_ATTR { return load(row, j); };
+                        HWY_ATTR { return load(EightTag(), row, j); };
   const auto pull_row = [&](SpringType type, std::ptrdiff_t i, const WritablePlanes& to) HWY_ATTR {
     const SpringReach& r = reach[static_cast<size_t>(type)];
     if (i >= r.rows) {
@@ -123,7 +128,7 @@ HWY_INLINE void sweep_rows(const RowBlock& block, const Pull& pull, const Sink& 
     }
     const bool own = i >= block.first;
     for (std::ptrdiff_t j = 0; j < stride; j += lanes)
-      store(pull(type, i * stride + j, r, j, own), to, j);
+      store(pull(type, i * stride + j, r, j, own), EightTag(), to, j);
   };
 
   for (std::ptrdiff_t i = std::max(block.first - 2, 0); i < block.last; ++i) {
@@ -142,7 +147,7 @@ HWY_INLINE void sweep_rows(const RowBlock& block, const Pull& pull, const Sink& 
     const WritablePlanes from_above = kept(above), from_above_left = kept(2 + above),
                          from_above_right = kept(4 + above), from_two_above = kept(6 + (i + 1) % 3);
     for (std::ptrdiff_t j = 0; j < stride; j += lanes) {
-      Vector3 force = read(down, j) - read(from_above, j);
+      Eight3 force = read(down, j) - read(from_above, j);
       force = force + (read(right, j) - read(right, j - 1));
       force = force + (read(down_right, j) - read(from_above_left, j - 1));
       force = force + (read(from_above_right, j) - read(down_left, j - 1));
@@ -154,54 +159,56 @@ HWY_INLINE void sweep_rows(const RowBlock& block, const Pull& pull, const Sink& 
 }
 
 /// `v` for the springs that exist, zero in the padding.
-HWY_INLINE Vector3 existing(const Vector3& v, std::ptrdiff_t j, std::ptrdiff_t count) {
-  const Tag d;
+HWY_INLINE Eight3 existing(const Eight3& v, std::ptrdiff_t j, std::ptrdiff_t count) {
+  const EightTag d;
   if (j + static_cast<std::ptrdiff_t>(hn::Lanes(d)) <= count) return v;
   const auto mask = hn::FirstN(d, static_cast<size_t>(std::max<std::ptrdiff_t>(count - j, 0)));
   return {hn::IfThenElseZero(mask, v.x), hn::IfThenElseZero(mask, v.y),
           hn::IfThenElseZero(mask, v.z)};
 }
 
-HWY_INLINE Vector existing(const Vector& v, std::ptrdiff_t j, std::ptrdiff_t count) {
-  const Tag d;
+HWY_INLINE Eight existing(const Eight& v, std::ptrdiff_t j, std::ptrdiff_t count) {
+  const EightTag d;
   if (j + static_cast<std::ptrdiff_t>(hn::Lanes(d)) <= count) return v;
   return hn::IfThenElseZero(
       hn::FirstN(d, static_cast<size_t>(std::max<std::ptrdiff_t>(count - j, 0))), v);
 }
 
 double energy_and_gradient(const RowBlock& block, const EnergyArrays& arrays) {
-  const Tag d;
+  const EightTag d;
   const EnergyArrays in = arrays;
   HWY_ALIGN double energy[kLanes] = {};
-  const Vector half = hn::Set(d, 0.5), one = hn::Set(d, 1.0);
+  const Eight half = hn::Set(d, 0.5), one = hn::Set(d, 1.0);
   sweep_rows(
       block,
-      [&](SpringType type, std::ptrdiff_t at, const SpringReach& reach, std::ptrdiff_t j,
-          bool own) HWY_ATTR {
-        const auto t = static_cast<size_t>(type);
-        const Vector3 along = load(in.position_m, at + reach.b) - load(in.position_m, at + reach.a);
-        const Vector stiffness = hn::Set(d, in.stiffness_n_per_m[t]);
-        const Vector natural = hn::Set(d, in.natural_length_m[t]);
-        const Vector length2 = dot(along, along);
-        const Vector inverse = inverse_square_root(length2);
-        if (own) {
-          const Vector extension = hn::Sub(hn::Mul(length2, inverse), natural);
-          const Vector stored = hn::Mul(hn::Mul(half, stiffness), hn::Mul(extension, extension));
-          double* const sum = energy + j % kLanes;
-          hn::StoreU(hn::Add(hn::LoadU(d, sum), existing(stored, j, reach.columns)), d, sum);
-        }
-        const Vector share = hn::Mul(stiffness, hn::Sub(one, hn::Mul(natural, inverse)));
-        return existing(share * along, j, reach.columns);
-      },
-      [&](std::ptrdiff_t at, std::ptrdiff_t j, const Vector3& springs) HWY_ATTR {
-        const Vector mass = hn::LoadU(d, in.mass_kg + at);
-        const Vector3 gravity = {hn::Set(d, in.gravity_m_per_s2[0]),
-                                 hn::Set(d, in.gravity_m_per_s2[1]),
-                                 hn::Set(d, in.gravity_m_per_s2[2])};
-        const Vector3 weight = mass * gravity;
+      [&](SpringType type, std::ptrdiff_t at, const SpringReach& reach, std::ptrdiff_t j, bool own)
+          HWY_ATTR {
+            const auto t = static_cast<size_t>(type);
+            const Eight3 along = load(EightTag(), in.position_m, at + reach.b) -
+                                 load(EightTag(), in.position_m, at + reach.a);
+            const Eight stiffness = hn::Set(d, in.stiffness_n_per_m[t]);
+            const Eight natural = hn::Set(d, in.natural_length_m[t]);
+            const Eight length2 = dot(along, along);
+            const Eight inverse = inverse_square_root(length2);
+            if (own) {
+              const Eight extension = hn::Sub(hn::Mul(length2, inverse), natural);
+              const Eight stored = hn::Mul(hn::Mul(half, stiffness), hn::Mul(extension, extension));
+              double* const sum = energy + j % kLanes;
+              hn::StoreU(hn::Add(hn::LoadU(d, sum), existing(stored, j, reach.columns)), d, sum);
+            }
+            const Eight share = hn::Mul(stiffness, hn::Sub(one, hn::Mul(natural, inverse)));
+            return existing(share * along, j, reach.columns);
+          },
+      [&](std::ptrdiff_t at, std::ptrdiff_t j, const Eight3& springs) HWY_ATTR {
+        const Eight mass = hn::LoadU(d, in.mass_kg + at);
+        const Eight3 gravity = {hn::Set(d, in.gravity_m_per_s2[0]),
+                                hn::Set(d, in.gravity_m_per_s2[1]),
+                                hn::Set(d, in.gravity_m_per_s2[2])};
+        const Eight3 weight = mass * gravity;
         double* const sum = energy + j % kLanes;
-        hn::StoreU(hn::Sub(hn::LoadU(d, sum), dot(weight, load(in.position_m, at))), d, sum);
-        store(zero() - (springs + weight), in.gradient_n, at);
+        hn::StoreU(hn::Sub(hn::LoadU(d, sum), dot(weight, load(EightTag(), in.position_m, at))), d,
+                   sum);
+        store(zero(d) - (springs + weight), d, in.gradient_n, at);
       });
   double sum = 0;
   for (const double part : energy) sum += part;
@@ -209,64 +216,66 @@ double energy_and_gradient(const RowBlock& block, const EnergyArrays& arrays) {
 }
 
 void multiply_tangent(const RowBlock& block, const TangentArrays& arrays) {
-  const Tag d;
+  const EightTag d;
   const TangentArrays in = arrays;
-  sweep_rows(
-      block,
-      [&](SpringType type, std::ptrdiff_t at, const SpringReach& reach, std::ptrdiff_t j,
-          bool) HWY_ATTR {
-        const auto t = static_cast<size_t>(type);
-        const Vector3 along = load(in.position_m, at + reach.b) - load(in.position_m, at + reach.a);
-        const Vector3 change = load(in.direction, at + reach.b) - load(in.direction, at + reach.a);
-        const Vector transverse = hn::LoadU(d, in.transverse[t] + at);
-        const Vector longitudinal = hn::LoadU(d, in.longitudinal[t] + at);
-        return existing(transverse * change + hn::Mul(longitudinal, dot(along, change)) * along, j,
-                        reach.columns);
-      },
-      [&](std::ptrdiff_t at, std::ptrdiff_t, const Vector3& force)
-          HWY_ATTR { store(zero() - force, in.product, at); });
-}
-
-void multiply_matrices(const RowBlock& block, const MatrixArrays& arrays) {
-  const Tag d;
-  const MatrixArrays in = arrays;
   sweep_rows(
       block,
       [&](SpringType type, std::ptrdiff_t at, const SpringReach& reach, std::ptrdiff_t j, bool)
           HWY_ATTR {
-            const auto& k = in.stiffness[static_cast<size_t>(type)];
-            const auto entry = [&](size_t c) HWY_ATTR { return hn::LoadU(d, k[c] + at); };
-            const Vector3 v = load(in.direction, at + reach.b) - load(in.direction, at + reach.a);
-            const Vector xy = entry(3), xz = entry(4), yz = entry(5);
-            const auto row = [&](Vector x, Vector y, Vector z) HWY_ATTR {
-              return hn::Add(hn::Add(hn::Mul(x, v.x), hn::Mul(y, v.y)), hn::Mul(z, v.z));
-            };
-            return existing(
-                Vector3{row(entry(0), xy, xz), row(xy, entry(1), yz), row(xz, yz, entry(2))}, j,
-                reach.columns);
+            const auto t = static_cast<size_t>(type);
+            const Eight3 along = load(EightTag(), in.position_m, at + reach.b) -
+                                 load(EightTag(), in.position_m, at + reach.a);
+            const Eight3 change = load(EightTag(), in.direction, at + reach.b) -
+                                  load(EightTag(), in.direction, at + reach.a);
+            const Eight transverse = hn::LoadU(d, in.transverse[t] + at);
+            const Eight longitudinal = hn::LoadU(d, in.longitudinal[t] + at);
+            return existing(transverse * change + hn::Mul(longitudinal, dot(along, change)) * along,
+                            j, reach.columns);
           },
-      [&](std::ptrdiff_t at, std::ptrdiff_t, const Vector3& force)
-          HWY_ATTR { store(zero() - force, in.product, at); });
+      [&](std::ptrdiff_t at, std::ptrdiff_t, const Eight3& force)
+          HWY_ATTR { store(zero(d) - force, d, in.product, at); });
+}
+
+void multiply_matrices(const RowBlock& block, const MatrixArrays& arrays) {
+  const EightTag d;
+  const MatrixArrays in = arrays;
+  sweep_rows(
+      block,
+      [&](SpringType type, std::ptrdiff_t at, const SpringReach& reach, std::ptrdiff_t j,
+          bool) HWY_ATTR {
+        const auto& k = in.stiffness[static_cast<size_t>(type)];
+        const auto entry = [&](size_t c) HWY_ATTR { return hn::LoadU(d, k[c] + at); };
+        const Eight3 v = load(EightTag(), in.direction, at + reach.b) -
+                         load(EightTag(), in.direction, at + reach.a);
+        const Eight xy = entry(3), xz = entry(4), yz = entry(5);
+        const auto row = [&](Eight x, Eight y, Eight z) HWY_ATTR {
+          return hn::Add(hn::Add(hn::Mul(x, v.x), hn::Mul(y, v.y)), hn::Mul(z, v.z));
+        };
+        return existing(Eight3{row(entry(0), xy, xz), row(xy, entry(1), yz), row(xz, yz, entry(2))},
+                        j, reach.columns);
+      },
+      [&](std::ptrdiff_t at, std::ptrdiff_t, const Eight3& force)
+          HWY_ATTR { store(zero(d) - force, d, in.product, at); });
 }
 
 void linearise(const RowBlock& block, const LineariseArrays& in) {
-  const Tag d;
+  const EightTag d;
   const std::ptrdiff_t stride = block.layout.stride;
   const std::array<SpringReach, kSpringTypes> reach = reaches(block.layout);
   for (size_t t = 0; t < kSpringTypes; ++t) {
-    const Vector stiffness = hn::Set(d, in.stiffness_n_per_m[t]);
-    const Vector natural = hn::Set(d, in.natural_length_m[t]);
+    const Eight stiffness = hn::Set(d, in.stiffness_n_per_m[t]);
+    const Eight natural = hn::Set(d, in.natural_length_m[t]);
     for (std::ptrdiff_t i = block.first; i < std::min(block.last, reach[t].rows); ++i) {
       for (std::ptrdiff_t j = 0; j < stride; j += static_cast<std::ptrdiff_t>(hn::Lanes(d))) {
         const std::ptrdiff_t at = i * stride + j;
-        const Vector3 along =
-            load(in.position_m, at + reach[t].b) - load(in.position_m, at + reach[t].a);
+        const Eight3 along = load(EightTag(), in.position_m, at + reach[t].b) -
+                             load(EightTag(), in.position_m, at + reach[t].a);
         // A spring of no length has no direction: it keeps the stiffness of one that is 1e-100 m
         // long, whose derivative is finite and useless.
-        const Vector inverse = inverse_square_root(hn::Max(dot(along, along), hn::Set(d, 1e-200)));
-        const Vector part = hn::Mul(hn::Mul(stiffness, natural), inverse);
-        Vector transverse = hn::Sub(stiffness, part);
-        Vector longitudinal = hn::Mul(part, hn::Mul(inverse, inverse));
+        const Eight inverse = inverse_square_root(hn::Max(dot(along, along), hn::Set(d, 1e-200)));
+        const Eight part = hn::Mul(hn::Mul(stiffness, natural), inverse);
+        Eight transverse = hn::Sub(stiffness, part);
+        Eight longitudinal = hn::Mul(part, hn::Mul(inverse, inverse));
         if (in.clamped) {
           // transverse + longitudinal l^2 = k stays what it is.
           transverse = hn::Max(transverse, hn::Zero(d));

@@ -204,8 +204,9 @@ void add_tangents(const TangentArrays& arrays, const MutableVectors& force_n) {
   using V = Vector<ExactLanes>;
   const Tag<ExactLanes> d;
   const MutableVectors out = force_n;
-  sweep_tangents(arrays, [&](std::ptrdiff_t, std::ptrdiff_t self, const Vector3<V>& sum)
-                             HWY_ATTR { store(load(d, out, self) + sum, d, out, self); });
+  sweep_tangents(arrays,
+                 [&](std::ptrdiff_t, std::ptrdiff_t self, const Motion&, const Vector3<V>& sum)
+                     HWY_ATTR { store(load(d, out, self) + sum, d, out, self); });
 }
 
 void step_tangents(const TangentArrays& arrays, const TangentEuler& euler) {
@@ -214,15 +215,15 @@ void step_tangents(const TangentArrays& arrays, const TangentEuler& euler) {
   const TangentEuler to = euler;
   const V h = hn::Set(d, to.time_step_s);
   const bool any_effect = to.effect_force_n[0] != nullptr;
-  sweep_tangents(
-      arrays, [&](std::ptrdiff_t vertex, std::ptrdiff_t self, const Vector3<V>& springs) HWY_ATTR {
-        const Vector3<V> sum = any_effect ? springs + load(d, to.effect_force_n, self) : springs;
-        const Vector3<V> gravity = load(d, to.gravity_m_per_s2, self % kLanes);
-        const V inverse_mass = hn::Set(d, to.inverse_mass_per_kg[vertex]);
-        const Vector3<V> velocity = fused(h, fused(inverse_mass, sum, gravity), motion.velocity);
-        store(velocity, d, to.velocity_m_per_s, self);
-        store(fused(h, velocity, motion.position), d, to.position_m, self);
-      });
+  sweep_tangents(arrays, [&](std::ptrdiff_t vertex, std::ptrdiff_t self, const Motion& motion,
+                             const Vector3<V>& springs) HWY_ATTR {
+    const Vector3<V> sum = any_effect ? springs + load(d, to.effect_force_n, self) : springs;
+    const Vector3<V> gravity = load(d, to.gravity_m_per_s2, self % kLanes);
+    const V inverse_mass = hn::Set(d, to.inverse_mass_per_kg[vertex]);
+    const Vector3<V> velocity = fused(h, fused(inverse_mass, sum, gravity), motion.velocity);
+    store(velocity, d, to.velocity_m_per_s, self);
+    store(fused(h, velocity, motion.position), d, to.position_m, self);
+  });
 }
 
 void transpose(const TypeArrays& of, const TransposedArrays& arrays) {
