@@ -1,7 +1,6 @@
 #pragma once
 
 #include <Eigen/Dense>
-#include <sstream>
 #include <string>
 
 #include "model/cloth.h"
@@ -37,6 +36,27 @@ class EffectMap {
   int first_force() const { return 6 * vertices_; }
   int first_memory() const { return first_force() + 3 * acted_on_; }
   int first_parameter() const { return first_memory() + memory_; }
+
+  /// Everything that an effect looks at, nothing remembered and no forces.
+  Eigen::VectorXd input(const Eigen::Matrix3Xd& position_m,
+                        const Eigen::Matrix3Xd& velocity_m_per_s, const SpringParameters& springs,
+                        const Eigen::Vector3d& gravity_m_per_s2,
+                        const std::vector<double>& own) const {
+    Eigen::VectorXd in = Eigen::VectorXd::Zero(inputs());
+    in.head(6 * vertices_) << position_m.reshaped(), velocity_m_per_s.reshaped();
+    auto parameters = in.tail(inputs() - first_parameter());
+    for (int type = 0; type < kSpringTypes; ++type) {
+      const auto t = static_cast<size_t>(type);
+      parameters[ParameterNumber::natural_length(type)] = springs.natural_length_m[t];
+      parameters[ParameterNumber::stiffness(type)] = springs.stiffness_n_per_m[t];
+      parameters[ParameterNumber::damping(type)] = springs.damping_ns_per_m[t];
+    }
+    for (int axis = 0; axis < 3; ++axis)
+      parameters[ParameterNumber::gravity(axis)] = gravity_m_per_s2[axis];
+    for (int p = 0; p < own_; ++p)
+      parameters[ParameterNumber::own(p)] = own[static_cast<size_t>(p)];
+    return in;
+  }
 
   Eigen::VectorXd operator()(const Eigen::VectorXd& in) const {
     const Arguments at(*this, in);
@@ -154,73 +174,12 @@ class EffectMap {
 /// that: the differences' own error is some 1e-10 of the third derivative and, from rounding, 1e-11
 /// of the output. Laws of springs and surfaces that are nearly folded to nothing bend a few
 /// thousand times as much as smooth ones: 1e-6 of a column's largest entry is granted.
-inline std::string derivative_mismatch(const EffectMap& map, const Eigen::VectorXd& in,
-                                       const Eigen::VectorXd& size) {
-  const Eigen::MatrixXd stated = map.stated_jacobian(in);
-  const double output = map(in).cwiseAbs().maxCoeff();
-  for (Eigen::Index n = 0; n < in.size(); ++n) {
-    Eigen::VectorXd up = in, down = in;
-    up[n] += 1e-5 * size[n];
-    down[n] -= 1e-5 * size[n];
-    const Eigen::VectorXd seen = (map(up) - map(down)) / (up[n] - down[n]) * size[n];
-    const Eigen::VectorXd said = stated.col(n) * size[n];
-    Eigen::Index worst = 0;
-    const double difference = (seen - said).cwiseAbs().maxCoeff(&worst);
-    if (difference <= 1e-6 * seen.cwiseAbs().maxCoeff() + 1e-9 * output) continue;
-    std::ostringstream text;
-    text << "output " << worst << " by input " << n << " (velocities from " << map.first_velocity()
-         << ", forces " << map.first_force() << ", memory " << map.first_memory() << ", parameters "
-         << map.first_parameter() << "): stated " << stated(worst, n) << ", differences "
-         << seen[worst] / size[n];
-    return text.str();
-  }
-  return "";
-}
+std::string derivative_mismatch(const EffectMap& map, const Eigen::VectorXd& in,
+                                const Eigen::VectorXd& size);
 
 /// Compares everything that an effect says of its derivatives with differences, in a moving,
 /// crumpled cloth that is held at two points.
-inline std::string derivative_mismatch(const Effect& effect, const EffectDescription& description,
-                                       const std::vector<double>& own, Uniform& uniform) {
-  Cloth cloth = square_cloth(5);
-  cloth.held = {held_at(cloth.mesh, 0, 0), held_at(cloth.mesh, 0.31, 0.02)};
-  const int vertices = cloth.mesh.vertex_count();
-  const SpringParameters springs = spring_parameters(cotton(), cloth.mesh);
-
-  for (const EffectDeed deed :
-       {EffectDeed::add_force, EffectDeed::change_force, EffectDeed::shift_supports}) {
-    if (deed == EffectDeed::change_force && !effect.changes_force()) continue;
-    if (deed == EffectDeed::shift_supports && !effect.shifts_supports()) continue;
-    const EffectMap map(effect, cloth, static_cast<int>(own.size()), deed);
-    Eigen::VectorXd in(map.inputs()), size(map.inputs());
-    size.setOnes();  // m/s, N
-    size.head(3 * vertices).setConstant(cloth.mesh.spacing_s_m());
-    size.segment(map.first_memory(), map.first_parameter() - map.first_memory()).setConstant(1e-2);
-    for (double& value : in) value = uniform(-1, 1);
-    in.array() *= size.array();
-    in.head(3 * vertices) = crumpled(cloth.mesh, 0.3, uniform).reshaped();
-    const auto set = [&](int parameter, double value, double change) {
-      in[map.first_parameter() + parameter] = value;
-      size[map.first_parameter() + parameter] = change;
-    };
-    for (int type = 0; type < kSpringTypes; ++type) {
-      const auto t = static_cast<size_t>(type);
-      set(ParameterNumber::natural_length(type), springs.natural_length_m[t],
-          springs.natural_length_m[t]);
-      set(ParameterNumber::stiffness(type), springs.stiffness_n_per_m[t],
-          springs.stiffness_n_per_m[t]);
-      set(ParameterNumber::damping(type), springs.damping_ns_per_m[t], 1e-2);
-    }
-    for (int axis = 0; axis < 3; ++axis)
-      set(ParameterNumber::gravity(axis), uniform(-9.81, 9.81), 9.81);
-    for (size_t p = 0; p < own.size(); ++p)
-      set(ParameterNumber::own(static_cast<int>(p)), own[p], description.parameters[p].typical);
-
-    const std::string mismatch = derivative_mismatch(map, in, size);
-    if (mismatch.empty()) continue;
-    constexpr const char* kDeeds[] = {"add_force", "change_force", "shift_supports"};
-    return std::string(kDeeds[static_cast<size_t>(deed)]) + ": " + mismatch;
-  }
-  return "";
-}
+std::string derivative_mismatch(const Effect& effect, const EffectDescription& description,
+                                const std::vector<double>& own, Uniform& uniform);
 
 }  // namespace clothfit

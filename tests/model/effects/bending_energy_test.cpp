@@ -109,10 +109,9 @@ double sag_m(int rows, double load_n_per_m2) {
   const Cloth cloth = Cloth::of(mesh, masses_by_area(mesh, 0.01));
   const auto effect = bending_energy::make();
   const EffectMap map(*effect, cloth, 1, EffectDeed::add_force);
-  Eigen::VectorXd at = Eigen::VectorXd::Zero(map.inputs());
-  at.head(3 * mesh.vertex_count()) = flat_positions(mesh).reshaped();
-  at[map.inputs() - 1] = kB_nm;
-  const Eigen::MatrixXd jacobian = map.stated_jacobian(at);
+  const Eigen::Matrix3Xd flat = flat_positions(mesh);
+  const Eigen::MatrixXd jacobian =
+      map.stated_jacobian(map.input(flat, at_rest(flat), {}, {0, 0, 0}, {kB_nm}));
   const int held = 2 * mesh.columns, free = mesh.vertex_count() - held;
   Eigen::MatrixXd stiffness(free, free);
   for (int a = 0; a < free; ++a)
@@ -146,6 +145,29 @@ TEST(BendingEnergy, AClampedRibbonSagsLikeABeam) {
     coarser = error;
   }
   EXPECT_LT(coarser, 1e-3);
+}
+
+TEST(BendingEnergy, TheStepThatItsRatesAllowIsStableAndTwiceItIsNot) {
+  // A cloth that is bending stiffness and little else.
+  const Mesh mesh = square_mesh(17);
+  Cloth cloth = Cloth::of(mesh, masses_by_area(mesh, 0.025));
+  cloth.held = {held_at(mesh, 0, 0), held_at(mesh, 0.4, 0)};
+  cloth.add_effect("bending_energy", "test");
+  Uniform uniform(3);
+  const ParameterSet set{.springs = spring_parameters(
+                             {.tension_warp_n_per_m = 0.1, .tension_weft_n_per_m = 0.1}, mesh),
+                         .gravity_m_per_s2 = Eigen::Vector3d::Zero(),
+                         .effects = {{1e-3}},
+                         .start_position_m = crumpled(mesh, 0.3, uniform)};
+  const double stable_s = stable_time_step_s(cloth, set);
+  const auto stays = [&](double step_s) {
+    return simulate(cloth, {&set, 1}, {.frame_time_s = {0, 0.1}, .time_step_s = step_s})
+        .front()
+        .usable();
+  };
+
+  EXPECT_TRUE(stays(0.95 * stable_s));
+  EXPECT_FALSE(stays(2 * stable_s));
 }
 
 }  // namespace

@@ -61,6 +61,25 @@ TEST(RestCurvature, ItsForceIsMinusTheEnergysGradient) {
   }
 }
 
+TEST(RestCurvature, IsNoStifferThanItsRatesSay) {
+  const Cloth cloth = square_cloth(9);
+  const auto effect = rest_curvature::make();
+  const std::vector<double> moments_n{8e-3, -5e-3};
+  const double bound = effect->rates(cloth, {}, moments_n).frequency2_per_s2;
+  for (const unsigned seed : {1u, 2u, 3u}) {
+    Uniform uniform(seed);
+    for (const double share : {0.0, 0.1, 0.3}) {
+      const auto crumple = crumpled(cloth.mesh, share, uniform);
+
+      const double seen =
+          effect_contract::spectrum({{effect.get(), moments_n}}, cloth, crumple).frequency2_per_s2;
+
+      EXPECT_LE(seen, bound) << share;
+      EXPECT_GE(seen, 0.02 * bound) << share;
+    }
+  }
+}
+
 TEST(RestCurvature, AFreeStripWithBendingStiffnessRollsToMomentOverStiffness) {
   const double b_nm = 1e-4, m_t_n = 8e-4;
   const Mesh mesh{.columns = 3, .rows = 17, .width_m = 0.03, .height_m = 0.24};
