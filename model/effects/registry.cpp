@@ -5,6 +5,7 @@
 
 #include "data/input_error.h"
 #include "model/effects/added_air_mass.h"
+#include "model/effects/contact_mesh.h"
 #include "model/effects/contact_plane.h"
 #include "model/effects/contact_sphere.h"
 #include "model/effects/frame_acceleration.h"
@@ -13,6 +14,7 @@
 #include "model/effects/gust.h"
 #include "model/effects/nonuniform_mass.h"
 #include "model/effects/quadratic_drag.h"
+#include "model/effects/self_contact.h"
 #include "model/effects/support_drift.h"
 #include "model/effects/support_motion.h"
 #include "model/effects/support_slip.h"
@@ -26,6 +28,7 @@ namespace {
 constexpr std::array kEffects = {
     // alphabetical
     EffectEntry{"added_air_mass", added_air_mass::describe, added_air_mass::make},
+    EffectEntry{"contact_mesh", contact_mesh::describe, contact_mesh::make},
     EffectEntry{"contact_plane", contact_plane::describe, contact_plane::make},
     EffectEntry{"contact_sphere", contact_sphere::describe, contact_sphere::make},
     EffectEntry{"frame_acceleration", frame_acceleration::describe, frame_acceleration::make},
@@ -34,6 +37,7 @@ constexpr std::array kEffects = {
     EffectEntry{"gust", gust::describe, gust::make},
     EffectEntry{"nonuniform_mass", nonuniform_mass::describe, nonuniform_mass::make},
     EffectEntry{"quadratic_drag", quadratic_drag::describe, quadratic_drag::make},
+    EffectEntry{"self_contact", self_contact::describe, self_contact::make},
     EffectEntry{"support_drift", support_drift::describe, support_drift::make},
     EffectEntry{"support_motion", support_motion::describe, support_motion::make},
     EffectEntry{"support_slip", support_slip::describe, support_slip::make},

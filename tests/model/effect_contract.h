@@ -12,6 +12,7 @@
 #include "tests/model/effect_derivatives.h"
 #include "tests/model/mechanics.h"
 #include "tests/model/random_cloth.h"
+#include "tests/model/touched_cloth.h"
 
 namespace clothfit {
 
@@ -53,11 +54,11 @@ EffectValues<L> every_lane(const Parameters& values) {
 
 /// A moving, crumpled cloth of cotton.
 struct State {
-  Cloth cloth = square_cloth(6);
+  Cloth cloth = touched_cloth(6);
   Eigen::Matrix3Xd position_m, velocity_m_per_s;
 
-  explicit State(Uniform& uniform)
-      : position_m(crumpled(square_mesh(6), 0.5, uniform)),
+  explicit State(Uniform& uniform, const std::string& effect = "")
+      : position_m(crumpled_for(effect, square_mesh(6), 0.5, uniform)),
         velocity_m_per_s(uniform.vectors(36, 3.0)) {}
 };
 
@@ -113,12 +114,12 @@ inline void expect_a_complete_description(const EffectEntry& entry) {
 
 inline void expect_nothing_at_neutral(const EffectEntry& entry, Uniform& uniform) {
   // Given a swinging cloth with the effect and one without,
-  Cloth plain = square_cloth(6);
+  Cloth plain = touched_cloth(6);
   plain.held = {held_at(plain.mesh, 0, 0), held_at(plain.mesh, 0.31, 0.02)};
   Cloth with = plain;
   with.add_effect(entry.name, "test");
   ParameterSet set{.springs = spring_parameters(cotton(), plain.mesh),
-                   .start_position_m = crumpled(plain.mesh, 0.3, uniform)};
+                   .start_position_m = crumpled_for(entry.name, plain.mesh, 0.3, uniform)};
   const Schedule schedule{.frame_time_s = {0, 0.1, 0.2, 0.3}, .time_step_s = 2e-4};
   const SimulateResult without = simulate(plain, {&set, 1}, schedule).front();
 
@@ -138,7 +139,7 @@ inline void expect_nothing_at_neutral(const EffectEntry& entry, Uniform& uniform
 }
 
 inline void expect_to_add_to_what_is_there(const EffectEntry& entry, Uniform& uniform) {
-  const State state(uniform);
+  const State state(uniform, entry.name);
   const Parameters parameters = random_parameters(entry.describe(), uniform);
   const Eigen::Matrix3Xd there_n = uniform.vectors(36, 1);
 
@@ -151,7 +152,7 @@ inline void expect_to_add_to_what_is_there(const EffectEntry& entry, Uniform& un
 
 /// One law, three kinds of lanes: a single simulation to the bit, float to its rounding.
 inline void expect_every_kind_of_lanes_to_agree(const EffectEntry& entry, Uniform& uniform) {
-  const State state(uniform);
+  const State state(uniform, entry.name);
   const Parameters parameters = random_parameters(entry.describe(), uniform);
   const auto effect = entry.make();
   // What changes a force must have one to change.
@@ -165,14 +166,14 @@ inline void expect_every_kind_of_lanes_to_agree(const EffectEntry& entry, Unifor
 
 inline void expect_lanes_to_know_nothing_of_each_other(const EffectEntry& entry, Uniform& uniform) {
   const EffectDescription effect = entry.describe();
-  Cloth cloth = square_cloth(5);
+  Cloth cloth = touched_cloth(5);
   cloth.held = {held_at(cloth.mesh, 0, 0)};
   cloth.add_effect(entry.name, "test");
   std::vector<ParameterSet> sets;
   for (int l = 0; l < kLanes; ++l)
     sets.push_back({.springs = spring_parameters(cotton(), cloth.mesh),
                     .effects = {random_parameters(effect, uniform)},
-                    .start_position_m = crumpled(cloth.mesh, 0.3, uniform)});
+                    .start_position_m = crumpled_for(entry.name, cloth.mesh, 0.3, uniform)});
   const Schedule schedule{.frame_time_s = {0, 0.02}, .time_step_s = 1e-4};
 
   const std::vector<SimulateResult> together = simulate(cloth, sets, schedule);
@@ -183,7 +184,7 @@ inline void expect_lanes_to_know_nothing_of_each_other(const EffectEntry& entry,
 }
 
 inline void expect_to_turn_with_the_scene(const EffectEntry& entry, Uniform& uniform) {
-  const State state(uniform);
+  const State state(uniform, entry.name);
   const Parameters parameters = random_parameters(entry.describe(), uniform);
   const Eigen::Matrix3d turn = uniform.rotation();
   State turned = state;
@@ -197,7 +198,7 @@ inline void expect_to_turn_with_the_scene(const EffectEntry& entry, Uniform& uni
 }
 
 inline void expect_neither_push_nor_torque(const EffectEntry& entry, Uniform& uniform) {
-  const State state(uniform);
+  const State state(uniform, entry.name);
   const Eigen::Matrix3Xd f = force_n(entry, state, random_parameters(entry.describe(), uniform));
 
   EXPECT_GT(f.norm(), 0);
@@ -216,12 +217,12 @@ inline void expect_true_derivatives(const EffectEntry& entry, Uniform& uniform) 
 
 /// The rates that an effect gives must bound what it does to a step, up to a fit's bounds.
 inline void expect_the_stable_step_to_be_stable(const EffectEntry& entry, Uniform& uniform) {
-  Cloth cloth = square_cloth(6);
+  Cloth cloth = touched_cloth(6);
   cloth.held = {held_at(cloth.mesh, 0, 0), held_at(cloth.mesh, 0.31, 0.02)};
   cloth.add_effect(entry.name, "test");
   ParameterSet set{.springs = spring_parameters(cotton(), cloth.mesh),
                    .effects = {{}},
-                   .start_position_m = crumpled(cloth.mesh, 0.3, uniform)};
+                   .start_position_m = crumpled_for(entry.name, cloth.mesh, 0.3, uniform)};
   for (const EffectParameter& p : entry.describe().parameters)
     set.effects[0].push_back(uniform(0, 1) < 0.5 ? p.lower : p.upper);
 
@@ -233,7 +234,7 @@ inline void expect_the_stable_step_to_be_stable(const EffectEntry& entry, Unifor
 }
 
 inline void expect_to_damp_only(const EffectEntry& entry, Uniform& uniform) {
-  const State state(uniform);
+  const State state(uniform, entry.name);
   const Parameters parameters = random_parameters(entry.describe(), uniform);
 
   const double power_w =
@@ -248,7 +249,7 @@ inline void expect_to_damp_only(const EffectEntry& entry, Uniform& uniform) {
 }
 
 inline void expect_proportional(const EffectEntry& entry, Uniform& uniform) {
-  const State state(uniform);
+  const State state(uniform, entry.name);
   Parameters parameters = random_parameters(entry.describe(), uniform);
   const Eigen::Matrix3Xd once_n = force_n(entry, state, parameters);
   parameters[0] *= 2;

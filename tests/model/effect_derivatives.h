@@ -7,6 +7,7 @@
 #include "model/cloth.h"
 #include "model/effects/linearisation.h"
 #include "tests/model/random_cloth.h"
+#include "tests/model/touched_cloth.h"
 
 namespace clothfit {
 
@@ -181,7 +182,7 @@ inline std::string derivative_mismatch(const EffectMap& map, const Eigen::Vector
 /// crumpled cloth that is held at two points.
 inline std::string derivative_mismatch(const Effect& effect, const EffectDescription& description,
                                        const std::vector<double>& own, Uniform& uniform) {
-  Cloth cloth = square_cloth(5);
+  Cloth cloth = touched_cloth(5);
   cloth.held = {held_at(cloth.mesh, 0, 0), held_at(cloth.mesh, 0.31, 0.02)};
   const int vertices = cloth.mesh.vertex_count();
   const SpringParameters springs = spring_parameters(cotton(), cloth.mesh);
@@ -197,7 +198,7 @@ inline std::string derivative_mismatch(const Effect& effect, const EffectDescrip
     size.segment(map.first_memory(), map.first_parameter() - map.first_memory()).setConstant(1e-2);
     for (double& value : in) value = uniform(-1, 1);
     in.array() *= size.array();
-    in.head(3 * vertices) = crumpled(cloth.mesh, 0.3, uniform).reshaped();
+    in.head(3 * vertices) = crumpled_for(description.name, cloth.mesh, 0.3, uniform).reshaped();
     const auto set = [&](int parameter, double value, double change) {
       in[map.first_parameter() + parameter] = value;
       size[map.first_parameter() + parameter] = change;
