@@ -35,9 +35,8 @@ struct Law {
 
   /// Calls `visit(vertex, part of the surface, position, area)` for every vertex that is below it.
   template <class Vectors, class Visit>
-  static void for_contacts(const Cloth& cloth, const Vectors& position_m, const Parameters& p,
-                           const Visit& visit) {
-    if (!cloth.obstacle || (p[0] == 0 && p[1] == 0)) return;
+  static void for_contacts(const Cloth& cloth, const Vectors& position_m, const Visit& visit) {
+    if (!cloth.obstacle) return;
     const Mesh& mesh = cloth.mesh;
     for (int k = 0; k < mesh.vertex_count(); ++k) {
       const Vector3<double> x = position_m(k);
@@ -49,7 +48,8 @@ struct Law {
   template <class Vectors, class Add>
   static void forces(const Cloth& cloth, const Vectors& position_m, const Vectors& velocity_m_per_s,
                      const Parameters& p, const Add& add) {
-    for_contacts(cloth, position_m, p,
+    if (p[0] == 0 && p[1] == 0) return;  // before the search
+    for_contacts(cloth, position_m,
                  [&](int k, const Nearest& surface, const Vector3<double>& x, double area_m2) {
                    add(k, force(surface, x, velocity_m_per_s(k), area_m2, cloth.mass_kg[k], p));
                  });
@@ -64,7 +64,7 @@ struct Law {
       return {Dual(v.x, first), Dual(v.y, first + 1), Dual(v.z, first + 2)};
     };
     const std::array<Dual, kParameters> parameters{Dual(p[0], 6), Dual(p[1], 7), Dual(p[2], 8)};
-    for_contacts(cloth, position_m, p,
+    for_contacts(cloth, position_m,
                  [&](int k, const Nearest& surface, const Vector3<double>& x, double area_m2) {
                    const Vector3<Dual> f = force(surface, dual(x, 0), dual(velocity_m_per_s(k), 3),
                                                  area_m2, cloth.mass_kg[k], parameters);
