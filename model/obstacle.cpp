@@ -123,6 +123,7 @@ std::optional<Obstacle::Nearest> Obstacle::beneath(const Eigen::Vector3d& point_
   const auto look_at = [&](const Triangle& triangle) {
     // Inside the triangle's prism the face is nearest, elsewhere one of the edges.
     const double height = triangle.normal.dot(point_m - triangle.corner[0]);
+    if (height * height >= best) return;
     const Eigen::Vector3d foot = point_m - height * triangle.normal;
     bool inside = true;
     for (size_t n = 0; n < 3; ++n) {
@@ -130,7 +131,6 @@ std::optional<Obstacle::Nearest> Obstacle::beneath(const Eigen::Vector3d& point_
       inside = inside && side.cross(foot - triangle.corner[n]).dot(triangle.normal) >= 0;
     }
     if (inside) {
-      if (height * height >= best) return;
       best = height * height;
       nearest = {Nearest::face, foot, triangle.normal};
       rim = nullptr;
