@@ -18,7 +18,6 @@ Vector3<Real> vector(const Eigen::Vector3d& v) {
 
 struct Law {
   static constexpr int kParameters = Contact::kParameters;
-  using Parameters = std::array<double, kParameters>;
 
   /// The force on a vertex below the part `surface` of the obstacle.
   template <class Real>
@@ -39,25 +38,27 @@ struct Law {
     if (!cloth.obstacle) return;
     const Mesh& mesh = cloth.mesh;
     for (int k = 0; k < mesh.vertex_count(); ++k) {
-      const Vector3<double> x = position_m(k);
-      const auto surface = cloth.obstacle->beneath({x.x, x.y, x.z});
+      const auto x = position_m(k);
+      const auto [x_m, y_m, z_m] = value_of(x);
+      const auto surface = cloth.obstacle->beneath({x_m, y_m, z_m});
       if (surface) visit(k, *surface, x, flat_area_m2(mesh, k / mesh.columns, k % mesh.columns));
     }
   }
 
-  template <class Vectors, class Add>
+  template <class Real, class Vectors, class Add>
   static void forces(const Cloth& cloth, const Vectors& position_m, const Vectors& velocity_m_per_s,
-                     const Parameters& p, const Add& add) {
-    if (p[0] == 0 && p[1] == 0) return;  // before the search
+                     const std::array<Real, kParameters>& p, const Add& add) {
+    // Nothing to search for; but at neutral there are derivatives.
+    if (std::is_same_v<Real, double> && p[0] == Real(0.0) && p[1] == Real(0.0)) return;
     for_contacts(cloth, position_m,
-                 [&](int k, const Nearest& surface, const Vector3<double>& x, double area_m2) {
+                 [&](int k, const Nearest& surface, const Vector3<Real>& x, double area_m2) {
                    add(k, force(surface, x, velocity_m_per_s(k), area_m2, cloth.mass_kg[k], p));
                  });
   }
 
   template <class Vectors>
   static void linearise(const Cloth& cloth, const Vectors& position_m,
-                        const Vectors& velocity_m_per_s, const Parameters& p,
+                        const Vectors& velocity_m_per_s, const std::array<double, kParameters>& p,
                         EffectLinearisation& derivatives) {
     using Dual = ceres::Jet<double, 6 + kParameters>;
     const auto dual = [](const Vector3<double>& v, int first) -> Vector3<Dual> {

@@ -13,7 +13,6 @@ namespace {
 
 struct Law {
   static constexpr int kParameters = 2;
-  using Parameters = std::array<double, kParameters>;
 
   static bool neighbours(const Mesh& mesh, int a, int b, double thickness_m) {
     const int columns = std::abs(a % mesh.columns - b % mesh.columns);
@@ -23,8 +22,7 @@ struct Law {
            apart_s_m * apart_s_m + apart_t_m * apart_t_m < 4 * thickness_m * thickness_m;
   }
 
-  /// Calls `visit(a, b, vector from a to b, their distance r, A_a A_b)` for every two vertices that
-  /// touch.
+  /// Calls `visit(a, b, A_a A_b)` for every two vertices that touch.
   template <class Vectors, class Visit>
   static void for_contacts(const Cloth& cloth, const Vectors& position_m, double thickness_m,
                            const Visit& visit) {
@@ -34,50 +32,55 @@ struct Law {
     const auto area_m2 = [&](int k) {
       return flat_area_m2(mesh, k / mesh.columns, k % mesh.columns);
     };
-    search.for_pairs(mesh.vertex_count(), position_m, thickness_m,
-                     [&](int a, int b, const Vector3<double>& connection, double distance_m2) {
-                       // Two vertices in the same place know no direction.
-                       if (!(distance_m2 > 0) || neighbours(mesh, a, b, thickness_m)) return;
-                       visit(a, b, connection, std::sqrt(distance_m2), area_m2(a) * area_m2(b));
-                     });
+    search.for_pairs(
+        mesh.vertex_count(), [&](int k) { return value_of(position_m(k)); }, thickness_m,
+        [&](int a, int b, const Vector3<double>&, double distance_m2) {
+          // Two vertices in the same place know no direction.
+          if (distance_m2 > 0 && !neighbours(mesh, a, b, thickness_m))
+            visit(a, b, area_m2(a) * area_m2(b));
+        });
   }
 
-  template <class Vectors, class Add>
+  template <class Real, class Vectors, class Add>
   static void forces(const Cloth& cloth, const Vectors& position_m, const Vectors&,
-                     const Parameters& p, const Add& add) {
-    const auto [stiffness, d] = p;
-    if (stiffness == 0) return;
-    for_contacts(cloth, position_m, d,
-                 [&](int a, int b, const Vector3<double>& connection, double r, double areas) {
-                   const double push = stiffness * areas * (d - r) / (d * d * r);
-                   add(b, push * connection);
-                   add(a, -push * connection);
-                 });
+                     const std::array<Real, kParameters>& p, const Add& add) {
+    using std::sqrt;
+    const auto& [stiffness, d] = p;
+    // Nothing to search for; but at neutral there are derivatives.
+    if (std::is_same_v<Real, double> && stiffness == Real(0.0)) return;
+    for_contacts(cloth, position_m, value_of(d), [&](int a, int b, double areas_m4) {
+      const Vector3<Real> connection = position_m(b) - position_m(a);
+      const Real r = sqrt(dot(connection, connection));
+      const Real push = stiffness * Real(areas_m4) * (d - r) / (d * d * r);
+      add(b, push * connection);
+      add(a, -push * connection);
+    });
   }
 
   template <class Vectors>
   static void linearise(const Cloth& cloth, const Vectors& position_m, const Vectors&,
-                        const Parameters& p, EffectLinearisation& derivatives) {
-    const auto [stiffness, d] = p;
+                        const std::array<double, kParameters>& p,
+                        EffectLinearisation& derivatives) {
+    const double stiffness = p[0], d = p[1];
     // At neutral too: what matters there is the derivative by the stiffness.
-    for_contacts(
-        cloth, position_m, d,
-        [&](int a, int b, const Vector3<double>& connection, double r, double areas) {
-          const Eigen::Vector3d u = Eigen::Vector3d(connection.x, connection.y, connection.z) / r;
-          const Eigen::Matrix3d along = u * u.transpose();
-          const Eigen::Matrix3d by_connection =
-              stiffness * areas / (d * d) *
-              ((d - r) / r * (Eigen::Matrix3d::Identity() - along) - along);
-          const Eigen::Vector3d by_stiffness = areas * (d - r) / (d * d) * u;
-          const Eigen::Vector3d by_thickness = stiffness * areas * (2 * r - d) / (d * d * d) * u;
-          for (const auto& [on, sign] : {std::pair{b, 1.0}, {a, -1.0}}) {
-            const Eigen::Matrix3d none = Eigen::Matrix3d::Zero();
-            derivatives.by_motion.push_back({on, b, sign * by_connection, none});
-            derivatives.by_motion.push_back({on, a, -sign * by_connection, none});
-            derivatives.by_parameter.push_back({on, ParameterNumber::own(0), sign * by_stiffness});
-            derivatives.by_parameter.push_back({on, ParameterNumber::own(1), sign * by_thickness});
-          }
-        });
+    for_contacts(cloth, position_m, d, [&](int a, int b, double areas) {
+      const Vector3<double> connection = position_m(b) - position_m(a);
+      const double r = std::sqrt(dot(connection, connection));
+      const Eigen::Vector3d u = Eigen::Vector3d(connection.x, connection.y, connection.z) / r;
+      const Eigen::Matrix3d along = u * u.transpose();
+      const Eigen::Matrix3d by_connection =
+          stiffness * areas / (d * d) *
+          ((d - r) / r * (Eigen::Matrix3d::Identity() - along) - along);
+      const Eigen::Vector3d by_stiffness = areas * (d - r) / (d * d) * u;
+      const Eigen::Vector3d by_thickness = stiffness * areas * (2 * r - d) / (d * d * d) * u;
+      for (const auto& [on, sign] : {std::pair{b, 1.0}, {a, -1.0}}) {
+        const Eigen::Matrix3d none = Eigen::Matrix3d::Zero();
+        derivatives.by_motion.push_back({on, b, sign * by_connection, none});
+        derivatives.by_motion.push_back({on, a, -sign * by_connection, none});
+        derivatives.by_parameter.push_back({on, ParameterNumber::own(0), sign * by_stiffness});
+        derivatives.by_parameter.push_back({on, ParameterNumber::own(1), sign * by_thickness});
+      }
+    });
   }
 
   /// Twice the stiffness against all vertices that may be near, over the mass: those of two other

@@ -2,6 +2,8 @@
 
 #include <sstream>
 
+#include "tests/model/touched_cloth.h"
+
 namespace clothfit {
 
 std::string derivative_mismatch(const EffectMap& map, const Eigen::VectorXd& in,
@@ -39,8 +41,9 @@ std::string derivative_mismatch(const Effect& effect, const EffectDescription& d
     if (deed == EffectDeed::change_force && !effect.changes_force()) continue;
     if (deed == EffectDeed::shift_supports && !effect.shifts_supports()) continue;
     const EffectMap map(effect, cloth, static_cast<int>(own.size()), deed);
-    Eigen::VectorXd in = map.input(crumpled_for(description.name, cloth.mesh, 0.3, uniform), uniform.vectors(vertices, 1),
-                                   springs, uniform.vectors(1, 9.81), own);
+    Eigen::VectorXd in =
+        map.input(crumpled_for(description.name, cloth.mesh, 0.3, uniform),
+                  uniform.vectors(vertices, 1), springs, uniform.vectors(1, 9.81), own);
     Eigen::VectorXd size = Eigen::VectorXd::Ones(map.inputs());  // m/s, N
     size.head(3 * vertices).setConstant(cloth.mesh.spacing_s_m());
     size.segment(map.first_memory(), map.first_parameter() - map.first_memory()).setConstant(1e-2);

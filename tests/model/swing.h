@@ -8,7 +8,7 @@ namespace clothfit {
 
 /// A swinging cloth with one point held at a vertex, one between vertices, one that is moved.
 struct Swing {
-  Cloth cloth = square_cloth(6);
+  Cloth cloth = touched_cloth(6);
   ParameterSet set;
   Schedule schedule{.frame_time_s = {0, 0.03, 0.05, 0.1}, .time_step_s = 5e-4};
 
@@ -31,6 +31,7 @@ inline Swing swing_under(const EffectEntry& entry, Uniform& uniform) {
   swing.cloth.add_effect(entry.name, "test");
   swing.set.effects = {effect_contract::random_parameters(entry.describe(), uniform)};
   swing.schedule = {.frame_time_s = {0, 0.004, 0.01}, .time_step_s = 2e-4};
+  swing.set.start_position_m = crumpled_for(entry.name, swing.cloth.mesh, 0.1, uniform);
   return swing;
 }
 
