@@ -81,6 +81,7 @@ std::string command_text(const FitVerbOptions& options, const FitFlags& flags) {
 
 void write_results(const FitReport& report, const Recording& recording, const fs::path& folder) {
   write_fit_result(report.result, folder / "fit.json");
+  write_model(report.model, folder);
   const Table parameters = parameter_table(report.result);
   const Table errors = error_table(report.result);
   const Table residuals = residual_table(report, recording);

@@ -142,6 +142,7 @@ void write_recording(const Recording& recording, const std::filesystem::path& fo
 
 /// Reads a held point's path (columns time,x,y,z). Throws InputError.
 HeldPath read_held_path(const std::filesystem::path& file);
+void write_held_path(const HeldPath& path, const std::filesystem::path& file);
 
 /// Text forms used in recording.yaml.
 std::string to_string(MarkerKind kind);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cassert>
 #include <string>
 #include <utility>
 #include <vector>
@@ -11,6 +12,15 @@ namespace clothfit {
 /// The words that recording.yaml has for each choice. Inside data/ only.
 template <class Choice>
 using Words = std::vector<std::pair<std::string, Choice>>;
+
+template <class Choice>
+std::string word_of(const Words<Choice>& words, Choice choice) {
+  for (const auto& [word, known] : words) {
+    if (known == choice) return word;
+  }
+  assert(false && "every choice has a word");
+  return {};
+}
 
 inline Words<MarkerKind> marker_kind_words() {
   return {{"apriltag", MarkerKind::apriltag},

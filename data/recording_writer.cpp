@@ -1,56 +1,16 @@
-#include <array>
-#include <cassert>
+#include <fmt/format.h>
 
+#include <array>
+
+#include "data/number_text.h"
 #include "data/recording.h"
+#include "data/recording_parts.h"
 #include "data/recording_words.h"
 #include "data/text_file.h"
 #include "data/yaml_writer.h"
 
 namespace clothfit {
 namespace {
-
-template <class Choice>
-std::string word_of(const Words<Choice>& words, Choice choice) {
-  for (const auto& [word, known] : words) {
-    if (known == choice) return word;
-  }
-  assert(false && "every choice has a word");
-  return {};
-}
-
-std::array<double, 2> numbers(const Eigen::Vector2d& v) {
-  return {v.x(), v.y()};
-}
-
-/// Names files relative to the folder that recording.yaml is written to.
-class RelativePaths {
- public:
-  explicit RelativePaths(const std::filesystem::path& folder)
-      : folder_(std::filesystem::weakly_canonical(std::filesystem::absolute(folder))) {}
-  std::string operator()(const std::filesystem::path& path) const {
-    const std::filesystem::path whole = std::filesystem::absolute(path).lexically_normal();
-    const std::filesystem::path parent = std::filesystem::weakly_canonical(whole.parent_path());
-    return (parent / whole.filename()).lexically_relative(folder_).generic_string();
-  }
-
- private:
-  std::filesystem::path folder_;
-};
-
-void write_cloth(YamlWriter& out, const ClothDescription& cloth) {
-  out.key("cloth").begin_map();
-  out.key("size").value(std::array{cloth.width_m, cloth.height_m});
-  out.key("mass");
-  if (cloth.mass_kg) {
-    out.value(*cloth.mass_kg);
-  } else {
-    out.null();
-  }
-  out.key("masses").value(word_of(mass_distribution_words(), cloth.masses));
-  out.key("mesh").begin_flow_map();
-  out.key("columns").value(cloth.mesh_columns).key("rows").value(cloth.mesh_rows);
-  out.end_map().end_map();
-}
 
 void write_camera_entry(YamlWriter& out, const CameraEntry& camera, const RelativePaths& relative) {
   out.begin_flow_map().key("name").value(camera.name);
@@ -93,49 +53,6 @@ void write_body(YamlWriter& out, const RigidBody& body, const RelativePaths& rel
   out.end_list().end_map();
 }
 
-void write_held_point(YamlWriter& out, const HeldPoint& point, const RelativePaths& relative) {
-  out.begin_flow_map();
-  if (point.edge) {
-    out.key("edge").value(to_string(*point.edge));
-  } else {
-    out.key("at").value(numbers(point.at_m));
-  }
-  out.key("motion").value(to_string(point.motion));
-  if (point.file) out.key("file").value(relative(*point.file));
-  out.end_map();
-}
-
-void write_declared_effect(YamlWriter& out, const DeclaredEffect& effect) {
-  out.begin_flow_map().key("effect").value(effect.name);
-  if (!effect.parameters.empty()) {
-    out.key("parameters").begin_flow_map();
-    for (const auto& [name, values] : effect.parameters) {
-      out.key(name);
-      if (values.size() == 1) {
-        out.value(values.front());
-      } else {
-        out.value(values);
-      }
-    }
-    out.end_map();
-  }
-  out.end_map();
-}
-
-/// A list with an item per line; `[]` when there is none.
-template <class Item, class WriteItem>
-void write_list(YamlWriter& out, const std::string& key, const std::vector<Item>& items,
-                const WriteItem& write_item) {
-  out.key(key);
-  if (items.empty()) {
-    out.begin_flow_list().end_list();
-    return;
-  }
-  out.begin_list();
-  for (const Item& item : items) write_item(item);
-  out.end_list();
-}
-
 }  // namespace
 
 std::string to_string(MarkerKind kind) {
@@ -149,6 +66,16 @@ std::string to_string(StartKind start) {
 }
 std::string to_string(ClothEdge edge) {
   return word_of(cloth_edge_words(), edge);
+}
+
+void write_held_path(const HeldPath& path, const std::filesystem::path& file) {
+  std::string text = "time,x,y,z\n";
+  for (std::size_t n = 0; n < path.time_s.size(); ++n) {
+    const Eigen::Vector3d& p = path.position_m[n];
+    text += fmt::format("{},{},{},{}\n", number_text(path.time_s[n]), number_text(p.x()),
+                        number_text(p.y()), number_text(p.z()));
+  }
+  write_text(text, file);
 }
 
 void write_recording(const Recording& recording, const std::filesystem::path& folder) {

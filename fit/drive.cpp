@@ -68,7 +68,7 @@ int marker_at(const Recording& recording, const Eigen::Vector2d& at_m) {
       "use motion: fixed or path, or name a place that carries a marker");
 }
 
-void hold_edge(const HeldPoint& edge, const Mesh& mesh, Drive& drive) {
+void hold_edge(const HeldPoint& edge, const Mesh& mesh, std::vector<HeldVertexWeights>& held) {
   const bool along_s = edge.edge == ClothEdge::top || edge.edge == ClothEdge::bottom;
   const int count = along_s ? mesh.columns : mesh.rows;
   for (int n = 0; n < count; ++n) {
@@ -78,30 +78,34 @@ void hold_edge(const HeldPoint& edge, const Mesh& mesh, Drive& drive) {
     } else {
       j = edge.edge == ClothEdge::left ? 0 : mesh.columns - 1;
     }
-    drive.held.push_back({.weights = {{mesh.vertex(i, j), 1.0}}, .motion = {}});
+    held.push_back({.weights = {{mesh.vertex(i, j), 1.0}}, .motion = {}});
   }
 }
 
 }  // namespace
 
+void hold(const HeldPoint& point, const HeldPath* path, const Mesh& mesh,
+          std::vector<HeldVertexWeights>& held) {
+  if (point.edge) return hold_edge(point, mesh, held);
+  held.push_back(held_at(mesh, point.at_m.x(), point.at_m.y()));
+  if (path != nullptr) held.back().motion = follow_path(*path);
+}
+
 Drive make_drive(const Recording& recording, const Mesh& mesh, const Tracks3d& tracks,
                  const std::vector<double>& frame_time_s) {
   Drive drive;
   for (const HeldPoint& point : recording.held) {
-    if (point.edge) {
-      hold_edge(point, mesh, drive);
+    if (point.motion == HeldMotion::path) {
+      const HeldPath path = read_held_path(*point.file);
+      hold(point, &path, mesh, drive.held);
       continue;
     }
-    HeldVertexWeights held = held_at(mesh, point.at_m.x(), point.at_m.y());
-    if (point.motion == HeldMotion::path) {
-      held.motion = follow_path(read_held_path(*point.file));
-    } else if (point.motion == HeldMotion::tracked) {
+    hold(point, nullptr, mesh, drive.held);
+    if (point.motion == HeldMotion::tracked) {
       const int marker = marker_at(recording, point.at_m);
-      SmoothingSpline spline = smooth_track(recording, marker, tracks, frame_time_s);
+      drive.held.back().motion = follow(smooth_track(recording, marker, tracks, frame_time_s));
       drive.driving_markers.push_back(marker);
-      held.motion = follow(std::move(spline));
     }
-    drive.held.push_back(std::move(held));
   }
   return drive;
 }

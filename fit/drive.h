@@ -14,6 +14,11 @@ struct Drive {
   std::vector<int> driving_markers;  ///< markers whose own track drives a held point
 };
 
+/// Adds a point or an edge that stays where the start shape has it or, where `path` is given,
+/// follows that.
+void hold(const HeldPoint& point, const HeldPath* path, const Mesh& mesh,
+          std::vector<HeldVertexWeights>& held);
+
 /// Held points with their motion: `fixed` ones stay where the start shape has them, `path` ones
 /// follow their file, `tracked` ones a smoothing spline through their marker's 3D track (held-out
 /// frames included: the drive is an input, not a prediction). Throws InputError for a tracked point

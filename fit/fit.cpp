@@ -13,6 +13,7 @@
 #include "fit/problem.h"
 #include "fit/refine.h"
 #include "fit/report_residuals.h"
+#include "fit/simulation.h"
 #include "fit/uncertainty.h"
 #include "model/stability.h"
 
@@ -382,6 +383,8 @@ FitReport fit(const FitInput& input, const FitOptions& options, const ProgressCa
         std::max(longest_frame_s, problem.frame_time_s[f] - problem.frame_time_s[f - 1]);
   result.substeps = static_cast<int>(std::ceil(longest_frame_s / result.time_step_s - 1e-9));
   fill_parameters(problem, options, values, uncertainty, result);
+  report.model = describe_model(problem, input.recording, values);
+  report.model.time_step_s = result.time_step_s;
   fill_residuals(problem, trajectories.front(), report);
   for (const ObservationSet& set : problem.observations)
     result.observations_used += static_cast<int>(set.rows.size());

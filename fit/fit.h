@@ -8,6 +8,7 @@
 
 #include "data/camera_parameters.h"
 #include "data/fit_result.h"
+#include "data/model_description.h"
 #include "data/progress.h"
 #include "data/recording.h"
 #include "data/tracks.h"
@@ -51,6 +52,7 @@ struct FitReport {
   std::string message;  ///< one line for a person
   FitResult result;
   bool usable() const { return stop == FitStop::converged || stop == FitStop::reached_limit; }
+  ModelDescription model;  ///< what was found, with all that a simulation needs
 
   /// Correlations between the fitted parameters, in the order of `correlation_names`.
   std::vector<std::string> correlation_names;

@@ -3,12 +3,12 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
 #include <cassert>
 #include <cmath>
 
 #include "calib/projection.h"
 #include "data/input_error.h"
+#include "fit/cloth_setup.h"
 #include "fit/sheet_placement.h"
 #include "model/effects/registry.h"
 #include "model/simulate.h"
@@ -87,10 +87,7 @@ void add_masses(const Recording& recording, const Mesh& mesh, FitProblem& proble
   problem.mass_assumed = !cloth.mass_kg.has_value();
   problem.cloth_mass_kg =
       cloth.mass_kg.value_or(kAssumedDensityKgPerM2 * cloth.width_m * cloth.height_m);
-  const Mesh reference{cloth.mesh_columns, cloth.mesh_rows, cloth.width_m, cloth.height_m};
-  problem.cloth = Cloth::of(mesh, cloth.masses == MassDistribution::equal
-                                      ? masses_equal(mesh, reference, problem.cloth_mass_kg)
-                                      : masses_by_area(mesh, problem.cloth_mass_kg));
+  problem.cloth = make_cloth(cloth, mesh, problem.cloth_mass_kg);
 }
 
 /// Ranges of the search, from what the cloth must carry: a spring beside a held corner bears about
@@ -133,40 +130,6 @@ void add_fabric(const Recording& recording, const FitOptions& options, FitProble
   fabric.flexion_weft = bind("flexion_weft", "N/m", 0.01 * unit, 25 * unit);
   fabric.damping_warp = bind("damping_warp", "s", 1e-5, 2e-2);
   fabric.damping_weft = bind("damping_weft", "s", 1e-5, 2e-2);
-}
-
-/// The numbers given for an effect by the names of its own parameters: a vector [x, y, z] under
-/// NAME stands for NAME_x, NAME_y and NAME_z.
-std::map<std::string, double> by_parameter(
-    const EffectDescription& effect, const std::string& where,
-    const std::map<std::string, std::vector<double>>& given) {
-  const auto is_parameter = [&](const std::string& name) {
-    return std::ranges::find(effect.parameters, name, &EffectParameter::name) !=
-           effect.parameters.end();
-  };
-  std::map<std::string, double> numbers;
-  for (const auto& [key, values] : given) {
-    const bool is_vector = is_parameter(key + "_x");
-    if (!is_vector && !is_parameter(key)) {
-      std::string known;
-      for (const EffectParameter& parameter : effect.parameters)
-        known += (known.empty() ? "" : ", ") + parameter.name;
-      throw InputError(where, "effect " + effect.name + " has no parameter '" + key + "'",
-                       "its parameters are " + known);
-    }
-    const size_t expected = is_vector ? 3 : 1;
-    if (values.size() != expected)
-      throw InputError(
-          where, effect.name + "." + key + " has " + std::to_string(values.size()) + " numbers",
-          is_vector ? "a vector [x, y, z]" : "one number");
-    if (!is_vector) {
-      numbers[key] = values.front();
-      continue;
-    }
-    for (size_t axis = 0; axis < 3; ++axis)
-      numbers[key + std::array{"_x", "_y", "_z"}[axis]] = values[axis];
-  }
-  return numbers;
 }
 
 /// Adds an effect to the cloth and binds its parameters: to `given` values, else to the fit.
@@ -352,17 +315,20 @@ FitProblem make_problem(const FitInput& input, const FitOptions& options, int me
   return problem;
 }
 
-ParameterSet parameter_set(const FitProblem& problem, const Eigen::VectorXd& values) {
+Fabric fabric_of(const FitProblem& problem, const Eigen::VectorXd& values) {
   const FabricBindings& f = problem.fabric;
-  const Fabric fabric{.tension_warp_n_per_m = f.tension_warp.value(values),
-                      .tension_weft_n_per_m = f.tension_weft.value(values),
-                      .shear_n_per_m = f.shear.value(values),
-                      .flexion_warp_n_per_m = f.flexion_warp.value(values),
-                      .flexion_weft_n_per_m = f.flexion_weft.value(values),
-                      .damping_warp_s = f.damping_warp.value(values),
-                      .damping_weft_s = f.damping_weft.value(values)};
+  return {.tension_warp_n_per_m = f.tension_warp.value(values),
+          .tension_weft_n_per_m = f.tension_weft.value(values),
+          .shear_n_per_m = f.shear.value(values),
+          .flexion_warp_n_per_m = f.flexion_warp.value(values),
+          .flexion_weft_n_per_m = f.flexion_weft.value(values),
+          .damping_warp_s = f.damping_warp.value(values),
+          .damping_weft_s = f.damping_weft.value(values)};
+}
+
+ParameterSet parameter_set(const FitProblem& problem, const Eigen::VectorXd& values) {
   ParameterSet set;
-  set.springs = spring_parameters(fabric, problem.cloth.mesh);
+  set.springs = spring_parameters(fabric_of(problem, values), problem.cloth.mesh);
   set.gravity_m_per_s2 = problem.gravity_m_per_s2;
   if (!problem.tilt.empty()) {
     const Eigen::Vector3d turn =

@@ -9,6 +9,7 @@
 #include "fit/observations.h"
 #include "fit/parameter_space.h"
 #include "model/cloth.h"
+#include "model/fabric.h"
 #include "model/surface.h"
 
 namespace clothfit {
@@ -49,6 +50,9 @@ struct FitProblem {
 /// Throws InputError for a recording that cannot be fitted as it stands.
 FitProblem make_problem(const FitInput& input, const FitOptions& options, int mesh_columns,
                         int mesh_rows);
+
+/// The fabric for values of the parameters.
+Fabric fabric_of(const FitProblem& problem, const Eigen::VectorXd& values);
 
 /// The model's numbers for values of the parameters. The start shape is the placed sheet.
 ParameterSet parameter_set(const FitProblem& problem, const Eigen::VectorXd& values);

@@ -8,13 +8,17 @@
 namespace clothfit {
 
 /// An Eigen array of `rows` x a number of columns set when it is made, in aligned memory. Reads and
-/// writes like any other; assigning another array or expression takes on its size.
+/// writes like any other; assigning another array or expression takes on its size. A vector that
+/// begins inside may reach up to kPadding numbers past the last one; what stands there counts for
+/// nothing.
 template <class Number, int rows>
 class AlignedArray : public Eigen::Map<Eigen::Array<Number, rows, Eigen::Dynamic>> {
   using Plain = Eigen::Array<Number, rows, Eigen::Dynamic>;
   using Map = Eigen::Map<Plain>;
 
  public:
+  static constexpr int kPadding = 7;
+
   AlignedArray() : Map(nullptr, rows, 0) {}
   AlignedArray(Eigen::Index, Eigen::Index columns) : Map(nullptr, rows, 0) { resize(columns); }
   AlignedArray(const AlignedArray& other) : AlignedArray(rows, other.cols()) {
@@ -45,7 +49,7 @@ class AlignedArray : public Eigen::Map<Eigen::Array<Number, rows, Eigen::Dynamic
  private:
   /// Leaves zeros.
   void resize(Eigen::Index columns) {
-    numbers_ = AlignedNumbers<Number>(static_cast<std::size_t>(rows * columns));
+    numbers_ = AlignedNumbers<Number>(static_cast<std::size_t>(rows * columns + kPadding));
     look_at(columns);
   }
   void swap(AlignedArray& other) noexcept {

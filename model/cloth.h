@@ -9,6 +9,7 @@
 #include "model/fabric.h"
 #include "model/kernels/strain_limit.h"
 #include "model/mesh.h"
+#include "model/obstacle.h"
 
 namespace clothfit {
 
@@ -35,6 +36,7 @@ struct Cloth {
   Eigen::VectorXd mass_kg;  ///< per vertex, > 0
   std::vector<HeldVertexWeights> held;
   StrainLimit strain_limit;
+  std::shared_ptr<const Obstacle> obstacle;  ///< what contact_mesh feels; none unless set
   std::vector<EffectDescription> effect_descriptions;
   std::vector<std::shared_ptr<const Effect>> effects;  ///< in the order of the descriptions
 

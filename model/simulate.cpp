@@ -77,13 +77,23 @@ class LaneRun {
   LaneVectors<L> held_target_m_;
 };
 
-/// Calls `run(group, first)` for every group of up to kLanes parameter sets.
-template <class Run>
+/// Calls `run.operator()<L>(group, first)` for every group of parameter sets, in parallel: as many
+/// at once as lanes of a kind hold, a few left over one by one.
+template <class L, class Run>
 void for_lane_groups(std::span<const ParameterSet> parameters, const Run& run) {
-  const size_t groups = (parameters.size() + kLanes - 1) / kLanes;
-  tbb::parallel_for(size_t{0}, groups, [&](size_t g) {
-    const size_t first = g * kLanes;
-    run(parameters.subspan(first, std::min<size_t>(kLanes, parameters.size() - first)), first);
+  const size_t whole = parameters.size() / L::kCount, left = parameters.size() % L::kCount;
+  // Half of the lanes cost about as much as that many simulations vectorised over the cloth.
+  const size_t groups = whole + (left > L::kCount / 2 ? 1 : 0);
+  const size_t in_groups = std::min(groups * L::kCount, parameters.size());
+  tbb::parallel_for(size_t{0}, groups + parameters.size() - in_groups, [&](size_t g) {
+    if (g < groups) {
+      const size_t first = g * L::kCount;
+      run.template operator()<L>(
+          parameters.subspan(first, std::min<size_t>(L::kCount, in_groups - first)), first);
+    } else {
+      const size_t first = in_groups + g - groups;
+      run.template operator()<SingleLane>(parameters.subspan(first, 1), first);
+    }
   });
 }
 
@@ -103,12 +113,12 @@ int Schedule::substeps(int frame) const {
 }
 
 std::vector<SimulateResult> simulate(const Cloth& cloth, std::span<const ParameterSet> parameters,
-                                     const Schedule& schedule) {
+                                     const Schedule& schedule, Precision precision) {
   assert(schedule.time_step_s > 0);
   std::vector<SimulateResult> results(parameters.size());
   const size_t frames = schedule.frame_time_s.size();
-  for_lane_groups(parameters, [&](std::span<const ParameterSet> group, size_t first) {
-    LaneRun<ExactLanes> run(cloth, group);
+  const auto run_group = [&]<class L>(std::span<const ParameterSet> group, size_t first) {
+    LaneRun<L> run(cloth, group);
     for (size_t l = 0; l < group.size(); ++l) results[first + l].position_m.reserve(frames);
     for (size_t frame = 0; frame < frames; ++frame) {
       if (frame > 0)
@@ -131,7 +141,11 @@ std::vector<SimulateResult> simulate(const Cloth& cloth, std::span<const Paramet
         results[first + l].position_m.resize(frames, results[first + l].position_m.back());
       break;
     }
-  });
+  };
+  if (precision == Precision::exact)
+    for_lane_groups<ExactLanes>(parameters, run_group);
+  else
+    for_lane_groups<FastLanes>(parameters, run_group);
   return results;
 }
 
@@ -150,12 +164,13 @@ std::vector<Eigen::Matrix3Xd> relax(const Cloth& cloth, std::span<const Paramete
   const double duration_s = kPendulumTimes / pendulum_rate;
   const int steps = std::max(1, static_cast<int>(std::ceil(duration_s / time_step_s)));
   std::vector<Eigen::Matrix3Xd> shapes(parameters.size());
-  for_lane_groups(damped, [&](std::span<const ParameterSet> group, size_t first) {
-    LaneRun<ExactLanes> run(heavy, group);
-    run.settle(time_s, duration_s / steps, steps);
-    for (size_t l = 0; l < group.size(); ++l)
-      shapes[first + l] = run.state().position_m.lane(static_cast<int>(l));
-  });
+  for_lane_groups<ExactLanes>(
+      damped, [&]<class L>(std::span<const ParameterSet> group, size_t first) {
+        LaneRun<L> run(heavy, group);
+        run.settle(time_s, duration_s / steps, steps);
+        for (size_t l = 0; l < group.size(); ++l)
+          shapes[first + l] = run.state().position_m.lane(static_cast<int>(l));
+      });
   return shapes;
 }
 

@@ -30,10 +30,16 @@ struct SimulateResult {
 /// from where it started. All 3 x vertices.
 bool left_the_scene(const Eigen::Matrix3Xd& now, const Eigen::Matrix3Xd& start, const Mesh& mesh);
 
-/// Simulates every parameter set, kLanes at a time, groups of lanes in parallel. A result does not
-/// depend on the number of sets, their order or the number of threads.
+/// `exact`: strict double, the same bits on every processor; what results come from. `fast`: float,
+/// for screening; a few tenths of a millimetre off after a second of a swinging cloth, and not the
+/// same bits on every processor.
+enum class Precision { exact, fast };
+
+/// Simulates every parameter set, several side by side in lanes, groups of lanes in parallel. With
+/// `exact` a result does not depend on the number of sets, their order or the number of threads.
 std::vector<SimulateResult> simulate(const Cloth& cloth, std::span<const ParameterSet> parameters,
-                                     const Schedule& schedule);
+                                     const Schedule& schedule,
+                                     Precision precision = Precision::exact);
 
 /// The shape in which the cloth hangs still: the start positions relaxed under gravity with heavy
 /// viscous damping (critical for the pendulum of the cloth's height), held points where `motion`

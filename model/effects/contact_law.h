@@ -35,7 +35,8 @@ struct Contact {
     const Real none(0.0);
     const Real leaving = dot(normal, velocity_m_per_s);
     Real pressure = stiffness_pa_per_m * depth_m - damping_pa_s_per_m * leaving;
-    pressure = select(pressure > none, pressure, none);
+    // At neutral, where it is exactly nothing, its derivative by the stiffness is that of a push.
+    pressure = select(pressure < none, none, pressure);
     const Real press_n = Real(area_m2) * select(depth_m > none, pressure, none);
 
     const Vector3<Real> sliding = velocity_m_per_s - leaving * normal;

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
+#include <vector>
 
 #include "model/aligned_numbers.h"
 #include "model/lanes.h"
@@ -56,6 +58,9 @@ struct SpringFactors {
 /// starts from the processor's estimate (4e-7), so they differ between processors. Compiled for
 /// several instruction sets; the processor's best is taken when the program starts.
 ///
+/// A SingleLane's vectors hold neighbouring vertices of the one simulation; its sums run in the
+/// same order, so it has the bits of ExactLanes.
+///
 /// Holds scratch memory: one object per thread.
 template <class L = ExactLanes>
 class ClothSweep {
@@ -77,6 +82,8 @@ class ClothSweep {
 
  private:
   Mesh mesh_;
+  /// Of a single lane: bit k of entry v is set where a spring of the type leaves vertex v + k.
+  std::array<std::vector<std::uint8_t>, kSpringTypes> leaving_;
   AlignedNumbers<typename L::Number> scratch_;  ///< forces on vertices that are not reached yet
 };
 

@@ -26,16 +26,17 @@ HWY_INLINE Vector3<V> force(const Vector3<V>& pull) {
 }
 
 /// Walks over the vertices in row-major order, for the lanes from `lane` on that fit into a vector.
-/// `pull_to(type, vertex, self, offset)` is what the spring of that type that leaves the vertex
-/// (its element is `self`) pulls it with, added to and subtracted from a Vector3; `sink(vertex,
-/// self, sum)` takes the sum over its springs. The sink may move the vertex: no spring of a later
-/// one reaches back to it.
-template <class L, class PullTo, class Sink>
+/// `pull_to(type, vertex, here, element)` is what the spring of that type that leaves the
+/// vertex (its element is `self`) pulls it with, added to and subtracted from a Vector3;
+/// `sink(vertex, self, sum)` takes the sum over its springs. The sink may move the vertex: no
+/// spring of a later one reaches back to it.
+template <class L, class Here, class PullTo, class Sink>
 HWY_INLINE void sweep_rows(const Mesh& mesh, std::ptrdiff_t lane, typename L::Number* scratch,
-                           const PullTo& pull_to, const Sink& sink) {
+                           const Here& here_at, const PullTo& pull_to, const Sink& sink) {
   using Number = typename L::Number;
   using V = Vector<L>;
-  using Pull = decltype(pull_to(size_t{}, std::ptrdiff_t{}, std::ptrdiff_t{}, std::ptrdiff_t{}));
+  using Pull =
+      decltype(pull_to(size_t{}, std::ptrdiff_t{}, here_at(std::ptrdiff_t{}), std::ptrdiff_t{}));
   const Tag<L> d;
   constexpr std::ptrdiff_t kLaneCount = L::kCount;
   const std::ptrdiff_t columns = mesh.columns, rows = mesh.rows;
@@ -55,40 +56,41 @@ HWY_INLINE void sweep_rows(const Mesh& mesh, std::ptrdiff_t lane, typename L::Nu
     for (std::ptrdiff_t j = 0; j < columns; ++j) {
       const std::ptrdiff_t at = j * kLaneCount + lane, self = i * width + at;
       const std::ptrdiff_t vertex = i * columns + j;
+      const auto here = here_at(self);
       Vector3<V> sum = zero(d) - (load(d, from_above, at) + load(d, from_two_above, at));
       sum = sum - right;
       sum = sum - right_two;
       right_two = right_two_next;
       if (j + 1 < columns) {
-        right = pull_to(structural_s, vertex, self, kLaneCount);
+        right = pull_to(structural_s, vertex, here, self + kLaneCount);
         sum = sum + right;
       }
       if (j + 2 < columns) {
-        right_two_next = pull_to(flexion_s, vertex, self, 2 * kLaneCount);
+        right_two_next = pull_to(flexion_s, vertex, here, self + 2 * kLaneCount);
         sum = sum + right_two_next;
       }
       if (two_below) {
-        const Pull down_two = pull_to(flexion_t, vertex, self, 2 * width);
+        const Pull down_two = pull_to(flexion_t, vertex, here, self + 2 * width);
         sum = sum + down_two;
         store(force(down_two), d, from_two_above, at);
       }
       if (one_below) {
         if (j > 0) {
-          const Pull down_left = pull_to(shear_up, vertex, self, width - kLaneCount);
+          const Pull down_left = pull_to(shear_up, vertex, here, self + width - kLaneCount);
           sum = sum + down_left;
           store(to_below + down_left, d, from_above, at - kLaneCount);
         }
-        const Pull down = pull_to(structural_t, vertex, self, width);
+        const Pull down = pull_to(structural_t, vertex, here, self + width);
         sum = sum + down;
         to_below = force(down) + down_right;
         if (j + 1 < columns) {
-          down_right = pull_to(shear_down, vertex, self, width + kLaneCount);
+          down_right = pull_to(shear_down, vertex, here, self + width + kLaneCount);
           sum = sum + down_right;
         } else {
           store(to_below, d, from_above, at);
         }
       }
-      sink(vertex, self, sum);
+      sink(vertex, self, here, sum);
     }
   }
 }

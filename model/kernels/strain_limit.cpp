@@ -32,6 +32,7 @@ struct LimitArrays {
   const std::array<std::array<VertexSet, 2>, kSpringTypes>& groups;
   std::array<VertexSet, kSpringTypes>& too_long;
   VertexSet& moved;
+  std::vector<std::int32_t>& found;
   std::array<Number*, 3> position_m;
   std::array<Number*, 3> velocity_m_per_s;  ///< null: not corrected
   std::vector<LimitMove>* moves = nullptr;  ///< of a single lane, where they are asked for
@@ -44,6 +45,15 @@ struct LimitArrays {
 
 inline void insert(VertexSet& set, std::ptrdiff_t vertex) {
   set[static_cast<size_t>(vertex / 64)] |= std::uint64_t{1} << (vertex % 64);
+}
+
+/// Inserts the vertices `first` + k for every bit k of `bits`.
+inline void insert(VertexSet& set, std::ptrdiff_t first, std::uint64_t bits) {
+  const auto word = static_cast<size_t>(first / 64);
+  const auto shift = static_cast<int>(first % 64);
+  const std::uint64_t beyond = shift > 0 ? bits >> (64 - shift) : 0;
+  if (bits << shift != 0) set[word] |= bits << shift;
+  if (beyond != 0) set[word + 1] |= beyond;
 }
 
 /// Word `w` of the set of vertices v with v + offset in `set`.
@@ -108,10 +118,9 @@ HWY_INLINE void look(LimitArrays<L>& arrays, std::ptrdiff_t lane) {
   }
 }
 
-/// The springs of one type in the lanes from `lane` on.
+/// What the springs of one type are held to, and by which shares.
 template <class L>
 struct TypeLimit {
-  int type;
   std::ptrdiff_t offset;  ///< from a spring's first end to its second, in vertices
   Vector<L> longest, longest2;
   const typename L::Number* first_share;
@@ -139,8 +148,6 @@ HWY_INLINE void shorten(LimitArrays<L>& arrays, const TypeLimit<L>& type, std::p
     length2[s] = squared_length(along[s]);
     exceeds[s] = hn::And(active, hn::Gt(length2[s], type.longest2));
     shortened = hn::Add(shortened, hn::IfThenElseZero(exceeds[s], one));
-    insert(arrays.moved, vertices[s]);
-    insert(arrays.moved, vertices[s] + type.offset);
   }
   if constexpr (kMayContract<V>) {
     twice_inverse_square_roots(length2, excess);
@@ -150,18 +157,6 @@ HWY_INLINE void shorten(LimitArrays<L>& arrays, const TypeLimit<L>& type, std::p
     V inverse[n];
     inverse_square_roots(length2, inverse);
     for (size_t s = 0; s < n; ++s) excess[s] = minus_product(one, type.longest, inverse[s]);
-    if constexpr (L::kCount == 1) {
-      for (size_t s = 0; s < n && arrays.moves != nullptr; ++s)
-        arrays.moves->push_back({.type = type.type,
-                                 .first = vertices[s],
-                                 .second = static_cast<int>(vertices[s] + type.offset),
-                                 .first_share = type.first_share[vertices[s]],
-                                 .second_share = type.second_share[vertices[s]],
-                                 .along_m = {hn::GetLane(along[s].x), hn::GetLane(along[s].y),
-                                             hn::GetLane(along[s].z)},
-                                 .excess = hn::GetLane(excess[s]),
-                                 .inverse_length_per_m = hn::GetLane(inverse[s])});
-    }
   }
   const auto move = [&](size_t s, const std::array<Number*, 3>& of, const V& share) HWY_ATTR {
     // Lanes that do not exceed keep their bits.
@@ -191,43 +186,167 @@ HWY_INLINE void visit(LimitArrays<L>& arrays, size_t type, std::ptrdiff_t lane) 
   const V tolerated = hn::LoadU(d, arrays.limits.tolerated_m[type].data() + lane);
   const V allowed = pass == Pass::sweep ? longest : tolerated;
   const V allowed2 = hn::Mul(allowed, allowed);
-  const TypeLimit<L> limit{static_cast<int>(type), offset, longest, allowed2, arrays.shares[type].first.data(),
+  const TypeLimit<L> limit{offset, longest, allowed2, arrays.shares[type].first.data(),
                            arrays.shares[type].second.data()};
   const Mask active = hn::Gt(hn::LoadU(d, arrays.active.data() + lane), hn::Zero(d));
   V shortened = hn::LoadU(d, arrays.shortened.data() + lane);
   V intolerable = hn::LoadU(d, arrays.intolerable.data() + lane);
 
   for (const VertexSet& group : arrays.groups[type]) {
+    // Those that do exceed are listed first, without a branch that would be hard to foresee, and
+    // then shortened several at once: the springs of a group share no vertex.
+    std::int32_t* const found = arrays.found.data();
+    size_t count = 0;
     for (size_t w = 0; w + 1 < group.size(); ++w) {
-      // The springs of a group share no vertex: none of them makes another worth a visit.
-      std::uint64_t left = group[w] & (arrays.too_long[type][w] | arrays.moved[w] |
-                                       word_before(arrays.moved, w, offset));
-      // Those that do exceed are listed first, without a branch that would be hard to foresee, and
-      // then shortened several at once.
-      std::int32_t found[64 + 1];
-      size_t count = 0;
-      for (; left != 0; left &= left - 1) {
-        const int vertex = static_cast<int>(w) * 64 + std::countr_zero(left);
-        const std::ptrdiff_t self = std::ptrdiff_t{vertex} * L::kCount + lane;
+      const std::uint64_t moved =
+          group[w] & (arrays.moved[w] | word_before(arrays.moved, w, offset));
+      const std::uint64_t too_long = group[w] & arrays.too_long[type][w];
+      // One that was too long and has not been touched since still is.
+      std::uint64_t exceeding = pass == Pass::sweep ? too_long & ~moved : 0;
+      for (std::uint64_t left = pass == Pass::sweep ? moved : moved | too_long; left != 0;
+           left &= left - 1) {
+        const int bit = std::countr_zero(left);
+        const std::ptrdiff_t self = static_cast<std::ptrdiff_t>(w * 64 + bit) * L::kCount + lane;
         const Vector3<V> along =
             load(d, position, self + offset * L::kCount) - load(d, position, self);
         const Mask exceeds = hn::And(active, hn::Gt(squared_length(along), allowed2));
         if constexpr (pass == Pass::check)
           intolerable = hn::IfThenElse(exceeds, hn::Set(d, Number{1}), intolerable);
-        found[count] = vertex;
-        count += hn::AllFalse(d, exceeds) ? 0 : 1;
+        else
+          exceeding |= static_cast<std::uint64_t>(!hn::AllFalse(d, exceeds)) << bit;
       }
-      if constexpr (pass == Pass::sweep) {
-        constexpr size_t kAtOnce = 4;
-        size_t n = 0;
-        for (; n + kAtOnce <= count; n += kAtOnce)
-          shorten<L, kAtOnce>(arrays, limit, lane, active, found + n, shortened);
-        for (; n < count; ++n) shorten<L, 1>(arrays, limit, lane, active, found + n, shortened);
-      }
+      insert(arrays.moved, static_cast<std::ptrdiff_t>(w * 64), exceeding);
+      insert(arrays.moved, static_cast<std::ptrdiff_t>(w * 64) + offset, exceeding);
+      for (; exceeding != 0; exceeding &= exceeding - 1)
+        found[count++] = static_cast<int>(w) * 64 + std::countr_zero(exceeding);
+    }
+    if constexpr (pass == Pass::sweep) {
+      constexpr size_t kAtOnce = 4;
+      size_t n = 0;
+      for (; n + kAtOnce <= count; n += kAtOnce)
+        shorten<L, kAtOnce>(arrays, limit, lane, active, found + n, shortened);
+      for (; n < count; ++n) shorten<L, 1>(arrays, limit, lane, active, found + n, shortened);
     }
   }
   hn::StoreU(shortened, d, arrays.shortened.data() + lane);
   hn::StoreU(intolerable, d, arrays.intolerable.data() + lane);
+}
+
+// One simulation: the numbers of a vector are neighbouring vertices.
+
+using Neighbours = Tag<ExactLanes>;
+
+HWY_INLINE std::uint64_t bits_of(const hn::Mask<Neighbours>& mask) {
+  std::uint8_t bits[8] = {};
+  hn::StoreMaskBits(Neighbours(), mask, bits);
+  return bits[0];
+}
+
+HWY_INLINE void look_along(LimitArrays<SingleLane>& arrays) {
+  const Neighbours d;
+  const auto size = static_cast<std::ptrdiff_t>(hn::Lanes(d));
+  const std::array<const double*, 3> position = {arrays.position_m[0], arrays.position_m[1],
+                                                 arrays.position_m[2]};
+  for (size_t type = 0; type < kSpringTypes; ++type) {
+    const std::ptrdiff_t offset = offset_of(arrays.mesh, type);
+    const double longest = arrays.limits.longest_m[type][0];
+    const auto allowed2 = hn::Set(d, longest * longest);
+    for (std::ptrdiff_t at = 0; at + offset < arrays.mesh.vertex_count(); at += size) {
+      const auto along = load(d, position, at + offset) - load(d, position, at);
+      arrays.too_long[type][static_cast<size_t>(at / 64)] |=
+          bits_of(hn::Gt(dot(along, along), allowed2)) << (at % 64);
+    }
+  }
+}
+
+template <class V>
+HWY_INLINE void store_where(const hn::Mask<Neighbours>& mask, const Vector3<V>& v, Neighbours d,
+                            const std::array<double*, 3>& to, std::ptrdiff_t at) {
+  hn::BlendedStore(v.x, mask, d, to[0] + at);
+  hn::BlendedStore(v.y, mask, d, to[1] + at);
+  hn::BlendedStore(v.z, mask, d, to[2] + at);
+}
+
+template <class V>
+void note_moves(LimitArrays<SingleLane>& arrays, size_t type, std::ptrdiff_t at,
+                std::uint64_t found, const Vector3<V>& along, const V& excess, const V& inverse) {
+  const Neighbours d;
+  double x[8], y[8], z[8], excesses[8], inverses[8];
+  hn::StoreU(along.x, d, x);
+  hn::StoreU(along.y, d, y);
+  hn::StoreU(along.z, d, z);
+  hn::StoreU(excess, d, excesses);
+  hn::StoreU(inverse, d, inverses);
+  for (; found != 0; found &= found - 1) {
+    const int k = std::countr_zero(found);
+    const auto vertex = static_cast<size_t>(at + k);
+    arrays.moves->push_back({.type = static_cast<int>(type),
+                             .first = static_cast<int>(vertex),
+                             .second = static_cast<int>(at + k + offset_of(arrays.mesh, type)),
+                             .first_share = arrays.shares[type].first[vertex],
+                             .second_share = arrays.shares[type].second[vertex],
+                             .along_m = {x[k], y[k], z[k]},
+                             .excess = excesses[k],
+                             .inverse_length_per_m = inverses[k]});
+  }
+}
+
+template <Pass pass>
+HWY_INLINE void visit_along(LimitArrays<SingleLane>& arrays, size_t type) {
+  const Neighbours d;
+  using V = hn::Vec<Neighbours>;
+  constexpr size_t kWordBits = 64;
+  const auto size = static_cast<int>(hn::Lanes(d));
+  const std::ptrdiff_t offset = offset_of(arrays.mesh, type);
+  const std::array<double*, 3> position = arrays.position_m, velocity = arrays.velocity_m_per_s;
+  const double allowed_m =
+      (pass == Pass::sweep ? arrays.limits.longest_m : arrays.limits.tolerated_m)[type][0];
+  const V allowed2 = hn::Set(d, allowed_m * allowed_m);
+  const V longest = hn::Set(d, arrays.limits.longest_m[type][0]);
+  const V one = hn::Set(d, 1.0), steps_per_s = hn::Set(d, arrays.steps_per_s);
+  if (!(arrays.active[0] > 0)) return;
+
+  for (const VertexSet& group : arrays.groups[type]) {
+    for (size_t w = 0; w + 1 < group.size(); ++w) {
+      std::uint64_t left = group[w] & (arrays.too_long[type][w] | arrays.moved[w] |
+                                       word_before(arrays.moved, w, offset));
+      while (left != 0) {
+        const int shift = std::countr_zero(left) / size * size;
+        const std::uint8_t wanted = static_cast<std::uint8_t>((left >> shift) & ((1u << size) - 1));
+        left &= ~(std::uint64_t{wanted} << shift);
+        const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(w * kWordBits) + shift;
+        const Vector3<V> a = load(d, position, at), b = load(d, position, at + offset);
+        const Vector3<V> along = b - a;
+        const V length2 = dot(along, along);
+        const auto exceeds = hn::And(hn::LoadMaskBits(d, &wanted), hn::Gt(length2, allowed2));
+        const std::uint64_t found = bits_of(exceeds);
+        if (found == 0) continue;
+        if constexpr (pass == Pass::check) {
+          arrays.intolerable[0] = 1;
+          return;
+        }
+        arrays.shortened[0] += std::popcount(found);
+        insert(arrays.moved, at, found);
+        insert(arrays.moved, at + offset, found);
+        const V inverse = inverse_square_root(length2);
+        const V excess = minus_product(one, longest, inverse);
+        const V first_share = hn::LoadU(d, arrays.shares[type].first.data() + at);
+        const V second_share = hn::LoadU(d, arrays.shares[type].second.data() + at);
+        if (arrays.moves != nullptr) note_moves(arrays, type, at, found, along, excess, inverse);
+        const auto move = [&](const std::array<double*, 3>& of, const Vector3<V>& from,
+                              const Vector3<V>& to, const V& share) HWY_ATTR {
+          // Neither end of a spring is among the other ends, so what is stored second stands.
+          store_where(exceeds, mul_add(hn::Mul(share, first_share), along, from), d, of, at);
+          store_where(exceeds, minus_product(to, hn::Mul(share, second_share), along), d, of,
+                      at + offset);
+        };
+        move(position, a, b, excess);
+        if (velocity[0] != nullptr)
+          move(velocity, load(d, velocity, at), load(d, velocity, at + offset),
+               hn::Mul(steps_per_s, excess));
+      }
+    }
+  }
 }
 
 template <class L, class Act>
@@ -239,14 +358,21 @@ HWY_INLINE void for_all_lanes(const Act& act) {
 
 template <class L>
 HWY_INLINE void look(LimitArrays<L>& arrays) {
-  for_all_lanes<L>([&](std::ptrdiff_t lane) HWY_ATTR { look(arrays, lane); });
+  if constexpr (L::kCount == 1)
+    look_along(arrays);
+  else
+    for_all_lanes<L>([&](std::ptrdiff_t lane) HWY_ATTR { look(arrays, lane); });
 }
 
 template <class L, Pass pass>
 HWY_INLINE void visit(LimitArrays<L>& arrays) {
-  for_all_lanes<L>([&](std::ptrdiff_t lane) HWY_ATTR {
-    for (size_t type = 0; type < kSpringTypes; ++type) visit<L, pass>(arrays, type, lane);
-  });
+  if constexpr (L::kCount == 1) {
+    for (size_t type = 0; type < kSpringTypes; ++type) visit_along<pass>(arrays, type);
+  } else {
+    for_all_lanes<L>([&](std::ptrdiff_t lane) HWY_ATTR {
+      for (size_t type = 0; type < kSpringTypes; ++type) visit<L, pass>(arrays, type, lane);
+    });
+  }
 }
 
 void look_exact(LimitArrays<ExactLanes>& arrays) {
@@ -340,10 +466,12 @@ StrainLimiter<L>::StrainLimiter(const Mesh& mesh, const Eigen::VectorXd& inverse
   using Number = typename L::Number;
   const auto vertices = static_cast<size_t>(mesh.vertex_count());
   moved_.resize(vertices / 64 + 2);
+  found_.resize(vertices + 1);
   for (size_t type = 0; type < kSpringTypes; ++type) {
     const auto [down, right] = kSpringReach[type];
-    shares_[type].first.resize(vertices);
-    shares_[type].second.resize(vertices);
+    constexpr size_t kPadding = 8;  // a vector of neighbours may reach past the last one
+    shares_[type].first.resize(vertices + kPadding);
+    shares_[type].second.resize(vertices + kPadding);
     too_long_[type].resize(moved_.size());
     for (VertexSet& group : groups_[type]) group.resize(moved_.size());
     for (int i = 0; i + down < mesh.rows; ++i) {
@@ -373,6 +501,7 @@ LimitOutcome<L> StrainLimiter<L>::limit_positions(const LaneLimits<L>& limits,
                         .groups = groups_,
                         .too_long = too_long_,
                         .moved = moved_,
+                        .found = found_,
                         .position_m = position_m.data(),
                         .velocity_m_per_s = {},
                         .moves = moves};
@@ -392,6 +521,7 @@ LimitOutcome<L> StrainLimiter<L>::limit_consistently(const LaneLimits<L>& limits
                         .groups = groups_,
                         .too_long = too_long_,
                         .moved = moved_,
+                        .found = found_,
                         .position_m = position_m.data(),
                         .velocity_m_per_s = velocity_m_per_s.data(),
                         .moves = moves,

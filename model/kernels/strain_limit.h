@@ -101,6 +101,7 @@ class StrainLimiter {
   std::array<std::array<VertexSet, 2>, kSpringTypes> groups_;
   std::array<VertexSet, kSpringTypes> too_long_;  ///< at the first look, in any lane
   VertexSet moved_;                               ///< since then, in any lane
+  std::vector<std::int32_t> found_;               ///< scratch: where springs to shorten begin
 };
 
 }  // namespace clothfit

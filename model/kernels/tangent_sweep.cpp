@@ -129,39 +129,64 @@ void linearise(const LineariseArrays& from, const TypeArrays& to) {
 /// How the types' constants change the tensions: not at all, each spring's alike, or by factors.
 enum class Constants { still, change, change_by_factors };
 
+/// The derivative of a vertex's position and velocity.
+struct Motion {
+  Vector3<Vector<ExactLanes>> position, velocity;
+};
+
+template <class V>
+HWY_INLINE Vector3<V> fused(const V& a, const Vector3<V>& b, const Vector3<V>& c) {
+  return {hn::MulAdd(a, b.x, c.x), hn::MulAdd(a, b.y, c.y), hn::MulAdd(a, b.z, c.z)};
+}
+
+template <class V>
+HWY_INLINE V fused_dot(const Vector3<V>& a, const Vector3<V>& b) {
+  return hn::MulAdd(a.z, b.z, hn::MulAdd(a.y, b.y, hn::Mul(a.x, b.x)));
+}
+
 template <Constants constants, class Sink>
 HWY_INLINE void sweep_tangents(const TangentArrays& arrays, const Sink& sink) {
   using L = ExactLanes;
   using V = Vector<L>;
   const Tag<L> d;
   const ConstVectors positions = arrays.position_m, velocities = arrays.velocity_m_per_s;
+  const std::array<TypeArrays, kSpringTypes> types = arrays.types;
   std::fill_n(arrays.scratch, kScratchRows * arrays.mesh.columns * kLanes, 0.0);
   for (std::ptrdiff_t lane = 0; lane < kLanes; lane += static_cast<std::ptrdiff_t>(hn::Lanes(d))) {
-    const auto pull_to = [&](size_t type, std::ptrdiff_t vertex, std::ptrdiff_t self,
-                             std::ptrdiff_t offset) HWY_ATTR {
-      const TypeArrays& of = arrays.types[type];
+    V dampings[kSpringTypes], by_natural[kSpringTypes], by_stiffness[kSpringTypes],
+        by_damping[kSpringTypes];
+    for (size_t type = 0; type < kSpringTypes; ++type) {
+      dampings[type] = hn::Set(d, arrays.damping_ns_per_m[type]);
+      by_natural[type] = hn::LoadU(d, arrays.springs.natural_length_m[type].data() + lane);
+      by_stiffness[type] = hn::LoadU(d, arrays.springs.stiffness_n_per_m[type].data() + lane);
+      by_damping[type] = hn::LoadU(d, arrays.springs.damping_ns_per_m[type].data() + lane);
+    }
+    const auto motion_at = [&](std::ptrdiff_t element) HWY_ATTR {
+      return Motion{load(d, positions, element), load(d, velocities, element)};
+    };
+    const auto pull_to = [&](size_t type, std::ptrdiff_t vertex, const Motion& here,
+                             std::ptrdiff_t element) HWY_ATTR {
+      const TypeArrays& of = types[type];
       const auto at = [&](const double* array) HWY_ATTR { return hn::Set(d, array[vertex]); };
-      const Vector3<V> along = load(d, positions, self + offset) - load(d, positions, self);
-      const Vector3<V> rate = load(d, velocities, self + offset) - load(d, velocities, self);
+      const Motion there = motion_at(element);
+      const Vector3<V> along = there.position - here.position;
+      const Vector3<V> rate = there.velocity - here.velocity;
       const Vector3<V> u{at(of.direction[0]), at(of.direction[1]), at(of.direction[2])};
       const Vector3<V> w{at(of.w[0]), at(of.w[1]), at(of.w[2])};
-      const V damping = hn::Set(d, arrays.damping_ns_per_m[type]);
-      V tension = hn::Add(dot(w, along), hn::Mul(damping, dot(u, rate)));
+      V tension = hn::MulAdd(dampings[type], fused_dot(u, rate), fused_dot(w, along));
       if constexpr (constants != Constants::still) {
-        V natural = hn::LoadU(d, arrays.springs.natural_length_m[type].data() + lane);
-        V stiffness = hn::LoadU(d, arrays.springs.stiffness_n_per_m[type].data() + lane);
+        V natural = by_natural[type], stiffness = by_stiffness[type];
         if constexpr (constants == Constants::change_by_factors) {
           natural = hn::Mul(natural, hn::Set(d, arrays.factors->natural_length[type][vertex]));
           stiffness = hn::Mul(stiffness, hn::Set(d, arrays.factors->stiffness[type][vertex]));
         }
-        const V dampings = hn::LoadU(d, arrays.springs.damping_ns_per_m[type].data() + lane);
-        tension = hn::Add(tension, hn::Sub(hn::Add(hn::Mul(at(of.elongation_m), stiffness),
-                                                   hn::Mul(at(of.stretching_m_per_s), dampings)),
-                                           hn::Mul(at(of.stiffness), natural)));
+        tension = hn::MulAdd(at(of.elongation_m), stiffness, tension);
+        tension = hn::MulAdd(at(of.stretching_m_per_s), by_damping[type], tension);
+        tension = hn::NegMulAdd(at(of.stiffness), natural, tension);
       }
-      return at(of.tension_ratio) * along + tension * u;
+      return fused(tension, u, at(of.tension_ratio) * along);
     };
-    sweep_rows<L>(arrays.mesh, lane, arrays.scratch, pull_to, sink);
+    sweep_rows<L>(arrays.mesh, lane, arrays.scratch, motion_at, pull_to, sink);
   }
 }
 
@@ -179,8 +204,9 @@ void add_tangents(const TangentArrays& arrays, const MutableVectors& force_n) {
   using V = Vector<ExactLanes>;
   const Tag<ExactLanes> d;
   const MutableVectors out = force_n;
-  sweep_tangents(arrays, [&](std::ptrdiff_t, std::ptrdiff_t self, const Vector3<V>& sum)
-                             HWY_ATTR { store(load(d, out, self) + sum, d, out, self); });
+  sweep_tangents(arrays,
+                 [&](std::ptrdiff_t, std::ptrdiff_t self, const Motion&, const Vector3<V>& sum)
+                     HWY_ATTR { store(load(d, out, self) + sum, d, out, self); });
 }
 
 void step_tangents(const TangentArrays& arrays, const TangentEuler& euler) {
@@ -189,16 +215,15 @@ void step_tangents(const TangentArrays& arrays, const TangentEuler& euler) {
   const TangentEuler to = euler;
   const V h = hn::Set(d, to.time_step_s);
   const bool any_effect = to.effect_force_n[0] != nullptr;
-  sweep_tangents(
-      arrays, [&](std::ptrdiff_t vertex, std::ptrdiff_t self, const Vector3<V>& springs) HWY_ATTR {
-        const Vector3<V> sum = any_effect ? springs + load(d, to.effect_force_n, self) : springs;
-        const Vector3<V> gravity = load(d, to.gravity_m_per_s2, self % kLanes);
-        const V inverse_mass = hn::Set(d, to.inverse_mass_per_kg[vertex]);
-        const Vector3<V> velocity =
-            load(d, to.velocity_m_per_s, self) + h * (gravity + inverse_mass * sum);
-        store(velocity, d, to.velocity_m_per_s, self);
-        store(load(d, to.position_m, self) + h * velocity, d, to.position_m, self);
-      });
+  sweep_tangents(arrays, [&](std::ptrdiff_t vertex, std::ptrdiff_t self, const Motion& motion,
+                             const Vector3<V>& springs) HWY_ATTR {
+    const Vector3<V> sum = any_effect ? springs + load(d, to.effect_force_n, self) : springs;
+    const Vector3<V> gravity = load(d, to.gravity_m_per_s2, self % kLanes);
+    const V inverse_mass = hn::Set(d, to.inverse_mass_per_kg[vertex]);
+    const Vector3<V> velocity = fused(h, fused(inverse_mass, sum, gravity), motion.velocity);
+    store(velocity, d, to.velocity_m_per_s, self);
+    store(fused(h, velocity, motion.position), d, to.position_m, self);
+  });
 }
 
 void transpose(const TypeArrays& of, const TransposedArrays& arrays) {

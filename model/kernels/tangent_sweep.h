@@ -18,6 +18,9 @@ namespace clothfit {
 ///   dF = T / l dL + u (w . dL + c u . dV + (l - l0) dk - k dl0 + (u . V) dc),
 ///   w = (k - T / l) u + c / l (V - u (u . V)).
 ///
+/// Products may be fused with sums, so derivatives differ in their last bits between processors with
+/// and without such an operation.
+///
 /// Holds scratch memory: one object per thread.
 class TangentSweep {
  public:

@@ -5,12 +5,15 @@
 #include <signal.h>
 
 #include <chrono>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <thread>
 
 #include "data/fit_result.h"
 #include "data/recording.h"
+#include "data/tracks.h"
+#include "model/surface.h"
 #include "tests/apps/program_run.h"
 #include "tests/apps/scratch_folder.h"
 
@@ -57,6 +60,46 @@ TEST(ProgramFit, WritesAWholeResultFolder) {
   ASSERT_FALSE(result.errors.empty());
   EXPECT_GT(result.errors[0].held_out.count, 0);
   EXPECT_THAT(read_text(here.path() / "a.fit" / "report.html"), HasSubstr("<h2>Parameters</h2>"));
+}
+
+TEST(ProgramSimulate, OfAFitGivesTheFitsOwnError) {
+  const test::ScratchFolder here("simulate_fit");
+  const fs::path source = kBundled / "swing_plain";
+  ASSERT_EQ(run_program(small_fit(source.string(), "a.fit"), here.path()).exit_code, 0);
+
+  const ProgramRun run =
+      run_program({"simulate", "--fit", "a.fit", "--format", "csv"}, here.path());
+
+  ASSERT_EQ(run.exit_code, 0) << run.error;
+  EXPECT_THAT(run.out, HasSubstr("as the model says"));
+  const FitResult fit = read_fit_result(here.path() / "a.fit" / "fit.json");
+  const Recording measured = read_recording(source);
+  const Recording simulated = read_recording(here.path() / "swing_plain.simulation");
+  EXPECT_EQ(simulated.markers.markers.size(), 81u);
+  // The vertices' tracks, read back, looked at where the markers are.
+  std::vector<Eigen::Matrix3Xd> mesh;
+  for (const Position3d& row : read_tracks3d(*simulated.tracks3d, simulated.markers)) {
+    if (row.marker == 0) mesh.emplace_back(3, 81);
+    mesh.back().col(row.marker) = row.position_m;
+  }
+  Eigen::Matrix2Xd places(2, static_cast<Eigen::Index>(measured.markers.markers.size()));
+  for (std::size_t m = 0; m < measured.markers.markers.size(); ++m)
+    places.col(static_cast<Eigen::Index>(m)) << measured.markers.markers[m].s_m,
+        measured.markers.markers[m].t_m;
+  const Surface surface = make_surface(9, 9, 0.4, 0.4, places);
+  double fitted = 0, held_out = 0;
+  int fitted_count = 0, held_out_count = 0;
+  for (const Position3d& row : read_tracks3d(*measured.tracks3d, measured.markers)) {
+    const Eigen::Matrix3Xd at = surface.evaluate(mesh[static_cast<std::size_t>(row.frame)]);
+    const bool is_held_out = row.frame >= *measured.held_out_from_frame;
+    (is_held_out ? held_out : fitted) += (at.col(row.marker) - row.position_m).squaredNorm();
+    ++(is_held_out ? held_out_count : fitted_count);
+  }
+  ASSERT_EQ(fitted_count, fit.errors[0].fitted.count);
+  ASSERT_EQ(held_out_count, fit.errors[0].held_out.count);
+  // The pose's rounding, 1e-16, is all that differs.
+  EXPECT_NEAR(std::sqrt(fitted / fitted_count), fit.errors[0].fitted.rms_distance, 1e-9);
+  EXPECT_NEAR(std::sqrt(held_out / held_out_count), fit.errors[0].held_out.rms_distance, 1e-9);
 }
 
 TEST(ProgramFit, GivesTheSameBytesOnOneThreadAndOnTwo) {

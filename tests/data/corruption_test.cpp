@@ -8,6 +8,7 @@
 
 #include "data/camera_parameters.h"
 #include "data/fit_result.h"
+#include "data/model_description.h"
 #include "data/recording.h"
 #include "data/tracks.h"
 #include "tests/data/expect_refused.h"
@@ -150,6 +151,26 @@ TEST(HostileYaml, IsRefusedWithoutExhaustingTheStack) {
     SCOPED_TRACE(text.substr(0, 20));
     EXPECT_THROW(read_camera(folder.write("camera.yaml", text)), InputError);
   }
+}
+
+TEST(DamagedModel, IsReadOrRefused) {
+  const TemporaryFolder folder;
+  folder.write("right.csv", "time,x,y,z\n0,0,0,1\n1,0.1,0,1\n");
+  const std::string text =
+      "format: clothfit-model/1\nname: a\ncloth: {size: [1, 1], mass: 0.1}\n"
+      "fabric: {tension_warp: 1, tension_weft: 1, shear: 0, flexion_warp: 0, flexion_weft: 0, "
+      "damping_warp: 0, damping_weft: 0}\n"
+      "held: [{at: [0, 0], motion: path, file: right.csv}, {edge: top, motion: fixed}]\n"
+      "effects: [{effect: wind, parameters: {q: [0, 1, 0]}}]\n"
+      "start: {kind: released_flat, orientation: [1, 0, 0, 0]}\n"
+      "time: {frame_rate: 10, duration: 1}\ntime_step: 1e-3\n";
+
+  const int refused = refusals(text, 2000, [&](const std::string& damaged) {
+    read_model(folder.write("model.yaml", damaged));
+  });
+
+  EXPECT_GT(refused, 500);
+  EXPECT_LT(refused, 2000);
 }
 
 }  // namespace

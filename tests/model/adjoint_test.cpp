@@ -110,6 +110,28 @@ TEST(Adjoint, EqualsTheTangentUnderWindAndDamping) {
   expect_adjoint_to_equal_tangent(swing, uniform);
 }
 
+TEST(Adjoint, EqualsTheTangentUnderEveryEffect) {
+  for (const EffectEntry& entry : effect_registry()) {
+    SCOPED_TRACE(entry.name);
+    Uniform uniform(8);
+    Swing swing = swing_under(entry, uniform);
+    expect_adjoint_to_equal_tangent(swing, uniform);
+  }
+}
+
+TEST(Adjoint, EqualsTheTangentUnderSeveralEffectsAtOnce) {
+  Uniform uniform(9);
+  Swing swing(uniform);
+  for (const char* name : {"added_air_mass", "relaxation", "nonuniform_mass", "support_slip",
+                           "support_motion", "bending_energy"}) {
+    swing.cloth.add_effect(name, "test");
+    swing.set.effects.push_back(
+        effect_contract::random_parameters(find_effect(name, "test").describe(), uniform));
+  }
+  swing.schedule = {.frame_time_s = {0, 0.004, 0.01}, .time_step_s = 1e-4};
+  expect_adjoint_to_equal_tangent(swing, uniform);
+}
+
 /// (cost(value + by) - cost(value - by)) / 2 by.
 template <class CostOf>
 double difference(double& value, double by, const CostOf& cost_of) {

@@ -55,12 +55,12 @@ void expect_a_complete_description(const EffectEntry& entry) {
 
 void expect_nothing_at_neutral(const EffectEntry& entry, Uniform& uniform) {
   // Given a swinging cloth with the effect and one without,
-  Cloth plain = square_cloth(6);
+  Cloth plain = touched_cloth(6);
   plain.held = {held_at(plain.mesh, 0, 0), held_at(plain.mesh, 0.31, 0.02)};
   Cloth with = plain;
   with.add_effect(entry.name, "test");
   ParameterSet set{.springs = spring_parameters(cotton(), plain.mesh),
-                   .start_position_m = crumpled(plain.mesh, 0.3, uniform)};
+                   .start_position_m = crumpled_for(entry.name, plain.mesh, 0.3, uniform)};
   const Schedule schedule{.frame_time_s = {0, 0.1, 0.2, 0.3}, .time_step_s = 2e-4};
   const SimulateResult without = simulate(plain, {&set, 1}, schedule).front();
 
@@ -80,7 +80,7 @@ void expect_nothing_at_neutral(const EffectEntry& entry, Uniform& uniform) {
 }
 
 void expect_to_add_to_what_is_there(const EffectEntry& entry, Uniform& uniform) {
-  const State state(uniform);
+  const State state(uniform, entry.name);
   const Parameters parameters = random_parameters(entry.describe(), uniform);
   const Eigen::Matrix3Xd there_n = uniform.vectors(36, 1);
 
@@ -93,7 +93,7 @@ void expect_to_add_to_what_is_there(const EffectEntry& entry, Uniform& uniform) 
 
 /// One law, three kinds of lanes: a single simulation to the bit, float to its rounding.
 void expect_every_kind_of_lanes_to_agree(const EffectEntry& entry, Uniform& uniform) {
-  const State state(uniform);
+  const State state(uniform, entry.name);
   const Parameters parameters = random_parameters(entry.describe(), uniform);
   const auto effect = entry.make();
   // What changes a force must have one to change.
@@ -107,14 +107,14 @@ void expect_every_kind_of_lanes_to_agree(const EffectEntry& entry, Uniform& unif
 
 void expect_lanes_to_know_nothing_of_each_other(const EffectEntry& entry, Uniform& uniform) {
   const EffectDescription effect = entry.describe();
-  Cloth cloth = square_cloth(5);
+  Cloth cloth = touched_cloth(5);
   cloth.held = {held_at(cloth.mesh, 0, 0)};
   cloth.add_effect(entry.name, "test");
   std::vector<ParameterSet> sets;
   for (int l = 0; l < kLanes; ++l)
     sets.push_back({.springs = spring_parameters(cotton(), cloth.mesh),
                     .effects = {random_parameters(effect, uniform)},
-                    .start_position_m = crumpled(cloth.mesh, 0.3, uniform)});
+                    .start_position_m = crumpled_for(entry.name, cloth.mesh, 0.3, uniform)});
   const Schedule schedule{.frame_time_s = {0, 0.02}, .time_step_s = 1e-4};
 
   const std::vector<SimulateResult> together = simulate(cloth, sets, schedule);
@@ -125,7 +125,7 @@ void expect_lanes_to_know_nothing_of_each_other(const EffectEntry& entry, Unifor
 }
 
 void expect_to_turn_with_the_scene(const EffectEntry& entry, Uniform& uniform) {
-  const State state(uniform);
+  const State state(uniform, entry.name);
   const Parameters parameters = random_parameters(entry.describe(), uniform);
   const Eigen::Matrix3d turn = uniform.rotation();
   State turned = state;
@@ -139,7 +139,7 @@ void expect_to_turn_with_the_scene(const EffectEntry& entry, Uniform& uniform) {
 }
 
 void expect_neither_push_nor_torque(const EffectEntry& entry, Uniform& uniform) {
-  const State state(uniform);
+  const State state(uniform, entry.name);
   const Eigen::Matrix3Xd f = force_n(entry, state, random_parameters(entry.describe(), uniform));
 
   EXPECT_GT(f.norm(), 0);
@@ -158,12 +158,12 @@ void expect_true_derivatives(const EffectEntry& entry, Uniform& uniform) {
 
 /// The rates that an effect gives must bound what it does to a step, up to a fit's bounds.
 void expect_the_stable_step_to_be_stable(const EffectEntry& entry, Uniform& uniform) {
-  Cloth cloth = square_cloth(6);
+  Cloth cloth = touched_cloth(6);
   cloth.held = {held_at(cloth.mesh, 0, 0), held_at(cloth.mesh, 0.31, 0.02)};
   cloth.add_effect(entry.name, "test");
   ParameterSet set{.springs = spring_parameters(cotton(), cloth.mesh),
                    .effects = {{}},
-                   .start_position_m = crumpled(cloth.mesh, 0.3, uniform)};
+                   .start_position_m = crumpled_for(entry.name, cloth.mesh, 0.3, uniform)};
   for (const EffectParameter& p : entry.describe().parameters)
     set.effects[0].push_back(uniform(0, 1) < 0.5 ? p.lower : p.upper);
 
@@ -177,14 +177,14 @@ void expect_the_stable_step_to_be_stable(const EffectEntry& entry, Uniform& unif
 /// Of an effect inside the fabric: springs and effect together are no stiffer and damp no more than
 /// the stable step is chosen for.
 void expect_rates_to_bound_the_spectrum(const EffectEntry& entry, Uniform& uniform) {
-  const Cloth cloth = square_cloth(6);
+  const Cloth cloth = touched_cloth(6);
   const SpringParameters springs = spring_parameters(cotton(), cloth.mesh);
   const Parameters parameters = random_parameters(entry.describe(), uniform);
   const SpringLawEffect<PlainSprings> plain;
   const auto effect = entry.make();
 
   const Spectrum both = spectrum({{&plain, {}}, {effect.get(), parameters}}, cloth,
-                                 crumpled(cloth.mesh, 0.3, uniform));
+                                 crumpled_for(entry.name, cloth.mesh, 0.3, uniform));
 
   const auto bound = [&](const std::array<double, kSpringTypes>& constant) {
     return network_bound(
@@ -196,7 +196,7 @@ void expect_rates_to_bound_the_spectrum(const EffectEntry& entry, Uniform& unifo
 }
 
 void expect_to_damp_only(const EffectEntry& entry, Uniform& uniform) {
-  const State state(uniform);
+  const State state(uniform, entry.name);
   const Parameters parameters = random_parameters(entry.describe(), uniform);
 
   const double power_w =
@@ -211,7 +211,7 @@ void expect_to_damp_only(const EffectEntry& entry, Uniform& uniform) {
 }
 
 void expect_proportional(const EffectEntry& entry, Uniform& uniform) {
-  const State state(uniform);
+  const State state(uniform, entry.name);
   Parameters parameters = random_parameters(entry.describe(), uniform);
   const Eigen::Matrix3Xd once_n = force_n(entry, state, parameters);
   parameters[0] *= 2;

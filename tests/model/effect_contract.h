@@ -13,6 +13,7 @@
 #include "tests/model/effect_derivatives.h"
 #include "tests/model/mechanics.h"
 #include "tests/model/random_cloth.h"
+#include "tests/model/touched_cloth.h"
 
 namespace clothfit {
 
@@ -54,11 +55,11 @@ EffectValues<L> every_lane(const Parameters& values) {
 
 /// A moving, crumpled cloth of cotton.
 struct State {
-  Cloth cloth = square_cloth(6);
+  Cloth cloth = touched_cloth(6);
   Eigen::Matrix3Xd position_m, velocity_m_per_s;
 
-  explicit State(Uniform& uniform)
-      : position_m(crumpled(square_mesh(6), 0.5, uniform)),
+  explicit State(Uniform& uniform, const std::string& effect = "")
+      : position_m(crumpled_for(effect, square_mesh(6), 0.5, uniform)),
         velocity_m_per_s(uniform.vectors(36, 3.0)) {}
 };
 

@@ -29,7 +29,7 @@ std::string derivative_mismatch(const EffectMap& map, const Eigen::VectorXd& in,
 
 std::string derivative_mismatch(const Effect& effect, const EffectDescription& description,
                                 const std::vector<double>& own, Uniform& uniform) {
-  Cloth cloth = square_cloth(5);
+  Cloth cloth = touched_cloth(5);
   cloth.held = {held_at(cloth.mesh, 0, 0), held_at(cloth.mesh, 0.31, 0.02)};
   const int vertices = cloth.mesh.vertex_count();
   const SpringParameters springs = spring_parameters(cotton(), cloth.mesh);
@@ -39,7 +39,7 @@ std::string derivative_mismatch(const Effect& effect, const EffectDescription& d
     if (deed == EffectDeed::change_force && !effect.changes_force()) continue;
     if (deed == EffectDeed::shift_supports && !effect.shifts_supports()) continue;
     const EffectMap map(effect, cloth, static_cast<int>(own.size()), deed);
-    Eigen::VectorXd in = map.input(crumpled(cloth.mesh, 0.3, uniform), uniform.vectors(vertices, 1),
+    Eigen::VectorXd in = map.input(crumpled_for(description.name, cloth.mesh, 0.3, uniform), uniform.vectors(vertices, 1),
                                    springs, uniform.vectors(1, 9.81), own);
     Eigen::VectorXd size = Eigen::VectorXd::Ones(map.inputs());  // m/s, N
     size.head(3 * vertices).setConstant(cloth.mesh.spacing_s_m());

@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "model/fabric_conversion.h"
 #include "tests/model/mechanics.h"
 #include "tests/model/random_cloth.h"
 
@@ -91,6 +92,11 @@ TEST(Fabric, AmountsToTheContinuumThatItsHeaderStates) {
     EXPECT_NEAR(c22, 70 + 9 + 4 * 3, 1e-4);
     EXPECT_NEAR(c12, 9, 1e-4);
     EXPECT_NEAR(c33, 9, 1e-4);
+    const Continuum stated = continuum(kFabric);
+    EXPECT_NEAR(stated.c11_n_per_m, c11, 1e-4);
+    EXPECT_NEAR(stated.c22_n_per_m, c22, 1e-4);
+    EXPECT_NEAR(stated.c12_n_per_m, c12, 1e-4);
+    EXPECT_NEAR(stated.c33_n_per_m, c33, 1e-4);
   }
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "model/tangents.h"
+#include "tests/model/effect_contract.h"
 #include "tests/model/random_cloth.h"
 
 namespace clothfit {
@@ -23,6 +24,15 @@ struct Swing {
            .start_velocity_m_per_s = uniform.vectors(36, 0.5)};
   }
 };
+
+/// The swing under one more effect, some typical changes away from neutral.
+inline Swing swing_under(const EffectEntry& entry, Uniform& uniform) {
+  Swing swing(uniform);
+  swing.cloth.add_effect(entry.name, "test");
+  swing.set.effects = {effect_contract::random_parameters(entry.describe(), uniform)};
+  swing.schedule = {.frame_time_s = {0, 0.004, 0.01}, .time_step_s = 2e-4};
+  return swing;
+}
 
 inline Direction random_direction(const Cloth& cloth, Uniform& uniform) {
   Direction d;

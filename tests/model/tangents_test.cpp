@@ -98,6 +98,17 @@ TEST(Tangents, AgreeWithCentralDifferencesUnderWindAndDamping) {
   }
 }
 
+TEST(Tangents, AgreeWithCentralDifferencesUnderEveryEffect) {
+  for (const EffectEntry& entry : effect_registry()) {
+    SCOPED_TRACE(entry.name);
+    Uniform uniform(7);
+    const Swing swing = swing_under(entry, uniform);
+    const Direction direction = random_direction(swing.cloth, uniform);
+
+    EXPECT_LT(error_of_tangents(swing.cloth, swing.set, direction, swing.schedule, 1e-6), 1e-6);
+  }
+}
+
 TEST(Tangents, CarryASimulationOfTheSameBits) {
   for (const StrainLimitMode mode :
        {StrainLimitMode::off, StrainLimitMode::positions, StrainLimitMode::consistent}) {

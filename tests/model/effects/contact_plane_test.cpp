@@ -103,6 +103,22 @@ TEST(ContactPlane, PushesAndNeverPulls) {
   EXPECT_EQ(sheet.cloth.force_n(-inside, -leaving).norm(), 0);  // not inside
 }
 
+TEST(ContactPlane, AtNeutralItsDerivativeByTheStiffnessIsThatOfAPush) {
+  const OnSlope sheet(0, 0, 0, 2e-3);
+  const EffectMap map(*sheet.cloth.cloth.effects.front(), sheet.cloth.cloth, 7,
+                      EffectDeed::add_force);
+  const int own = map.first_parameter() + ParameterNumber::own(0);
+  Eigen::VectorXd neutral = Eigen::VectorXd::Zero(map.inputs());
+  neutral.head<75>() = sheet.cloth.set.start_position_m.reshaped();
+  neutral[own + 5] = 1;  // n_z
+  Eigen::VectorXd hard = neutral;
+  hard[own] = 1;
+
+  EXPECT_EQ(map(neutral).norm(), 0);
+  EXPECT_GT(map(hard).norm(), 0);
+  EXPECT_LT((map.stated_jacobian(neutral).col(own) - map(hard)).norm(), 1e-17);
+}
+
 TEST(ContactPlane, IsAForcePerArea) {
   for (const int vertices : {2, 5, 9}) {
     const Cloth bare = square_cloth(vertices);

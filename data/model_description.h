@@ -1,0 +1,83 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <array>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "data/recording.h"
+
+namespace clothfit {
+
+/// A parameter of the set `fabric`, as model files, fit.json and `--set` name it.
+struct FabricParameterName {
+  const char* name;
+  const char* unit;
+};
+inline constexpr std::array<FabricParameterName, 7> kFabricParameters = {{{"tension_warp", "N/m"},
+                                                                          {"tension_weft", "N/m"},
+                                                                          {"shear", "N/m"},
+                                                                          {"flexion_warp", "N/m"},
+                                                                          {"flexion_weft", "N/m"},
+                                                                          {"damping_warp", "s"},
+                                                                          {"damping_weft", "s"}}};
+
+/// Where the flat, unstretched sheet lies: x_world = orientation * (s, t, 0) + position_m.
+struct SheetPose {
+  Eigen::Vector3d position_m = Eigen::Vector3d::Zero();
+  Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();
+};
+
+enum class StrainLimitKind { off, positions, consistent };
+
+/// A prescribed point or edge; `motion` is fixed or path.
+struct ModelHeldPoint {
+  HeldPoint point;
+  HeldPath path;  ///< for `path`
+};
+
+/// What a model file says (format clothfit-model/1): a cloth with every number that its simulation
+/// needs.
+struct ModelDescription {
+  std::string file;  ///< as the user gave it, for messages; empty when it was not read from one
+  std::string name;
+  ClothDescription cloth;  ///< with its mass
+  int mesh_columns = 0;    ///< of the simulation
+  int mesh_rows = 0;
+  std::map<std::string, double> fabric;  ///< a value for each of kFabricParameters
+  StrainLimitKind strain_limit = StrainLimitKind::off;
+  double critical_elongation = 0;  ///< of every spring, as a share of its natural length
+  Eigen::Vector3d gravity_m_per_s2{0, 0, -9.81};
+  std::vector<ModelHeldPoint> held;
+  std::vector<DeclaredEffect> effects;  ///< a parameter that is left out is at its neutral value
+  StartKind start = StartKind::released_flat;  ///< not unknown
+  SheetPose sheet;
+  std::vector<double> frame_time_s;     ///< rising, at least two
+  std::optional<double> frame_rate_hz;  ///< when they are evenly spaced
+  std::optional<double> time_step_s;    ///< absent: as stability allows
+
+  /// Where things stand in the file, for messages; 0 when unknown.
+  int fabric_line = 0;
+  int time_step_line = 0;
+  /// FILE:LINE of a thing of this model, as InputError has it.
+  std::string where(int line) const;
+};
+
+/// The largest number of frames that a simulation may have.
+inline constexpr int kMostModelFrames = 1'000'000;
+
+/// Times of the frames from 0 to `duration_s` at a constant rate. Nothing when that is less than
+/// two frames or more than kMostModelFrames.
+std::optional<std::vector<double>> frame_times(double frame_rate_hz, double duration_s);
+
+/// Reads a model file and the tables that it names. Throws InputError, with file and line.
+ModelDescription read_model(const std::filesystem::path& file);
+
+/// Writes `folder`/model.yaml that read_model reads back to the last bit, with held/NUMBER.csv for
+/// the paths of held points and times.csv where the frames are not evenly spaced.
+void write_model(const ModelDescription& model, const std::filesystem::path& folder);
+
+}  // namespace clothfit

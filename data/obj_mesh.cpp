@@ -1,0 +1,74 @@
+#include "data/obj_mesh.h"
+
+#include <algorithm>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "data/input_error.h"
+#include "data/number_text.h"
+#include "data/shown_text.h"
+#include "data/text_file.h"
+
+namespace clothfit {
+namespace {
+
+/// The next word of `rest`, which shrinks to what follows it; empty at the end.
+std::string_view next_word(std::string_view& rest) {
+  constexpr std::string_view kBlank = " \t";
+  rest.remove_prefix(std::min(rest.find_first_not_of(kBlank), rest.size()));
+  const std::string_view word = rest.substr(0, rest.find_first_of(kBlank));
+  rest.remove_prefix(word.size());
+  return word;
+}
+
+}  // namespace
+
+SurfaceMesh read_obj(const std::filesystem::path& file) {
+  const std::string content = read_text(file);
+  std::vector<double> coordinates;
+  std::vector<int> corners;
+  std::string_view rest = content;
+  for (int line = 1; !rest.empty(); ++line) {
+    std::string_view text = rest.substr(0, rest.find('\n'));
+    rest.remove_prefix(std::min(text.size() + 1, rest.size()));
+    text = text.substr(0, text.find('#'));
+    const std::string_view kind = next_word(text);
+    if (kind == "v") {
+      for (int axis = 0; axis < 3; ++axis) {
+        const std::string_view word = next_word(text);
+        const auto number = parse_number(word);
+        if (!number)
+          throw InputError(file.string(), line, "coordinate `" + shown_text(word) + "`",
+                           "a vertex is three numbers, in metres");
+        coordinates.push_back(*number);
+      }
+    } else if (kind == "f") {
+      const int vertices = static_cast<int>(coordinates.size() / 3);
+      std::vector<int> face;
+      for (std::string_view word = next_word(text); !word.empty(); word = next_word(text)) {
+        // VERTEX, VERTEX/TEXTURE, VERTEX//NORMAL or VERTEX/TEXTURE/NORMAL
+        const auto index = parse_whole_number(word.substr(0, word.find('/')));
+        if (!index || *index == 0 || *index > vertices || *index < -vertices)
+          throw InputError(
+              file.string(), line, "corner `" + shown_text(word) + "`",
+              "corners are the numbers of vertices above, 1 to " + std::to_string(vertices));
+        face.push_back(*index > 0 ? *index - 1 : vertices + *index);
+      }
+      if (face.size() < 3)
+        throw InputError(file.string(), line,
+                         "a face with " + std::to_string(face.size()) + " corners",
+                         "a face has three or more");
+      for (size_t n = 2; n < face.size(); ++n)
+        corners.insert(corners.end(), {face[0], face[n - 1], face[n]});
+    }
+  }
+  if (corners.empty())
+    throw InputError(file.string(), "no faces", "a surface of triangles: lines `f a b c`");
+  return {Eigen::Map<const Eigen::Matrix3Xd>(coordinates.data(), 3,
+                                             static_cast<Eigen::Index>(coordinates.size() / 3)),
+          Eigen::Map<const Eigen::Matrix3Xi>(corners.data(), 3,
+                                             static_cast<Eigen::Index>(corners.size() / 3))};
+}
+
+}  // namespace clothfit

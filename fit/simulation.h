@@ -1,0 +1,40 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "data/model_description.h"
+#include "fit/problem.h"
+#include "model/cloth.h"
+#include "model/fabric.h"
+#include "model/simulate.h"
+
+namespace clothfit {
+
+/// One run of the model, made ready.
+struct Simulation {
+  Cloth cloth;
+  Fabric fabric;
+  ParameterSet parameters;  ///< starts from the placed sheet
+  StartKind start = StartKind::released_flat;
+  std::vector<double> frame_time_s;
+};
+
+/// Throws InputError for an effect, or a parameter of one, that does not exist.
+Simulation make_simulation(const ModelDescription& model);
+
+/// A fitted, or given, model of a recording as a model file has it: the cloth on the problem's mesh
+/// with the parameters `values`, gravity and the sheet as they were fitted along, and the paths of
+/// held points, tracked ones as their smoothing splines have them at the frames.
+ModelDescription describe_model(const FitProblem& problem, const Recording& recording,
+                                const Eigen::VectorXd& values);
+
+/// The largest time step that a run takes unless it is told another one: two thirds of the largest
+/// stable one, as fits leave it (RefineOptions::stability_margin), because the estimate does not
+/// see violently crumpled cloth.
+double default_time_step_s(const Simulation& simulation);
+
+/// Positions of the mesh in every frame. A start at rest is relaxed first.
+SimulateResult run(const Simulation& simulation, double time_step_s);
+
+}  // namespace clothfit

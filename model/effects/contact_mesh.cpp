@@ -1,0 +1,98 @@
+#include "model/effects/contact_mesh.h"
+
+#include <ceres/jet.h>
+
+#include "model/effects/contact_law.h"
+#include "model/effects/lane_by_lane.h"
+#include "model/obstacle.h"
+
+namespace clothfit::contact_mesh {
+namespace {
+
+using Nearest = Obstacle::Nearest;
+
+template <class Real>
+Vector3<Real> vector(const Eigen::Vector3d& v) {
+  return {Real(v.x()), Real(v.y()), Real(v.z())};
+}
+
+struct Law {
+  static constexpr int kParameters = Contact::kParameters;
+  using Parameters = std::array<double, kParameters>;
+
+  /// The force on a vertex below the part `surface` of the obstacle.
+  template <class Real>
+  static Vector3<Real> force(const Nearest& surface, const Vector3<Real>& position_m,
+                             const Vector3<Real>& velocity_m_per_s, double area_m2, double mass_kg,
+                             const std::array<Real, kParameters>& p) {
+    Vector3<Real> outwards = vector<Real>(surface.place_m) - position_m;
+    const Vector3<Real> along = vector<Real>(surface.direction);
+    if (surface.kind == Nearest::edge) outwards = outwards - dot(along, outwards) * along;
+    const Vector3<Real> n = surface.kind == Nearest::face ? along : direction(outwards);
+    return Contact::force(dot(n, outwards), n, velocity_m_per_s, area_m2, mass_kg, p[0], p[1],
+                          p[2]);
+  }
+
+  /// Calls `visit(vertex, part of the surface, position, area)` for every vertex that is below it.
+  template <class Vectors, class Visit>
+  static void for_contacts(const Cloth& cloth, const Vectors& position_m, const Visit& visit) {
+    if (!cloth.obstacle) return;
+    const Mesh& mesh = cloth.mesh;
+    for (int k = 0; k < mesh.vertex_count(); ++k) {
+      const Vector3<double> x = position_m(k);
+      const auto surface = cloth.obstacle->beneath({x.x, x.y, x.z});
+      if (surface) visit(k, *surface, x, flat_area_m2(mesh, k / mesh.columns, k % mesh.columns));
+    }
+  }
+
+  template <class Vectors, class Add>
+  static void forces(const Cloth& cloth, const Vectors& position_m, const Vectors& velocity_m_per_s,
+                     const Parameters& p, const Add& add) {
+    if (p[0] == 0 && p[1] == 0) return;  // before the search
+    for_contacts(cloth, position_m,
+                 [&](int k, const Nearest& surface, const Vector3<double>& x, double area_m2) {
+                   add(k, force(surface, x, velocity_m_per_s(k), area_m2, cloth.mass_kg[k], p));
+                 });
+  }
+
+  template <class Vectors>
+  static void linearise(const Cloth& cloth, const Vectors& position_m,
+                        const Vectors& velocity_m_per_s, const Parameters& p,
+                        EffectLinearisation& derivatives) {
+    using Dual = ceres::Jet<double, 6 + kParameters>;
+    const auto dual = [](const Vector3<double>& v, int first) -> Vector3<Dual> {
+      return {Dual(v.x, first), Dual(v.y, first + 1), Dual(v.z, first + 2)};
+    };
+    const std::array<Dual, kParameters> parameters{Dual(p[0], 6), Dual(p[1], 7), Dual(p[2], 8)};
+    for_contacts(cloth, position_m,
+                 [&](int k, const Nearest& surface, const Vector3<double>& x, double area_m2) {
+                   const Vector3<Dual> f = force(surface, dual(x, 0), dual(velocity_m_per_s(k), 3),
+                                                 area_m2, cloth.mass_kg[k], parameters);
+                   Eigen::Matrix<double, 3, 6 + kParameters> j;
+                   j << f.x.v.transpose(), f.y.v.transpose(), f.z.v.transpose();
+                   derivatives.by_motion.push_back({k, k, j.middleCols<3>(0), j.middleCols<3>(3)});
+                   for (int n = 0; n < kParameters; ++n)
+                     derivatives.by_parameter.push_back({k, ParameterNumber::own(n), j.col(6 + n)});
+                 });
+  }
+
+  static EffectRates rates(const Cloth& cloth, const SpringParameters&,
+                           const std::vector<double>& parameters) {
+    return Contact::rates(cloth, parameters);
+  }
+};
+
+}  // namespace
+
+EffectDescription describe() {
+  return {.name = "contact_mesh",
+          .summary = "an obstacle of triangles that the cloth cannot pass",
+          .parameters = Contact::parameters(),
+          .test = EffectTest::finite};
+}
+
+std::unique_ptr<Effect> make() {
+  return std::make_unique<LaneByLaneEffect<Law>>();
+}
+
+}  // namespace clothfit::contact_mesh

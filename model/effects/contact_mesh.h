@@ -1,0 +1,17 @@
+#pragma once
+
+#include <memory>
+
+#include "model/effects/effect.h"
+
+/// An obstacle of triangles that the cloth cannot pass: the cloth's `obstacle` (model/obstacle.h).
+/// A vertex below its surface feels the force of contact_law.h towards the nearest point of the
+/// surface; a cloth without an obstacle feels nothing.
+///
+/// Parameters: stiffness (Pa/m), damping (Pa s/m), friction (ratio), neutral at 0.
+namespace clothfit::contact_mesh {
+
+EffectDescription describe();
+std::unique_ptr<Effect> make();
+
+}  // namespace clothfit::contact_mesh

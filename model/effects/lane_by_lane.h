@@ -1,0 +1,89 @@
+#pragma once
+
+#include <array>
+
+#include "model/effects/effect.h"
+#include "model/effects/linearisation.h"
+#include "model/effects/number.h"
+
+namespace clothfit {
+
+/// The vectors of one simulation among those in lanes, in double precision.
+template <class L>
+struct OneLane {
+  const LaneVectors<L>& vectors;
+  int lane;
+
+  Vector3<double> operator()(int k) const {
+    return {static_cast<double>(vectors.x(lane, k)), static_cast<double>(vectors.y(lane, k)),
+            static_cast<double>(vectors.z(lane, k))};
+  }
+};
+
+/// An effect that has to search, for what it touches, so that each simulation walks its own path:
+/// lanes are taken one after the other. A Law has
+///   static constexpr int kParameters;
+///   using Parameters = std::array<double, kParameters>;
+///   // `position_m` and `velocity_m_per_s` give a vertex's Vector3<double>;
+///   // calls add(vertex, Vector3<double>) with forces (N)
+///   template <class Vectors, class Add> static void forces(const Cloth&, const Vectors&
+///   position_m,
+///       const Vectors& velocity_m_per_s, const Parameters&, const Add& add);
+///   template <class Vectors> static void linearise(const Cloth&, const Vectors& position_m,
+///       const Vectors& velocity_m_per_s, const Parameters&, EffectLinearisation&);
+///   static EffectRates rates(const Cloth&, const SpringParameters&, const std::vector<double>&);
+template <class Law>
+class LaneByLaneEffect final : public Effect {
+ public:
+  void add_force(const EffectScene<ExactLanes>& scene, const EffectValues<ExactLanes>& parameters,
+                 EffectMemory<ExactLanes>&, LaneVectors<ExactLanes>& force_n) const override {
+    add(scene, parameters, force_n);
+  }
+  void add_force(const EffectScene<FastLanes>& scene, const EffectValues<FastLanes>& parameters,
+                 EffectMemory<FastLanes>&, LaneVectors<FastLanes>& force_n) const override {
+    add(scene, parameters, force_n);
+  }
+  void add_force(const EffectScene<DualLanes>& scene, const EffectValues<DualLanes>& parameters,
+                 EffectMemory<DualLanes>&, LaneVectors<DualLanes>& force_n) const override {
+    add(scene, parameters, force_n);
+  }
+  void add_force(const EffectScene<SingleLane>& scene, const EffectValues<SingleLane>& parameters,
+                 EffectMemory<SingleLane>&, LaneVectors<SingleLane>& force_n) const override {
+    add(scene, parameters, force_n);
+  }
+  void linearise_force(const EffectScene<SingleLane>& scene,
+                       const EffectValues<SingleLane>& parameters, const EffectMemory<SingleLane>&,
+                       EffectLinearisation& derivatives) const override {
+    Law::linearise(scene.cloth, OneLane<SingleLane>{scene.position_m, 0},
+                   OneLane<SingleLane>{scene.velocity_m_per_s, 0},
+                   parameters_of<SingleLane>(parameters, 0), derivatives);
+  }
+  EffectRates rates(const Cloth& cloth, const SpringParameters& springs,
+                    const std::vector<double>& parameters) const override {
+    return Law::rates(cloth, springs, parameters);
+  }
+
+ private:
+  template <class L>
+  static std::array<double, Law::kParameters> parameters_of(const EffectValues<L>& values,
+                                                            int lane) {
+    std::array<double, Law::kParameters> p;
+    for (size_t n = 0; n < p.size(); ++n) p[n] = static_cast<double>(values[n][lane]);
+    return p;
+  }
+  template <class L>
+  static void add(const EffectScene<L>& scene, const EffectValues<L>& parameters,
+                  LaneVectors<L>& force_n) {
+    using Number = typename L::Number;
+    for (int l = 0; l < L::kCount; ++l)
+      Law::forces(scene.cloth, OneLane<L>{scene.position_m, l},
+                  OneLane<L>{scene.velocity_m_per_s, l}, parameters_of<L>(parameters, l),
+                  [&](int k, const Vector3<double>& f) {
+                    force_n.x(l, k) += static_cast<Number>(f.x);
+                    force_n.y(l, k) += static_cast<Number>(f.y);
+                    force_n.z(l, k) += static_cast<Number>(f.z);
+                  });
+  }
+};
+
+}  // namespace clothfit

@@ -1,0 +1,121 @@
+#include "model/effects/self_contact.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "model/effects/lane_by_lane.h"
+#include "model/effects/vertex_law.h"
+#include "model/near_pairs.h"
+
+namespace clothfit::self_contact {
+namespace {
+
+struct Law {
+  static constexpr int kParameters = 2;
+  using Parameters = std::array<double, kParameters>;
+
+  static bool neighbours(const Mesh& mesh, int a, int b, double thickness_m) {
+    const int columns = std::abs(a % mesh.columns - b % mesh.columns);
+    const int rows = std::abs(a / mesh.columns - b / mesh.columns);
+    const double apart_s_m = columns * mesh.spacing_s_m(), apart_t_m = rows * mesh.spacing_t_m();
+    return (columns <= 2 && rows <= 2) ||
+           apart_s_m * apart_s_m + apart_t_m * apart_t_m < 4 * thickness_m * thickness_m;
+  }
+
+  /// Calls `visit(a, b, vector from a to b, their distance r, A_a A_b)` for every two vertices that
+  /// touch.
+  template <class Vectors, class Visit>
+  static void for_contacts(const Cloth& cloth, const Vectors& position_m, double thickness_m,
+                           const Visit& visit) {
+    // Memory only: nothing in it is meant to last from one call to the next.
+    thread_local NearPairs search;
+    const Mesh& mesh = cloth.mesh;
+    const auto area_m2 = [&](int k) {
+      return flat_area_m2(mesh, k / mesh.columns, k % mesh.columns);
+    };
+    search.for_pairs(mesh.vertex_count(), position_m, thickness_m,
+                     [&](int a, int b, const Vector3<double>& connection, double distance_m2) {
+                       // Two vertices in the same place know no direction.
+                       if (!(distance_m2 > 0) || neighbours(mesh, a, b, thickness_m)) return;
+                       visit(a, b, connection, std::sqrt(distance_m2), area_m2(a) * area_m2(b));
+                     });
+  }
+
+  template <class Vectors, class Add>
+  static void forces(const Cloth& cloth, const Vectors& position_m, const Vectors&,
+                     const Parameters& p, const Add& add) {
+    const auto [stiffness, d] = p;
+    if (stiffness == 0) return;
+    for_contacts(cloth, position_m, d,
+                 [&](int a, int b, const Vector3<double>& connection, double r, double areas) {
+                   const double push = stiffness * areas * (d - r) / (d * d * r);
+                   add(b, push * connection);
+                   add(a, -push * connection);
+                 });
+  }
+
+  template <class Vectors>
+  static void linearise(const Cloth& cloth, const Vectors& position_m, const Vectors&,
+                        const Parameters& p, EffectLinearisation& derivatives) {
+    const auto [stiffness, d] = p;
+    // At neutral too: what matters there is the derivative by the stiffness.
+    for_contacts(
+        cloth, position_m, d,
+        [&](int a, int b, const Vector3<double>& connection, double r, double areas) {
+          const Eigen::Vector3d u = Eigen::Vector3d(connection.x, connection.y, connection.z) / r;
+          const Eigen::Matrix3d along = u * u.transpose();
+          const Eigen::Matrix3d by_connection =
+              stiffness * areas / (d * d) *
+              ((d - r) / r * (Eigen::Matrix3d::Identity() - along) - along);
+          const Eigen::Vector3d by_stiffness = areas * (d - r) / (d * d) * u;
+          const Eigen::Vector3d by_thickness = stiffness * areas * (2 * r - d) / (d * d * d) * u;
+          for (const auto& [on, sign] : {std::pair{b, 1.0}, {a, -1.0}}) {
+            const Eigen::Matrix3d none = Eigen::Matrix3d::Zero();
+            derivatives.by_motion.push_back({on, b, sign * by_connection, none});
+            derivatives.by_motion.push_back({on, a, -sign * by_connection, none});
+            derivatives.by_parameter.push_back({on, ParameterNumber::own(0), sign * by_stiffness});
+            derivatives.by_parameter.push_back({on, ParameterNumber::own(1), sign * by_thickness});
+          }
+        });
+  }
+
+  /// Twice the stiffness against all vertices that may be near, over the mass: those of two other
+  /// layers within a disc of the thickness, widened by what a lattice may have more.
+  static EffectRates rates(const Cloth& cloth, const SpringParameters&,
+                           const std::vector<double>& parameters) {
+    constexpr double kLayers = 2;
+    const Mesh& mesh = cloth.mesh;
+    const double thickness_m = parameters[1];
+    const double reach_m = thickness_m + 0.5 * std::hypot(mesh.spacing_s_m(), mesh.spacing_t_m());
+    const double near_m2 = kLayers * std::numbers::pi * reach_m * reach_m;
+    return {.frequency2_per_s2 = 2 * parameters[0] * largest_area_per_mass(cloth) * near_m2 /
+                                 (thickness_m * thickness_m)};
+  }
+};
+
+}  // namespace
+
+EffectDescription describe() {
+  return {.name = "self_contact",
+          .summary = "the cloth does not pass through itself, F = k A_a A_b (d - r) / d^2",
+          .parameters = {{.name = "stiffness",
+                          .unit = "Pa/m",
+                          .neutral = 0,
+                          .lower = 0,
+                          .upper = 1e5,
+                          .typical = 500},
+                         {.name = "thickness",
+                          .unit = "m",
+                          .neutral = 0.03,
+                          .lower = 0.005,
+                          .upper = 0.1,
+                          .typical = 0.002}},
+          .test = EffectTest::finite};
+}
+
+std::unique_ptr<Effect> make() {
+  return std::make_unique<LaneByLaneEffect<Law>>();
+}
+
+}  // namespace clothfit::self_contact

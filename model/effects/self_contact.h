@@ -1,0 +1,29 @@
+#pragma once
+
+#include <memory>
+
+#include "model/effects/effect.h"
+
+/// The cloth does not pass through itself: between every two vertices that are not neighbours,
+/// closer than the thickness d,
+///
+///   F = stiffness A_a A_b (d - r) / d^2  along their connection, apart
+///
+/// r: their distance; A_a, A_b: the areas that belong to them in the flat cloth, so that the sum
+/// over vertices stands for an integral over both sheets and survives a change of mesh: parallel
+/// sheets at the distance z press each other apart by
+///
+///   p = pi stiffness z (d - z)^2 / d^2.
+///
+/// Not neighbours: apart by 2 d or more in the flat cloth, and by no spring. (Sheets that a fold
+/// brings together at distance d are at least pi d / 2 of cloth apart.) Where d is less than the
+/// mesh's spacing, sheets slip through between the vertices. Ours.
+///
+/// Parameters: stiffness (Pa/m), neutral at 0; thickness d (m), which matters only where stiffness
+/// does.
+namespace clothfit::self_contact {
+
+EffectDescription describe();
+std::unique_ptr<Effect> make();
+
+}  // namespace clothfit::self_contact

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <optional>
+#include <vector>
+
+namespace clothfit {
+
+/// A surface of triangles in the world (m). Corners run counterclockwise as seen from the free
+/// side.
+struct TriangleMesh {
+  Eigen::Matrix3Xd vertex_m;
+  Eigen::Matrix3Xi triangle;  ///< indices of vertices, 0 the first
+};
+
+/// A resting body that cloth cannot pass, with what it takes to find the nearest point of its
+/// surface fast: a tree of boxes, and whether edges and corners are seen from outside.
+class Obstacle {
+ public:
+  /// `reach_m`: how far below the surface a point still belongs to this side of it; more than cloth
+  /// ever sinks in, less than the thickness of what lies behind. Vertices in the same place are the
+  /// same vertex; triangles without area are left out. Indices must be those of vertices.
+  explicit Obstacle(const TriangleMesh& mesh, double reach_m = 0.05);
+
+  /// The part of the surface that is nearest to a point below it.
+  struct Nearest {
+    enum Kind { face, edge, corner };
+    Kind kind = face;
+    Eigen::Vector3d place_m;    ///< on it: the nearest point
+    Eigen::Vector3d direction;  ///< a face's outward normal, an edge's direction: unit vectors
+  };
+  /// Nothing where the point is on the free side, deeper than the reach, or beyond the border of a
+  /// surface that is not closed.
+  std::optional<Nearest> beneath(const Eigen::Vector3d& point_m) const;
+
+  int triangles() const { return static_cast<int>(triangles_.size()); }
+
+ private:
+  struct Rim {
+    Eigen::Vector3d normal = Eigen::Vector3d::Zero();  ///< outwards, mean of its faces, not unit
+    bool border = false;                               ///< of a surface that is not closed
+  };
+  struct Triangle {
+    std::array<Eigen::Vector3d, 3> corner;
+    Eigen::Vector3d normal;
+    std::array<int, 3> edge_rim, corner_rim;  ///< edge n runs from corner n to the next
+  };
+  struct Node {
+    Eigen::Vector3d low, high;
+    int first = 0;  ///< a leaf's first triangle, otherwise the second child; the first comes next
+    int count = 0;  ///< 0 unless a leaf
+  };
+  void build_tree(int first, int last);
+
+  double reach_m_;
+  std::vector<Triangle> triangles_;
+  std::vector<Rim> rims_;
+  std::vector<Node> nodes_;
+};
+
+}  // namespace clothfit

@@ -1,0 +1,210 @@
+// Model files: what is read, written and refused. Not checked here: what a model's simulation does
+// (tests/fit/simulation_test.cpp), and what recordings share with it in full (recording_test.cpp).
+
+#include "data/model_description.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <limits>
+
+#include "tests/data/expect_refused.h"
+#include "tests/data/temporary_folder.h"
+
+namespace clothfit {
+namespace {
+
+/// Line 1 holds the format.
+const std::string kModel = R"(format: clothfit-model/1
+name: curtain
+cloth: {size: [0.3, 0.4], mass: 0.03, masses: equal, mesh: {columns: 17, rows: 13}}
+mesh: {columns: 9, rows: 7}
+fabric:
+  tension_warp: 41.5
+  tension_weft: 40
+  shear: 15
+  flexion_warp: 8
+  flexion_weft: 7
+  damping_warp: 0.002
+  damping_weft: 0.001
+strain_limit: {mode: consistent, elongation: 0.1}
+gravity: [0.0, 0.5, -9.8]
+held:
+  - {at: [0.0, 0.0], motion: fixed}
+  - {at: [0.3, 0.0], motion: path, file: right.csv}
+  - {edge: bottom, motion: fixed}
+effects:
+  - {effect: wind, parameters: {q: [0.0, 0.25, 0.0]}}
+start: {kind: at_rest, position: [0.1, 0.2, 1.0], orientation: [0.6, 0.8, 0.0, 0.0]}
+time: {frame_rate: 50.0, duration: 0.7}
+time_step: 0.0005
+)";
+
+class ModelFile : public testing::Test {
+ protected:
+  const TemporaryFolder folder_;
+  void SetUp() override {
+    folder_.write("right.csv", "time,x,y,z\n0,0,0,1\n0.5,0.1,0,1\n1,0,0,1\n");
+  }
+
+  ModelDescription read(const std::string& text) const {
+    return read_model(folder_.write("model.yaml", text));
+  }
+  /// The model with the first `from` replaced.
+  static std::string with(const std::string& from, const std::string& to) {
+    std::string text = kModel;
+    const std::size_t at = text.find(from);
+    EXPECT_NE(at, std::string::npos) << from;
+    return text.replace(at, from.size(), to);
+  }
+  void expect_refused_with(const std::string& from, const std::string& to,
+                           const std::string& beginning) const {
+    expect_refused(folder_, beginning, [&] { read(with(from, to)); });
+  }
+};
+
+TEST_F(ModelFile, HoldsEveryKeyOfTheFormat) {
+  const ModelDescription model = read(kModel);
+
+  EXPECT_EQ(model.name, "curtain");
+  EXPECT_EQ(model.cloth.width_m, 0.3);
+  EXPECT_EQ(model.cloth.mass_kg, 0.03);
+  EXPECT_EQ(model.cloth.masses, MassDistribution::equal);
+  EXPECT_EQ(model.cloth.mesh_columns, 17);
+  EXPECT_EQ(model.mesh_columns, 9);
+  EXPECT_EQ(model.mesh_rows, 7);
+  EXPECT_EQ(model.fabric.at("tension_warp"), 41.5);
+  EXPECT_EQ(model.fabric.at("damping_weft"), 0.001);
+  EXPECT_EQ(model.strain_limit, StrainLimitKind::consistent);
+  EXPECT_EQ(model.critical_elongation, 0.1);
+  EXPECT_EQ(model.gravity_m_per_s2, Eigen::Vector3d(0, 0.5, -9.8));
+  ASSERT_EQ(model.held.size(), 3u);
+  EXPECT_EQ(model.held[0].point.motion, HeldMotion::fixed);
+  EXPECT_EQ(model.held[1].path.position_m[1], Eigen::Vector3d(0.1, 0, 1));
+  EXPECT_EQ(model.held[2].point.edge, ClothEdge::bottom);
+  ASSERT_EQ(model.effects.size(), 1u);
+  EXPECT_EQ(model.effects[0].parameters.at("q"), (std::vector<double>{0, 0.25, 0}));
+  EXPECT_EQ(model.effects[0].line, 20);
+  EXPECT_EQ(model.start, StartKind::at_rest);
+  EXPECT_EQ(model.sheet.position_m, Eigen::Vector3d(0.1, 0.2, 1.0));
+  EXPECT_EQ(model.sheet.orientation.coeffs(), Eigen::Vector4d(0.8, 0, 0, 0.6));
+  EXPECT_EQ(model.frame_rate_hz, 50.0);
+  ASSERT_EQ(model.frame_time_s.size(), 36u);  // 0.7 * 50 is a little below 35 in binary
+  EXPECT_EQ(model.frame_time_s.back(), 0.7);
+  EXPECT_EQ(model.time_step_s, 0.0005);
+}
+
+TEST_F(ModelFile, NeedsLittle) {
+  const ModelDescription model = read(
+      "format: clothfit-model/1\nname: a\ncloth: {size: [1, 1], mass: 0.1}\n"
+      "fabric: {tension_warp: 1, tension_weft: 1, shear: 0, flexion_warp: 0, flexion_weft: 0, "
+      "damping_warp: 0, damping_weft: 0}\n"
+      "start: {kind: released_flat}\ntime: {frame_rate: 10, duration: 1}\n");
+
+  EXPECT_EQ(model.mesh_columns, 17);
+  EXPECT_EQ(model.gravity_m_per_s2, Eigen::Vector3d(0, 0, -9.81));
+  EXPECT_TRUE(model.held.empty());
+  EXPECT_FALSE(model.time_step_s);
+  EXPECT_EQ(model.strain_limit, StrainLimitKind::off);
+}
+
+TEST_F(ModelFile, OfTheDocumentsIsOne) {
+  std::ifstream in(std::string(CLOTHFIT_SOURCE_DIR) + "/docs/formats.md");
+  const std::string page{std::istreambuf_iterator<char>(in), {}};
+  const std::size_t begin = page.find("format: clothfit-model/1");
+  ASSERT_NE(begin, std::string::npos);
+
+  const ModelDescription model = read(page.substr(begin, page.find("```", begin) - begin));
+
+  EXPECT_EQ(model.name, "curtain");
+  EXPECT_EQ(model.frame_time_s.size(), 121u);
+}
+
+TEST_F(ModelFile, ReadsBackAsWrittenToTheLastBit) {
+  ModelDescription model = read(kModel);
+  model.fabric["shear"] = 1.0 / 3;
+  model.sheet.orientation = Eigen::Quaterniond(0.1, 0.2, 0.3, 0.4).normalized();
+  model.held[1].path.position_m[0].x() = std::numeric_limits<double>::denorm_min();
+
+  std::filesystem::create_directories(folder_ / "out");
+  write_model(model, folder_ / "out");
+  const ModelDescription again = read_model(folder_ / "out" / "model.yaml");
+
+  EXPECT_EQ(again.fabric, model.fabric);
+  EXPECT_EQ(again.sheet.orientation.coeffs(), model.sheet.orientation.coeffs());
+  EXPECT_EQ(again.sheet.position_m, model.sheet.position_m);
+  EXPECT_EQ(again.frame_time_s, model.frame_time_s);
+  EXPECT_EQ(again.frame_rate_hz, model.frame_rate_hz);
+  EXPECT_EQ(again.time_step_s, model.time_step_s);
+  EXPECT_EQ(again.cloth.masses, model.cloth.masses);
+  EXPECT_EQ(again.cloth.mesh_rows, model.cloth.mesh_rows);
+  EXPECT_EQ(again.mesh_rows, model.mesh_rows);
+  EXPECT_EQ(again.strain_limit, model.strain_limit);
+  EXPECT_EQ(again.critical_elongation, model.critical_elongation);
+  EXPECT_EQ(again.gravity_m_per_s2, model.gravity_m_per_s2);
+  ASSERT_EQ(again.held.size(), model.held.size());
+  EXPECT_EQ(again.held[1].path.time_s, model.held[1].path.time_s);
+  EXPECT_EQ(again.held[1].path.position_m, model.held[1].path.position_m);
+  EXPECT_EQ(again.held[2].point.edge, model.held[2].point.edge);
+  EXPECT_EQ(again.effects[0].parameters, model.effects[0].parameters);
+  EXPECT_EQ(again.start, model.start);
+}
+
+TEST_F(ModelFile, KeepsUnevenTimes) {
+  folder_.write("t.csv", "frame,time\n0,0.5\n1,0.6\n2,0.75\n");
+  const ModelDescription model = read(with("{frame_rate: 50.0, duration: 0.7}", "{file: t.csv}"));
+  EXPECT_EQ(model.frame_time_s, (std::vector<double>{0.5, 0.6, 0.75}));
+
+  std::filesystem::create_directories(folder_ / "out");
+  write_model(model, folder_ / "out");
+
+  EXPECT_EQ(read_model(folder_ / "out" / "model.yaml").frame_time_s, model.frame_time_s);
+}
+
+TEST_F(ModelFile, IsRefusedWithFileAndLine) {
+  expect_refused_with("mass: 0.03", "mass: -0.03", "model.yaml:3: cloth.mass = -0.03; ");
+  expect_refused_with("mass: 0.03, ", "", "model.yaml:3: cloth.mass is missing; ");
+  expect_refused_with("[0.3, 0.4]", "[0.3, -0.4]", "model.yaml:3: cloth.size[1] = -0.4; ");
+  expect_refused_with("columns: 9", "columns: 1", "model.yaml:4: mesh.columns = 1; ");
+  expect_refused_with("tension_weft: 40", "tension_weft: -40",
+                      "model.yaml:7: fabric.tension_weft = -40; ");
+  expect_refused_with("tension_weft: 40", "tension_weft: .nan",
+                      "model.yaml:7: fabric.tension_weft = .nan; ");
+  expect_refused_with("tension_weft: 40", "tension_weft: 1e400",
+                      "model.yaml:7: fabric.tension_weft = 1e400; ");
+  expect_refused_with("  shear: 15\n", "", "model.yaml:");
+  expect_refused_with("  shear: 15", "  sheer: 15", "model.yaml:8: unknown key");
+  expect_refused_with("damping_warp: 0.002", "damping_warp: -1",
+                      "model.yaml:11: fabric.damping_warp = -1; ");
+  expect_refused_with("elongation: 0.1", "elongation: -0.1",
+                      "model.yaml:13: strain_limit.elongation = -0.1; ");
+  expect_refused_with("mode: consistent", "mode: strict", "model.yaml:13: ");
+  expect_refused_with("at: [0.0, 0.0]", "at: [0.31, 0.0]",
+                      "model.yaml:16: held[0].at = [0.31, 0] lies outside the cloth; ");
+  expect_refused_with("motion: path", "motion: tracked", "model.yaml:17: ");
+  expect_refused_with("right.csv", "left.csv", "model.yaml:17: ");
+  expect_refused_with("kind: at_rest", "kind: unknown", "model.yaml:21: ");
+  expect_refused_with("[0.6, 0.8, 0.0, 0.0]", "[1, 1, 0, 0]",
+                      "model.yaml:21: start.orientation = [1, 1, 0, 0] is no rotation; ");
+  expect_refused_with("duration: 0.7", "duration: 0", "model.yaml:22: time.duration = 0; ");
+  expect_refused_with("duration: 0.7", "duration: -1", "model.yaml:22: time.duration = -1; ");
+  expect_refused_with("duration: 0.7", "duration: 0.01", "model.yaml:22: time.duration = 0.01; ");
+  expect_refused_with("duration: 0.7", "duration: 1e9", "model.yaml:22: time.duration = ");
+  expect_refused_with("duration: 0.7", "file: right.csv", "model.yaml:22: time has both ");
+  expect_refused_with("time_step: 0.0005", "time_step: 0", "model.yaml:23: time_step = 0; ");
+  expect_refused_with("clothfit-model/1", "clothfit-recording/1", "model.yaml:1: ");
+}
+
+TEST_F(ModelFile, IsRefusedWithoutAnyStiffness) {
+  std::string text = kModel;
+  for (const char* number : {"41.5", " 40", " 15", " 8", " 7"}) {
+    const std::size_t at = text.find(number, text.find("tension_warp"));
+    text.replace(at, std::string(number).size(), " 0");
+  }
+
+  expect_refused(folder_, "model.yaml:5: fabric: every stiffness is 0; ", [&] { read(text); });
+}
+
+}  // namespace
+}  // namespace clothfit

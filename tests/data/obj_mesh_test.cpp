@@ -1,0 +1,67 @@
+// Surfaces in Wavefront OBJ files. Not checked here: what an obstacle makes of them
+// (tests/model/obstacle_test.cpp), compressed and damaged files (corruption_test.cpp).
+
+#include "data/obj_mesh.h"
+
+#include "tests/data/expect_refused.h"
+
+namespace clothfit {
+namespace {
+
+TEST(ObjMesh, IsItsVerticesAndFacesWhateverElseTheFileHolds) {
+  const TemporaryFolder folder;
+  const auto file = folder.write("table.obj",
+                                 "# a table\n"
+                                 "mtllib wood.mtl\n"
+                                 "o table\n"
+                                 "v 0 0 0.7 # a corner\n"
+                                 "v 1.5 0 0.7 1.0\n"
+                                 "v\t1.5 -1e-1 0.7\n"
+                                 "vn 0 0 1\n"
+                                 "vt 0.5 0.5\n"
+                                 "f 1/1/1 2//1 3/1\n"
+                                 "s off\n");
+
+  const SurfaceMesh mesh = read_obj(file);
+
+  ASSERT_EQ(mesh.vertex_m.cols(), 3);
+  EXPECT_EQ(mesh.vertex_m.col(2), Eigen::Vector3d(1.5, -0.1, 0.7));
+  ASSERT_EQ(mesh.triangle.cols(), 1);
+  EXPECT_EQ(mesh.triangle.col(0), Eigen::Vector3i(0, 1, 2));
+}
+
+TEST(ObjMesh, CutsFacesAndCountsBackwards) {
+  const TemporaryFolder folder;
+  const auto file = folder.write("square.obj",
+                                 "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
+                                 "f -4 -3 -2 -1\n"
+                                 "v 0 0 1\n"
+                                 "f 1 2 -1");
+
+  const SurfaceMesh mesh = read_obj(file);
+
+  ASSERT_EQ(mesh.triangle.cols(), 3);
+  EXPECT_EQ(mesh.triangle.col(0), Eigen::Vector3i(0, 1, 2));
+  EXPECT_EQ(mesh.triangle.col(1), Eigen::Vector3i(0, 2, 3));
+  EXPECT_EQ(mesh.triangle.col(2), Eigen::Vector3i(0, 1, 4));
+}
+
+TEST(ObjMesh, RefusesWhatIsNoSurface) {
+  const TemporaryFolder folder;
+  const auto refused = [&](const std::string& text, const std::string& beginning) {
+    const auto file = folder.write("body.obj", text);
+    expect_refused(folder, beginning, [&] { read_obj(file); });
+  };
+  const std::string corners = "v 0 0 0\nv 1 0 0\nv 1 1 0\n";
+  refused("", "body.obj: no faces");
+  refused(corners, "body.obj: no faces");
+  refused("v 0 0\n", "body.obj:1: coordinate ``");
+  refused("v 0 0 nan\n", "body.obj:1: coordinate `nan`");
+  refused("\nv 0 one 0\n", "body.obj:2: coordinate `one`");
+  refused(corners + "f 1 2\n", "body.obj:4: a face with 2 corners");
+  for (const char* corner : {"0", "4", "-4", "x", "1.5", "/1", "99999999999"})
+    refused(corners + "f 1 2 " + corner + "\n", "body.obj:4: corner `" + std::string(corner) + "`");
+}
+
+}  // namespace
+}  // namespace clothfit

@@ -1,0 +1,175 @@
+// From model files and fits to simulations and back. Not checked here: the reader and the writer of
+// model files (tests/data/model_description_test.cpp), and the steps of a simulation (tests/model).
+
+#include "fit/simulation.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "data/input_error.h"
+#include "model/simulate.h"
+#include "model/stability.h"
+#include "tests/fit/synthetic_cloth.h"
+
+namespace clothfit {
+namespace {
+
+ModelDescription small_model() {
+  ModelDescription model;
+  model.name = "small";
+  model.cloth = {.width_m = 0.3, .height_m = 0.4, .mass_kg = 0.02};
+  model.mesh_columns = 7;
+  model.mesh_rows = 9;
+  for (const FabricParameterName& parameter : kFabricParameters) model.fabric[parameter.name] = 20;
+  model.fabric["damping_warp"] = model.fabric["damping_weft"] = 1e-3;
+  model.frame_rate_hz = 60;
+  model.frame_time_s = *frame_times(60, 0.5);
+  return model;
+}
+
+double largest_difference_m(const std::vector<Eigen::Matrix3Xd>& a,
+                            const std::vector<Eigen::Matrix3Xd>& b) {
+  double largest = a.size() == b.size() ? 0 : INFINITY;
+  for (size_t f = 0; f < a.size(); ++f)
+    largest = std::max(largest, (a[f] - b[f]).cwiseAbs().maxCoeff());
+  return largest;
+}
+
+TEST(Simulation, PlacesTheSheetWhereTheModelSays) {
+  ModelDescription model = small_model();
+  model.sheet.position_m = {1, 2, 3};
+  // A quarter turn about x: t runs down.
+  model.sheet.orientation = Eigen::AngleAxisd(-M_PI / 2, Eigen::Vector3d::UnitX());
+
+  const Simulation simulation = make_simulation(model);
+
+  const Mesh& mesh = simulation.cloth.mesh;
+  const Eigen::Matrix3Xd& p = simulation.parameters.start_position_m;
+  EXPECT_LT((p.col(mesh.vertex(0, 0)) - Eigen::Vector3d(1, 2, 3)).norm(), 1e-15);
+  EXPECT_LT((p.col(mesh.vertex(0, 6)) - Eigen::Vector3d(1.3, 2, 3)).norm(), 1e-15);
+  EXPECT_LT((p.col(mesh.vertex(8, 0)) - Eigen::Vector3d(1, 2, 2.6)).norm(), 1e-15);
+  EXPECT_NEAR(simulation.cloth.mass_kg.sum(), 0.02, 1e-17);
+}
+
+TEST(Simulation, FollowsThePathsOfItsHeldPoints) {
+  ModelDescription model = small_model();
+  model.held.push_back({.point = {.edge = ClothEdge::top}, .path = {}});
+  model.held.push_back({.point = {.at_m = {0.3, 0.4}, .motion = HeldMotion::path},
+                        .path = {.time_s = {0, 0.5, 1},
+                                 .position_m = {{0.3, 0.4, 0}, {0.3, 0.4, 0.1}, {0.3, 0.4, 0.2}}}});
+  const Simulation simulation = make_simulation(model);
+
+  const SimulateResult result = run(simulation, default_time_step_s(simulation));
+
+  ASSERT_TRUE(result.usable());
+  const Mesh& mesh = simulation.cloth.mesh;
+  EXPECT_EQ(simulation.cloth.held.size(), 8u);
+  for (size_t f = 0; f < result.position_m.size(); ++f) {
+    const double time_s = simulation.frame_time_s[f];
+    EXPECT_LT(
+        (result.position_m[f].col(mesh.vertex(8, 6)) - Eigen::Vector3d(0.3, 0.4, 0.2 * time_s))
+            .norm(),
+        1e-12);
+    EXPECT_LT((result.position_m[f].col(mesh.vertex(0, 3)) - Eigen::Vector3d(0.15, 0, 0)).norm(),
+              1e-12);
+  }
+}
+
+TEST(Simulation, LeavesParametersOfAnEffectThatAreNotGivenNeutral) {
+  ModelDescription model = small_model();
+  model.effects = {{.name = "wind", .parameters = {{"q", {0.1, 0.2, 0.3}}}}};
+
+  const Simulation simulation = make_simulation(model);
+
+  EXPECT_EQ(simulation.parameters.effects, (std::vector<std::vector<double>>{{0, 0.1, 0.2, 0.3}}));
+}
+
+TEST(Simulation, RefusesEffectsThatDoNotExist) {
+  const auto refusal = [](const std::string& name, const std::string& parameter, double value) {
+    ModelDescription model = small_model();
+    model.file = "m.yaml";
+    model.effects = {{.name = name, .parameters = {{parameter, {value}}}, .line = 7}};
+    try {
+      make_simulation(model);
+    } catch (const InputError& error) {
+      return std::string(error.what());
+    }
+    return std::string("accepted");
+  };
+  using testing::StartsWith;
+
+  EXPECT_THAT(refusal("wnid", "c", 1), StartsWith("m.yaml:7: there is no effect 'wnid'; known "));
+  EXPECT_THAT(refusal("wind", "b", 1), StartsWith("m.yaml:7: effect wind has no parameter 'b'; "));
+  EXPECT_THAT(refusal("wind", "c", -1), StartsWith("m.yaml:7: wind.c = -1; "));
+  EXPECT_THAT(refusal("viscous_damping", "rate", -1), StartsWith("m.yaml:7: viscous_damping.rate"));
+  EXPECT_EQ(refusal("wind", "q_x", -1), "accepted");
+}
+
+TEST(Simulation, LimitsStrainWhereTheModelSays) {
+  ModelDescription model = small_model();
+  for (const char* name : {"tension_warp", "tension_weft", "shear", "flexion_warp", "flexion_weft"})
+    model.fabric[name] = 2;
+  model.held.push_back({.point = {.edge = ClothEdge::top}, .path = {}});
+  model.sheet.orientation = Eigen::AngleAxisd(-M_PI / 2, Eigen::Vector3d::UnitX());
+  const auto longest_share = [&] {
+    const Simulation simulation = make_simulation(model);
+    const SimulateResult result = run(simulation, 5e-4);
+    const Eigen::Matrix3Xd& p = result.position_m.back();
+    const Mesh& mesh = simulation.cloth.mesh;
+    return (p.col(mesh.vertex(1, 3)) - p.col(mesh.vertex(0, 3))).norm() / mesh.spacing_t_m();
+  };
+
+  EXPECT_GT(longest_share(), 1.1);
+  model.strain_limit = StrainLimitKind::consistent;
+  model.critical_elongation = 0.05;
+  EXPECT_LT(longest_share(), 1.05 + 1.1e-3);  // the limit's tolerance is 1e-3
+}
+
+TEST(Simulation, OfADescribedFitIsTheFitsOwn) {
+  for (const double tilt : {0.0, 0.01}) {
+    SCOPED_TRACE(tilt);
+    FitInput input = synthetic_input({});
+    input.recording.held = {{.at_m = {0, 0}, .motion = HeldMotion::fixed},
+                            {.at_m = {0.4, 0}, .motion = HeldMotion::tracked}};
+    const FitProblem problem = make_problem(input, {.effects = {"wind"}}, 9, 9);
+    Eigen::VectorXd values = problem.space.start();
+    values[problem.space.index("sheet_turn_x")] = tilt;
+    values[problem.space.index("sheet_shift_z")] = 0.002;
+    values[problem.space.index("shear")] = 17;
+    for (const char* name : {"tension_warp", "tension_weft"})
+      values[problem.space.index(name)] = 45;
+    for (const char* name : {"wind.c", "wind.q_x", "wind.q_y", "wind.q_z"})
+      values[problem.space.index(name)] = 0.02;
+    const double time_step_s =
+        0.5 * stable_time_step_s(problem.cloth, parameter_set(problem, values));
+
+    const Simulation simulation = make_simulation(describe_model(problem, input.recording, values));
+
+    const SimulateResult result = run(simulation, time_step_s);
+    const auto own = run_model(problem, {values}, problem.frames(), time_step_s).front();
+    ASSERT_FALSE(own.empty());
+    // A pose is rounded on its way through a quaternion (1e-16), the path through a second spline
+    // (1e-13 of its sizes), and half a second of motion multiplies that by a hundred or so.
+    EXPECT_LT(largest_difference_m(result.position_m, own), 1e-9);
+    EXPECT_GT((own.back() - own.front()).norm(), 0.1);
+  }
+}
+
+TEST(Simulation, StartsAtRestWhereTheModelSays) {
+  ModelDescription model = small_model();
+  model.start = StartKind::at_rest;
+  model.held.push_back({.point = {.edge = ClothEdge::top}, .path = {}});
+  model.sheet.orientation = Eigen::AngleAxisd(-M_PI / 2, Eigen::Vector3d::UnitX());
+  const Simulation simulation = make_simulation(model);
+
+  const SimulateResult result = run(simulation, default_time_step_s(simulation));
+
+  ASSERT_TRUE(result.usable());
+  const auto bottom = simulation.cloth.mesh.vertex(8, 3);
+  EXPECT_LT(result.position_m.front()(2, bottom), -0.4);  // it hangs longer than it is
+  // What relaxing leaves of the way to rest is below a percent of the stretch, a few millimetres.
+  EXPECT_LT((result.position_m.back() - result.position_m.front()).cwiseAbs().maxCoeff(), 2e-3);
+}
+
+}  // namespace
+}  // namespace clothfit
