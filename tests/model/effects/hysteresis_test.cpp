@@ -76,5 +76,22 @@ TEST(Hysteresis, AnOscillatorLosesTheSameOfItsAmplitudeInEveryCycle) {
   }
 }
 
+TEST(Hysteresis, WhereItSticksItIsNoStifferThanItsRatesSay) {
+  // Crumpled less than the yield; the contract's cloth is crumpled beyond it, where all slips.
+  Uniform uniform(1);
+  const Cloth cloth = square_cloth(6);
+  const auto effect = hysteresis::make();
+  const std::vector<double> parameters{2.0, 0.1};
+  const Eigen::Matrix3Xd p = crumpled(cloth.mesh, 0.02, uniform);
+
+  const double seen =
+      effect_contract::spectrum({{effect.get(), parameters}}, cloth, p).frequency2_per_s2;
+
+  const double bound =
+      effect->rates(cloth, spring_parameters(cotton(), cloth.mesh), parameters).frequency2_per_s2;
+  EXPECT_LE(seen, bound);
+  EXPECT_GE(seen, 0.4 * bound);
+}
+
 }  // namespace
 }  // namespace clothfit
