@@ -198,7 +198,7 @@ class Run {
       by_speed += h * by_place;
       by_force = h * inverse_mass * by_speed;
       // F / m is what the velocity has gained, less gravity.
-      gradient_.by_mass_kg -= (by_force * ((driven - velocity) / h - gravity)).matrix().transpose();
+      gradient_.by_mass_kg -= (by_force * ((driven - velocity) * (1 / h) - gravity)).matrix().transpose();
       return h * by_speed.sum();
     };
     const Vectors& driven = record.driven_velocity_m_per_s;
@@ -219,8 +219,9 @@ class Run {
                                          derivatives_);
       apply_transposed(e, by_force_);
     }
-    tangents_.linearise(parameters_.springs, before.position_m, before.velocity_m_per_s, factors_);
-    tangents_.add_transposed(by_force_, by_position, by_velocity, gradient_.by_springs);
+    tangents_.add_transposed(
+        {parameters_.springs, before.position_m, before.velocity_m_per_s, factors_}, by_force_,
+        by_position, by_velocity, gradient_.by_springs);
   }
 
   /// Effects that look at the sum of forces, in the reverse of the order in which they act.

@@ -115,19 +115,19 @@ void TangentStepper::step(const DualParameters& parameters,
     keep_memory(e);
   }
 
-  tangent_sweep_.linearise(parameters.value.springs, position.value, velocity.value);
+  const TangentSweep::State at{parameters.value.springs, position.value, velocity.value};
   const bool fused = !changes_force_ && !shifts_supports_;
   const LaneVectors<DualLanes>* target_m = &held_target_m;
   if (fused) {
-    tangent_sweep_.step_euler(parameters.tangent.springs, parameters.tangent.gravity_m_per_s2,
+    tangent_sweep_.step_euler(at, parameters.tangent.springs, parameters.tangent.gravity_m_per_s2,
                               inverse_mass_per_kg_, effects > 0 ? &force_n_.tangent : nullptr,
                               time_step_s, position.tangent, velocity.tangent);
     sweep_.step_euler(parameters.value.springs, parameters.value.gravity_m_per_s2,
                       inverse_mass_per_kg_, effects > 0 ? &force_n_.value : nullptr, time_step_s,
                       position.value, velocity.value);
   } else {
-    tangent_sweep_.add_spring_forces(parameters.tangent.springs, position.tangent, velocity.tangent,
-                                     force_n_.tangent);
+    tangent_sweep_.add_spring_forces(at, parameters.tangent.springs, position.tangent,
+                                     velocity.tangent, force_n_.tangent);
     sweep_.add_spring_forces(parameters.value.springs, position.value, velocity.value,
                              force_n_.value);
     for (size_t e = 0; e < effects; ++e) {

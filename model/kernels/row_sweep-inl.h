@@ -26,17 +26,18 @@ HWY_INLINE Vector3<V> force(const Vector3<V>& pull) {
 }
 
 /// Walks over the vertices in row-major order, for the lanes from `lane` on that fit into a vector.
-/// `pull_to(type, vertex, here, element)` is what the spring of that type that leaves the
-/// vertex (its element is `self`) pulls it with, added to and subtracted from a Vector3;
-/// `sink(vertex, self, sum)` takes the sum over its springs. The sink may move the vertex: no
+/// `here_at(vertex, self)` is what is read of a vertex whose element is `self`;
+/// `pull_to(type, vertex, here, element)` is what the spring of that type that leaves it for the
+/// vertex of `element` pulls it with, added to and subtracted from a Vector3;
+/// `sink(vertex, self, here, sum)` takes the sum over its springs. The sink may move the vertex: no
 /// spring of a later one reaches back to it.
 template <class L, class Here, class PullTo, class Sink>
 HWY_INLINE void sweep_rows(const Mesh& mesh, std::ptrdiff_t lane, typename L::Number* scratch,
                            const Here& here_at, const PullTo& pull_to, const Sink& sink) {
   using Number = typename L::Number;
   using V = Vector<L>;
-  using Pull =
-      decltype(pull_to(size_t{}, std::ptrdiff_t{}, here_at(std::ptrdiff_t{}), std::ptrdiff_t{}));
+  using Pull = decltype(pull_to(size_t{}, std::ptrdiff_t{},
+                                here_at(std::ptrdiff_t{}, std::ptrdiff_t{}), std::ptrdiff_t{}));
   const Tag<L> d;
   constexpr std::ptrdiff_t kLaneCount = L::kCount;
   const std::ptrdiff_t columns = mesh.columns, rows = mesh.rows;
@@ -56,7 +57,7 @@ HWY_INLINE void sweep_rows(const Mesh& mesh, std::ptrdiff_t lane, typename L::Nu
     for (std::ptrdiff_t j = 0; j < columns; ++j) {
       const std::ptrdiff_t at = j * kLaneCount + lane, self = i * width + at;
       const std::ptrdiff_t vertex = i * columns + j;
-      const auto here = here_at(self);
+      const auto here = here_at(vertex, self);
       Vector3<V> sum = zero(d) - (load(d, from_above, at) + load(d, from_two_above, at));
       sum = sum - right;
       sum = sum - right_two;

@@ -15,20 +15,15 @@
 
 #ifndef CLOTHFIT_MODEL_KERNELS_TANGENT_SWEEP_ONCE
 #define CLOTHFIT_MODEL_KERNELS_TANGENT_SWEEP_ONCE
+// The compiler must not make calls of these: vectors would go through memory.
+#define CLOTHFIT_INLINE __attribute__((always_inline))
 namespace clothfit {
 namespace {
 
 using ConstVectors = std::array<const double*, 3>;
 using MutableVectors = std::array<double*, 3>;
 
-/// One type's springs, in arrays over the vertices they leave.
-struct TypeArrays {
-  const double* exists;
-  MutableVectors direction, w;
-  double *tension_ratio, *elongation_m, *stretching_m_per_s, *stiffness;
-};
-
-/// What the coefficients of one type are computed from.
+/// The springs of one type and the state in which they are differentiated.
 struct LineariseArrays {
   std::ptrdiff_t count, offset;  ///< springs may leave vertices 0 to count - 1 for `offset` further
   ConstVectors position_m, velocity_m_per_s;
@@ -38,11 +33,9 @@ struct LineariseArrays {
 
 struct TangentArrays {
   Mesh mesh;
-  std::array<TypeArrays, kSpringTypes> types;
-  std::array<double, kSpringTypes> damping_ns_per_m;
-  const LaneSprings<>& springs;  ///< along the directions
-  bool any_spring;               ///< whether these are not all zero
-  const SpringFactors<SingleLane>* factors;
+  std::array<LineariseArrays, kSpringTypes> from;
+  const LaneSprings<>& springs;               ///< along the directions
+  bool any_spring;                            ///< whether these are not all zero
   ConstVectors position_m, velocity_m_per_s;  ///< along the directions
   double* scratch;
 };
@@ -55,11 +48,14 @@ struct TangentEuler {
   double time_step_s;
 };
 
+/// Ends of springs that are fewer vertices apart share vectors.
+constexpr std::ptrdiff_t kNear = 8;
+
 struct TransposedArrays {
-  std::ptrdiff_t count, offset;
-  double damping_ns_per_m;
+  const double* exists;  ///< 1 where a spring leaves, else 0
   ConstVectors by_force;
-  MutableVectors by_along, by_rate;  ///< scratch over all vertices
+  MutableVectors by_position, by_velocity;  ///< added to
+  MutableVectors by_along, by_rate;         ///< scratch over all vertices
   double *by_natural_length, *by_stiffness, *by_damping;
 };
 
@@ -83,47 +79,43 @@ HWY_INLINE void for_vectors(std::ptrdiff_t count, const Visit& visit) {
   for (; e < count; ++e) visit(single, e);
 }
 
-void linearise(const LineariseArrays& from, const TypeArrays& to) {
-  for_vectors(from.count, [&](auto d, std::ptrdiff_t e) HWY_ATTR {
-    using V = hn::Vec<decltype(d)>;
-    const auto constant = [&](double value, const double* factor) HWY_ATTR {
-      const V all = hn::Set(d, value);
-      return factor == nullptr ? all : hn::Mul(all, hn::LoadU(d, factor + e));
-    };
-    const V natural = constant(from.natural_length_m, from.natural_length_factor);
-    const V stiffness = constant(from.stiffness_n_per_m, from.stiffness_factor);
-    const V damping = hn::Set(d, from.damping_ns_per_m);
-    const Vector3<V> along =
-        load(d, from.position_m, e + from.offset) - load(d, from.position_m, e);
-    const Vector3<V> rate =
-        load(d, from.velocity_m_per_s, e + from.offset) - load(d, from.velocity_m_per_s, e);
-    const V length2 = dot(along, along);
-    const V inverse = inverse_square_root(length2);
-    const V length = hn::Mul(length2, inverse);
-    const Vector3<V> u = inverse * along;
-    const V stretching = dot(u, rate);
-    const V elongation = hn::Sub(length, natural);
-    const V tension = hn::Add(hn::Mul(stiffness, elongation), hn::Mul(damping, stretching));
-    const V ratio = hn::Mul(tension, inverse);
-    const Vector3<V> across = rate - stretching * u;
-    const Vector3<V> w = hn::Sub(stiffness, ratio) * u + hn::Mul(damping, inverse) * across;
-    // Nothing where there is no spring, or one that has no direction.
-    const auto there = hn::And(hn::Gt(hn::LoadU(d, to.exists + e), hn::Zero(d)),
-                               hn::Gt(length2, hn::Set(d, 1e-280)));
-    const auto keep = [&](const V& v, double* array)
-                          HWY_ATTR { hn::StoreU(hn::IfThenElseZero(there, v), d, array + e); };
-    const auto keep3 = [&](const Vector3<V>& v, const MutableVectors& arrays) HWY_ATTR {
-      keep(v.x, arrays[0]);
-      keep(v.y, arrays[1]);
-      keep(v.z, arrays[2]);
-    };
-    keep3(u, to.direction);
-    keep3(w, to.w);
-    keep(ratio, to.tension_ratio);
-    keep(elongation, to.elongation_m);
-    keep(stretching, to.stretching_m_per_s);
-    keep(stiffness, to.stiffness);
-  });
+/// What the derivatives of springs' forces consist of.
+template <class V>
+struct SpringDerivatives {
+  Vector3<V> u, w;
+  V tension_ratio, elongation, stretching, stiffness;
+};
+
+/// Those of the springs that leave the vertices from `e` on. All zero for one that has no
+/// direction.
+template <class D>
+HWY_INLINE SpringDerivatives<hn::Vec<D>> differentiate(D d, const LineariseArrays& from,
+                                                       std::ptrdiff_t e) {
+  using V = hn::Vec<D>;
+  V natural = hn::Set(d, from.natural_length_m), stiffness = hn::Set(d, from.stiffness_n_per_m);
+  if (from.stiffness_factor != nullptr) {
+    natural = hn::Mul(natural, hn::LoadU(d, from.natural_length_factor + e));
+    stiffness = hn::Mul(stiffness, hn::LoadU(d, from.stiffness_factor + e));
+  }
+  const V damping = hn::Set(d, from.damping_ns_per_m);
+  const Vector3<V> along = load(d, from.position_m, e + from.offset) - load(d, from.position_m, e);
+  const Vector3<V> rate =
+      load(d, from.velocity_m_per_s, e + from.offset) - load(d, from.velocity_m_per_s, e);
+  const V length2 = dot(along, along);
+  const V inverse =
+      hn::IfThenElseZero(hn::Gt(length2, hn::Set(d, 1e-280)), inverse_square_root(length2));
+  const Vector3<V> u = inverse * along;
+  const V stretching = dot(u, rate);
+  const V elongation = hn::Sub(hn::Mul(length2, inverse), natural);
+  const V tension = hn::Add(hn::Mul(stiffness, elongation), hn::Mul(damping, stretching));
+  const V ratio = hn::Mul(tension, inverse);
+  const Vector3<V> across = rate - stretching * u;
+  return {.u = u,
+          .w = hn::Sub(stiffness, ratio) * u + hn::Mul(damping, inverse) * across,
+          .tension_ratio = ratio,
+          .elongation = elongation,
+          .stretching = stretching,
+          .stiffness = stiffness};
 }
 
 /// How the types' constants change the tensions: not at all, each spring's alike, or by factors.
@@ -144,49 +136,85 @@ HWY_INLINE V fused_dot(const Vector3<V>& a, const Vector3<V>& b) {
   return hn::MulAdd(a.z, b.z, hn::MulAdd(a.y, b.y, hn::Mul(a.x, b.x)));
 }
 
+/// The derivatives of the springs that leave eight neighbouring vertices.
+struct Chunk {
+  static constexpr std::ptrdiff_t kVertices = 8;
+  alignas(64) double direction[kSpringTypes][3][kVertices];
+  alignas(64) double w[kSpringTypes][3][kVertices];
+  alignas(64) double tension_ratio[kSpringTypes][kVertices], elongation[kSpringTypes][kVertices],
+      stretching[kSpringTypes][kVertices], stiffness[kSpringTypes][kVertices];
+};
+
+HWY_INLINE void fill(const std::array<LineariseArrays, kSpringTypes>& from, std::ptrdiff_t first,
+                     Chunk& chunk) {
+  const hn::CappedTag<double, Chunk::kVertices> d;
+  for (size_t type = 0; type < kSpringTypes; ++type) {
+    if (first >= from[type].count) continue;
+    for (std::ptrdiff_t n = 0; n < Chunk::kVertices;
+         n += static_cast<std::ptrdiff_t>(hn::Lanes(d))) {
+      const auto spring = differentiate(d, from[type], first + n);
+      hn::Store(spring.u.x, d, chunk.direction[type][0] + n);
+      hn::Store(spring.u.y, d, chunk.direction[type][1] + n);
+      hn::Store(spring.u.z, d, chunk.direction[type][2] + n);
+      hn::Store(spring.w.x, d, chunk.w[type][0] + n);
+      hn::Store(spring.w.y, d, chunk.w[type][1] + n);
+      hn::Store(spring.w.z, d, chunk.w[type][2] + n);
+      hn::Store(spring.tension_ratio, d, chunk.tension_ratio[type] + n);
+      hn::Store(spring.elongation, d, chunk.elongation[type] + n);
+      hn::Store(spring.stretching, d, chunk.stretching[type] + n);
+      hn::Store(spring.stiffness, d, chunk.stiffness[type] + n);
+    }
+  }
+}
+
 template <Constants constants, class Sink>
 HWY_INLINE void sweep_tangents(const TangentArrays& arrays, const Sink& sink) {
   using L = ExactLanes;
   using V = Vector<L>;
   const Tag<L> d;
   const ConstVectors positions = arrays.position_m, velocities = arrays.velocity_m_per_s;
-  const std::array<TypeArrays, kSpringTypes> types = arrays.types;
+  const std::array<LineariseArrays, kSpringTypes> from = arrays.from;
   std::fill_n(arrays.scratch, kScratchRows * arrays.mesh.columns * kLanes, 0.0);
+  Chunk chunk;
   for (std::ptrdiff_t lane = 0; lane < kLanes; lane += static_cast<std::ptrdiff_t>(hn::Lanes(d))) {
-    V dampings[kSpringTypes], by_natural[kSpringTypes], by_stiffness[kSpringTypes],
-        by_damping[kSpringTypes];
+    V by_natural[kSpringTypes], by_stiffness[kSpringTypes], by_damping[kSpringTypes];
     for (size_t type = 0; type < kSpringTypes; ++type) {
-      dampings[type] = hn::Set(d, arrays.damping_ns_per_m[type]);
       by_natural[type] = hn::LoadU(d, arrays.springs.natural_length_m[type].data() + lane);
       by_stiffness[type] = hn::LoadU(d, arrays.springs.stiffness_n_per_m[type].data() + lane);
       by_damping[type] = hn::LoadU(d, arrays.springs.damping_ns_per_m[type].data() + lane);
     }
-    const auto motion_at = [&](std::ptrdiff_t element) HWY_ATTR {
+    const auto motion_at = [&](std::ptrdiff_t element) HWY_ATTR CLOTHFIT_INLINE {
       return Motion{load(d, positions, element), load(d, velocities, element)};
     };
+    const auto here_at = [&](std::ptrdiff_t vertex, std::ptrdiff_t self) HWY_ATTR CLOTHFIT_INLINE {
+      if (vertex % Chunk::kVertices == 0) fill(from, vertex, chunk);
+      return motion_at(self);
+    };
     const auto pull_to = [&](size_t type, std::ptrdiff_t vertex, const Motion& here,
-                             std::ptrdiff_t element) HWY_ATTR {
-      const TypeArrays& of = types[type];
-      const auto at = [&](const double* array) HWY_ATTR { return hn::Set(d, array[vertex]); };
+                             std::ptrdiff_t element) HWY_ATTR CLOTHFIT_INLINE {
+      const std::ptrdiff_t n = vertex % Chunk::kVertices;
+      const auto at = [&](const double* of) HWY_ATTR CLOTHFIT_INLINE { return hn::Set(d, of[n]); };
       const Motion there = motion_at(element);
       const Vector3<V> along = there.position - here.position;
       const Vector3<V> rate = there.velocity - here.velocity;
-      const Vector3<V> u{at(of.direction[0]), at(of.direction[1]), at(of.direction[2])};
-      const Vector3<V> w{at(of.w[0]), at(of.w[1]), at(of.w[2])};
-      V tension = hn::MulAdd(dampings[type], fused_dot(u, rate), fused_dot(w, along));
+      const Vector3<V> u{at(chunk.direction[type][0]), at(chunk.direction[type][1]),
+                         at(chunk.direction[type][2])};
+      const Vector3<V> w{at(chunk.w[type][0]), at(chunk.w[type][1]), at(chunk.w[type][2])};
+      V tension = hn::MulAdd(hn::Set(d, from[type].damping_ns_per_m), fused_dot(u, rate),
+                             fused_dot(w, along));
       if constexpr (constants != Constants::still) {
         V natural = by_natural[type], stiffness = by_stiffness[type];
         if constexpr (constants == Constants::change_by_factors) {
-          natural = hn::Mul(natural, hn::Set(d, arrays.factors->natural_length[type][vertex]));
-          stiffness = hn::Mul(stiffness, hn::Set(d, arrays.factors->stiffness[type][vertex]));
+          natural = hn::Mul(natural, hn::Set(d, from[type].natural_length_factor[vertex]));
+          stiffness = hn::Mul(stiffness, hn::Set(d, from[type].stiffness_factor[vertex]));
         }
-        tension = hn::MulAdd(at(of.elongation_m), stiffness, tension);
-        tension = hn::MulAdd(at(of.stretching_m_per_s), by_damping[type], tension);
-        tension = hn::NegMulAdd(at(of.stiffness), natural, tension);
+        tension = hn::MulAdd(at(chunk.elongation[type]), stiffness, tension);
+        tension = hn::MulAdd(at(chunk.stretching[type]), by_damping[type], tension);
+        tension = hn::NegMulAdd(at(chunk.stiffness[type]), natural, tension);
       }
-      return fused(tension, u, at(of.tension_ratio) * along);
+      return fused(tension, u, at(chunk.tension_ratio[type]) * along);
     };
-    sweep_rows<L>(arrays.mesh, lane, arrays.scratch, motion_at, pull_to, sink);
+    sweep_rows<L>(arrays.mesh, lane, arrays.scratch, here_at, pull_to, sink);
   }
 }
 
@@ -194,7 +222,7 @@ template <class Sink>
 HWY_INLINE void sweep_tangents(const TangentArrays& arrays, const Sink& sink) {
   if (!arrays.any_spring)
     sweep_tangents<Constants::still>(arrays, sink);
-  else if (arrays.factors == nullptr)
+  else if (arrays.from[0].stiffness_factor == nullptr)
     sweep_tangents<Constants::change>(arrays, sink);
   else
     sweep_tangents<Constants::change_by_factors>(arrays, sink);
@@ -226,38 +254,45 @@ void step_tangents(const TangentArrays& arrays, const TangentEuler& euler) {
   });
 }
 
-void transpose(const TypeArrays& of, const TransposedArrays& arrays) {
-  for_vectors(arrays.count, [&](auto d, std::ptrdiff_t e) HWY_ATTR {
+void transpose(const LineariseArrays& from, const TransposedArrays& arrays) {
+  for_vectors(from.count, [&](auto d, std::ptrdiff_t e) HWY_ATTR {
     using V = hn::Vec<decltype(d)>;
-    // What the force pulls one end with it pulls the other against.
+    const auto spring = differentiate(d, from, e);
+    // What the force pulls one end with it pulls the other against; nothing where no spring leaves.
+    const V exists = hn::LoadU(d, arrays.exists + e);
     const Vector3<V> by_force =
-        load(d, arrays.by_force, e) - load(d, arrays.by_force, e + arrays.offset);
-    const auto at = [&](const double* array) HWY_ATTR { return hn::LoadU(d, array + e); };
-    const Vector3<V> u = load(d, of.direction, e), w = load(d, of.w, e);
-    const V by_tension = dot(u, by_force);
-    store(at(of.tension_ratio) * by_force + by_tension * w, d, arrays.by_along, e);
-    store(hn::Mul(hn::Set(d, arrays.damping_ns_per_m), by_tension) * u, d, arrays.by_rate, e);
-    const auto add = [&](const V& v, double* array) HWY_ATTR {
+        exists * (load(d, arrays.by_force, e) - load(d, arrays.by_force, e + from.offset));
+    const V by_tension = dot(spring.u, by_force);
+    const auto share = [&](const Vector3<V>& by, const MutableVectors& kept,
+                           const MutableVectors& to) HWY_ATTR CLOTHFIT_INLINE {
+      store(load(d, to, e) - by, d, to, e);
+      // The other end's, unless it is so near that the next vector is the same memory: that waits.
+      if (from.offset >= kNear)
+        store(load(d, to, e + from.offset) + by, d, to, e + from.offset);
+      else
+        store(by, d, kept, e);
+    };
+    share(spring.tension_ratio * by_force + by_tension * spring.w, arrays.by_along,
+          arrays.by_position);
+    share(hn::Mul(hn::Set(d, from.damping_ns_per_m), by_tension) * spring.u, arrays.by_rate,
+          arrays.by_velocity);
+    const auto add = [&](const V& v, double* array) HWY_ATTR CLOTHFIT_INLINE {
       hn::StoreU(hn::Add(hn::LoadU(d, array + e), v), d, array + e);
     };
-    add(hn::Mul(by_tension, at(of.elongation_m)), arrays.by_stiffness);
-    add(hn::Mul(by_tension, at(of.stretching_m_per_s)), arrays.by_damping);
-    add(hn::Neg(hn::Mul(by_tension, at(of.stiffness))), arrays.by_natural_length);
+    add(hn::Mul(by_tension, spring.elongation), arrays.by_stiffness);
+    add(hn::Mul(by_tension, spring.stretching), arrays.by_damping);
+    add(hn::Neg(hn::Mul(by_tension, spring.stiffness)), arrays.by_natural_length);
   });
 }
 
-/// to[v] += share[v - offset] - share[v], shares of vertices 0 to count - 1.
-void scatter(std::ptrdiff_t count, std::ptrdiff_t offset, const MutableVectors& share,
-             const MutableVectors& to) {
+/// to[v + offset] += share[v] for v from 0 to count - 1.
+void shift_and_add(std::ptrdiff_t count, std::ptrdiff_t offset, const MutableVectors& share,
+                   const MutableVectors& to) {
   for (size_t axis = 0; axis < 3; ++axis) {
     const double* const from = share[axis];
-    double* const sum = to[axis];
+    double* const sum = to[axis] + offset;
     for_vectors(count, [&](auto d, std::ptrdiff_t e) HWY_ATTR {
-      hn::StoreU(hn::Sub(hn::LoadU(d, sum + e), hn::LoadU(d, from + e)), d, sum + e);
-    });
-    for_vectors(count, [&](auto d, std::ptrdiff_t e) HWY_ATTR {
-      hn::StoreU(hn::Add(hn::LoadU(d, sum + offset + e), hn::LoadU(d, from + e)), d,
-                 sum + offset + e);
+      hn::StoreU(hn::Add(hn::LoadU(d, sum + e), hn::LoadU(d, from + e)), d, sum + e);
     });
   }
 }
@@ -271,26 +306,12 @@ HWY_AFTER_NAMESPACE();
 namespace clothfit {
 namespace {
 
-HWY_EXPORT(linearise);
 HWY_EXPORT(add_tangents);
 HWY_EXPORT(step_tangents);
 HWY_EXPORT(transpose);
-HWY_EXPORT(scatter);
+HWY_EXPORT(shift_and_add);
 
 constexpr size_t kScratchRows = 9;  // as sweep_rows needs
-
-TypeArrays arrays_of(TangentSweep::Coefficients& c) {
-  const auto three = [](std::array<std::vector<double>, 3>& v) {
-    return MutableVectors{v[0].data(), v[1].data(), v[2].data()};
-  };
-  return {.exists = c.exists.data(),
-          .direction = three(c.direction),
-          .w = three(c.w),
-          .tension_ratio = c.tension_ratio.data(),
-          .elongation_m = c.elongation_m.data(),
-          .stretching_m_per_s = c.stretching_m_per_s.data(),
-          .stiffness = c.stiffness.data()};
-}
 
 bool any_change(const LaneSprings<>& springs) {
   bool any = false;
@@ -314,66 +335,51 @@ TangentSweep::SpringGradients TangentSweep::SpringGradients::zero(const Mesh& me
 TangentSweep::TangentSweep(const Mesh& mesh) : mesh_(mesh) {
   const auto vertices = static_cast<size_t>(mesh.vertex_count());
   for (size_t type = 0; type < kSpringTypes; ++type) {
-    Coefficients& c = coefficients_[type];
-    const std::vector<double> none(vertices, 0.0);
-    c = {none, {none, none, none}, {none, none, none}, none, none, none, none};
+    exists_[type].resize(vertices);
     for (int i = 0; i < mesh.rows; ++i)
       for (int j = 0; j < mesh.columns; ++j)
-        if (kSpringReach[type].leaves(mesh, i, j))
-          c.exists[static_cast<size_t>(mesh.vertex(i, j))] = 1;
+        exists_[type][static_cast<size_t>(mesh.vertex(i, j))] =
+            kSpringReach[type].leaves(mesh, i, j) ? 1 : 0;
   }
   scratch_.resize(
       std::max(kScratchRows * static_cast<size_t>(mesh.columns) * kLanes, 6 * vertices));
 }
 
-void TangentSweep::linearise(const LaneSprings<SingleLane>& springs,
-                             const LaneVectors<SingleLane>& position_m,
-                             const LaneVectors<SingleLane>& velocity_m_per_s,
-                             const SpringFactors<SingleLane>* factors) {
-  factors_ = factors;
-  for (size_t type = 0; type < kSpringTypes; ++type) {
-    damping_ns_per_m_[type] = springs.damping_ns_per_m[type][0];
-    const std::ptrdiff_t offset = kSpringReach[type].offset(mesh_);
-    const LineariseArrays from{
-        .count = std::max<std::ptrdiff_t>(mesh_.vertex_count() - offset, 0),
-        .offset = offset,
-        .position_m = position_m.data(),
-        .velocity_m_per_s = velocity_m_per_s.data(),
-        .natural_length_m = springs.natural_length_m[type][0],
-        .stiffness_n_per_m = springs.stiffness_n_per_m[type][0],
-        .damping_ns_per_m = springs.damping_ns_per_m[type][0],
-        .natural_length_factor =
-            factors != nullptr ? factors->natural_length[type].data() : nullptr,
-        .stiffness_factor = factors != nullptr ? factors->stiffness[type].data() : nullptr};
-    HWY_DYNAMIC_DISPATCH(linearise)(from, arrays_of(coefficients_[type]));
-  }
-}
-
 namespace {
 
-TangentArrays tangent_arrays(const Mesh& mesh,
-                             std::array<TangentSweep::Coefficients, kSpringTypes>& coefficients,
-                             const std::array<double, kSpringTypes>& damping_ns_per_m,
-                             const LaneSprings<>& springs, const SpringFactors<SingleLane>* factors,
-                             const LaneVectors<>& position_m, const LaneVectors<>& velocity_m_per_s,
-                             std::vector<double>& scratch) {
+LineariseArrays linearise_arrays(const Mesh& mesh, size_t type, const TangentSweep::State& at) {
+  const std::ptrdiff_t offset = kSpringReach[type].offset(mesh);
+  const bool factors = at.factors != nullptr;
+  return {.count = std::max<std::ptrdiff_t>(mesh.vertex_count() - offset, 0),
+          .offset = offset,
+          .position_m = at.position_m.data(),
+          .velocity_m_per_s = at.velocity_m_per_s.data(),
+          .natural_length_m = at.springs.natural_length_m[type][0],
+          .stiffness_n_per_m = at.springs.stiffness_n_per_m[type][0],
+          .damping_ns_per_m = at.springs.damping_ns_per_m[type][0],
+          .natural_length_factor = factors ? at.factors->natural_length[type].data() : nullptr,
+          .stiffness_factor = factors ? at.factors->stiffness[type].data() : nullptr};
+}
+
+TangentArrays tangent_arrays(const Mesh& mesh, const TangentSweep::State& at,
+                             const LaneSprings<>& springs, const LaneVectors<>& position_m,
+                             const LaneVectors<>& velocity_m_per_s, double* scratch) {
   TangentArrays arrays{.mesh = mesh,
-                       .types = {},
-                       .damping_ns_per_m = damping_ns_per_m,
+                       .from = {},
                        .springs = springs,
                        .any_spring = any_change(springs),
-                       .factors = factors,
                        .position_m = position_m.data(),
                        .velocity_m_per_s = velocity_m_per_s.data(),
-                       .scratch = scratch.data()};
+                       .scratch = scratch};
   for (size_t type = 0; type < kSpringTypes; ++type)
-    arrays.types[type] = arrays_of(coefficients[type]);
+    arrays.from[type] = linearise_arrays(mesh, type, at);
   return arrays;
 }
 
 }  // namespace
 
-void TangentSweep::step_euler(const LaneSprings<>& springs, const LaneVector<>& gravity,
+void TangentSweep::step_euler(const State& at, const LaneSprings<>& springs,
+                              const LaneVector<>& gravity,
                               const Eigen::VectorXd& inverse_mass_per_kg,
                               const LaneVectors<>* effect_force_n, double time_step_s,
                               LaneVectors<>& position_m, LaneVectors<>& velocity_m_per_s) {
@@ -385,21 +391,19 @@ void TangentSweep::step_euler(const LaneSprings<>& springs, const LaneVector<>& 
       .inverse_mass_per_kg = inverse_mass_per_kg.data(),
       .time_step_s = time_step_s};
   HWY_DYNAMIC_DISPATCH(step_tangents)
-  (tangent_arrays(mesh_, coefficients_, damping_ns_per_m_, springs, factors_, position_m,
-                  velocity_m_per_s, scratch_),
-   euler);
+  (tangent_arrays(mesh_, at, springs, position_m, velocity_m_per_s, scratch_.data()), euler);
 }
 
-void TangentSweep::add_spring_forces(const LaneSprings<>& springs, const LaneVectors<>& position_m,
+void TangentSweep::add_spring_forces(const State& at, const LaneSprings<>& springs,
+                                     const LaneVectors<>& position_m,
                                      const LaneVectors<>& velocity_m_per_s,
                                      LaneVectors<>& force_n) {
   HWY_DYNAMIC_DISPATCH(add_tangents)
-  (tangent_arrays(mesh_, coefficients_, damping_ns_per_m_, springs, factors_, position_m,
-                  velocity_m_per_s, scratch_),
+  (tangent_arrays(mesh_, at, springs, position_m, velocity_m_per_s, scratch_.data()),
    force_n.data());
 }
 
-void TangentSweep::add_transposed(const LaneVectors<SingleLane>& by_force,
+void TangentSweep::add_transposed(const State& at, const LaneVectors<SingleLane>& by_force,
                                   LaneVectors<SingleLane>& by_position,
                                   LaneVectors<SingleLane>& by_velocity,
                                   SpringGradients& by_springs) {
@@ -409,19 +413,22 @@ void TangentSweep::add_transposed(const LaneVectors<SingleLane>& by_force,
     return MutableVectors{first, first + vertices, first + 2 * vertices};
   };
   for (size_t type = 0; type < kSpringTypes; ++type) {
-    const std::ptrdiff_t offset = kSpringReach[type].offset(mesh_);
-    const TransposedArrays arrays{.count = std::max<std::ptrdiff_t>(vertices - offset, 0),
-                                  .offset = offset,
-                                  .damping_ns_per_m = damping_ns_per_m_[type],
+    const LineariseArrays from = linearise_arrays(mesh_, type, at);
+    const TransposedArrays arrays{.exists = exists_[type].data(),
                                   .by_force = by_force.data(),
+                                  .by_position = by_position.data(),
+                                  .by_velocity = by_velocity.data(),
                                   .by_along = scratch(0),
                                   .by_rate = scratch(1),
                                   .by_natural_length = by_springs.natural_length_m[type].data(),
                                   .by_stiffness = by_springs.stiffness_n_per_m[type].data(),
                                   .by_damping = by_springs.damping_ns_per_m[type].data()};
-    HWY_DYNAMIC_DISPATCH(transpose)(arrays_of(coefficients_[type]), arrays);
-    HWY_DYNAMIC_DISPATCH(scatter)(arrays.count, offset, arrays.by_along, by_position.data());
-    HWY_DYNAMIC_DISPATCH(scatter)(arrays.count, offset, arrays.by_rate, by_velocity.data());
+    HWY_DYNAMIC_DISPATCH(transpose)(from, arrays);
+    if (from.offset >= kNear) continue;
+    HWY_DYNAMIC_DISPATCH(shift_and_add)
+    (from.count, from.offset, arrays.by_along, by_position.data());
+    HWY_DYNAMIC_DISPATCH(shift_and_add)
+    (from.count, from.offset, arrays.by_rate, by_velocity.data());
   }
 }
 

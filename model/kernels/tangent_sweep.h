@@ -3,14 +3,15 @@
 #include <array>
 #include <vector>
 
+#include "model/aligned_numbers.h"
 #include "model/kernels/cloth_sweep.h"
 #include "model/lanes.h"
 #include "model/mesh.h"
 
 namespace clothfit {
 
-/// The derivative of the springs' forces in one state of one simulation, kept between the calls
-/// that multiply by it or by its transpose.
+/// The derivative of the springs' forces in a state of one simulation: products with it, and with
+/// its transpose.
 ///
 /// With L and V the relative position and velocity of a spring's ends, l = |L|, u = L / l, and the
 /// tension T = k (l - l0) + c u . V, the force T u changes by
@@ -18,39 +19,33 @@ namespace clothfit {
 ///   dF = T / l dL + u (w . dL + c u . dV + (l - l0) dk - k dl0 + (u . V) dc),
 ///   w = (k - T / l) u + c / l (V - u (u . V)).
 ///
-/// Products may be fused with sums, so derivatives differ in their last bits between processors with
-/// and without such an operation.
+/// Products may be fused with sums, so derivatives differ in their last bits between processors
+/// with and without such an operation.
 ///
 /// Holds scratch memory: one object per thread.
 class TangentSweep {
  public:
   explicit TangentSweep(const Mesh& mesh);
 
-  /// Sets the state in which derivatives are taken. `factors`: null for springs of a type all
-  /// alike.
-  void linearise(const LaneSprings<SingleLane>& springs, const LaneVectors<SingleLane>& position_m,
-                 const LaneVectors<SingleLane>& velocity_m_per_s,
-                 const SpringFactors<SingleLane>* factors = nullptr);
+  /// Where derivatives are taken. `factors`: null for springs of a type all alike.
+  struct State {
+    const LaneSprings<SingleLane>& springs;
+    const LaneVectors<SingleLane>& position_m;
+    const LaneVectors<SingleLane>& velocity_m_per_s;
+    const SpringFactors<SingleLane>* factors = nullptr;
+  };
 
   /// The derivative of ClothSweep::step_euler along a direction in every lane: state and parameters
   /// change by `position_m`, `velocity_m_per_s`, `springs` (derivatives of the types' constants)
   /// and `gravity`, the forces of effects by `effect_force_n` (may be null).
-  void step_euler(const LaneSprings<>& springs, const LaneVector<>& gravity,
+  void step_euler(const State& at, const LaneSprings<>& springs, const LaneVector<>& gravity,
                   const Eigen::VectorXd& inverse_mass_per_kg, const LaneVectors<>* effect_force_n,
                   double time_step_s, LaneVectors<>& position_m, LaneVectors<>& velocity_m_per_s);
 
   /// The derivative of ClothSweep::add_spring_forces, likewise.
-  void add_spring_forces(const LaneSprings<>& springs, const LaneVectors<>& position_m,
-                         const LaneVectors<>& velocity_m_per_s, LaneVectors<>& force_n);
-
-  /// Of every spring of a type, by the vertex it leaves; all zero where none leaves.
-  struct Coefficients {
-    std::vector<double> exists;                       ///< 1 where a spring leaves
-    std::array<std::vector<double>, 3> direction, w;  ///< u, w
-    std::vector<double> tension_ratio;                ///< T / l
-    std::vector<double> elongation_m, stretching_m_per_s;
-    std::vector<double> stiffness;  ///< k, factors included
-  };
+  void add_spring_forces(const State& at, const LaneSprings<>& springs,
+                         const LaneVectors<>& position_m, const LaneVectors<>& velocity_m_per_s,
+                         LaneVectors<>& force_n);
 
   /// A number for every spring, by type and by the vertex it leaves.
   using PerSpring = std::array<std::vector<double>, kSpringTypes>;
@@ -64,15 +59,14 @@ class TangentSweep {
 
   /// The transpose: from a cost's derivatives by the forces, adds those by the state before to
   /// `by_position` and `by_velocity`, and those by the springs' own constants to `by_springs`.
-  void add_transposed(const LaneVectors<SingleLane>& by_force, LaneVectors<SingleLane>& by_position,
-                      LaneVectors<SingleLane>& by_velocity, SpringGradients& by_springs);
+  void add_transposed(const State& at, const LaneVectors<SingleLane>& by_force,
+                      LaneVectors<SingleLane>& by_position, LaneVectors<SingleLane>& by_velocity,
+                      SpringGradients& by_springs);
 
  private:
   Mesh mesh_;
-  const SpringFactors<SingleLane>* factors_ = nullptr;
-  std::array<double, kSpringTypes> damping_ns_per_m_{};
-  std::array<Coefficients, kSpringTypes> coefficients_;
-  std::vector<double> scratch_;
+  std::array<AlignedNumbers<double>, kSpringTypes> exists_;  ///< 1 where a spring leaves a vertex
+  AlignedNumbers<double> scratch_;
 };
 
 }  // namespace clothfit
