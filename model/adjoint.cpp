@@ -192,23 +192,17 @@ class Run {
                                         h};
     // P += h V with the new V; V += h (g + F / m)
     Vectors &by_position = by_state_.position_m, &by_velocity = by_state_.velocity_m_per_s;
-    const auto inverse_mass = inverse_mass_per_kg_.transpose().array();
-    const auto take_back = [&](const auto& driven, const auto& velocity, double gravity,
-                               const auto& by_place, auto& by_speed, auto& by_force) {
-      by_speed += h * by_place;
-      by_force = h * inverse_mass * by_speed;
-      // F / m is what the velocity has gained, less gravity.
-      gradient_.by_mass_kg -= (by_force * ((driven - velocity) * (1 / h) - gravity)).matrix().transpose();
-      return h * by_speed.sum();
-    };
-    const Vectors& driven = record.driven_velocity_m_per_s;
+    const Vectors &velocity = before.velocity_m_per_s, &driven = record.driven_velocity_m_per_s;
     const LaneVector<SingleLane>& g = parameters_.gravity_m_per_s2;
-    gradient_.by_gravity += Eigen::Vector3d(take_back(driven.x, before.velocity_m_per_s.x, g.x[0],
-                                                      by_position.x, by_velocity.x, by_force_.x),
-                                            take_back(driven.y, before.velocity_m_per_s.y, g.y[0],
-                                                      by_position.y, by_velocity.y, by_force_.y),
-                                            take_back(driven.z, before.velocity_m_per_s.z, g.z[0],
-                                                      by_position.z, by_velocity.z, by_force_.z));
+    Eigen::VectorXd& by_mass = gradient_.by_mass_kg;
+    TangentSweep::take_back_motion(h, g.x[0], inverse_mass_per_kg_, velocity.x, driven.x,
+                                   by_position.x, by_velocity.x, by_force_.x, by_mass);
+    TangentSweep::take_back_motion(h, g.y[0], inverse_mass_per_kg_, velocity.y, driven.y,
+                                   by_position.y, by_velocity.y, by_force_.y, by_mass);
+    TangentSweep::take_back_motion(h, g.z[0], inverse_mass_per_kg_, velocity.z, driven.z,
+                                   by_position.z, by_velocity.z, by_force_.z, by_mass);
+    gradient_.by_gravity +=
+        h * Eigen::Vector3d(by_velocity.x.sum(), by_velocity.y.sum(), by_velocity.z.sum());
     take_back_inertia_and_supports(step, scene, before);
 
     if (!force_n_.empty())

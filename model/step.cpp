@@ -191,7 +191,7 @@ void EulerStepper<L>::step(const LaneParameters<L>& parameters, const LaneVector
   const bool any_force = effects > 0 || extras.force_n != nullptr;
   if (extras.force_n != nullptr)
     force_n_ = *extras.force_n;
-  else
+  else if (any_force || changes_force_ || shifts_supports_)
     force_n_.set_zero();
   for (size_t e = 0; e < effects; ++e)
     cloth_.effects[e]->add_force(scene, parameters.effects[e], state.effect_memory[e], force_n_);

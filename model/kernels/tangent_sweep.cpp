@@ -48,6 +48,14 @@ struct TangentEuler {
   double time_step_s;
 };
 
+/// One coordinate.
+struct MotionArrays {
+  std::ptrdiff_t count;
+  double time_step_s, gravity_m_per_s2;
+  const double *inverse_mass_per_kg, *velocity_m_per_s, *driven_velocity_m_per_s, *by_position;
+  double *by_velocity, *by_force, *by_mass;
+};
+
 /// Ends of springs that are fewer vertices apart share vectors.
 constexpr std::ptrdiff_t kNear = 8;
 
@@ -285,6 +293,24 @@ void transpose(const LineariseArrays& from, const TransposedArrays& arrays) {
   });
 }
 
+void take_back(const MotionArrays& arrays) {
+  for_vectors(arrays.count, [&](auto d, std::ptrdiff_t e) HWY_ATTR {
+    using V = hn::Vec<decltype(d)>;
+    const auto at = [&](const double* array)
+                        HWY_ATTR CLOTHFIT_INLINE { return hn::LoadU(d, array + e); };
+    const V h = hn::Set(d, arrays.time_step_s);
+    const V by_velocity = hn::MulAdd(h, at(arrays.by_position), at(arrays.by_velocity));
+    const V by_force = hn::Mul(hn::Mul(h, at(arrays.inverse_mass_per_kg)), by_velocity);
+    const V acceleration =
+        hn::MulSub(hn::Sub(at(arrays.driven_velocity_m_per_s), at(arrays.velocity_m_per_s)),
+                   hn::Set(d, 1 / arrays.time_step_s), hn::Set(d, arrays.gravity_m_per_s2));
+    hn::StoreU(by_velocity, d, arrays.by_velocity + e);
+    hn::StoreU(by_force, d, arrays.by_force + e);
+    // F / m is the acceleration less gravity.
+    hn::StoreU(hn::NegMulAdd(by_force, acceleration, at(arrays.by_mass)), d, arrays.by_mass + e);
+  });
+}
+
 /// to[v + offset] += share[v] for v from 0 to count - 1.
 void shift_and_add(std::ptrdiff_t count, std::ptrdiff_t offset, const MutableVectors& share,
                    const MutableVectors& to) {
@@ -310,6 +336,7 @@ HWY_EXPORT(add_tangents);
 HWY_EXPORT(step_tangents);
 HWY_EXPORT(transpose);
 HWY_EXPORT(shift_and_add);
+HWY_EXPORT(take_back);
 
 constexpr size_t kScratchRows = 9;  // as sweep_rows needs
 
@@ -430,6 +457,26 @@ void TangentSweep::add_transposed(const State& at, const LaneVectors<SingleLane>
     HWY_DYNAMIC_DISPATCH(shift_and_add)
     (from.count, from.offset, arrays.by_rate, by_velocity.data());
   }
+}
+
+void TangentSweep::take_back_motion(double time_step_s, double gravity_m_per_s2,
+                                    const Eigen::VectorXd& inverse_mass_per_kg,
+                                    const LaneArray<SingleLane>& velocity_m_per_s,
+                                    const LaneArray<SingleLane>& driven_velocity_m_per_s,
+                                    const LaneArray<SingleLane>& by_position,
+                                    LaneArray<SingleLane>& by_velocity,
+                                    LaneArray<SingleLane>& by_force, Eigen::VectorXd& by_mass) {
+  HWY_DYNAMIC_DISPATCH(take_back)
+  ({.count = by_mass.size(),
+    .time_step_s = time_step_s,
+    .gravity_m_per_s2 = gravity_m_per_s2,
+    .inverse_mass_per_kg = inverse_mass_per_kg.data(),
+    .velocity_m_per_s = velocity_m_per_s.data(),
+    .driven_velocity_m_per_s = driven_velocity_m_per_s.data(),
+    .by_position = by_position.data(),
+    .by_velocity = by_velocity.data(),
+    .by_force = by_force.data(),
+    .by_mass = by_mass.data()});
 }
 
 }  // namespace clothfit

@@ -63,6 +63,18 @@ class TangentSweep {
                       LaneVectors<SingleLane>& by_position, LaneVectors<SingleLane>& by_velocity,
                       SpringGradients& by_springs);
 
+  /// The transpose of one coordinate of V += h (g + F / m), P += h V. Given a cost's derivatives by
+  /// the new positions and velocities, makes of `by_velocity` those by V before, sets `by_force`,
+  /// and adds to `by_mass` those by the masses, from the acceleration that `driven` velocities
+  /// show.
+  static void take_back_motion(double time_step_s, double gravity_m_per_s2,
+                               const Eigen::VectorXd& inverse_mass_per_kg,
+                               const LaneArray<SingleLane>& velocity_m_per_s,
+                               const LaneArray<SingleLane>& driven_velocity_m_per_s,
+                               const LaneArray<SingleLane>& by_position,
+                               LaneArray<SingleLane>& by_velocity, LaneArray<SingleLane>& by_force,
+                               Eigen::VectorXd& by_mass);
+
  private:
   Mesh mesh_;
   std::array<AlignedNumbers<double>, kSpringTypes> exists_;  ///< 1 where a spring leaves a vertex
