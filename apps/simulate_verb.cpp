@@ -145,9 +145,10 @@ std::string divergence_text(const Divergence& divergence, const StepChoice& choi
   return text;
 }
 
-SimulateResult run_or_explain(const Simulation& simulation, const StepChoice& choice) {
-  SimulateResult result = run(simulation, choice.time_step_s);
-  if (interrupted()) throw Cancelled();
+SimulateResult run_or_explain(const Simulation& simulation, const StepChoice& choice,
+                              const ProgressCallback& progress) {
+  SimulateResult result = run(simulation, choice.time_step_s, progress);
+  if (result.reason == StopReason::cancelled || interrupted()) throw Cancelled();
   if (result.usable()) return result;
   // A start that does not come to rest is looked at as the sheet is let go.
   const bool never_rested = result.diverged_frame == 0;
@@ -261,8 +262,7 @@ int run_simulate(const SimulateVerbOptions& options) {
                     simulation.cloth.mesh.columns, simulation.cloth.mesh.rows,
                     simulation.cloth.spring_count()) +
         step_text(choice);
-    progress({.stage = "simulate", .done = 0, .total = 0, .unit = "steps", .note = ""});
-    const SimulateResult result = run_or_explain(simulation, choice);
+    const SimulateResult result = run_or_explain(simulation, choice, progress);
     if (interrupted()) throw Cancelled();
     const double stretch = largest_stretch(simulation, result);
     if (stretch > kLengthBeyondReason)

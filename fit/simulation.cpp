@@ -163,13 +163,22 @@ double default_time_step_s(const Simulation& simulation) {
   return std::min(stable_s / RefineOptions().stability_margin, longest_s);
 }
 
-SimulateResult run(const Simulation& simulation, double time_step_s) {
+SimulateResult run(const Simulation& simulation, double time_step_s,
+                   const ProgressCallback& progress) {
   std::vector<ParameterSet> sets{simulation.parameters};
   if (simulation.start == StartKind::at_rest)
     sets[0].start_position_m =
         relax(simulation.cloth, sets, simulation.frame_time_s.front(), time_step_s).front();
   const Schedule schedule{.frame_time_s = simulation.frame_time_s, .time_step_s = time_step_s};
-  return std::move(simulate(simulation.cloth, sets, schedule).front());
+  const auto after_frame = [&](int frame) {
+    return !progress || progress({.stage = "simulate",
+                                  .done = static_cast<double>(frame),
+                                  .total = static_cast<double>(schedule.frame_time_s.size() - 1),
+                                  .unit = "frames",
+                                  .note = ""});
+  };
+  return std::move(
+      simulate(simulation.cloth, sets, schedule, Precision::exact, after_frame).front());
 }
 
 }  // namespace clothfit

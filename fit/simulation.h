@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "data/model_description.h"
+#include "data/progress.h"
 #include "fit/problem.h"
 #include "model/cloth.h"
 #include "model/fabric.h"
@@ -35,6 +36,7 @@ ModelDescription describe_model(const FitProblem& problem, const Recording& reco
 double default_time_step_s(const Simulation& simulation);
 
 /// Positions of the mesh in every frame. A start at rest is relaxed first.
-SimulateResult run(const Simulation& simulation, double time_step_s);
+SimulateResult run(const Simulation& simulation, double time_step_s,
+                   const ProgressCallback& progress = {});
 
 }  // namespace clothfit

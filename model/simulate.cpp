@@ -113,7 +113,8 @@ int Schedule::substeps(int frame) const {
 }
 
 std::vector<SimulateResult> simulate(const Cloth& cloth, std::span<const ParameterSet> parameters,
-                                     const Schedule& schedule, Precision precision) {
+                                     const Schedule& schedule, Precision precision,
+                                     const FrameCallback& after_frame) {
   assert(schedule.time_step_s > 0);
   std::vector<SimulateResult> results(parameters.size());
   const size_t frames = schedule.frame_time_s.size();
@@ -136,9 +137,14 @@ std::vector<SimulateResult> simulate(const Cloth& cloth, std::span<const Paramet
         any_alive = any_alive || result.usable();
         result.position_m.push_back(std::move(now));
       }
-      if (any_alive) continue;
-      for (size_t l = 0; l < group.size(); ++l)
-        results[first + l].position_m.resize(frames, results[first + l].position_m.back());
+      const bool stop = after_frame && frame + 1 < frames && !after_frame(static_cast<int>(frame));
+      if (any_alive && !stop) continue;
+      const Eigen::Matrix3Xd none = Eigen::Matrix3Xd::Constant(3, cloth.mesh.vertex_count(), NAN);
+      for (size_t l = 0; l < group.size(); ++l) {
+        SimulateResult& result = results[first + l];
+        if (result.usable() && frame + 1 < frames) result.reason = StopReason::cancelled;
+        result.position_m.resize(frames, none);
+      }
       break;
     }
   };

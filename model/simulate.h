@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -16,12 +17,13 @@ struct Schedule {
   int substeps(int frame) const;
 };
 
-enum class StopReason { reached_end, diverged };
+enum class StopReason { reached_end, diverged, cancelled };
 
 struct SimulateResult {
   StopReason reason = StopReason::reached_end;
   int diverged_frame = -1;  ///< first frame that is not finite or left the scene
-  /// Positions at every frame, 3 x vertices (world, m); from the diverged frame on NaN.
+  /// Positions at every frame, 3 x vertices (world, m); NaN from where it diverged or was
+  /// cancelled.
   std::vector<Eigen::Matrix3Xd> position_m;
   bool usable() const { return reason == StopReason::reached_end; }
 };
@@ -35,11 +37,16 @@ bool left_the_scene(const Eigen::Matrix3Xd& now, const Eigen::Matrix3Xd& start, 
 /// same bits on every processor.
 enum class Precision { exact, fast };
 
+/// Called after each frame of each group of lanes, by several threads at once where there are
+/// several groups. False asks to stop: runs that are not at their end are then cancelled.
+using FrameCallback = std::function<bool(int frame)>;
+
 /// Simulates every parameter set, several side by side in lanes, groups of lanes in parallel. With
 /// `exact` a result does not depend on the number of sets, their order or the number of threads.
 std::vector<SimulateResult> simulate(const Cloth& cloth, std::span<const ParameterSet> parameters,
                                      const Schedule& schedule,
-                                     Precision precision = Precision::exact);
+                                     Precision precision = Precision::exact,
+                                     const FrameCallback& after_frame = {});
 
 /// The shape in which the cloth hangs still: the start positions relaxed under gravity with heavy
 /// viscous damping (critical for the pendulum of the cloth's height), held points where `motion`

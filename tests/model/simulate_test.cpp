@@ -320,5 +320,44 @@ TEST(Relax, DependsNeitherOnTheNumberOfSetsNorOnTheirOrder) {
   }
 }
 
+TEST(Simulate, EndsEarlyWhereItIsAskedTo) {
+  const Cloth cloth = square_cloth(4);
+  const ParameterSet set{.springs = spring_parameters(cotton(), cloth.mesh),
+                         .start_position_m = flat_positions(cloth.mesh)};
+  const Schedule schedule{.frame_time_s = {0, 0.01, 0.02, 0.03}, .time_step_s = 1e-3};
+  std::vector<int> seen;
+
+  const SimulateResult result =
+      simulate(cloth, {&set, 1}, schedule, Precision::exact, [&](int frame) {
+        seen.push_back(frame);
+        return frame < 2;
+      }).front();
+
+  EXPECT_EQ(result.reason, StopReason::cancelled);
+  EXPECT_EQ(seen, (std::vector<int>{0, 1, 2}));
+  ASSERT_EQ(result.position_m.size(), 4u);
+  EXPECT_TRUE(result.position_m[2].allFinite());
+  EXPECT_TRUE(result.position_m[3].array().isNaN().all());
+}
+
+TEST(Simulate, OfLeftOverSetsGivesWhatEachGivesAlone) {
+  // 8 lanes hold 8 sets; of 11, 13 or 3 some are left over and run alone or in a group not full.
+  Uniform uniform(12);
+  const Cloth cloth = square_cloth(4);
+  const Schedule schedule{.frame_time_s = {0, 0.02}, .time_step_s = 1e-3};
+  std::vector<ParameterSet> sets;
+  for (int n = 0; n < 13; ++n)
+    sets.push_back({.springs = spring_parameters(random_fabric(uniform), cloth.mesh),
+                    .start_position_m = crumpled(cloth.mesh, 0.2, uniform)});
+
+  for (const size_t count : {size_t{3}, size_t{11}, size_t{13}}) {
+    SCOPED_TRACE(count);
+    const std::vector<SimulateResult> together = simulate(cloth, {sets.data(), count}, schedule);
+    ASSERT_EQ(together.size(), count);
+    for (size_t n = 0; n < count; ++n)
+      EXPECT_EQ(together[n].position_m, simulate(cloth, {&sets[n], 1}, schedule)[0].position_m);
+  }
+}
+
 }  // namespace
 }  // namespace clothfit

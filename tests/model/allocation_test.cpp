@@ -1,0 +1,98 @@
+// A time step allocates nothing: it is taken ten thousand times a second, by several threads.
+// Counted are calls of operator new, which containers and aligned arrays use; this program's are
+// replaced.
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cstddef>
+#include <cstdlib>
+#include <memory>
+#include <new>
+
+#include "model/step.h"
+#include "tests/model/random_cloth.h"
+
+namespace {
+
+std::atomic<long> allocations{0};
+
+void* counted(std::size_t size, std::size_t alignment) {
+  ++allocations;
+  const std::size_t whole = (size + alignment - 1) / alignment * alignment;
+  void* const memory = std::aligned_alloc(alignment, whole > 0 ? whole : alignment);
+  if (memory == nullptr) throw std::bad_alloc();
+  return memory;
+}
+
+}  // namespace
+
+void* operator new(std::size_t size) {
+  return counted(size, alignof(std::max_align_t));
+}
+void* operator new(std::size_t size, std::align_val_t alignment) {
+  return counted(size, static_cast<std::size_t>(alignment));
+}
+void operator delete(void* memory) noexcept {
+  std::free(memory);
+}
+void operator delete(void* memory, std::size_t) noexcept {
+  std::free(memory);
+}
+void operator delete(void* memory, std::align_val_t) noexcept {
+  std::free(memory);
+}
+void operator delete(void* memory, std::size_t, std::align_val_t) noexcept {
+  std::free(memory);
+}
+
+namespace clothfit {
+namespace {
+
+template <class L>
+long allocations_in_ten_steps(StrainLimitMode mode) {
+  Cloth cloth = square_cloth(7);
+  cloth.held = {held_at(cloth.mesh, 0, 0), held_at(cloth.mesh, 0.31, 0.02)};
+  cloth.strain_limit.mode = mode;
+  cloth.add_effect("wind", "test");
+  cloth.add_effect("hysteresis", "test");
+  cloth.add_effect("added_air_mass", "test");
+  cloth.add_effect("support_drift", "test");
+  ParameterSet set{.springs = spring_parameters(cotton(), cloth.mesh),
+                   .start_position_m = flat_positions(cloth.mesh)};
+  set.springs.critical_elongation.fill(0.01);
+  for (const EffectDescription& effect : cloth.effect_descriptions) {
+    set.effects.emplace_back();
+    for (const EffectParameter& p : effect.parameters)
+      set.effects.back().push_back(p.neutral + p.typical);
+  }
+  EulerStepper<L> stepper(cloth);
+  const LaneParameters<L> parameters = lane_parameters<L>(cloth, {&set, 1});
+  LaneState<L> state = LaneState<L>::of(cloth);
+  for (int l = 0; l < L::kCount; ++l) state.position_m.set_lane(l, set.start_position_m);
+  const LaneVectors<L> target = stepper.held().locate(state.position_m);
+  stepper.step(parameters, target, 0, 1e-4, state);
+
+  const long before = allocations;
+  for (int n = 1; n <= 10; ++n) stepper.step(parameters, target, n * 1e-4, 1e-4, state);
+  return allocations - before;
+}
+
+TEST(Step, AllocatesNothing) {
+  for (const StrainLimitMode mode :
+       {StrainLimitMode::off, StrainLimitMode::positions, StrainLimitMode::consistent}) {
+    SCOPED_TRACE(static_cast<int>(mode));
+    EXPECT_EQ(allocations_in_ten_steps<ExactLanes>(mode), 0);
+    EXPECT_EQ(allocations_in_ten_steps<FastLanes>(mode), 0);
+    EXPECT_EQ(allocations_in_ten_steps<SingleLane>(mode), 0);
+  }
+}
+
+TEST(Step, CountsAllocationsThatThereAre) {
+  const long before = allocations;
+  const auto held = std::make_unique<Cloth>();
+  EXPECT_GT(allocations - before, 0);
+}
+
+}  // namespace
+}  // namespace clothfit
