@@ -256,12 +256,13 @@ int run_simulate(const SimulateVerbOptions& options) {
     const Simulation simulation = make_simulation(model);
     const StepChoice choice = choose_step(simulation, model, options.time_step_s);
     require_possible(choice, simulation, model, options.allow_unstable);
-    said =
-        fmt::format("\nSimulated {}: {} frames, {} s, {} x {} nodes, {} springs\n", model.name,
-                    simulation.frame_time_s.size(), significant(simulation.frame_time_s.back(), 4),
-                    simulation.cloth.mesh.columns, simulation.cloth.mesh.rows,
-                    simulation.cloth.spring_count()) +
-        step_text(choice);
+    said = fmt::format(
+               "\nSimulated {}: {} frames, {} s, {} x {} nodes, {} springs\n", model.name,
+               simulation.frame_time_s.size(),
+               significant(simulation.frame_time_s.back() - simulation.frame_time_s.front(), 4),
+               simulation.cloth.mesh.columns, simulation.cloth.mesh.rows,
+               simulation.cloth.spring_count()) +
+           step_text(choice);
     const SimulateResult result = run_or_explain(simulation, choice, progress);
     if (interrupted()) throw Cancelled();
     const double stretch = largest_stretch(simulation, result);

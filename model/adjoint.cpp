@@ -29,7 +29,7 @@ Vectors vectors_of(const Eigen::Matrix3Xd& values) {
 
 /// One time step of a schedule.
 struct Step {
-  double time_s = 0, time_step_s = 0;
+  double time_s = 0, end_s = 0, time_step_s = 0;
   int frame = 0;  ///< that it leads to
   bool ends_frame = false;
 };
@@ -40,7 +40,8 @@ std::vector<Step> steps_of(const Schedule& schedule) {
     const double from_s = schedule.frame_time_s[static_cast<size_t>(frame) - 1];
     const int count = schedule.substeps(frame);
     const double h = (schedule.frame_time_s[static_cast<size_t>(frame)] - from_s) / count;
-    for (int n = 0; n < count; ++n) steps.push_back({from_s + n * h, h, frame, n + 1 == count});
+    for (int n = 0; n < count; ++n)
+      steps.push_back({from_s + n * h, from_s + (n + 1) * h, h, frame, n + 1 == count});
   }
   return steps;
 }
@@ -93,8 +94,8 @@ class Run {
       extras.moves = &record->moves;
       extras.driven_velocity_m_per_s = &record->driven_velocity_m_per_s;
     }
-    stepper_.step(parameters_, target_at(step.time_s + step.time_step_s), step.time_s,
-                  step.time_step_s, state_, extras);
+    stepper_.step(parameters_, target_at(step.end_s), step.time_s, step.time_step_s, state_,
+                  extras);
   }
 
   void add_cost(const Eigen::Matrix3Xd& by_position) {
@@ -234,13 +235,13 @@ class Run {
       cloth_.effects[e]->add_force(scene, parameters_.effects[e], memory[e], force_n);
     sweep_.add_spring_forces(parameters_.springs, before.position_m, before.velocity_m_per_s,
                              force_n, factors_);
+    Vectors pull_n = Vectors::zero(stepper_.held().count());
+    stepper_.held().add_pulls(force_n, parameters_.gravity_m_per_s2, pull_n);
     std::vector<Vectors> force_before;
     for (size_t e = 0; e < cloth_.effects.size(); ++e) {
       force_before.push_back(force_n);
       cloth_.effects[e]->change_force(scene, parameters_.effects[e], force_n);
     }
-    Vectors pull_n = Vectors::zero(stepper_.held().count());
-    stepper_.held().add_pulls(force_n, parameters_.gravity_m_per_s2, pull_n);
 
     Vectors by_pull = Vectors::zero(stepper_.held().count());
     for (size_t e = cloth_.effects.size(); e-- > 0;) {
@@ -255,17 +256,6 @@ class Run {
             block.derivative.transpose() * by_state_.effect_memory[e](0, block.number));
       apply_transposed(e, by_target_);
     }
-    for (int h = 0; h < stepper_.held().count(); ++h) {
-      const Eigen::Vector3d by = at(by_pull, h);
-      for (const auto& [vertex, weight] : cloth_.held[static_cast<size_t>(h)].weights) {
-        add(by_force_, vertex, weight * by);
-        gradient_.by_gravity += weight * cloth_.mass_kg[vertex] * by;
-        gradient_.by_mass_kg[vertex] +=
-            weight * by.dot(Eigen::Vector3d(parameters_.gravity_m_per_s2.x[0],
-                                            parameters_.gravity_m_per_s2.y[0],
-                                            parameters_.gravity_m_per_s2.z[0]));
-      }
-    }
     for (size_t e = cloth_.effects.size(); e-- > 0;) {
       if (!cloth_.effects[e]->changes_force()) continue;
       derivatives_.clear();
@@ -276,6 +266,17 @@ class Run {
       for (const EffectLinearisation::ByForce& block : derivatives_.by_force)
         add(by_force, block.on, block.derivative.transpose() * at(by_force_, block.on));
       by_force_ = by_force;
+    }
+    for (int h = 0; h < stepper_.held().count(); ++h) {
+      const Eigen::Vector3d by = at(by_pull, h);
+      for (const auto& [vertex, weight] : cloth_.held[static_cast<size_t>(h)].weights) {
+        add(by_force_, vertex, weight * by);
+        gradient_.by_gravity += weight * cloth_.mass_kg[vertex] * by;
+        gradient_.by_mass_kg[vertex] +=
+            weight * by.dot(Eigen::Vector3d(parameters_.gravity_m_per_s2.x[0],
+                                            parameters_.gravity_m_per_s2.y[0],
+                                            parameters_.gravity_m_per_s2.z[0]));
+      }
     }
   }
 

@@ -23,7 +23,7 @@ struct SimulationFields {
 using CostByPosition =
     std::function<Eigen::Matrix3Xd(int frame, const Eigen::Matrix3Xd& position_m)>;
 
-/// A cost's derivatives by everything that the simulation depends on.
+/// A cost's derivatives by what a simulation depends on, the paths of held points excepted.
 struct CostGradient {
   TangentSweep::SpringGradients by_springs;  ///< by every single spring's constants
   /// What effects add to that, by their types' constants alone: a ParameterNumber each.
@@ -47,7 +47,9 @@ struct GradientResult {
 /// computed anew between, so memory grows with sqrt(n) states.
 ///
 /// `by_mass_kg` leaves out that the masses also share out what held points between vertices and the
-/// strain limit move; it is exact for points held at vertices without a limit.
+/// strain limit move, and that the forces of some effects are proportional to mass: it is exact for
+/// points held at vertices, without a limit, and effects whose forces do not contain the mass
+/// (wind, what acts inside the fabric).
 GradientResult simulate_with_gradient(const Cloth& cloth, const ParameterSet& parameters,
                                       const Schedule& schedule, const SimulationFields& fields,
                                       const CostByPosition& cost_by_position);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <type_traits>
 
 #include "model/effects/viscous_damping.h"
 #include "model/step.h"
@@ -61,8 +62,11 @@ class LaneRun {
       const Eigen::Vector3d target = cloth_.held[h].motion(time_s);
       const auto column = static_cast<Eigen::Index>(h);
       const auto move = [share](auto place, double goal) {
-        place += static_cast<typename L::Number>(share) *
-                 (static_cast<typename L::Number>(goal) - place);
+        const auto there = static_cast<typename L::Number>(goal);
+        if (share == 1)
+          place.setConstant(there);
+        else
+          place += static_cast<typename L::Number>(share) * (there - place);
       };
       move(held_target_m_.x.col(column), target.x());
       move(held_target_m_.y.col(column), target.y());
@@ -82,8 +86,9 @@ class LaneRun {
 template <class L, class Run>
 void for_lane_groups(std::span<const ParameterSet> parameters, const Run& run) {
   const size_t whole = parameters.size() / L::kCount, left = parameters.size() % L::kCount;
-  // Half of the lanes cost about as much as that many simulations vectorised over the cloth.
-  const size_t groups = whole + (left > L::kCount / 2 ? 1 : 0);
+  // What all lanes cost is what about this many simulations vectorised over the cloth cost.
+  constexpr size_t kWorthAGroup = std::is_same_v<L, FastLanes> ? 3 : 5;
+  const size_t groups = whole + (left > kWorthAGroup ? 1 : 0);
   const size_t in_groups = std::min(groups * L::kCount, parameters.size());
   tbb::parallel_for(size_t{0}, groups + parameters.size() - in_groups, [&](size_t g) {
     if (g < groups) {
@@ -157,15 +162,30 @@ std::vector<SimulateResult> simulate(const Cloth& cloth, std::span<const Paramet
 
 std::vector<Eigen::Matrix3Xd> relax(const Cloth& cloth, std::span<const ParameterSet> parameters,
                                     double time_s, double time_step_s) {
+  if (parameters.empty()) return {};
   constexpr double kPendulumTimes = 7;  // (1 + 7) exp(-7) is left of the distance: 0.7 %
   const double gravity = parameters.front().gravity_m_per_s2.norm();
   const double pendulum_rate = std::sqrt(std::max(gravity, 1e-3) / cloth.mesh.height_m);
 
+  // Supports shift in time, and time stands still here.
   Cloth heavy = cloth;
+  std::vector<size_t> kept;
+  heavy.effects.clear();
+  heavy.effect_descriptions.clear();
+  for (size_t e = 0; e < cloth.effects.size(); ++e) {
+    if (cloth.effects[e]->shifts_supports()) continue;
+    kept.push_back(e);
+    heavy.effects.push_back(cloth.effects[e]);
+    heavy.effect_descriptions.push_back(cloth.effect_descriptions[e]);
+  }
   heavy.effect_descriptions.push_back(viscous_damping::describe());
   heavy.effects.push_back(viscous_damping::make());
   std::vector<ParameterSet> damped(parameters.begin(), parameters.end());
-  for (ParameterSet& set : damped) set.effects.push_back({2 * pendulum_rate});
+  for (size_t n = 0; n < damped.size(); ++n) {
+    damped[n].effects.clear();
+    for (const size_t e : kept) damped[n].effects.push_back(parameters[n].effects[e]);
+    damped[n].effects.push_back({2 * pendulum_rate});
+  }
 
   const double duration_s = kPendulumTimes / pendulum_rate;
   const int steps = std::max(1, static_cast<int>(std::ceil(duration_s / time_step_s)));

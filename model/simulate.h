@@ -32,9 +32,9 @@ struct SimulateResult {
 /// from where it started. All 3 x vertices.
 bool left_the_scene(const Eigen::Matrix3Xd& now, const Eigen::Matrix3Xd& start, const Mesh& mesh);
 
-/// `exact`: strict double, the same bits on every processor; what results come from. `fast`: float,
-/// for screening; a few tenths of a millimetre off after a second of a swinging cloth, and not the
-/// same bits on every processor.
+/// `exact`: strict double, the same bits on every processor; what results come from. `fast`: float
+/// (a few left-over sets in double), for screening; a few tenths of a millimetre off after a second
+/// of a swinging cloth, and not the same bits on every processor.
 enum class Precision { exact, fast };
 
 /// Called after each frame of each group of lanes, by several threads at once where there are
@@ -51,7 +51,11 @@ std::vector<SimulateResult> simulate(const Cloth& cloth, std::span<const Paramet
 /// The shape in which the cloth hangs still: the start positions relaxed under gravity with heavy
 /// viscous damping (critical for the pendulum of the cloth's height), held points where `motion`
 /// has them at `time_s`. A fixed number of steps, so that the shape depends smoothly on the
-/// parameters. What is left of the initial distance to equilibrium is below a percent.
+/// parameters; their number follows from the first set's gravity. What is left of the initial
+/// distance to equilibrium is below a percent. Supports are where they are without effects that
+/// shift them. What effects remember is not handed on: with hysteresis or relaxation in the springs
+/// the shape is at rest for the memory it has come to, and a run that starts from it with none
+/// moves.
 std::vector<Eigen::Matrix3Xd> relax(const Cloth& cloth, std::span<const ParameterSet> parameters,
                                     double time_s, double time_step_s);
 

@@ -191,7 +191,7 @@ void EulerStepper<L>::step(const LaneParameters<L>& parameters, const LaneVector
   const bool any_force = effects > 0 || extras.force_n != nullptr;
   if (extras.force_n != nullptr)
     force_n_ = *extras.force_n;
-  else if (any_force || changes_force_ || shifts_supports_)
+  else if (any_force)
     force_n_.set_zero();
   for (size_t e = 0; e < effects; ++e)
     cloth_.effects[e]->add_force(scene, parameters.effects[e], state.effect_memory[e], force_n_);
@@ -204,8 +204,6 @@ void EulerStepper<L>::step(const LaneParameters<L>& parameters, const LaneVector
   } else {
     sweep_.add_spring_forces(parameters.springs, position_m, velocity_m_per_s, force_n_,
                              extras.factors);
-    for (size_t e = 0; e < effects; ++e)
-      cloth_.effects[e]->change_force(scene, parameters.effects[e], force_n_);
     if (shifts_supports_) {
       target_m_ = held_target_m;
       target_m = &target_m_;
@@ -215,6 +213,8 @@ void EulerStepper<L>::step(const LaneParameters<L>& parameters, const LaneVector
         cloth_.effects[e]->shift_supports(scene, parameters.effects[e], pull_n_,
                                           state.effect_memory[e], target_m_);
     }
+    for (size_t e = 0; e < effects; ++e)
+      cloth_.effects[e]->change_force(scene, parameters.effects[e], force_n_);
     move_by_forces(force_n_, parameters.gravity_m_per_s2, inverse_mass_per_kg_, time_step_s,
                    position_m, velocity_m_per_s);
   }

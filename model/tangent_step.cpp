@@ -56,7 +56,9 @@ DualParameters DualParameters::of(const Cloth& cloth, const ParameterSet& set,
     p.effects.emplace_back();
     for (size_t n = 0; n < set.effects[e].size(); ++n)
       p.effects.back().push_back(dual(set.effects[e][n], along([&](const Direction& d) {
-                                        return d.effects.empty() ? 0.0 : d.effects[e][n];
+                                        return d.effects.empty() || d.effects[e].empty()
+                                                   ? 0.0
+                                                   : d.effects[e][n];
                                       })));
   }
   return p;
@@ -130,14 +132,6 @@ void TangentStepper::step(const DualParameters& parameters,
                                      velocity.tangent, force_n_.tangent);
     sweep_.add_spring_forces(parameters.value.springs, position.value, velocity.value,
                              force_n_.value);
-    for (size_t e = 0; e < effects; ++e) {
-      const Effect& effect = *cloth_.effects[e];
-      if (!effect.changes_force()) continue;
-      const LaneVectors<SingleLane> before = force_n_.value;
-      effect.change_force(scene, parameters.effects[e], force_n_);
-      force_n_.value = before;
-      effect.change_force(value_scene, parameters.value.effects[e], force_n_.value);
-    }
     if (shifts_supports_) {
       pull_n_.set_zero();
       held_value_.add_pulls(force_n_.value, parameters.value.gravity_m_per_s2, pull_n_.value);
@@ -156,6 +150,14 @@ void TangentStepper::step(const DualParameters& parameters,
         keep_memory(e);
       }
       target_m = &target_m_;
+    }
+    for (size_t e = 0; e < effects; ++e) {
+      const Effect& effect = *cloth_.effects[e];
+      if (!effect.changes_force()) continue;
+      const LaneVectors<SingleLane> before = force_n_.value;
+      effect.change_force(scene, parameters.effects[e], force_n_);
+      force_n_.value = before;
+      effect.change_force(value_scene, parameters.value.effects[e], force_n_.value);
     }
     move_by_forces(force_n_.tangent, parameters.tangent.gravity_m_per_s2, inverse_mass_per_kg_,
                    time_step_s, position.tangent, velocity.tangent);

@@ -46,14 +46,17 @@ Vector3<double> value_of(const Vector3<Real>& v) {
 /// An effect that has to search, for what it touches, so that each simulation walks its own path:
 /// lanes are taken one after the other. A Law has
 ///   static constexpr int kParameters;
-///   using Parameters = std::array<double, kParameters>;
-///   // `position_m` and `velocity_m_per_s` give a vertex's Vector3<double>;
-///   // calls add(vertex, Vector3<double>) with forces (N)
-///   template <class Vectors, class Add> static void forces(const Cloth&, const Vectors&
-///   position_m,
-///       const Vectors& velocity_m_per_s, const Parameters&, const Add& add);
-///   template <class Vectors> static void linearise(const Cloth&, const Vectors& position_m,
-///       const Vectors& velocity_m_per_s, const Parameters&, EffectLinearisation&);
+///   // `position_m` and `velocity_m_per_s` give a vertex's Vector3<Real> (Real is double or a dual
+///   // number); calls add(vertex, Vector3<Real>) with forces (N)
+///
+///   template <class Vectors, class Parameters, class Add> static void forces(
+///       const Cloth&, const Vectors& position_m, const Vectors& velocity_m_per_s,
+///       const Parameters&, const Add& add);
+///
+///   template <class Vectors, class Parameters> static void linearise(
+///       const Cloth&, const Vectors& position_m, const Vectors& velocity_m_per_s,
+///       const Parameters&, EffectLinearisation&);
+///
 ///   static EffectRates rates(const Cloth&, const SpringParameters&, const std::vector<double>&);
 template <class Law>
 class LaneByLaneEffect final : public Effect {

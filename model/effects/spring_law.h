@@ -34,7 +34,6 @@ inline std::array<double, 2> middle_of(const Mesh& mesh, const Spring& spring) {
 template <class L, class Visit>
 void for_springs(const EffectScene<L>& scene, const Visit& visit) {
   using Real = RealOf<L>;
-  using std::sqrt;
   const Cloth& cloth = scene.cloth;
   SpringSight<Real> sight;
   sight.time_step_s = scene.time_step_s;
@@ -50,8 +49,8 @@ void for_springs(const EffectScene<L>& scene, const Visit& visit) {
           vector_at<L>(scene.position_m, spring.b) - vector_at<L>(scene.position_m, spring.a);
       const Vector3<Real> rate = vector_at<L>(scene.velocity_m_per_s, spring.b) -
                                  vector_at<L>(scene.velocity_m_per_s, spring.a);
-      sight.length_m = sqrt(dot(along, along));
       const Vector3<Real> u = direction(along);
+      sight.length_m = dot(u, along);  // 0 where there is no direction, its derivatives too
       sight.stretching_m_per_s = dot(u, rate);
       const auto [place_s, place_t] = middle_of(cloth.mesh, spring);
       sight.s = place_s;

@@ -21,9 +21,11 @@ struct Stencil {
 
 /// An effect between a few vertices each, such as bending. A Law has
 ///   static constexpr int kParameters, kVertices;
-///   // calls visit(Stencil<kVertices>) for every place where it acts; a vertex may stand in it
-///   twice template <class Visit> static void for_stencils(const Cloth&, const Visit&); template
-///   <class Real> static std::array<Vector3<Real>, kVertices> forces(
+///   // calls visit(Stencil<kVertices>) where it acts; a vertex may stand in it twice
+///
+///   template <class Visit> static void for_stencils(const Cloth&, const Visit&);
+///
+///   template <class Real> static std::array<Vector3<Real>, kVertices> forces(
 ///       const std::array<Vector3<Real>, kVertices>& position_m,
 ///       const std::array<double, 4>& constants, const std::array<Real, kParameters>&);  // N
 ///   static EffectRates rates(const Cloth&, const SpringParameters&, const std::vector<double>&);

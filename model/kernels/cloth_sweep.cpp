@@ -238,7 +238,7 @@ ClothSweep<L>::ClothSweep(const Mesh& mesh)
     : mesh_(mesh), scratch_(static_cast<size_t>(scratch_size<L>(mesh))) {
   if (L::kCount > 1) return;
   for (size_t type = 0; type < kSpringTypes; ++type) {
-    leaving_[type].resize(static_cast<size_t>(mesh.vertex_count()));
+    leaving_[type].resize(static_cast<size_t>(mesh.vertex_count()) + 8);  // masks load 8 bytes
     for (int i = 0; i < mesh.rows; ++i)
       for (int j = 0; j < mesh.columns; ++j)
         for (int k = 0; k < kMostVertices && kSpringReach[type].leaves(mesh, i, j); ++k)

@@ -27,7 +27,7 @@ struct SpringFactors {
   std::array<PerVertex, kSpringTypes> stiffness;
   std::array<PerVertex, kSpringTypes> natural_length;
 
-  /// Entries that vectors over vertices may read beyond the last one.
+  /// Entries that vectors over vertices may read beyond the last one: make factors by `ones`.
   static constexpr int kPadding = 8;
 
   static SpringFactors ones(const Mesh& mesh) {

@@ -1,4 +1,5 @@
-// The walk over the cloth's springs that kernels share: included once for each instruction set.
+// The walk over the cloth's springs in lanes, in the order of cloth_sweep.cpp: included once for
+// each instruction set.
 #if defined(CLOTHFIT_MODEL_KERNELS_ROW_SWEEP_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef CLOTHFIT_MODEL_KERNELS_ROW_SWEEP_INL_H_
 #undef CLOTHFIT_MODEL_KERNELS_ROW_SWEEP_INL_H_
@@ -9,16 +10,13 @@
 #include <algorithm>
 
 #include "model/kernels/lane_vector-inl.h"
+#include "model/kernels/spring_reach.h"
 #include "model/mesh.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace clothfit {
 namespace {
 namespace HWY_NAMESPACE {
-
-/// Three coordinates of the forces that arrive from one row above, and twice three of those from
-/// two rows above: one for the row at hand, one for the next.
-constexpr int kScratchRows = 9;
 
 template <class V>
 HWY_INLINE Vector3<V> force(const Vector3<V>& pull) {

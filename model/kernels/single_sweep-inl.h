@@ -92,9 +92,12 @@ HWY_INLINE void sweep_single(const SweepArrays<SingleLane>& arrays, const Sink& 
       }
       for (size_t s = 0; s < kCount; ++s) {
         PullRing& ring = rings[s];
-        pulls[s].strength =
-            hn::IfThenElseZero(hn::LoadMaskBits(d, leaving[s] + ahead), pulls[s].strength);
-        const Vector3<V> pulled = force(pulls[s]);
+        // Nothing where no spring leaves, whatever stands beyond the last vertex.
+        const auto leaves = hn::LoadMaskBits(d, leaving[s] + ahead);
+        const Vector3<V> all = force(pulls[s]);
+        const Vector3<V> pulled{hn::IfThenElseZero(leaves, all.x),
+                                hn::IfThenElseZero(leaves, all.y),
+                                hn::IfThenElseZero(leaves, all.z)};
         store(pulled, d, ring.pulls, ring.next);
         if (ring.next < kMostVertices) store(pulled, d, ring.pulls, ring.next + ring.length);
       }

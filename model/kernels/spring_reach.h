@@ -24,4 +24,9 @@ struct SpringReach {
 inline constexpr SpringReach kSpringReach[kSpringTypes] = {{1, 0},  {0, 1}, {1, 1},
                                                            {1, -1}, {2, 0}, {0, 2}};
 
+/// Rows of scratch memory that the walk in row_sweep-inl.h takes: three coordinates of the forces
+/// that arrive from one row above, and twice three of those from two rows above, one for the row at
+/// hand, one for the next.
+inline constexpr int kRowSweepScratchRows = 9;
+
 }  // namespace clothfit

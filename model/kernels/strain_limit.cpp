@@ -313,12 +313,13 @@ HWY_INLINE void visit_along(LimitArrays<SingleLane>& arrays, size_t type) {
       while (left != 0) {
         const int shift = std::countr_zero(left) / size * size;
         const std::uint8_t wanted = static_cast<std::uint8_t>((left >> shift) & ((1u << size) - 1));
+        const std::uint8_t wanted_bits[8] = {wanted};  // as many as a mask may load
         left &= ~(std::uint64_t{wanted} << shift);
         const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(w * kWordBits) + shift;
         const Vector3<V> a = load(d, position, at), b = load(d, position, at + offset);
         const Vector3<V> along = b - a;
         const V length2 = dot(along, along);
-        const auto exceeds = hn::And(hn::LoadMaskBits(d, &wanted), hn::Gt(length2, allowed2));
+        const auto exceeds = hn::And(hn::LoadMaskBits(d, wanted_bits), hn::Gt(length2, allowed2));
         const std::uint64_t found = bits_of(exceeds);
         if (found == 0) continue;
         if constexpr (pass == Pass::check) {

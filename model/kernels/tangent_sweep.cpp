@@ -182,7 +182,7 @@ HWY_INLINE void sweep_tangents(const TangentArrays& arrays, const Sink& sink) {
   const Tag<L> d;
   const ConstVectors positions = arrays.position_m, velocities = arrays.velocity_m_per_s;
   const std::array<LineariseArrays, kSpringTypes> from = arrays.from;
-  std::fill_n(arrays.scratch, kScratchRows * arrays.mesh.columns * kLanes, 0.0);
+  std::fill_n(arrays.scratch, kRowSweepScratchRows * arrays.mesh.columns * kLanes, 0.0);
   Chunk chunk;
   for (std::ptrdiff_t lane = 0; lane < kLanes; lane += static_cast<std::ptrdiff_t>(hn::Lanes(d))) {
     V by_natural[kSpringTypes], by_stiffness[kSpringTypes], by_damping[kSpringTypes];
@@ -338,8 +338,6 @@ HWY_EXPORT(transpose);
 HWY_EXPORT(shift_and_add);
 HWY_EXPORT(take_back);
 
-constexpr size_t kScratchRows = 9;  // as sweep_rows needs
-
 bool any_change(const LaneSprings<>& springs) {
   bool any = false;
   for (size_t type = 0; type < kSpringTypes; ++type)
@@ -369,7 +367,7 @@ TangentSweep::TangentSweep(const Mesh& mesh) : mesh_(mesh) {
             kSpringReach[type].leaves(mesh, i, j) ? 1 : 0;
   }
   scratch_.resize(
-      std::max(kScratchRows * static_cast<size_t>(mesh.columns) * kLanes, 6 * vertices));
+      std::max(kRowSweepScratchRows * static_cast<size_t>(mesh.columns) * kLanes, 6 * vertices));
 }
 
 namespace {
