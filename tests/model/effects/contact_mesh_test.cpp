@@ -119,13 +119,5 @@ TEST(ContactMesh, ASheetComesToRestOnHillsAndIsCarried) {
               0.01 * 0.025 * 9.81);
 }
 
-TEST(ContactMesh, WithoutAnObstacleIsNothing) {
-  Uniform uniform(4);
-  const Cloth bare = square_cloth(6);
-  const Eigen::Matrix3Xd p = crumpled(bare.mesh, 0.2, uniform);
-
-  EXPECT_EQ(ClothWithEffect(bare, "contact_mesh", kContact, p).force_n(p, p).norm(), 0);
-}
-
 }  // namespace
 }  // namespace clothfit

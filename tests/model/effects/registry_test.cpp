@@ -32,7 +32,7 @@ TEST(EffectRegistry, EveryEffectKeepsTheContract) {
 TEST(EffectRegistry, FindsEveryEffectByItsName) {
   for (const EffectEntry& entry : effect_registry()) {
     EXPECT_EQ(find_effect(entry.name, "test").make, entry.make);
-    Cloth cloth = square_cloth(3);
+    Cloth cloth = touched_cloth(3);
     cloth.add_effect(entry.name, "test");
     EXPECT_EQ(cloth.effect_descriptions.at(0).name, entry.name);
     EXPECT_NE(cloth.effects.at(0), nullptr);
@@ -55,6 +55,18 @@ TEST(EffectRegistry, RefusesAnUnknownNameAndListsTheKnownOnes) {
     EXPECT_TRUE(cloth.effects.empty());
     EXPECT_TRUE(cloth.effect_descriptions.empty());
   }
+}
+
+TEST(EffectRegistry, ContactWithAMeshIsRefusedWithoutOne) {
+  Cloth cloth = square_cloth(3);
+  try {
+    cloth.add_effect("contact_mesh", "recording.yaml:7");
+    FAIL() << "it would do nothing without a word";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("recording.yaml:7"), std::string::npos);
+    EXPECT_NE(std::string(error.what()).find("obstacle"), std::string::npos);
+  }
+  EXPECT_TRUE(cloth.effects.empty());
 }
 
 }  // namespace
