@@ -37,9 +37,22 @@ struct SpringShares {
   std::vector<Number> first, second;
 };
 
+/// Springs of one type that share no vertex, by the vertices that they leave.
+using SpringGroup = std::vector<std::int32_t>;
+
+/// Two of each type, in the order in which a sweep takes them: type t has 2 t and 2 t + 1.
+inline constexpr size_t kSpringGroups = 2 * kSpringTypes;
+
 /// A set of vertices: bit v % 64 of word v / 64. A word more than that, so that one can read past
 /// the last vertex.
 using VertexSet = std::vector<std::uint64_t>;
+
+/// Which springs to visit, for a single simulation: the vertices that they leave.
+struct SingleLimitSets {
+  std::array<VertexSet, kSpringGroups> groups;
+  std::array<VertexSet, kSpringTypes> too_long;  ///< at the first look
+  VertexSet moved;                               ///< vertices that have moved since
+};
 
 /// One spring that a limit has shortened: its ends have moved by shares of `excess` times `along`
 /// towards each other.
@@ -70,8 +83,9 @@ struct LimitOutcome {
 /// (columns) 0, 1, 4, 5, 8, ..., then the others. The springs of one such group share no vertex, so
 /// their order among themselves does not matter.
 ///
-/// Most springs are within their limits at most times, so one look finds those that are not, and
-/// the sweeps then visit these and what hangs on a vertex that has moved since.
+/// In lanes every spring is measured as its group's turn comes. For a single simulation, most of
+/// whose springs are within their limits at most times, one look finds those that are not, and the
+/// sweeps then visit these and what hangs on a vertex that has moved since.
 ///
 /// In `double` strict IEEE, the same bits on every instruction set. A lane's result does not depend
 /// on what the others carry. Holds scratch memory: one object per thread.
@@ -97,11 +111,9 @@ class StrainLimiter {
  private:
   Mesh mesh_;
   std::array<SpringShares<typename L::Number>, kSpringTypes> shares_;
-  /// The vertices that the springs of each group leave; springs held at both ends left out.
-  std::array<std::array<VertexSet, 2>, kSpringTypes> groups_;
-  std::array<VertexSet, kSpringTypes> too_long_;  ///< at the first look, in any lane
-  VertexSet moved_;                               ///< since then, in any lane
-  std::vector<std::int32_t> found_;               ///< scratch: where springs to shorten begin
+  std::array<SpringGroup, kSpringGroups> groups_;  ///< without springs held at both ends
+  SpringGroup found_;                              ///< scratch: those of a group to shorten
+  SingleLimitSets single_;                         ///< empty in lanes
 };
 
 }  // namespace clothfit
