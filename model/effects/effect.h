@@ -98,25 +98,18 @@ struct EffectRates {
   double acceleration_ratio = 1;  ///< acceleration for a given force over that without the effect
 };
 
-/// One physical effect beyond springs, dampers along them, and gravity.
-class Effect : public LaneEffect<ExactLanes>,
-               public LaneEffect<FastLanes>,
-               public LaneEffect<SingleLane>,
-               public LaneEffect<DualLanes> {
+/// What an effect does in lanes of the kinds L.
+template <class... L>
+class EffectInLanes : public LaneEffect<L>... {
  public:
-  using LaneEffect<ExactLanes>::add_force;
-  using LaneEffect<FastLanes>::add_force;
-  using LaneEffect<SingleLane>::add_force;
-  using LaneEffect<DualLanes>::add_force;
-  using LaneEffect<ExactLanes>::change_force;
-  using LaneEffect<FastLanes>::change_force;
-  using LaneEffect<SingleLane>::change_force;
-  using LaneEffect<DualLanes>::change_force;
-  using LaneEffect<ExactLanes>::shift_supports;
-  using LaneEffect<FastLanes>::shift_supports;
-  using LaneEffect<SingleLane>::shift_supports;
-  using LaneEffect<DualLanes>::shift_supports;
+  using LaneEffect<L>::add_force...;
+  using LaneEffect<L>::change_force...;
+  using LaneEffect<L>::shift_supports...;
+};
 
+/// One physical effect beyond springs, dampers along them, and gravity.
+class Effect : public EffectInLanes<ExactLanes, FastLanes, SingleLane, DualLanes> {
+ public:
   virtual bool changes_force() const { return false; }
   virtual bool shifts_supports() const { return false; }
   virtual int memory_size(const Cloth& /*cloth*/) const { return 0; }
