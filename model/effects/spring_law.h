@@ -28,9 +28,9 @@ inline std::array<double, 2> middle_of(const Mesh& mesh, const Spring& spring) {
           middle(spring.a / mesh.columns, spring.b / mesh.columns, mesh.rows)};
 }
 
-/// Calls `visit(number, spring, along, rate, direction, sight)` for every spring, type by type:
-/// position and velocity of its end b relative to a, and its direction, zero where it has no length
-/// (there it pulls at nothing).
+/// Calls `visit(number, spring, rate, direction, sight)` for every spring, type by type: the
+/// velocity of its end b relative to a (m/s), and its direction from a to b, zero where it has no
+/// length (there it pulls at nothing).
 template <class L, class Visit>
 void for_springs(const EffectScene<L>& scene, const Visit& visit) {
   using Real = RealOf<L>;
@@ -60,7 +60,7 @@ void for_springs(const EffectScene<L>& scene, const Visit& visit) {
   }
 }
 
-/// An effect inside the springs: tension beyond k (l - l0) + c dl/dt. A Law has
+/// An effect inside the springs: tension (> 0 pulls) beyond k (l - l0) + c dl/dt. A Law has
 ///   static constexpr int kParameters, kMemory;   // kMemory numbers are remembered per spring
 ///   template <class Real> static Real tension(const SpringSight<Real>&,
 ///       const std::array<Real, kParameters>&, std::array<Real, kMemory>& memory);  // N

@@ -21,10 +21,10 @@ struct VertexSight {
   Vector3<Real> area_m2;
   Vector3<Real> gravity_m_per_s2;
   double mass_kg = 0;
-  double flat_area_m2 = 0;
+  double flat_area_m2 = 0;  ///< that belongs to the vertex in the flat cloth
   double s = 0, t = 0;      ///< place on the cloth, shares of its width and height
   const Mesh* mesh = nullptr;
-  double time_s = 0;
+  double time_s = 0;  ///< the recording's, at the beginning of the step
 };
 
 /// The vector area at vertex [i, j], from differences to the neighbours on both sides, or the one
@@ -191,7 +191,7 @@ class VertexLawEffect final : public LawEffect<VertexLawEffect<Law>, Law> {
 /// An effect of inertia beyond the vertices' mass, which changes the sum of forces. A Law has
 ///   static constexpr int kParameters;
 ///   template <class Real> static Vector3<Real> change(const VertexSight<Real>&,
-///       const Vector3<Real>& force_n, const std::array<Real, kParameters>&);
+///       const Vector3<Real>& force_n, const std::array<Real, kParameters>&);  // N
 ///   static EffectRates rates(...);  // as above
 template <class Law>
 class InertiaLawEffect final : public LawEffect<InertiaLawEffect<Law>, Law> {
