@@ -47,7 +47,7 @@ struct EffectDescription {
   EffectTest test = EffectTest::smooth;
 };
 
-/// What an effect may look at: the state at the beginning of a step.
+/// What an effect may look at: the state at the beginning of a step, in SI units, world.
 template <class L = ExactLanes>
 struct EffectScene {
   const Cloth& cloth;
@@ -55,11 +55,11 @@ struct EffectScene {
   const LaneVector<L>& gravity_m_per_s2;
   const LaneVectors<L>& position_m;
   const LaneVectors<L>& velocity_m_per_s;
-  double time_s = 0;
+  double time_s = 0;  ///< the recording's, at the beginning of the step
   double time_step_s = 0;
 };
 
-/// One effect's parameters in every lane, in the description's order.
+/// One effect's parameters in every lane, in the description's order and units.
 template <class L = ExactLanes>
 using EffectValues = std::vector<LaneValue<L>>;
 
@@ -74,17 +74,17 @@ class LaneEffect {
  public:
   virtual ~LaneEffect() = default;
 
-  /// Adds the effect's force to `force_n` and moves its memory on.
+  /// Adds the effect's force on every vertex to `force_n` and moves its memory on.
   virtual void add_force(const EffectScene<L>& /*scene*/, const EffectValues<L>& /*parameters*/,
                          EffectMemory<L>& /*memory*/, LaneVectors<L>& /*force_n*/) const {}
 
-  /// Changes the sum of all forces but the weight, for inertia that is not the vertices' mass: the
-  /// step moves a vertex by g + F / m.
+  /// Changes the sum F of all forces but the weight on every vertex, for inertia that is not the
+  /// vertices' mass m: the step accelerates a vertex by g + F / m.
   virtual void change_force(const EffectScene<L>& /*scene*/, const EffectValues<L>& /*parameters*/,
                             LaneVectors<L>& /*force_n*/) const {}
 
-  /// Shifts where the held points are placed at the end of the step. `support_force_n`: what the
-  /// cloth, its weight included, pulls each held point with.
+  /// Shifts `target_m`, where each held point is placed at the end of the step (world), and moves
+  /// the memory on. `support_force_n`: what the cloth, its weight included, pulls each with.
   virtual void shift_supports(const EffectScene<L>& /*scene*/,
                               const EffectValues<L>& /*parameters*/,
                               const LaneVectors<L>& /*support_force_n*/,
@@ -98,31 +98,27 @@ struct EffectRates {
   double acceleration_ratio = 1;  ///< acceleration for a given force over that without the effect
 };
 
-/// One physical effect beyond springs, dampers along them, and gravity.
-class Effect : public LaneEffect<ExactLanes>,
-               public LaneEffect<FastLanes>,
-               public LaneEffect<SingleLane>,
-               public LaneEffect<DualLanes> {
+/// What an effect does in lanes of the kinds L.
+template <class... L>
+class EffectInLanes : public LaneEffect<L>... {
  public:
-  using LaneEffect<ExactLanes>::add_force;
-  using LaneEffect<FastLanes>::add_force;
-  using LaneEffect<SingleLane>::add_force;
-  using LaneEffect<DualLanes>::add_force;
-  using LaneEffect<ExactLanes>::change_force;
-  using LaneEffect<FastLanes>::change_force;
-  using LaneEffect<SingleLane>::change_force;
-  using LaneEffect<DualLanes>::change_force;
-  using LaneEffect<ExactLanes>::shift_supports;
-  using LaneEffect<FastLanes>::shift_supports;
-  using LaneEffect<SingleLane>::shift_supports;
-  using LaneEffect<DualLanes>::shift_supports;
+  using LaneEffect<L>::add_force...;
+  using LaneEffect<L>::change_force...;
+  using LaneEffect<L>::shift_supports...;
+};
 
+/// One physical effect beyond springs, dampers along them, and gravity.
+class Effect : public EffectInLanes<ExactLanes, FastLanes, SingleLane, DualLanes> {
+ public:
+  /// Whether `change_force` and `shift_supports` do anything.
   virtual bool changes_force() const { return false; }
   virtual bool shifts_supports() const { return false; }
+
+  /// How many numbers it remembers of one simulation.
   virtual int memory_size(const Cloth& /*cloth*/) const { return 0; }
 
-  /// The derivatives of `add_force`, `change_force` and `shift_supports` in one simulation, at what
-  /// these are given.
+  /// Add the derivatives of `add_force`, `change_force` and `shift_supports` in one simulation, at
+  /// what these are given, to those there are.
   virtual void linearise_force(const EffectScene<SingleLane>& /*scene*/,
                                const EffectValues<SingleLane>& /*parameters*/,
                                const EffectMemory<SingleLane>& /*memory*/,

@@ -5,7 +5,7 @@
 #include <array>
 #include <type_traits>
 
-#include "model/effects/effect.h"
+#include "model/effects/law_effect.h"
 #include "model/effects/linearisation.h"
 #include "model/effects/number.h"
 
@@ -59,46 +59,10 @@ Vector3<double> value_of(const Vector3<Real>& v) {
 ///
 ///   static EffectRates rates(const Cloth&, const SpringParameters&, const std::vector<double>&);
 template <class Law>
-class LaneByLaneEffect final : public Effect {
+class LaneByLaneEffect final : public LawEffect<LaneByLaneEffect<Law>, Law> {
  public:
-  void add_force(const EffectScene<ExactLanes>& scene, const EffectValues<ExactLanes>& parameters,
-                 EffectMemory<ExactLanes>&, LaneVectors<ExactLanes>& force_n) const override {
-    add(scene, parameters, force_n);
-  }
-  void add_force(const EffectScene<FastLanes>& scene, const EffectValues<FastLanes>& parameters,
-                 EffectMemory<FastLanes>&, LaneVectors<FastLanes>& force_n) const override {
-    add(scene, parameters, force_n);
-  }
-  void add_force(const EffectScene<DualLanes>& scene, const EffectValues<DualLanes>& parameters,
-                 EffectMemory<DualLanes>&, LaneVectors<DualLanes>& force_n) const override {
-    add(scene, parameters, force_n);
-  }
-  void add_force(const EffectScene<SingleLane>& scene, const EffectValues<SingleLane>& parameters,
-                 EffectMemory<SingleLane>&, LaneVectors<SingleLane>& force_n) const override {
-    add(scene, parameters, force_n);
-  }
-  void linearise_force(const EffectScene<SingleLane>& scene,
-                       const EffectValues<SingleLane>& parameters, const EffectMemory<SingleLane>&,
-                       EffectLinearisation& derivatives) const override {
-    Law::linearise(scene.cloth, OneLane<SingleLane>{scene.position_m, 0},
-                   OneLane<SingleLane>{scene.velocity_m_per_s, 0},
-                   parameters_of<SingleLane>(parameters, 0), derivatives);
-  }
-  EffectRates rates(const Cloth& cloth, const SpringParameters& springs,
-                    const std::vector<double>& parameters) const override {
-    return Law::rates(cloth, springs, parameters);
-  }
-
- private:
   template <class L>
-  static auto parameters_of(const EffectValues<L>& values, int lane) {
-    using Real = typename OneLane<L>::Real;
-    std::array<Real, Law::kParameters> p;
-    for (size_t n = 0; n < p.size(); ++n) p[n] = static_cast<Real>(values[n][lane]);
-    return p;
-  }
-  template <class L>
-  static void add(const EffectScene<L>& scene, const EffectValues<L>& parameters,
+  static void add(const EffectScene<L>& scene, const EffectValues<L>& parameters, EffectMemory<L>&,
                   LaneVectors<L>& force_n) {
     using Number = typename L::Number;
     for (int l = 0; l < L::kCount; ++l)
@@ -113,6 +77,23 @@ class LaneByLaneEffect final : public Effect {
                       force_n.z(l, k) += static_cast<Number>(f.z);
                     }
                   });
+  }
+
+  void linearise_force(const EffectScene<SingleLane>& scene,
+                       const EffectValues<SingleLane>& parameters, const EffectMemory<SingleLane>&,
+                       EffectLinearisation& derivatives) const override {
+    Law::linearise(scene.cloth, OneLane<SingleLane>{scene.position_m, 0},
+                   OneLane<SingleLane>{scene.velocity_m_per_s, 0},
+                   parameters_of<SingleLane>(parameters, 0), derivatives);
+  }
+
+ private:
+  template <class L>
+  static auto parameters_of(const EffectValues<L>& values, int lane) {
+    using Real = typename OneLane<L>::Real;
+    std::array<Real, Law::kParameters> p;
+    for (size_t n = 0; n < p.size(); ++n) p[n] = static_cast<Real>(values[n][lane]);
+    return p;
   }
 };
 

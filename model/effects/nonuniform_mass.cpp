@@ -6,8 +6,8 @@ namespace clothfit::nonuniform_mass {
 namespace {
 enum Parameter { hem, hem_width, gradient_s, gradient_t, patch, patch_s, patch_t, patch_radius };
 
-/// The share of the cell around place `x` of a side with vertices every `spacing` that lies within
-/// `band` of the side's ends.
+/// The share of the cell around place `x_m` of a side with vertices every `spacing_m` that lies
+/// within `band_m` of the side's ends.
 template <class Real>
 Real band_share(double x_m, double side_m, double spacing_m, const Real& band_m) {
   const double from = std::max(0.0, x_m - 0.5 * spacing_m);

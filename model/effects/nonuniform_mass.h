@@ -15,9 +15,9 @@
 /// patch_radius in the flat cloth. Ours.
 ///
 /// The total is not kept: what a hem or a patch weighs comes on top of the stated mass; gradients
-/// leave it alone. Forces that other effects state per mass belong to the stated mass. Neutral:
-/// hem, gradient_s, gradient_t, patch at 0; hem_width, patch_s, patch_t and patch_radius matter
-/// only where hem or patch do.
+/// leave it alone. Forces that other effects state per mass belong to the stated mass. Parameters:
+/// hem, gradient_s, gradient_t, patch (ratios), neutral at 0; hem_width (m), patch_s, patch_t
+/// (shares) and patch_radius (m), which matter only where hem or patch do.
 namespace clothfit::nonuniform_mass {
 
 EffectDescription describe();

@@ -86,8 +86,8 @@ Vector3<Real> cross(const Vector3<Real>& a, const Vector3<Real>& b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 
-/// The vector's direction, or nothing where it is zero: a search that tries poor parameters meets
-/// surfaces that are folded to nothing, and needs to carry on.
+/// The vector's direction, or nothing where it is shorter than 1e-15: a search that tries poor
+/// parameters meets surfaces that are folded to nothing, and needs to carry on.
 template <class Real>
 Vector3<Real> direction(const Vector3<Real>& v) {
   using std::sqrt;

@@ -15,9 +15,10 @@
 ///
 ///   p = pi stiffness z (d - z)^2 / d^2.
 ///
-/// Not neighbours: apart by 2 d or more in the flat cloth, and by no spring. (Sheets that a fold
-/// brings together at distance d are at least pi d / 2 of cloth apart.) Where d is less than the
-/// mesh's spacing, sheets slip through between the vertices. Ours.
+/// Not neighbours: apart by 2 d or more in the flat cloth, and by more than two columns or rows, so
+/// that no spring joins them. (Sheets that a fold brings together at distance d are at least
+/// pi d / 2 of cloth apart.) Where d is less than the mesh's spacing, sheets slip through between
+/// the vertices. Ours.
 ///
 /// Parameters: stiffness (Pa/m), neutral at 0; thickness d (m), which matters only where stiffness
 /// does.

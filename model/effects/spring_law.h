@@ -5,7 +5,7 @@
 #include <array>
 
 #include "model/cloth.h"
-#include "model/effects/effect.h"
+#include "model/effects/law_effect.h"
 #include "model/effects/linearisation.h"
 #include "model/effects/number.h"
 
@@ -28,9 +28,9 @@ inline std::array<double, 2> middle_of(const Mesh& mesh, const Spring& spring) {
           middle(spring.a / mesh.columns, spring.b / mesh.columns, mesh.rows)};
 }
 
-/// Calls `visit(number, spring, along, rate, direction, sight)` for every spring, type by type:
-/// position and velocity of its end b relative to a, and its direction, zero where it has no length
-/// (there it pulls at nothing).
+/// Calls `visit(number, spring, rate, direction, sight)` for every spring, type by type: the
+/// velocity of its end b relative to a (m/s), and its direction from a to b, zero where it has no
+/// length (there it pulls at nothing).
 template <class L, class Visit>
 void for_springs(const EffectScene<L>& scene, const Visit& visit) {
   using Real = RealOf<L>;
@@ -60,35 +60,36 @@ void for_springs(const EffectScene<L>& scene, const Visit& visit) {
   }
 }
 
-/// An effect inside the springs: tension beyond k (l - l0) + c dl/dt. A Law has
+/// An effect inside the springs: tension (> 0 pulls) beyond k (l - l0) + c dl/dt. A Law has
 ///   static constexpr int kParameters, kMemory;   // kMemory numbers are remembered per spring
 ///   template <class Real> static Real tension(const SpringSight<Real>&,
 ///       const std::array<Real, kParameters>&, std::array<Real, kMemory>& memory);  // N
 ///   static EffectRates rates(const Cloth&, const SpringParameters&, const std::vector<double>&);
 /// Lanes, tangents and the adjoint follow from these.
 template <class Law>
-class SpringLawEffect final : public Effect {
+class SpringLawEffect final : public LawEffect<SpringLawEffect<Law>, Law> {
  public:
   int memory_size(const Cloth& cloth) const override {
     return Law::kMemory * static_cast<int>(cloth.spring_count());
   }
-  void add_force(const EffectScene<ExactLanes>& scene, const EffectValues<ExactLanes>& parameters,
-                 EffectMemory<ExactLanes>& memory,
-                 LaneVectors<ExactLanes>& force_n) const override {
-    add(scene, parameters, memory, force_n);
-  }
-  void add_force(const EffectScene<FastLanes>& scene, const EffectValues<FastLanes>& parameters,
-                 EffectMemory<FastLanes>& memory, LaneVectors<FastLanes>& force_n) const override {
-    add(scene, parameters, memory, force_n);
-  }
-  void add_force(const EffectScene<DualLanes>& scene, const EffectValues<DualLanes>& parameters,
-                 EffectMemory<DualLanes>& memory, LaneVectors<DualLanes>& force_n) const override {
-    add(scene, parameters, memory, force_n);
-  }
-  void add_force(const EffectScene<SingleLane>& scene, const EffectValues<SingleLane>& parameters,
-                 EffectMemory<SingleLane>& memory,
-                 LaneVectors<SingleLane>& force_n) const override {
-    add(scene, parameters, memory, force_n);
+
+  template <class L>
+  static void add(const EffectScene<L>& scene, const EffectValues<L>& parameters,
+                  EffectMemory<L>& memory, LaneVectors<L>& force_n) {
+    using Real = RealOf<L>;
+    const auto p = reals_of<L, Law::kParameters>(parameters);
+    for_springs<L>(scene, [&](int number, const Spring& spring, const Vector3<Real>&,
+                              const Vector3<Real>& u, const SpringSight<Real>& sight) {
+      std::array<Real, Law::kMemory> remembered;
+      for (int m = 0; m < Law::kMemory; ++m)
+        remembered[static_cast<size_t>(m)] =
+            real_of<L>(LaneValue<L>(memory.col(number * Law::kMemory + m)));
+      const Vector3<Real> pull = Law::tension(sight, p, remembered) * u;
+      for (int m = 0; m < Law::kMemory; ++m)
+        set_real<L>(memory, number * Law::kMemory + m, remembered[static_cast<size_t>(m)]);
+      add_at<L>(force_n, spring.a, pull);
+      set_at<L>(force_n, spring.b, vector_at<L>(force_n, spring.b) - pull);
+    });
   }
 
   void linearise_force(const EffectScene<SingleLane>& scene,
@@ -170,31 +171,6 @@ class SpringLawEffect final : public Effect {
               derivatives.memory_by_memory.push_back({first + m, first + of, next.v[kMemory + of]});
           }
         });
-  }
-
-  EffectRates rates(const Cloth& cloth, const SpringParameters& springs,
-                    const std::vector<double>& parameters) const override {
-    return Law::rates(cloth, springs, parameters);
-  }
-
- private:
-  template <class L>
-  static void add(const EffectScene<L>& scene, const EffectValues<L>& parameters,
-                  EffectMemory<L>& memory, LaneVectors<L>& force_n) {
-    using Real = RealOf<L>;
-    const auto p = reals_of<L, Law::kParameters>(parameters);
-    for_springs<L>(scene, [&](int number, const Spring& spring, const Vector3<Real>&,
-                              const Vector3<Real>& u, const SpringSight<Real>& sight) {
-      std::array<Real, Law::kMemory> remembered;
-      for (int m = 0; m < Law::kMemory; ++m)
-        remembered[static_cast<size_t>(m)] =
-            real_of<L>(LaneValue<L>(memory.col(number * Law::kMemory + m)));
-      const Vector3<Real> pull = Law::tension(sight, p, remembered) * u;
-      for (int m = 0; m < Law::kMemory; ++m)
-        set_real<L>(memory, number * Law::kMemory + m, remembered[static_cast<size_t>(m)]);
-      add_at<L>(force_n, spring.a, pull);
-      set_at<L>(force_n, spring.b, vector_at<L>(force_n, spring.b) - pull);
-    });
   }
 };
 

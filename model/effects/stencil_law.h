@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "model/cloth.h"
-#include "model/effects/effect.h"
+#include "model/effects/law_effect.h"
 #include "model/effects/linearisation.h"
 #include "model/effects/number.h"
 
@@ -31,23 +31,19 @@ struct Stencil {
 ///   static EffectRates rates(const Cloth&, const SpringParameters&, const std::vector<double>&);
 /// Lanes, tangents and the adjoint follow from these.
 template <class Law>
-class StencilLawEffect final : public Effect {
+class StencilLawEffect final : public LawEffect<StencilLawEffect<Law>, Law> {
  public:
-  void add_force(const EffectScene<ExactLanes>& scene, const EffectValues<ExactLanes>& parameters,
-                 EffectMemory<ExactLanes>&, LaneVectors<ExactLanes>& force_n) const override {
-    add(scene, parameters, force_n);
-  }
-  void add_force(const EffectScene<FastLanes>& scene, const EffectValues<FastLanes>& parameters,
-                 EffectMemory<FastLanes>&, LaneVectors<FastLanes>& force_n) const override {
-    add(scene, parameters, force_n);
-  }
-  void add_force(const EffectScene<DualLanes>& scene, const EffectValues<DualLanes>& parameters,
-                 EffectMemory<DualLanes>&, LaneVectors<DualLanes>& force_n) const override {
-    add(scene, parameters, force_n);
-  }
-  void add_force(const EffectScene<SingleLane>& scene, const EffectValues<SingleLane>& parameters,
-                 EffectMemory<SingleLane>&, LaneVectors<SingleLane>& force_n) const override {
-    add(scene, parameters, force_n);
+  template <class L>
+  static void add(const EffectScene<L>& scene, const EffectValues<L>& parameters, EffectMemory<L>&,
+                  LaneVectors<L>& force_n) {
+    const auto p = reals_of<L, Law::kParameters>(parameters);
+    Law::for_stencils(scene.cloth, [&](const Stencil<Law::kVertices>& stencil) {
+      std::array<Vector3<RealOf<L>>, Law::kVertices> position;
+      for (size_t v = 0; v < Law::kVertices; ++v)
+        position[v] = vector_at<L>(scene.position_m, stencil.vertex[v]);
+      const auto forces = Law::forces(position, stencil.constants, p);
+      for (size_t v = 0; v < Law::kVertices; ++v) add_at<L>(force_n, stencil.vertex[v], forces[v]);
+    });
   }
 
   void linearise_force(const EffectScene<SingleLane>& scene,
@@ -79,25 +75,6 @@ class StencilLawEffect final : public Effect {
             derivatives.by_parameter.push_back(
                 {stencil.vertex[on], ParameterNumber::own(n), j.col(kOwn + n)});
       }
-    });
-  }
-
-  EffectRates rates(const Cloth& cloth, const SpringParameters& springs,
-                    const std::vector<double>& parameters) const override {
-    return Law::rates(cloth, springs, parameters);
-  }
-
- private:
-  template <class L>
-  static void add(const EffectScene<L>& scene, const EffectValues<L>& parameters,
-                  LaneVectors<L>& force_n) {
-    const auto p = reals_of<L, Law::kParameters>(parameters);
-    Law::for_stencils(scene.cloth, [&](const Stencil<Law::kVertices>& stencil) {
-      std::array<Vector3<RealOf<L>>, Law::kVertices> position;
-      for (size_t v = 0; v < Law::kVertices; ++v)
-        position[v] = vector_at<L>(scene.position_m, stencil.vertex[v]);
-      const auto forces = Law::forces(position, stencil.constants, p);
-      for (size_t v = 0; v < Law::kVertices; ++v) add_at<L>(force_n, stencil.vertex[v], forces[v]);
     });
   }
 };

@@ -1,6 +1,7 @@
 #include "model/effects/support_drift.h"
 
 #include "model/effects/support_law.h"
+#include "model/effects/vector_parameter.h"
 
 namespace clothfit::support_drift {
 namespace {
@@ -23,24 +24,12 @@ struct Law {
 EffectDescription describe() {
   return {.name = "support_drift",
           .summary = "held points drift, shift = velocity t",
-          .parameters = {{.name = "velocity_x",
-                          .unit = "m/s",
-                          .neutral = 0,
-                          .lower = -0.2,
-                          .upper = 0.2,
-                          .typical = 0.002},
-                         {.name = "velocity_y",
-                          .unit = "m/s",
-                          .neutral = 0,
-                          .lower = -0.2,
-                          .upper = 0.2,
-                          .typical = 0.002},
-                         {.name = "velocity_z",
-                          .unit = "m/s",
-                          .neutral = 0,
-                          .lower = -0.2,
-                          .upper = 0.2,
-                          .typical = 0.002}}};
+          .parameters = vector_parameter({.name = "velocity",
+                                          .unit = "m/s",
+                                          .neutral = 0,
+                                          .lower = -0.2,
+                                          .upper = 0.2,
+                                          .typical = 0.002})};
 }
 
 std::unique_ptr<Effect> make() {

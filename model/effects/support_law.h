@@ -5,7 +5,7 @@
 #include <array>
 
 #include "model/cloth.h"
-#include "model/effects/effect.h"
+#include "model/effects/law_effect.h"
 #include "model/effects/linearisation.h"
 #include "model/effects/number.h"
 
@@ -27,39 +27,33 @@ struct SupportSight {
 ///   static EffectRates rates(const Cloth&, const SpringParameters&, const std::vector<double>&);
 /// Lanes, tangents and the adjoint follow from these.
 template <class Law>
-class SupportLawEffect final : public Effect {
+class SupportLawEffect final : public LawEffect<SupportLawEffect<Law>, Law> {
  public:
   bool shifts_supports() const override { return true; }
   int memory_size(const Cloth& cloth) const override {
     return Law::kMemory * static_cast<int>(cloth.held.size());
   }
-  void shift_supports(const EffectScene<ExactLanes>& scene,
-                      const EffectValues<ExactLanes>& parameters,
-                      const LaneVectors<ExactLanes>& support_force_n,
-                      EffectMemory<ExactLanes>& memory,
-                      LaneVectors<ExactLanes>& target_m) const override {
-    shift(scene, parameters, support_force_n, memory, target_m);
-  }
-  void shift_supports(const EffectScene<FastLanes>& scene,
-                      const EffectValues<FastLanes>& parameters,
-                      const LaneVectors<FastLanes>& support_force_n,
-                      EffectMemory<FastLanes>& memory,
-                      LaneVectors<FastLanes>& target_m) const override {
-    shift(scene, parameters, support_force_n, memory, target_m);
-  }
-  void shift_supports(const EffectScene<DualLanes>& scene,
-                      const EffectValues<DualLanes>& parameters,
-                      const LaneVectors<DualLanes>& support_force_n,
-                      EffectMemory<DualLanes>& memory,
-                      LaneVectors<DualLanes>& target_m) const override {
-    shift(scene, parameters, support_force_n, memory, target_m);
-  }
-  void shift_supports(const EffectScene<SingleLane>& scene,
-                      const EffectValues<SingleLane>& parameters,
-                      const LaneVectors<SingleLane>& support_force_n,
-                      EffectMemory<SingleLane>& memory,
-                      LaneVectors<SingleLane>& target_m) const override {
-    shift(scene, parameters, support_force_n, memory, target_m);
+
+  template <class L>
+  static void shift(const EffectScene<L>& scene, const EffectValues<L>& parameters,
+                    const LaneVectors<L>& support_force_n, EffectMemory<L>& memory,
+                    LaneVectors<L>& target_m) {
+    using Real = RealOf<L>;
+    const auto p = reals_of<L, Law::kParameters>(parameters);
+    for (int h = 0; h < static_cast<int>(scene.cloth.held.size()); ++h) {
+      std::array<Real, Law::kMemory> remembered;
+      for (int m = 0; m < Law::kMemory; ++m)
+        remembered[static_cast<size_t>(m)] =
+            real_of<L>(LaneValue<L>(memory.col(h * Law::kMemory + m)));
+      add_at<L>(target_m, h,
+                Law::shift(SupportSight<Real>{.pull_n = vector_at<L>(support_force_n, h),
+                                              .number = h,
+                                              .end_time_s = scene.time_s + scene.time_step_s,
+                                              .time_step_s = scene.time_step_s},
+                           p, remembered));
+      for (int m = 0; m < Law::kMemory; ++m)
+        set_real<L>(memory, h * Law::kMemory + m, remembered[static_cast<size_t>(m)]);
+    }
   }
 
   void linearise_supports(const EffectScene<SingleLane>& scene,
@@ -100,34 +94,6 @@ class SupportLawEffect final : public Effect {
         for (int of = 0; of < Law::kMemory; ++of)
           derivatives.memory_by_memory.push_back({first + m, first + of, next.v[kMemory + of]});
       }
-    }
-  }
-
-  EffectRates rates(const Cloth& cloth, const SpringParameters& springs,
-                    const std::vector<double>& parameters) const override {
-    return Law::rates(cloth, springs, parameters);
-  }
-
- private:
-  template <class L>
-  static void shift(const EffectScene<L>& scene, const EffectValues<L>& parameters,
-                    const LaneVectors<L>& support_force_n, EffectMemory<L>& memory,
-                    LaneVectors<L>& target_m) {
-    using Real = RealOf<L>;
-    const auto p = reals_of<L, Law::kParameters>(parameters);
-    for (int h = 0; h < static_cast<int>(scene.cloth.held.size()); ++h) {
-      std::array<Real, Law::kMemory> remembered;
-      for (int m = 0; m < Law::kMemory; ++m)
-        remembered[static_cast<size_t>(m)] =
-            real_of<L>(LaneValue<L>(memory.col(h * Law::kMemory + m)));
-      add_at<L>(target_m, h,
-                Law::shift(SupportSight<Real>{.pull_n = vector_at<L>(support_force_n, h),
-                                              .number = h,
-                                              .end_time_s = scene.time_s + scene.time_step_s,
-                                              .time_step_s = scene.time_step_s},
-                           p, remembered));
-      for (int m = 0; m < Law::kMemory; ++m)
-        set_real<L>(memory, h * Law::kMemory + m, remembered[static_cast<size_t>(m)]);
     }
   }
 };

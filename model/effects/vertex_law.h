@@ -6,7 +6,7 @@
 #include <array>
 
 #include "model/cloth.h"
-#include "model/effects/effect.h"
+#include "model/effects/law_effect.h"
 #include "model/effects/linearisation.h"
 #include "model/effects/number.h"
 
@@ -21,10 +21,10 @@ struct VertexSight {
   Vector3<Real> area_m2;
   Vector3<Real> gravity_m_per_s2;
   double mass_kg = 0;
-  double flat_area_m2 = 0;
-  double s = 0, t = 0;  ///< place on the cloth, shares of its width and height
+  double flat_area_m2 = 0;  ///< that belongs to the vertex in the flat cloth
+  double s = 0, t = 0;      ///< place on the cloth, shares of its width and height
   const Mesh* mesh = nullptr;
-  double time_s = 0;
+  double time_s = 0;  ///< the recording's, at the beginning of the step
 };
 
 /// The vector area at vertex [i, j], from differences to the neighbours on both sides, or the one
@@ -164,24 +164,17 @@ struct VertexDual {
 ///   static EffectRates rates(const Cloth&, const SpringParameters&, const std::vector<double>&);
 /// Lanes, tangents and the adjoint follow from these.
 template <class Law>
-class VertexLawEffect final : public Effect {
+class VertexLawEffect final : public LawEffect<VertexLawEffect<Law>, Law> {
  public:
-  void add_force(const EffectScene<ExactLanes>& scene, const EffectValues<ExactLanes>& parameters,
-                 EffectMemory<ExactLanes>&, LaneVectors<ExactLanes>& force_n) const override {
-    add(scene, parameters, force_n);
+  template <class L>
+  static void add(const EffectScene<L>& scene, const EffectValues<L>& parameters, EffectMemory<L>&,
+                  LaneVectors<L>& force_n) {
+    const auto p = reals_of<L, Law::kParameters>(parameters);
+    for_vertices<L>(scene, [&](int k, const AreaStencil&, const VertexSight<RealOf<L>>& sight) {
+      add_at<L>(force_n, k, Law::force(sight, p));
+    });
   }
-  void add_force(const EffectScene<FastLanes>& scene, const EffectValues<FastLanes>& parameters,
-                 EffectMemory<FastLanes>&, LaneVectors<FastLanes>& force_n) const override {
-    add(scene, parameters, force_n);
-  }
-  void add_force(const EffectScene<DualLanes>& scene, const EffectValues<DualLanes>& parameters,
-                 EffectMemory<DualLanes>&, LaneVectors<DualLanes>& force_n) const override {
-    add(scene, parameters, force_n);
-  }
-  void add_force(const EffectScene<SingleLane>& scene, const EffectValues<SingleLane>& parameters,
-                 EffectMemory<SingleLane>&, LaneVectors<SingleLane>& force_n) const override {
-    add(scene, parameters, force_n);
-  }
+
   void linearise_force(const EffectScene<SingleLane>& scene,
                        const EffectValues<SingleLane>& parameters, const EffectMemory<SingleLane>&,
                        EffectLinearisation& derivatives) const override {
@@ -193,49 +186,27 @@ class VertexLawEffect final : public Effect {
                            Dual::jacobian(Law::force(Dual::sight(sight), p)), derivatives);
         });
   }
-  EffectRates rates(const Cloth& cloth, const SpringParameters& springs,
-                    const std::vector<double>& parameters) const override {
-    return Law::rates(cloth, springs, parameters);
-  }
-
- private:
-  template <class L>
-  static void add(const EffectScene<L>& scene, const EffectValues<L>& parameters,
-                  LaneVectors<L>& force_n) {
-    const auto p = reals_of<L, Law::kParameters>(parameters);
-    for_vertices<L>(scene, [&](int k, const AreaStencil&, const VertexSight<RealOf<L>>& sight) {
-      add_at<L>(force_n, k, Law::force(sight, p));
-    });
-  }
 };
 
 /// An effect of inertia beyond the vertices' mass, which changes the sum of forces. A Law has
 ///   static constexpr int kParameters;
 ///   template <class Real> static Vector3<Real> change(const VertexSight<Real>&,
-///       const Vector3<Real>& force_n, const std::array<Real, kParameters>&);
+///       const Vector3<Real>& force_n, const std::array<Real, kParameters>&);  // N
 ///   static EffectRates rates(...);  // as above
 template <class Law>
-class InertiaLawEffect final : public Effect {
+class InertiaLawEffect final : public LawEffect<InertiaLawEffect<Law>, Law> {
  public:
   bool changes_force() const override { return true; }
-  void change_force(const EffectScene<ExactLanes>& scene,
-                    const EffectValues<ExactLanes>& parameters,
-                    LaneVectors<ExactLanes>& force_n) const override {
-    change(scene, parameters, force_n);
+
+  template <class L>
+  static void change(const EffectScene<L>& scene, const EffectValues<L>& parameters,
+                     LaneVectors<L>& force_n) {
+    const auto p = reals_of<L, Law::kParameters>(parameters);
+    for_vertices<L>(scene, [&](int k, const AreaStencil&, const VertexSight<RealOf<L>>& sight) {
+      set_at<L>(force_n, k, Law::change(sight, vector_at<L>(force_n, k), p));
+    });
   }
-  void change_force(const EffectScene<FastLanes>& scene, const EffectValues<FastLanes>& parameters,
-                    LaneVectors<FastLanes>& force_n) const override {
-    change(scene, parameters, force_n);
-  }
-  void change_force(const EffectScene<DualLanes>& scene, const EffectValues<DualLanes>& parameters,
-                    LaneVectors<DualLanes>& force_n) const override {
-    change(scene, parameters, force_n);
-  }
-  void change_force(const EffectScene<SingleLane>& scene,
-                    const EffectValues<SingleLane>& parameters,
-                    LaneVectors<SingleLane>& force_n) const override {
-    change(scene, parameters, force_n);
-  }
+
   void linearise_change(const EffectScene<SingleLane>& scene,
                         const EffectValues<SingleLane>& parameters,
                         const LaneVectors<SingleLane>& force_n,
@@ -249,20 +220,6 @@ class InertiaLawEffect final : public Effect {
           Dual::add_blocks(k, area, scene.position_m, j, derivatives);
           derivatives.by_force.push_back({k, j.template middleCols<3>(Dual::kMore)});
         });
-  }
-  EffectRates rates(const Cloth& cloth, const SpringParameters& springs,
-                    const std::vector<double>& parameters) const override {
-    return Law::rates(cloth, springs, parameters);
-  }
-
- private:
-  template <class L>
-  static void change(const EffectScene<L>& scene, const EffectValues<L>& parameters,
-                     LaneVectors<L>& force_n) {
-    const auto p = reals_of<L, Law::kParameters>(parameters);
-    for_vertices<L>(scene, [&](int k, const AreaStencil&, const VertexSight<RealOf<L>>& sight) {
-      set_at<L>(force_n, k, Law::change(sight, vector_at<L>(force_n, k), p));
-    });
   }
 };
 

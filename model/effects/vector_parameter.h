@@ -1,0 +1,19 @@
+#pragma once
+
+#include <vector>
+
+#include "model/effects/effect.h"
+
+namespace clothfit {
+
+/// The three parameters of a vector, which are alike but for their names: NAME_x, NAME_y, NAME_z
+/// for the one called NAME that is given.
+inline std::vector<EffectParameter> vector_parameter(const EffectParameter& of_each) {
+  std::vector<EffectParameter> three(3, of_each);
+  three[0].name += "_x";
+  three[1].name += "_y";
+  three[2].name += "_z";
+  return three;
+}
+
+}  // namespace clothfit
