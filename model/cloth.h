@@ -42,6 +42,9 @@ struct Cloth {
 
   /// A cloth of a mesh with its springs, without held points or effects.
   static Cloth of(const Mesh& mesh, Eigen::VectorXd mass_kg);
+  /// Adds the effect called `name`. Throws InputError at `where` for a name that is not known (it
+  /// lists those that are), and for contact_mesh on a cloth whose `obstacle` is not set yet: it
+  /// would touch nothing without a word.
   void add_effect(const std::string& name, const std::string& where);
 
   size_t spring_count() const;
