@@ -359,11 +359,8 @@ std::vector<std::vector<Eigen::Matrix3Xd>> run_model(const FitProblem& problem,
   }
   std::vector<std::vector<Eigen::Matrix3Xd>> trajectories(values.size());
   if (sets.empty()) return trajectories;
-  if (problem.start == StartKind::at_rest) {
-    std::vector<Eigen::Matrix3Xd> shapes =
-        relax(problem.cloth, sets, problem.frame_time_s.front(), time_step_s);
-    for (size_t n = 0; n < sets.size(); ++n) sets[n].start_position_m = std::move(shapes[n]);
-  }
+  if (problem.start == StartKind::at_rest)
+    start_at_rest(problem.cloth, sets, problem.frame_time_s.front(), time_step_s);
   const Schedule schedule{
       .frame_time_s = {problem.frame_time_s.begin(), problem.frame_time_s.begin() + frames},
       .time_step_s = time_step_s};

@@ -167,8 +167,7 @@ SimulateResult run(const Simulation& simulation, double time_step_s,
                    const ProgressCallback& progress) {
   std::vector<ParameterSet> sets{simulation.parameters};
   if (simulation.start == StartKind::at_rest)
-    sets[0].start_position_m =
-        relax(simulation.cloth, sets, simulation.frame_time_s.front(), time_step_s).front();
+    start_at_rest(simulation.cloth, sets, simulation.frame_time_s.front(), time_step_s);
   const Schedule schedule{.frame_time_s = simulation.frame_time_s, .time_step_s = time_step_s};
   const auto after_frame = [&](int frame) {
     return !progress || progress({.stage = "simulate",

@@ -65,9 +65,7 @@ class Run {
         parameters_(lane_parameters<SingleLane>(cloth, {&set, 1})),
         state_(LaneState<SingleLane>::of(cloth)),
         inverse_mass_per_kg_(cloth.mass_kg.cwiseInverse()) {
-    state_.position_m.set_lane(0, set.start_position_m);
-    if (set.start_velocity_m_per_s.cols() > 0)
-      state_.velocity_m_per_s.set_lane(0, set.start_velocity_m_per_s);
+    set_start(0, set, state_);
     start_target_m_ = stepper_.held().locate(state_.position_m);
     for (const Eigen::Matrix3Xd& force : fields.force_n) force_n_.push_back(vectors_of(force));
 
@@ -120,6 +118,8 @@ class Run {
     }
     gradient_.by_start_position = by_state_.position_m.lane(0);
     gradient_.by_start_velocity = by_state_.velocity_m_per_s.lane(0);
+    for (const EffectMemory<SingleLane>& by_memory : by_state_.effect_memory)
+      gradient_.by_start_effect_memory.emplace_back(by_memory.row(0).matrix().transpose());
     return std::move(gradient_);
   }
 

@@ -32,6 +32,7 @@ struct CostGradient {
   Eigen::VectorXd by_mass_kg;                       ///< per vertex; see simulate_with_gradient
   Eigen::Vector3d by_gravity = Eigen::Vector3d::Zero();
   Eigen::Matrix3Xd by_start_position, by_start_velocity;  ///< 3 x vertices
+  std::vector<Eigen::VectorXd> by_start_effect_memory;    ///< [effect], as in ParameterSet
   std::vector<Eigen::Matrix3Xd> by_force_n;               ///< as SimulationFields::force_n
   std::vector<std::vector<double>> by_effects;            ///< [effect][parameter]
 };

@@ -46,7 +46,6 @@ Cloth Cloth::of(const Mesh& mesh, Eigen::VectorXd mass_kg) {
 
 void Cloth::add_effect(const std::string& name, const std::string& where) {
   const EffectEntry& entry = find_effect(name, where);
-  // It would do nothing without a word.
   if (name == "contact_mesh" && !obstacle)
     throw InputError(where, "effect 'contact_mesh' has no obstacle to touch",
                      "recordings and model files cannot give one yet; contact_plane and "

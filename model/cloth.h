@@ -42,6 +42,9 @@ struct Cloth {
 
   /// A cloth of a mesh with its springs, without held points or effects.
   static Cloth of(const Mesh& mesh, Eigen::VectorXd mass_kg);
+  /// Adds the effect called `name`. Throws InputError at `where` for a name that is not known (it
+  /// lists those that are), and for contact_mesh on a cloth whose `obstacle` is not set yet: it
+  /// would touch nothing without a word.
   void add_effect(const std::string& name, const std::string& where);
 
   size_t spring_count() const;
@@ -54,6 +57,8 @@ struct ParameterSet {
   std::vector<std::vector<double>> effects;  ///< parameters of each effect of the cloth
   Eigen::Matrix3Xd start_position_m;         ///< 3 x vertices, world
   Eigen::Matrix3Xd start_velocity_m_per_s;   ///< the same; empty: at rest
+  /// What each effect of the cloth remembers at the start (EffectMemory's numbers); empty: nothing.
+  std::vector<Eigen::VectorXd> start_effect_memory;
 };
 
 }  // namespace clothfit

@@ -24,9 +24,7 @@ class LaneRun {
         state_(LaneState<L>::of(cloth)) {
     for (int l = 0; l < L::kCount; ++l) {
       const ParameterSet& set = group[std::min(static_cast<size_t>(l), group.size() - 1)];
-      state_.position_m.set_lane(l, set.start_position_m);
-      if (set.start_velocity_m_per_s.cols() > 0)
-        state_.velocity_m_per_s.set_lane(l, set.start_velocity_m_per_s);
+      set_start(l, set, state_);
     }
     held_target_m_ = stepper_.held().locate(state_.position_m);
   }
@@ -160,8 +158,8 @@ std::vector<SimulateResult> simulate(const Cloth& cloth, std::span<const Paramet
   return results;
 }
 
-std::vector<Eigen::Matrix3Xd> relax(const Cloth& cloth, std::span<const ParameterSet> parameters,
-                                    double time_s, double time_step_s) {
+std::vector<RelaxedCloth> relax(const Cloth& cloth, std::span<const ParameterSet> parameters,
+                                double time_s, double time_step_s) {
   if (parameters.empty()) return {};
   constexpr double kPendulumTimes = 7;  // (1 + 7) exp(-7) is left of the distance: 0.7 %
   const double gravity = parameters.front().gravity_m_per_s2.norm();
@@ -185,19 +183,37 @@ std::vector<Eigen::Matrix3Xd> relax(const Cloth& cloth, std::span<const Paramete
     damped[n].effects.clear();
     for (const size_t e : kept) damped[n].effects.push_back(parameters[n].effects[e]);
     damped[n].effects.push_back({2 * pendulum_rate});
+    damped[n].start_effect_memory.clear();
   }
 
   const double duration_s = kPendulumTimes / pendulum_rate;
   const int steps = std::max(1, static_cast<int>(std::ceil(duration_s / time_step_s)));
-  std::vector<Eigen::Matrix3Xd> shapes(parameters.size());
+  std::vector<RelaxedCloth> relaxed(parameters.size());
   for_lane_groups<ExactLanes>(
       damped, [&]<class L>(std::span<const ParameterSet> group, size_t first) {
         LaneRun<L> run(heavy, group);
         run.settle(time_s, duration_s / steps, steps);
-        for (size_t l = 0; l < group.size(); ++l)
-          shapes[first + l] = run.state().position_m.lane(static_cast<int>(l));
+        for (size_t l = 0; l < group.size(); ++l) {
+          RelaxedCloth& result = relaxed[first + l];
+          result.position_m = run.state().position_m.lane(static_cast<int>(l));
+          for (const std::shared_ptr<const Effect>& effect : cloth.effects)
+            result.effect_memory.emplace_back(Eigen::VectorXd::Zero(effect->memory_size(cloth)));
+          for (size_t k = 0; k < kept.size(); ++k)
+            result.effect_memory[kept[k]] =
+                run.state().effect_memory[k].row(static_cast<Eigen::Index>(l)).matrix();
+        }
       });
-  return shapes;
+  return relaxed;
+}
+
+void start_at_rest(const Cloth& cloth, std::span<ParameterSet> parameters, double time_s,
+                   double time_step_s) {
+  std::vector<RelaxedCloth> relaxed = relax(cloth, parameters, time_s, time_step_s);
+  for (size_t n = 0; n < parameters.size(); ++n) {
+    parameters[n].start_position_m = std::move(relaxed[n].position_m);
+    parameters[n].start_effect_memory = std::move(relaxed[n].effect_memory);
+    parameters[n].start_velocity_m_per_s.resize(3, 0);
+  }
 }
 
 }  // namespace clothfit

@@ -48,15 +48,26 @@ std::vector<SimulateResult> simulate(const Cloth& cloth, std::span<const Paramet
                                      Precision precision = Precision::exact,
                                      const FrameCallback& after_frame = {});
 
-/// The shape in which the cloth hangs still: the start positions relaxed under gravity with heavy
-/// viscous damping (critical for the pendulum of the cloth's height), held points where `motion`
-/// has them at `time_s`. A fixed number of steps, so that the shape depends smoothly on the
-/// parameters; their number follows from the first set's gravity. What is left of the initial
-/// distance to equilibrium is below a percent. Supports are where they are without effects that
-/// shift them. What effects remember is not handed on: with hysteresis or relaxation in the springs
-/// the shape is at rest for the memory it has come to, and a run that starts from it with none
-/// moves.
-std::vector<Eigen::Matrix3Xd> relax(const Cloth& cloth, std::span<const ParameterSet> parameters,
-                                    double time_s, double time_step_s);
+/// A cloth that has calmed down.
+struct RelaxedCloth {
+  Eigen::Matrix3Xd position_m;                 ///< 3 x vertices
+  std::vector<Eigen::VectorXd> effect_memory;  ///< as ParameterSet::start_effect_memory
+};
+
+/// The start positions relaxed under gravity with heavy viscous damping (critical for the pendulum
+/// of the cloth's height), held points where `motion` has them at `time_s`, and what the effects
+/// have come to remember on the way. A fixed number of steps, so that the shape depends smoothly on
+/// the parameters; their number follows from the first set's gravity. Of the pendulum's distance to
+/// equilibrium less than a percent is left, of slower motions (folds that open, a cloth that turns
+/// about a single support) more. Supports are where they are without effects that shift them, which
+/// remember nothing.
+std::vector<RelaxedCloth> relax(const Cloth& cloth, std::span<const ParameterSet> parameters,
+                                double time_s, double time_step_s);
+
+/// Lets every set start from rest: relaxed from where it would have started, as relax() does it,
+/// with what its effects have come to remember, and without velocity. The exact minimum of the
+/// energy is not looked for: docs/theory/equilibrium.md says why.
+void start_at_rest(const Cloth& cloth, std::span<ParameterSet> parameters, double time_s,
+                   double time_step_s);
 
 }  // namespace clothfit

@@ -18,6 +18,16 @@ LaneState<L> LaneState<L>::of(const Cloth& cloth) {
 }
 
 template <class L>
+void set_start(int lane, const ParameterSet& set, LaneState<L>& state) {
+  state.position_m.set_lane(lane, set.start_position_m);
+  if (set.start_velocity_m_per_s.cols() > 0)
+    state.velocity_m_per_s.set_lane(lane, set.start_velocity_m_per_s);
+  for (size_t e = 0; e < set.start_effect_memory.size(); ++e)
+    state.effect_memory[e].row(lane) =
+        set.start_effect_memory[e].transpose().array().template cast<typename L::Number>();
+}
+
+template <class L>
 HeldPlacement<L>::HeldPlacement(const Cloth& cloth)
     : held_(cloth.held),
       mass_kg_(cloth.mass_kg),
@@ -237,6 +247,7 @@ void EulerStepper<L>::step(const LaneParameters<L>& parameters, const LaneVector
 #define CLOTHFIT_INSTANTIATE(L)                                                                 \
   template struct LaneState<L>;                                                                 \
   template class HeldPlacement<L>;                                                              \
+  template void set_start(int, const ParameterSet&, LaneState<L>&);                             \
   template void set_lane(int, const SpringParameters&, const StrainLimit&, LaneParameters<L>&); \
   template LaneParameters<L> lane_parameters(const Cloth&, std::span<const ParameterSet>);      \
   template void move_by_forces(const LaneVectors<L>&, const LaneVector<L>&,                     \

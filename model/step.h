@@ -28,6 +28,10 @@ struct LaneState {
   static LaneState of(const Cloth& cloth);
 };
 
+/// Lets one lane start as `set` does.
+template <class L>
+void set_start(int lane, const ParameterSet& set, LaneState<L>& state);
+
 /// Sets one lane's springs, and their limits for a cloth with this strain limit.
 template <class L>
 void set_lane(int lane, const SpringParameters& springs, const StrainLimit& strain_limit,

@@ -21,6 +21,7 @@ struct Direction {
   Eigen::Vector3d gravity_m_per_s2 = Eigen::Vector3d::Zero();
   std::vector<std::vector<double>> effects;  ///< parameters of each effect of the cloth
   Eigen::Matrix3Xd start_position_m, start_velocity_m_per_s;  ///< 3 x vertices
+  std::vector<Eigen::VectorXd> start_effect_memory;           ///< of each effect of the cloth
   /// Of each held point, how its place changes (m); a point without a motion of its own moves with
   /// the start positions.
   std::vector<std::function<Eigen::Vector3d(double time_s)>> held_motion;

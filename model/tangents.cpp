@@ -24,6 +24,14 @@ TangentResult run_group(const Cloth& cloth, const ParameterSet& set,
     if (directions[d].start_velocity_m_per_s.cols() > 0)
       state.velocity_m_per_s.tangent.set_lane(lane, directions[d].start_velocity_m_per_s);
   }
+  for (size_t e = 0; e < set.start_effect_memory.size(); ++e)
+    for (Eigen::Index n = 0; n < set.start_effect_memory[e].size(); ++n)
+      state.effect_memory[e](0, n).a = set.start_effect_memory[e][n];
+  for (size_t d = 0; d < directions.size(); ++d)
+    for (size_t e = 0; e < directions[d].start_effect_memory.size(); ++e)
+      for (Eigen::Index n = 0; n < directions[d].start_effect_memory[e].size(); ++n)
+        state.effect_memory[e](0, n).v[static_cast<Eigen::Index>(d)] =
+            directions[d].start_effect_memory[e][n];
   LaneVectors<DualLanes> target_m = stepper.locate(state.position_m);
   const auto aim = [&](double time_s) {
     for (size_t h = 0; h < cloth.held.size(); ++h) {

@@ -176,7 +176,8 @@ void time_rest_shapes() {
     for (size_t n = 0; n < sets.size(); ++n)
       for (double& k : sets[n].springs.stiffness_n_per_m) k *= 1 + 1e-3 * static_cast<double>(n);
     const double step_s = 0.8 * stable_time_step_s(on.cloth, sets.back());
-    std::vector<Eigen::Matrix3Xd> relaxed, rest;
+    std::vector<RelaxedCloth> relaxed;
+    std::vector<Eigen::Matrix3Xd> rest;
     const double relax_s = best_seconds_of(3, [&] { relaxed = relax(on.cloth, sets, 0, step_s); });
     const double rest_s = best_seconds_of(3, [&] { rest = rest_shapes(on.cloth, sets, 0); });
     const auto imbalance = [&](const Eigen::Matrix3Xd& shape) {
@@ -189,9 +190,9 @@ void time_rest_shapes() {
     fmt::print(
         "  held at {}: relax() {:.1f} ms a set, imbalance {:.1e}; rest_shapes() {:.1f} ms, "
         "{:.1e}; apart by up to {:.2f} mm\n",
-        corners == 2 ? "two corners" : "one corner", 1e3 * relax_s / 16, imbalance(relaxed[0]),
-        1e3 * rest_s / 16, imbalance(rest[0]),
-        1e3 * (relaxed[0] - rest[0]).colwise().norm().maxCoeff());
+        corners == 2 ? "two corners" : "one corner", 1e3 * relax_s / 16,
+        imbalance(relaxed[0].position_m), 1e3 * rest_s / 16, imbalance(rest[0]),
+        1e3 * (relaxed[0].position_m - rest[0]).colwise().norm().maxCoeff());
   }
 }
 

@@ -60,6 +60,8 @@ double along(const CostGradient& gradient, const Swing& swing, const Direction& 
   for (size_t e = 0; e < d.effects.size(); ++e)
     for (size_t p = 0; p < d.effects[e].size(); ++p)
       slope += gradient.by_effects[e][p] * d.effects[e][p];
+  for (size_t e = 0; e < d.start_effect_memory.size(); ++e)
+    slope += gradient.by_start_effect_memory[e].dot(d.start_effect_memory[e]);
   return slope;
 }
 

@@ -8,6 +8,7 @@
 
 #include <cmath>
 
+#include "model/effects/registry.h"
 #include "model/stability.h"
 #include "tests/model/mechanics.h"
 #include "tests/model/random_cloth.h"
@@ -227,7 +228,7 @@ TEST(Relax, AHangingChainStretchesByTheWeightBelowEachSpring) {
 
   // when it is relaxed,
   const Eigen::Matrix3Xd p =
-      relax(cloth, {&set, 1}, 0, 0.5 * stable_time_step_s(cloth, set)).front();
+      relax(cloth, {&set, 1}, 0, 0.5 * stable_time_step_s(cloth, set)).front().position_m;
 
   // then each spring carries what hangs below it: l - l0 = weight / k.
   for (int j = 0; j < 2; ++j) {
@@ -261,7 +262,7 @@ TEST(Relax, BalancesTheForcesOfAClothHungByTwoCorners) {
   for (const Cloth* hung : {&cloth, static_cast<const Cloth*>(&sagging)}) {
     SCOPED_TRACE(hung == &cloth ? "straight" : "sagging");
     const double h = 0.5 * stable_time_step_s(*hung, set);
-    const Eigen::Matrix3Xd p = relax(*hung, {&set, 1}, 0, h).front();
+    const Eigen::Matrix3Xd p = relax(*hung, {&set, 1}, 0, h).front().position_m;
 
     EXPECT_LT(residual_force(*hung, set, p), 0.01);
     EXPECT_GT(residual_force(*hung, set, set.start_position_m), 0.01);
@@ -276,7 +277,7 @@ TEST(Relax, PutsMovingHeldPointsWhereTheyAreAtThatTime) {
                          .start_position_m = hung_flat(cloth.mesh)};
 
   const Eigen::Matrix3Xd p =
-      relax(cloth, {&set, 1}, 0.5, 0.5 * stable_time_step_s(cloth, set)).front();
+      relax(cloth, {&set, 1}, 0.5, 0.5 * stable_time_step_s(cloth, set)).front().position_m;
 
   EXPECT_LT((p.col(4) - Eigen::Vector3d(0.35, 0, 0)).norm(), 1e-15);
 }
@@ -293,7 +294,7 @@ TEST(Relax, IsSmoothInTheParameters) {
       sets.back().springs.stiffness_n_per_m[type] *= 1 + sign * step;
     }
     const auto shapes = relax(cloth, sets, 0, h);
-    return Eigen::Matrix3Xd((shapes[0] - shapes[1]) / (2 * step));
+    return Eigen::Matrix3Xd((shapes[0].position_m - shapes[1].position_m) / (2 * step));
   };
 
   for (const size_t type : {structural_t, structural_s, shear_down, flexion_t}) {
@@ -315,8 +316,93 @@ TEST(Relax, DependsNeitherOnTheNumberOfSetsNorOnTheirOrder) {
   const auto reversed = relax(cloth, backwards, 0, 2e-4);
 
   for (size_t n = 0; n < sets.size(); ++n) {
-    EXPECT_EQ(shapes[n], reversed[sets.size() - 1 - n]) << n;
-    EXPECT_EQ(shapes[n], relax(cloth, {&sets[n], 1}, 0, 2e-4).front()) << n;
+    EXPECT_EQ(shapes[n].position_m, reversed[sets.size() - 1 - n].position_m) << n;
+    EXPECT_EQ(shapes[n].position_m, relax(cloth, {&sets[n], 1}, 0, 2e-4).front().position_m) << n;
+  }
+}
+
+/// A sheet that hangs flat from its upper edge, with effects on it.
+struct Curtain {
+  Cloth cloth = square_cloth(7);
+  ParameterSet set{.springs = spring_parameters(cotton(), cloth.mesh),
+                   .start_position_m = hung_flat(cloth.mesh)};
+
+  explicit Curtain(const std::vector<std::pair<std::string, std::vector<double>>>& effects) {
+    for (int j = 0; j < 7; ++j) cloth.held.push_back(held_at(cloth.mesh, 0.4 * j / 6, 0));
+    for (const auto& [name, parameters] : effects) {
+      cloth.add_effect(name, "test");
+      set.effects.push_back(parameters);
+    }
+  }
+  double time_step_s() const { return 0.5 * stable_time_step_s(cloth, set); }
+  ParameterSet at_rest() const {
+    ParameterSet start = set;
+    start_at_rest(cloth, {&start, 1}, 0, time_step_s());
+    return start;
+  }
+  /// How far any vertex comes from where it starts within half a second.
+  double way_m(const ParameterSet& start) const {
+    const SimulateResult run = simulate(cloth, {&start, 1}, frames(31, 60, time_step_s())).front();
+    double furthest_m = 0;
+    for (const Eigen::Matrix3Xd& p : run.position_m)
+      furthest_m = std::max(furthest_m, (p - start.start_position_m).colwise().norm().maxCoeff());
+    return furthest_m;
+  }
+};
+
+TEST(StartAtRest, AClothWhoseFabricRemembersStaysWhereItIs) {
+  const double ratio = 0.7, yield = 5e-3, time_s = 0.1;
+  for (const Curtain& curtain :
+       {Curtain({{"hysteresis", {ratio, yield}}}), Curtain({{"relaxation", {ratio, time_s}}})}) {
+    SCOPED_TRACE(curtain.cloth.effect_descriptions.front().name);
+    ParameterSet start = curtain.at_rest();
+
+    // Relaxing takes 1.4 s, in which a stress that halves in 0.07 s falls a millionfold; it began
+    // as some millimetres of stretch.
+    EXPECT_LT(curtain.way_m(start), 1e-6);
+    start.start_effect_memory.clear();
+    EXPECT_GT(curtain.way_m(start), 1e-4);
+  }
+}
+
+TEST(StartAtRest, HandsEveryEffectItsOwnMemory) {
+  const std::vector<double> wind{0.01, 0.1, 0.2, 0}, relaxation{0.7, 0.1};
+  const size_t slip_parameters = find_effect("support_slip", "test").describe().parameters.size();
+  const Curtain alone({{"wind", wind}, {"relaxation", relaxation}});
+  const Curtain among({{"wind", wind},
+                       {"support_slip", std::vector<double>(slip_parameters, 0.01)},
+                       {"relaxation", relaxation}});
+  ParameterSet one = alone.set, still = among.set;
+  still.start_velocity_m_per_s.setZero(3, among.cloth.mesh.vertex_count());
+
+  start_at_rest(alone.cloth, {&one, 1}, 0, among.time_step_s());
+  start_at_rest(among.cloth, {&still, 1}, 0, among.time_step_s());
+
+  ASSERT_EQ(still.start_effect_memory.size(), 3u);
+  EXPECT_EQ(still.start_position_m, one.start_position_m);
+  EXPECT_EQ(still.start_effect_memory[0].size(), 0);
+  EXPECT_EQ(still.start_effect_memory[1],
+            Eigen::VectorXd::Zero(among.cloth.effects[1]->memory_size(among.cloth)));
+  EXPECT_EQ(still.start_effect_memory[2], one.start_effect_memory[1]);
+  EXPECT_GT(one.start_effect_memory[1].norm(), 0.01);
+  EXPECT_EQ(still.start_velocity_m_per_s.cols(), 0);
+}
+
+TEST(StartAtRest, DependsNeitherOnTheOtherSetsNorOnTheThreads) {
+  const Curtain curtain({{"hysteresis", {0.7, 5e-3}}});
+  std::vector<ParameterSet> sets(kLanes + 2, curtain.set);
+  for (size_t n = 0; n < sets.size(); ++n)
+    sets[n].springs.stiffness_n_per_m[structural_t] *= 1 + 0.01 * static_cast<double>(n);
+  std::vector<ParameterSet> backwards(sets.rbegin(), sets.rend());
+
+  start_at_rest(curtain.cloth, sets, 0, 5e-4);
+  const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
+  start_at_rest(curtain.cloth, backwards, 0, 5e-4);
+
+  for (size_t n = 0; n < sets.size(); ++n) {
+    const ParameterSet& other = backwards[sets.size() - 1 - n];
+    EXPECT_EQ(sets[n].start_position_m, other.start_position_m) << n;
+    EXPECT_EQ(sets[n].start_effect_memory, other.start_effect_memory) << n;
   }
 }
 

@@ -25,13 +25,25 @@ struct Swing {
   }
 };
 
-/// The swing under one more effect, some typical changes away from neutral.
+/// Something for every effect to remember.
+inline std::vector<Eigen::VectorXd> random_memory(const Cloth& cloth, Uniform& uniform) {
+  std::vector<Eigen::VectorXd> memory;
+  for (const std::shared_ptr<const Effect>& effect : cloth.effects) {
+    memory.emplace_back(effect->memory_size(cloth));
+    for (double& number : memory.back()) number = uniform(-5e-3, 5e-3);
+  }
+  return memory;
+}
+
+/// The swing under one more effect, some typical changes away from neutral, that remembers
+/// something where it remembers.
 inline Swing swing_under(const EffectEntry& entry, Uniform& uniform) {
   Swing swing(uniform);
   swing.cloth.add_effect(entry.name, "test");
   swing.set.effects = {effect_contract::random_parameters(entry.describe(), uniform)};
   swing.schedule = {.frame_time_s = {0, 0.004, 0.01}, .time_step_s = 2e-4};
   swing.set.start_position_m = crumpled_for(entry.name, swing.cloth.mesh, 0.1, uniform);
+  swing.set.start_effect_memory = random_memory(swing.cloth, uniform);
   return swing;
 }
 
@@ -51,6 +63,7 @@ inline Direction random_direction(const Cloth& cloth, Uniform& uniform) {
   }
   d.start_position_m = uniform.vectors(cloth.mesh.vertex_count(), 0.01);
   d.start_velocity_m_per_s = uniform.vectors(cloth.mesh.vertex_count(), 0.1);
+  d.start_effect_memory = random_memory(cloth, uniform);
   const Eigen::Vector3d drift = uniform.vectors(1, 0.1);
   d.held_motion.resize(cloth.held.size());
   for (size_t h = 0; h < cloth.held.size(); ++h)

@@ -24,6 +24,8 @@ std::vector<Eigen::Matrix3Xd> moved(const Cloth& cloth, ParameterSet set, const 
     for (size_t p = 0; p < d.effects[e].size(); ++p) set.effects[e][p] += by * d.effects[e][p];
   set.start_position_m += by * d.start_position_m;
   set.start_velocity_m_per_s += by * d.start_velocity_m_per_s;
+  for (size_t e = 0; e < set.start_effect_memory.size(); ++e)
+    set.start_effect_memory[e] += by * d.start_effect_memory[e];
   Cloth there = cloth;
   for (size_t h = 0; h < d.held_motion.size(); ++h)
     if (d.held_motion[h])

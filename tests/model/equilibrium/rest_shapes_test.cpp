@@ -56,7 +56,8 @@ TEST(RestShapes, AreWhereRelaxationEnds) {
   const double h = 0.5 * stable_time_step_s(cloth, set);
 
   const Eigen::Matrix3Xd shape = rest_shapes(cloth, {&set, 1}, 0).front();
-  for (int n = 0; n < 12; ++n) set.start_position_m = relax(cloth, {&set, 1}, 0, h).front();
+  for (int n = 0; n < 12; ++n)
+    set.start_position_m = relax(cloth, {&set, 1}, 0, h).front().position_m;
 
   EXPECT_LT((shape - set.start_position_m).colwise().norm().maxCoeff(), 1e-5);
 }
