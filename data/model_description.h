@@ -31,7 +31,7 @@ struct SheetPose {
   Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();
 };
 
-enum class StrainLimitKind { off, positions, consistent };
+enum class StrainLimitKind { off, positions, rates_first, consistent };
 
 /// A prescribed point or edge; `motion` is fixed or path.
 struct ModelHeldPoint {

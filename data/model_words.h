@@ -19,6 +19,7 @@ inline Words<StartKind> model_start_words() {
 inline Words<StrainLimitKind> strain_limit_words() {
   return {{"off", StrainLimitKind::off},
           {"positions", StrainLimitKind::positions},
+          {"rates_first", StrainLimitKind::rates_first},
           {"consistent", StrainLimitKind::consistent}};
 }
 

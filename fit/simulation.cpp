@@ -39,6 +39,8 @@ StrainLimitMode mode_of(StrainLimitKind kind) {
   switch (kind) {
     case StrainLimitKind::positions:
       return StrainLimitMode::positions;
+    case StrainLimitKind::rates_first:
+      return StrainLimitMode::rates_first;
     case StrainLimitKind::consistent:
       return StrainLimitMode::consistent;
     case StrainLimitKind::off:

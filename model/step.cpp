@@ -230,18 +230,9 @@ void EulerStepper<L>::step(const LaneParameters<L>& parameters, const LaneVector
   }
   if (extras.driven_velocity_m_per_s != nullptr) *extras.driven_velocity_m_per_s = velocity_m_per_s;
   held_.place(*target_m, time_step_s, position_m, velocity_m_per_s);
-  switch (cloth_.strain_limit.mode) {
-    case StrainLimitMode::off:
-      break;
-    case StrainLimitMode::positions:
-      limit_outcome_ = limiter_.limit_positions(parameters.limits, position_m, extras.moves);
-      break;
-    case StrainLimitMode::consistent:
-      limit_outcome_ =
-          limiter_.limit_consistently(parameters.limits, cloth_.strain_limit.most_sweeps,
-                                      time_step_s, position_m, velocity_m_per_s, extras.moves);
-      break;
-  }
+  if (cloth_.strain_limit.mode != StrainLimitMode::off)
+    limit_outcome_ = limiter_.limit(cloth_.strain_limit, parameters.limits, time_step_s, position_m,
+                                    velocity_m_per_s, extras.moves);
 }
 
 #define CLOTHFIT_INSTANTIATE(L)                                                                 \

@@ -176,11 +176,8 @@ void TangentStepper::apply_limit(const DualParameters& parameters, double time_s
   LaneVectors<DualLanes>&position = state.position_m, &velocity = state.velocity_m_per_s;
   const bool correct_velocity = limit.mode == StrainLimitMode::consistent;
   moves_.clear();
-  if (correct_velocity)
-    limiter_.limit_consistently(parameters.value.limits, limit.most_sweeps, time_step_s,
-                                position.value, velocity.value, &moves_);
-  else
-    limiter_.limit_positions(parameters.value.limits, position.value, &moves_);
+  limiter_.limit(limit, parameters.value.limits, time_step_s, position.value, velocity.value,
+                 &moves_);
 
   // With longest the length a spring may have, its ends move by shares of (1 - longest / l) L:
   //   d((1 - longest / l) L) = (1 - longest / l) dL + (longest / l^3 (L . dL) - dlongest / l) L

@@ -14,9 +14,13 @@ inline std::ptrdiff_t offset_of(const Mesh& mesh, size_t type) {
   return kSpringReach[type].offset(mesh);
 }
 
+/// As many bytes as a mask of lanes is read from.
+constexpr size_t kMaskBytes = 8;
+
 enum class LimitPass {
-  sweep,  ///< shortens springs
-  check   ///< only looks for springs that are longer than tolerated
+  sweep,        ///< shortens springs that are too long as their turn comes
+  rates_first,  ///< shortens springs that are too long at its beginning
+  check         ///< only looks for springs that are longer than tolerated
 };
 
 /// What the passes over the springs work on; element (vertex * kCount + lane) of each array is one
@@ -28,8 +32,9 @@ struct LimitArrays {
   const LaneLimits<L>& limits;
   const std::array<SpringShares<Number>, kSpringTypes>& shares;
   const std::array<SpringGroup, kSpringGroups>& groups;
-  SpringGroup& found;       ///< scratch, as long as the longest group
-  SingleLimitSets& single;  ///< not used in lanes
+  SpringGroup& found;                      ///< scratch for all springs
+  std::vector<std::uint8_t>& found_lanes;  ///< scratch for kMaskBytes of each
+  SingleLimitSets& single;                 ///< not used in lanes
   std::array<Number*, 3> position_m;
   std::array<Number*, 3> velocity_m_per_s;  ///< null: not corrected
   std::vector<LimitMove>* moves = nullptr;  ///< of a single lane, where they are asked for

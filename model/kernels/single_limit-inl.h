@@ -87,7 +87,7 @@ HWY_INLINE void visit_along(LimitArrays<SingleLane>& arrays, size_t type) {
   const std::ptrdiff_t offset = offset_of(arrays.mesh, type);
   const std::array<double*, 3> position = arrays.position_m, velocity = arrays.velocity_m_per_s;
   const double allowed_m =
-      (pass == LimitPass::sweep ? arrays.limits.longest_m : arrays.limits.tolerated_m)[type][0];
+      (pass == LimitPass::check ? arrays.limits.tolerated_m : arrays.limits.longest_m)[type][0];
   const V allowed2 = hn::Set(d, allowed_m * allowed_m);
   const V longest = hn::Set(d, arrays.limits.longest_m[type][0]);
   const V one = hn::Set(d, 1.0), steps_per_s = hn::Set(d, arrays.steps_per_s);
@@ -96,8 +96,10 @@ HWY_INLINE void visit_along(LimitArrays<SingleLane>& arrays, size_t type) {
   for (const size_t g : {2 * type, 2 * type + 1}) {
     const VertexSet& group = arrays.single.groups[g];
     for (size_t w = 0; w + 1 < group.size(); ++w) {
-      std::uint64_t left = group[w] & (arrays.single.too_long[type][w] | arrays.single.moved[w] |
-                                       word_before(arrays.single.moved, w, offset));
+      std::uint64_t left = arrays.single.too_long[type][w];
+      if (pass != LimitPass::rates_first)
+        left |= arrays.single.moved[w] | word_before(arrays.single.moved, w, offset);
+      left &= group[w];
       while (left != 0) {
         const int shift = std::countr_zero(left) / size * size;
         const std::uint8_t wanted = static_cast<std::uint8_t>((left >> shift) & ((1u << size) - 1));
@@ -107,7 +109,9 @@ HWY_INLINE void visit_along(LimitArrays<SingleLane>& arrays, size_t type) {
         const Vector3<V> a = load(d, position, at), b = load(d, position, at + offset);
         const Vector3<V> along = b - a;
         const V length2 = dot(along, along);
-        const auto exceeds = hn::And(hn::LoadMaskBits(d, wanted_bits), hn::Gt(length2, allowed2));
+        auto exceeds = hn::LoadMaskBits(d, wanted_bits);
+        if constexpr (pass != LimitPass::rates_first)
+          exceeds = hn::And(exceeds, hn::Gt(length2, allowed2));
         const std::uint64_t found = bits_of(exceeds);
         if (found == 0) continue;
         if constexpr (pass == LimitPass::check) {

@@ -30,14 +30,16 @@ struct GroupLimit {
 };
 
 /// Lists the springs of `group` that may be longer than allowed in any lane, without a branch,
-/// which would be hard to foresee. Returns how many. Shortening measures them again, to the bit, so
-/// this may round as it likes, if only `from2` is less than allowed by more than that.
+/// which would be hard to foresee. Returns how many. They are measured again, to the bit, before
+/// anything is done, so this may round as it likes, if only it allows for more than that.
 template <class L>
 HWY_INLINE size_t list_long(const std::array<const typename L::Number*, 3>& position_m,
-                            const GroupLimit<L>& limit, const Vector<L>& from2,
-                            const SpringGroup& group, std::int32_t* found) {
+                            const GroupLimit<L>& limit, const SpringGroup& group,
+                            std::int32_t* found) {
   const Tag<L> d;
   const std::array<const typename L::Number*, 3> position = position_m;
+  const Vector<L> from2 =
+      hn::Mul(limit.allowed2, hn::Set(d, static_cast<typename L::Number>(1 - 1e-6)));
   size_t count = 0;
   for (const std::int32_t vertex : group) {
     const std::ptrdiff_t self = vertex * L::kCount + limit.lane;
@@ -51,26 +53,22 @@ HWY_INLINE size_t list_long(const std::array<const typename L::Number*, 3>& posi
   return count;
 }
 
-/// The lanes in which a spring of `group` is longer than allowed.
+/// The lanes in which the spring that leaves `vertex` is longer than allowed.
 template <class L>
-HWY_INLINE hn::Mask<Tag<L>> too_long(const std::array<const typename L::Number*, 3>& position_m,
-                                     const GroupLimit<L>& limit, const SpringGroup& group) {
+HWY_INLINE hn::Mask<Tag<L>> exceeds(const std::array<const typename L::Number*, 3>& position,
+                                    const GroupLimit<L>& limit, std::int32_t vertex) {
   const Tag<L> d;
-  const std::array<const typename L::Number*, 3> position = position_m;
-  Vector<L> longest2 = hn::Zero(d);
-  for (const std::int32_t vertex : group) {
-    const std::ptrdiff_t self = vertex * L::kCount + limit.lane;
-    const Vector3<Vector<L>> along =
-        load(d, position, self + limit.offset) - load(d, position, self);
-    longest2 = hn::Max(longest2, squared_length(along));
-  }
-  return hn::Gt(longest2, limit.allowed2);
+  const std::ptrdiff_t self = vertex * L::kCount + limit.lane;
+  const Vector3<Vector<L>> along = load(d, position, self + limit.offset) - load(d, position, self);
+  return hn::Gt(squared_length(along), limit.allowed2);
 }
 
-/// Shortens `n` springs of one group in the lanes in which they are too long.
+/// Shortens the springs of one group that leave `n` vertices, in the lanes in which they are too
+/// long, or, where `lanes` is not null, in those that it names, kMaskBytes for each.
 template <class L, size_t n>
 HWY_INLINE void shorten(LimitArrays<L>& arrays, const GroupLimit<L>& limit,
-                        const std::int32_t* vertices, Vector<L>& shortened) {
+                        const std::int32_t* vertices, const std::uint8_t* lanes,
+                        Vector<L>& shortened) {
   using V = Vector<L>;
   using Number = typename L::Number;
   const Tag<L> d;
@@ -84,7 +82,8 @@ HWY_INLINE void shorten(LimitArrays<L>& arrays, const GroupLimit<L>& limit,
     self[s] = vertices[s] * L::kCount + limit.lane;
     along[s] = load(d, position, self[s] + limit.offset) - load(d, position, self[s]);
     length2[s] = squared_length(along[s]);
-    exceeds[s] = hn::Gt(length2[s], limit.allowed2);
+    exceeds[s] = lanes == nullptr ? hn::Gt(length2[s], limit.allowed2)
+                                  : hn::LoadMaskBits(d, lanes + s * kMaskBytes);
     shortened = hn::Add(shortened, hn::IfThenElseZero(exceeds[s], one));
   }
   if constexpr (kMayContract<V>) {
@@ -112,6 +111,21 @@ HWY_INLINE void shorten(LimitArrays<L>& arrays, const GroupLimit<L>& limit,
   }
 }
 
+/// Shortens `count` springs of one group.
+template <class L>
+HWY_INLINE void shorten(LimitArrays<L>& arrays, const GroupLimit<L>& limit,
+                        const std::int32_t* vertices, const std::uint8_t* lanes, size_t count,
+                        Vector<L>& shortened) {
+  constexpr size_t kAtOnce = 3;  // more do not fit the registers
+  size_t n = 0;
+  const auto lanes_of = [&](size_t k) {
+    return lanes == nullptr ? nullptr : lanes + k * kMaskBytes;
+  };
+  for (; n + kAtOnce <= count; n += kAtOnce)
+    shorten<L, kAtOnce>(arrays, limit, vertices + n, lanes_of(n), shortened);
+  for (; n < count; ++n) shorten<L, 1>(arrays, limit, vertices + n, lanes_of(n), shortened);
+}
+
 template <class L, LimitPass pass>
 HWY_INLINE void visit(LimitArrays<L>& arrays, std::ptrdiff_t lane) {
   using V = Vector<L>;
@@ -121,31 +135,45 @@ HWY_INLINE void visit(LimitArrays<L>& arrays, std::ptrdiff_t lane) {
                                                  arrays.position_m[2]};
   const auto active = hn::Gt(hn::LoadU(d, arrays.active.data() + lane), hn::Zero(d));
   const auto& allowed_m =
-      pass == LimitPass::sweep ? arrays.limits.longest_m : arrays.limits.tolerated_m;
-  V shortened = hn::LoadU(d, arrays.shortened.data() + lane);
-  for (size_t g = 0; g < kSpringGroups; ++g) {
-    const size_t type = g / 2;
-    const SpringGroup& group = arrays.groups[g];
+      pass == LimitPass::check ? arrays.limits.tolerated_m : arrays.limits.longest_m;
+  const auto limit_of = [&](size_t type) HWY_ATTR {
     const V allowed = hn::LoadU(d, allowed_m[type].data() + lane);
-    const GroupLimit<L> limit{
-        .lane = lane,
-        .offset = offset_of(arrays.mesh, type) * L::kCount,
-        .longest = hn::LoadU(d, arrays.limits.longest_m[type].data() + lane),
-        .allowed2 = hn::IfThenElse(active, hn::Mul(allowed, allowed), hn::Inf(d)),
-        .first_share = arrays.shares[type].first.data(),
-        .second_share = arrays.shares[type].second.data()};
-    if constexpr (pass == LimitPass::sweep) {
-      const V from2 = hn::Mul(limit.allowed2, hn::Set(d, static_cast<Number>(1 - 1e-6)));
-      const std::int32_t* const found = arrays.found.data();
-      const size_t count = list_long<L>(position, limit, from2, group, arrays.found.data());
-      constexpr size_t kAtOnce = 3;  // more do not fit the registers
-      size_t n = 0;
-      for (; n + kAtOnce <= count; n += kAtOnce)
-        shorten<L, kAtOnce>(arrays, limit, found + n, shortened);
-      for (; n < count; ++n) shorten<L, 1>(arrays, limit, found + n, shortened);
-    } else {
-      hn::BlendedStore(hn::Set(d, Number{1}), too_long<L>(position, limit, group), d,
-                       arrays.intolerable.data() + lane);
+    return GroupLimit<L>{.lane = lane,
+                         .offset = offset_of(arrays.mesh, type) * L::kCount,
+                         .longest = hn::LoadU(d, arrays.limits.longest_m[type].data() + lane),
+                         .allowed2 = hn::IfThenElse(active, hn::Mul(allowed, allowed), hn::Inf(d)),
+                         .first_share = arrays.shares[type].first.data(),
+                         .second_share = arrays.shares[type].second.data()};
+  };
+  V shortened = hn::LoadU(d, arrays.shortened.data() + lane);
+  std::int32_t* found = arrays.found.data();
+  if constexpr (pass == LimitPass::rates_first) {
+    size_t counts[kSpringGroups];
+    std::uint8_t* lanes = arrays.found_lanes.data();
+    for (size_t g = 0; g < kSpringGroups; ++g) {
+      const GroupLimit<L> limit = limit_of(g / 2);
+      counts[g] = list_long<L>(position, limit, arrays.groups[g], found);
+      for (size_t n = 0; n < counts[g]; ++n, ++found, lanes += kMaskBytes)
+        hn::StoreMaskBits(d, exceeds<L>(position, limit, *found), lanes);
+    }
+    found = arrays.found.data();
+    lanes = arrays.found_lanes.data();
+    for (size_t g = 0; g < kSpringGroups; ++g) {
+      shorten<L>(arrays, limit_of(g / 2), found, lanes, counts[g], shortened);
+      found += counts[g];
+      lanes += counts[g] * kMaskBytes;
+    }
+  } else {
+    for (size_t g = 0; g < kSpringGroups; ++g) {
+      const GroupLimit<L> limit = limit_of(g / 2);
+      const size_t count = list_long<L>(position, limit, arrays.groups[g], found);
+      if constexpr (pass == LimitPass::sweep) {
+        shorten<L>(arrays, limit, found, nullptr, count, shortened);
+      } else {
+        for (size_t n = 0; n < count; ++n)
+          hn::BlendedStore(hn::Set(d, Number{1}), exceeds<L>(position, limit, found[n]), d,
+                           arrays.intolerable.data() + lane);
+      }
     }
   }
   hn::StoreU(shortened, d, arrays.shortened.data() + lane);
@@ -173,11 +201,20 @@ void sweep_fast(LimitArrays<FastLanes>& arrays) {
 void sweep_single(LimitArrays<SingleLane>& arrays) {
   visit<SingleLane, LimitPass::sweep>(arrays);
 }
+void rates_first_exact(LimitArrays<ExactLanes>& arrays) {
+  visit<ExactLanes, LimitPass::rates_first>(arrays);
+}
 void check_exact(LimitArrays<ExactLanes>& arrays) {
   visit<ExactLanes, LimitPass::check>(arrays);
 }
+void rates_first_fast(LimitArrays<FastLanes>& arrays) {
+  visit<FastLanes, LimitPass::rates_first>(arrays);
+}
 void check_fast(LimitArrays<FastLanes>& arrays) {
   visit<FastLanes, LimitPass::check>(arrays);
+}
+void rates_first_single(LimitArrays<SingleLane>& arrays) {
+  visit<SingleLane, LimitPass::rates_first>(arrays);
 }
 void check_single(LimitArrays<SingleLane>& arrays) {
   visit<SingleLane, LimitPass::check>(arrays);
@@ -196,8 +233,11 @@ HWY_EXPORT(look_single);
 HWY_EXPORT(sweep_exact);
 HWY_EXPORT(sweep_fast);
 HWY_EXPORT(sweep_single);
+HWY_EXPORT(rates_first_exact);
 HWY_EXPORT(check_exact);
+HWY_EXPORT(rates_first_fast);
 HWY_EXPORT(check_fast);
+HWY_EXPORT(rates_first_single);
 HWY_EXPORT(check_single);
 
 void sweep(LimitArrays<ExactLanes>& arrays) {
@@ -209,11 +249,20 @@ void sweep(LimitArrays<FastLanes>& arrays) {
 void sweep(LimitArrays<SingleLane>& arrays) {
   HWY_DYNAMIC_DISPATCH(sweep_single)(arrays);
 }
+void sweep_by_first_rates(LimitArrays<ExactLanes>& arrays) {
+  HWY_DYNAMIC_DISPATCH(rates_first_exact)(arrays);
+}
 void check(LimitArrays<ExactLanes>& arrays) {
   HWY_DYNAMIC_DISPATCH(check_exact)(arrays);
 }
+void sweep_by_first_rates(LimitArrays<FastLanes>& arrays) {
+  HWY_DYNAMIC_DISPATCH(rates_first_fast)(arrays);
+}
 void check(LimitArrays<FastLanes>& arrays) {
   HWY_DYNAMIC_DISPATCH(check_fast)(arrays);
+}
+void sweep_by_first_rates(LimitArrays<SingleLane>& arrays) {
+  HWY_DYNAMIC_DISPATCH(rates_first_single)(arrays);
 }
 void check(LimitArrays<SingleLane>& arrays) {
   HWY_DYNAMIC_DISPATCH(check_single)(arrays);
@@ -231,7 +280,6 @@ StrainLimiter<L>::StrainLimiter(const Mesh& mesh, const Eigen::VectorXd& inverse
     : mesh_(mesh) {
   using Number = typename L::Number;
   const auto vertices = static_cast<size_t>(mesh.vertex_count());
-  found_.resize(vertices);
   for (size_t type = 0; type < kSpringTypes; ++type) {
     const auto [down, right] = kSpringReach[type];
     constexpr size_t kPadding = 8;  // a vector of neighbours may reach past the last one
@@ -254,6 +302,10 @@ StrainLimiter<L>::StrainLimiter(const Mesh& mesh, const Eigen::VectorXd& inverse
     // To and fro: what the end of one walk has brought into the cache, the next begins with.
     std::ranges::reverse(groups_[2 * type]);
   }
+  size_t springs = 0;
+  for (const SpringGroup& group : groups_) springs += group.size();
+  found_.resize(springs + 1);  // one more than are found may be written
+  found_lanes_.resize(springs * kMaskBytes);
   if constexpr (L::kCount == 1) {
     const size_t words = vertices / 64 + 2;
     single_.moved.resize(words);
@@ -266,20 +318,56 @@ StrainLimiter<L>::StrainLimiter(const Mesh& mesh, const Eigen::VectorXd& inverse
 }
 
 template <class L>
+LimitArrays<L> StrainLimiter<L>::arrays(const LaneLimits<L>& limits, LaneVectors<L>& position_m,
+                                        std::vector<LimitMove>* moves) {
+  return {.mesh = mesh_,
+          .limits = limits,
+          .shares = shares_,
+          .groups = groups_,
+          .found = found_,
+          .found_lanes = found_lanes_,
+          .single = single_,
+          .position_m = position_m.data(),
+          .velocity_m_per_s = {},
+          .moves = moves};
+}
+
+template <class L>
+LimitOutcome<L> StrainLimiter<L>::limit(const StrainLimit& how, const LaneLimits<L>& limits,
+                                        double time_step_s, LaneVectors<L>& position_m,
+                                        LaneVectors<L>& velocity_m_per_s,
+                                        std::vector<LimitMove>* moves) {
+  switch (how.mode) {
+    case StrainLimitMode::positions:
+      return limit_positions(limits, position_m, moves);
+    case StrainLimitMode::rates_first:
+      return limit_by_first_rates(limits, position_m, moves);
+    case StrainLimitMode::consistent:
+      return limit_consistently(limits, how.most_sweeps, time_step_s, position_m, velocity_m_per_s,
+                                moves);
+    case StrainLimitMode::off:
+      break;
+  }
+  return {};
+}
+
+template <class L>
 LimitOutcome<L> StrainLimiter<L>::limit_positions(const LaneLimits<L>& limits,
                                                   LaneVectors<L>& position_m,
                                                   std::vector<LimitMove>* moves) {
-  LimitArrays<L> arrays{.mesh = mesh_,
-                        .limits = limits,
-                        .shares = shares_,
-                        .groups = groups_,
-                        .found = found_,
-                        .single = single_,
-                        .position_m = position_m.data(),
-                        .velocity_m_per_s = {},
-                        .moves = moves};
+  LimitArrays<L> arrays = this->arrays(limits, position_m, moves);
   begin(arrays);
   sweep(arrays);
+  return {.too_long = arrays.shortened};
+}
+
+template <class L>
+LimitOutcome<L> StrainLimiter<L>::limit_by_first_rates(const LaneLimits<L>& limits,
+                                                       LaneVectors<L>& position_m,
+                                                       std::vector<LimitMove>* moves) {
+  LimitArrays<L> arrays = this->arrays(limits, position_m, moves);
+  begin(arrays);
+  sweep_by_first_rates(arrays);
   return {.too_long = arrays.shortened};
 }
 
@@ -288,16 +376,9 @@ LimitOutcome<L> StrainLimiter<L>::limit_consistently(const LaneLimits<L>& limits
                                                      double time_step_s, LaneVectors<L>& position_m,
                                                      LaneVectors<L>& velocity_m_per_s,
                                                      std::vector<LimitMove>* moves) {
-  LimitArrays<L> arrays{.mesh = mesh_,
-                        .limits = limits,
-                        .shares = shares_,
-                        .groups = groups_,
-                        .found = found_,
-                        .single = single_,
-                        .position_m = position_m.data(),
-                        .velocity_m_per_s = velocity_m_per_s.data(),
-                        .moves = moves,
-                        .steps_per_s = static_cast<typename L::Number>(1 / time_step_s)};
+  LimitArrays<L> arrays = this->arrays(limits, position_m, moves);
+  arrays.velocity_m_per_s = velocity_m_per_s.data();
+  arrays.steps_per_s = static_cast<typename L::Number>(1 / time_step_s);
   begin(arrays);
   LimitOutcome<L> outcome;
   for (int n = 0; n < most_sweeps; ++n) {

@@ -12,7 +12,8 @@ namespace clothfit {
 /// How springs are kept from stretching beyond their critical elongation after each time step.
 enum class StrainLimitMode {
   off,
-  positions,  ///< as the founding paper has it: one sweep over the springs, velocities untouched
+  positions,    ///< the founding paper's: one sweep over the springs, velocities untouched
+  rates_first,  ///< the same, but which springs are too long is found out before any is moved
   consistent  ///< sweeps until no spring is longer than tolerated; velocities follow the positions
 };
 
@@ -72,6 +73,9 @@ struct LimitOutcome {
   LaneValue<L> unmet = LaneValue<L>::Zero();  ///< 1 where a spring is still longer than tolerated
 };
 
+template <class L>
+struct LimitArrays;
+
 /// Sets springs that are longer than `longest_m` to exactly that by moving their two ends along
 /// them [louchet1995, section 2.4; provot1995], by shares in proportion to the inverse masses, so
 /// that equal ends move half each and a held one not at all; a spring held at both ends is left
@@ -95,10 +99,20 @@ class StrainLimiter {
   /// `inverse_mass_per_kg` is 0 where a vertex must not move.
   StrainLimiter(const Mesh& mesh, const Eigen::VectorXd& inverse_mass_per_kg);
 
-  /// One sweep over positions alone; `unmet` is not looked at. A single simulation may ask for its
-  /// moves in the order in which they were made, here and below.
+  /// Limits as `how` says. A single simulation may ask for its moves, in the order in which they
+  /// were made, here and below.
+  LimitOutcome<L> limit(const StrainLimit& how, const LaneLimits<L>& limits, double time_step_s,
+                        LaneVectors<L>& position_m, LaneVectors<L>& velocity_m_per_s,
+                        std::vector<LimitMove>* moves = nullptr);
+
+  /// One sweep over positions alone; `unmet` is not looked at.
   LimitOutcome<L> limit_positions(const LaneLimits<L>& limits, LaneVectors<L>& position_m,
                                   std::vector<LimitMove>* moves = nullptr);
+
+  /// The same, but the springs that are too long before any is moved are those that are set to
+  /// `longest_m`, in the same order, even where others have shortened them meanwhile.
+  LimitOutcome<L> limit_by_first_rates(const LaneLimits<L>& limits, LaneVectors<L>& position_m,
+                                       std::vector<LimitMove>* moves = nullptr);
 
   /// Sweeps until no spring of a lane is longer than tolerated, at most `most_sweeps` times; what a
   /// vertex is moved by, over the time step, is added to its velocity. Held points that are further
@@ -109,10 +123,14 @@ class StrainLimiter {
                                      std::vector<LimitMove>* moves = nullptr);
 
  private:
+  LimitArrays<L> arrays(const LaneLimits<L>& limits, LaneVectors<L>& position_m,
+                        std::vector<LimitMove>* moves);
+
   Mesh mesh_;
   std::array<SpringShares<typename L::Number>, kSpringTypes> shares_;
   std::array<SpringGroup, kSpringGroups> groups_;  ///< without springs held at both ends
-  SpringGroup found_;                              ///< scratch: those of a group to shorten
+  SpringGroup found_;                              ///< scratch: those to shorten
+  std::vector<std::uint8_t> found_lanes_;          ///< scratch: in which lanes, kMaskBytes each
   SingleLimitSets single_;                         ///< empty in lanes
 };
 

@@ -91,7 +91,8 @@ TEST(Adjoint, EqualsTheTangent) {
 }
 
 TEST(Adjoint, EqualsTheTangentAtTheStrainLimit) {
-  for (const StrainLimitMode mode : {StrainLimitMode::positions, StrainLimitMode::consistent}) {
+  for (const StrainLimitMode mode :
+       {StrainLimitMode::positions, StrainLimitMode::rates_first, StrainLimitMode::consistent}) {
     for (const unsigned seed : {1u, 2u}) {
       SCOPED_TRACE(testing::Message() << "mode " << static_cast<int>(mode) << ", seed " << seed);
       Uniform uniform(seed);

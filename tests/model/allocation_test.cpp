@@ -79,8 +79,8 @@ long allocations_in_ten_steps(StrainLimitMode mode) {
 }
 
 TEST(Step, AllocatesNothing) {
-  for (const StrainLimitMode mode :
-       {StrainLimitMode::off, StrainLimitMode::positions, StrainLimitMode::consistent}) {
+  for (const StrainLimitMode mode : {StrainLimitMode::off, StrainLimitMode::positions,
+                                     StrainLimitMode::rates_first, StrainLimitMode::consistent}) {
     SCOPED_TRACE(static_cast<int>(mode));
     EXPECT_EQ(allocations_in_ten_steps<ExactLanes>(mode), 0);
     EXPECT_EQ(allocations_in_ten_steps<FastLanes>(mode), 0);

@@ -46,8 +46,8 @@ TEST_P(SingleLaneOn, GivesTheBitsOfExactLanes) {
   const std::pair<int, int> sizes[] = {{2, 2},  {2, 3},  {3, 2}, {3, 3},  {4, 5},
                                        {5, 19}, {33, 7}, {6, 9}, {17, 17}};
   for (const auto& [rows, columns] : sizes) {
-    for (const StrainLimitMode mode :
-         {StrainLimitMode::off, StrainLimitMode::positions, StrainLimitMode::consistent}) {
+    for (const StrainLimitMode mode : {StrainLimitMode::off, StrainLimitMode::positions,
+                                       StrainLimitMode::rates_first, StrainLimitMode::consistent}) {
       SCOPED_TRACE(testing::Message()
                    << rows << " x " << columns << ", mode " << static_cast<int>(mode));
       const Hung hung(rows, columns, mode, uniform);

@@ -97,6 +97,32 @@ TEST(StrainLimit, MovesTheFreeEndAloneWhenTheOtherIsHeld) {
   EXPECT_LT((position.lane(0) - expected).cwiseAbs().maxCoeff(), 1e-16);
 }
 
+TEST(StrainLimit, ByFirstRatesSetsWhatWasTooLongAlthoughOthersHaveShortenedItSince) {
+  // Given three vertices in a row, 0.15 m apart where 0.1 m is natural: the spring over both steps
+  // (0.3 m) is limited to 0.29 m, those over one (type 1) to 0.11 m.
+  const Mesh row{.columns = 3, .rows = 2, .width_m = 0.2, .height_m = 1};
+  LaneLimits<> limits = no_limits();
+  limits.longest_m[structural_s].setConstant(0.11);
+  limits.longest_m[flexion_s].setConstant(0.29);
+  Eigen::Matrix3Xd p = flat_positions(row);
+  p.row(0) *= 1.5;
+  StrainLimiter<> limiter(row, Eigen::VectorXd::Ones(6));
+  LaneVectors<> in_turn = every_lane(p), by_first = in_turn;
+
+  limiter.limit_positions(limits, in_turn);
+  const LimitOutcome<> outcome = limiter.limit_by_first_rates(limits, by_first);
+
+  // then the first pair moves to 0.02, 0.13; the second to 0.13 + 0.03, 0.30 - 0.03; and the outer
+  // vertices, 0.25 m apart by then, are left there, or moved to 0.29 m as the first look has it.
+  const auto x = [](const LaneVectors<>& position, int k) { return position.x(0, k); };
+  EXPECT_NEAR(x(in_turn, 0), 0.02, 1e-15);
+  EXPECT_NEAR(x(in_turn, 2), 0.27, 1e-15);
+  EXPECT_NEAR(x(by_first, 0), 0.0, 1e-15);
+  EXPECT_NEAR(x(by_first, 1), 0.16, 1e-15);
+  EXPECT_NEAR(x(by_first, 2), 0.29, 1e-15);
+  EXPECT_TRUE((outcome.too_long == 6).all());
+}
+
 TEST(StrainLimit, LeavesClothWithinItsLimitsAsItIs) {
   Uniform uniform(1);
   const Mesh mesh = square_mesh(9);
@@ -110,9 +136,10 @@ TEST(StrainLimit, LeavesClothWithinItsLimitsAsItIs) {
   const LimitOutcome<> once = limiter.limit_positions(limits_of(mesh, 0.2), position);
   const LimitOutcome<> consistent =
       limiter.limit_consistently(limits_of(mesh, 0.2), 10, 1e-3, position, velocity);
+  const LimitOutcome<> by_first = limiter.limit_by_first_rates(limits_of(mesh, 0.2), position);
   const LimitOutcome<> never = limiter.limit_positions(no_limits(), position);
 
-  for (const LimitOutcome<>& outcome : {once, consistent, never}) {
+  for (const LimitOutcome<>& outcome : {once, by_first, consistent, never}) {
     EXPECT_TRUE((outcome.too_long == 0).all());
     EXPECT_TRUE((outcome.unmet == 0).all());
   }
@@ -194,10 +221,15 @@ TEST(StrainLimit, SaysWhenHeldPointsAreTooFarApart) {
 // --- against plain arithmetic --------------------------------------------------------------------
 
 /// One sweep over plain vectors in the published order; returns whether it shortened a spring.
+/// Where `rates_first`, which springs are too long is seen in the positions as they are given.
 bool reference_sweep(const Mesh& mesh, const Eigen::VectorXd& inverse_mass,
                      const LaneLimits<>& limits, Eigen::Index lane, double steps_per_s,
-                     Eigen::Matrix3Xd& p, Eigen::Matrix3Xd& v) {
+                     Eigen::Matrix3Xd& p, Eigen::Matrix3Xd& v, bool rates_first = false) {
   bool shortened = false;
+  const auto squared_length = [](const Eigen::Vector3d& d) {
+    return d.x() * d.x() + d.y() * d.y() + d.z() * d.z();
+  };
+  const Eigen::Matrix3Xd given = p;
   const SpringNet net = make_springs(mesh);
   for (size_t type = 0; type < kSpringTypes; ++type) {
     for (const int group : {0, 1}) {
@@ -211,11 +243,12 @@ bool reference_sweep(const Mesh& mesh, const Eigen::VectorXd& inverse_mass,
                                                : i;
         if (place % 2 != group) continue;
         const Eigen::Vector3d along = p.col(other) - p.col(self);
-        const double length2 =
-            along.x() * along.x() + along.y() * along.y() + along.z() * along.z();
+        const double length2 = squared_length(along);
+        const double looked_at =
+            rates_first ? squared_length(given.col(other) - given.col(self)) : length2;
         const double longest = limits.longest_m[type][lane];
         const double sum = inverse_mass[self] + inverse_mass[other];
-        if (!(length2 > longest * longest) || sum == 0) continue;
+        if (!(looked_at > longest * longest) || sum == 0) continue;
         shortened = true;
         double inverse =
             std::bit_cast<double>(0x5fe6eb50c7b537a9 - (std::bit_cast<std::int64_t>(length2) >> 1));
@@ -274,8 +307,9 @@ TEST_P(StrainLimitOn, AgreesWithPlainArithmeticToTheLastBit) {
     // when they are limited until all are done,
     StrainLimiter<> limiter(mesh, inverse_mass);
     limiter.limit_consistently(limits, 40, 1e-3, position, velocity);
-    LaneVectors<> once = start;
+    LaneVectors<> once = start, by_first = start;
     limiter.limit_positions(limits, once);
+    limiter.limit_by_first_rates(limits, by_first);
 
     // then each is where it would be alone, bit for bit.
     for (int l = 0; l < kLanes; ++l) {
@@ -283,6 +317,9 @@ TEST_P(StrainLimitOn, AgreesWithPlainArithmeticToTheLastBit) {
       Eigen::Matrix3Xd first = start.lane(l), unused = at_rest(first);
       reference_sweep(mesh, inverse_mass, limits, l, 0, first, unused);
       EXPECT_EQ(once.lane(l), first);
+      first = start.lane(l);
+      reference_sweep(mesh, inverse_mass, limits, l, 0, first, unused, true);
+      EXPECT_EQ(by_first.lane(l), first);
 
       const auto lane = static_cast<size_t>(l);
       for (int n = 0; n < 40; ++n) {

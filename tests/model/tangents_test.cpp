@@ -65,7 +65,8 @@ TEST(Tangents, AgreeWithCentralDifferences) {
 }
 
 TEST(Tangents, AgreeWithCentralDifferencesAtTheStrainLimit) {
-  for (const StrainLimitMode mode : {StrainLimitMode::positions, StrainLimitMode::consistent}) {
+  for (const StrainLimitMode mode :
+       {StrainLimitMode::positions, StrainLimitMode::rates_first, StrainLimitMode::consistent}) {
     for (const unsigned seed : {1u, 2u, 3u}) {
       SCOPED_TRACE(testing::Message() << "mode " << static_cast<int>(mode) << ", seed " << seed);
       Uniform uniform(seed);
@@ -112,8 +113,8 @@ TEST(Tangents, AgreeWithCentralDifferencesUnderEveryEffect) {
 }
 
 TEST(Tangents, CarryASimulationOfTheSameBits) {
-  for (const StrainLimitMode mode :
-       {StrainLimitMode::off, StrainLimitMode::positions, StrainLimitMode::consistent}) {
+  for (const StrainLimitMode mode : {StrainLimitMode::off, StrainLimitMode::positions,
+                                     StrainLimitMode::rates_first, StrainLimitMode::consistent}) {
     SCOPED_TRACE(static_cast<int>(mode));
     Uniform uniform(4);
     Swing swing(uniform);
