@@ -50,6 +50,8 @@ std::vector<Step> steps_of(const Schedule& schedule) {
 struct Record {
   LaneState<SingleLane> before;
   std::vector<LimitMove> moves;
+  /// Of the vertices that held points touch, in their order, once these are placed.
+  std::vector<Eigen::Vector3d> placed_velocity_m_per_s;
   Vectors driven_velocity_m_per_s;
 };
 
@@ -94,6 +96,10 @@ class Run {
     }
     stepper_.step(parameters_, target_at(step.end_s), step.time_s, step.time_step_s, state_,
                   extras);
+    if (record == nullptr) return;
+    record->placed_velocity_m_per_s.clear();
+    for (const int vertex : stepper_.held().touched())
+      record->placed_velocity_m_per_s.push_back(at(state_.velocity_m_per_s, vertex));
   }
 
   void add_cost(const Eigen::Matrix3Xd& by_position) {
@@ -105,7 +111,7 @@ class Run {
   /// From derivatives by the state after a step to those by the state before it.
   void backward(const Step& step, const Record& record) {
     take_back_limit(record.moves, step.time_step_s);
-    take_back_placement(step.time_step_s);
+    take_back_placement(step.time_step_s, record);
     take_back_motion(step, record);
   }
 
@@ -149,20 +155,27 @@ class Run {
         if (velocities) sum += at(by_state_.velocity_m_per_s, k) / time_step_s;
         return sum;
       };
-      const Eigen::Vector3d by_move =
-          move->first_share * by_end(move->first) - move->second_share * by_end(move->second);
+      const Eigen::Vector3d by_first = by_end(move->first), by_second = by_end(move->second);
+      const Eigen::Vector3d by_move = move->first_share * by_first - move->second_share * by_second;
       const double along_move = by_move.dot(move->along_m);
       const double inverse = move->inverse_length_per_m;
       const Eigen::Vector3d by_along = move->excess * by_move + (1 - move->excess) * inverse *
                                                                     inverse * along_move *
                                                                     move->along_m;
       gradient_.by_longest_m[static_cast<size_t>(move->type)] -= inverse * along_move;
+      if (move->first_share > 0 && move->second_share > 0) {
+        // s_a = m_b / (m_a + m_b) = 1 - s_b; beside a held end the shares are 1 and 0
+        const double by_first_share = move->excess * (by_first + by_second).dot(move->along_m) /
+                                      (cloth_.mass_kg[move->first] + cloth_.mass_kg[move->second]);
+        gradient_.by_mass_kg[move->first] -= move->first_share * by_first_share;
+        gradient_.by_mass_kg[move->second] += move->second_share * by_first_share;
+      }
       add(by_state_.position_m, move->second, by_along);
       add(by_state_.position_m, move->first, -by_along);
     }
   }
 
-  void take_back_placement(double time_step_s) {
+  void take_back_placement(double time_step_s, const Record& record) {
     // P += C (target - A P), V += the same / h
     const HeldPlacement<SingleLane>& held = stepper_.held();
     by_target_.set_zero();
@@ -176,6 +189,15 @@ class Run {
     for (int h = 0; h < held.count(); ++h)
       for (const auto& [vertex, weight] : cloth_.held[static_cast<size_t>(h)].weights)
         add(by_state_.position_m, vertex, -weight * at(by_target_, h));
+    // C = W A' (A W A')^-1 with the inverse masses W: dC (target - A P) = (1 - C A) dW W^-1 shift
+    for (size_t n = 0; n < held.touched().size(); ++n) {
+      const int vertex = held.touched()[n];
+      const Eigen::Vector3d by_shift =
+          at(by_state_.position_m, vertex) + at(by_state_.velocity_m_per_s, vertex) / time_step_s;
+      const Eigen::Vector3d shift = time_step_s * (record.placed_velocity_m_per_s[n] -
+                                                   at(record.driven_velocity_m_per_s, vertex));
+      gradient_.by_mass_kg[vertex] -= by_shift.dot(shift) / cloth_.mass_kg[vertex];
+    }
     by_start_target_.x += by_target_.x;
     by_start_target_.y += by_target_.y;
     by_start_target_.z += by_target_.z;
@@ -291,6 +313,8 @@ class Run {
     }
     for (const EffectLinearisation::ByParameter& column : derivatives_.by_parameter)
       add_by_parameter(e, column.parameter, column.derivative.dot(at(by_action, column.on)));
+    for (const EffectLinearisation::ByMass& column : derivatives_.by_mass)
+      gradient_.by_mass_kg[column.on] += column.derivative.dot(at(by_action, column.on));
 
     EffectMemory<SingleLane>& by_memory = by.effect_memory[e];
     if (derivatives_.memory_by_memory.empty() && derivatives_.by_memory.empty()) return;

@@ -29,7 +29,7 @@ struct CostGradient {
   /// What effects add to that, by their types' constants alone: a ParameterNumber each.
   std::array<double, 3 * kSpringTypes> by_types{};
   std::array<double, kSpringTypes> by_longest_m{};  ///< by the length that the limit leaves a type
-  Eigen::VectorXd by_mass_kg;                       ///< per vertex; see simulate_with_gradient
+  Eigen::VectorXd by_mass_kg;                       ///< per vertex
   Eigen::Vector3d by_gravity = Eigen::Vector3d::Zero();
   Eigen::Matrix3Xd by_start_position, by_start_velocity;  ///< 3 x vertices
   std::vector<Eigen::VectorXd> by_start_effect_memory;    ///< [effect], as in ParameterSet
@@ -46,11 +46,6 @@ struct GradientResult {
 /// adjoint of each step: exact for the discrete scheme wherever it is smooth, at the price of a few
 /// simulations whatever the number of derivatives. The state is kept every sqrt(n) of n steps and
 /// computed anew between, so memory grows with sqrt(n) states.
-///
-/// `by_mass_kg` leaves out that the masses also share out what held points between vertices and the
-/// strain limit move, and that the forces of some effects are proportional to mass: it is exact for
-/// points held at vertices, without a limit, and effects whose forces do not contain the mass
-/// (wind, what acts inside the fabric).
 GradientResult simulate_with_gradient(const Cloth& cloth, const ParameterSet& parameters,
                                       const Schedule& schedule, const SimulationFields& fields,
                                       const CostByPosition& cost_by_position);

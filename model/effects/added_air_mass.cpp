@@ -11,7 +11,7 @@ struct Law {
   static Vector3<Real> change(const VertexSight<Real>& at, const Vector3<Real>& force_n,
                               const std::array<Real, 1>& mu_kg_per_m2) {
     const Vector3<Real> n = direction(at.area_m2);
-    const Real mass(at.mass_kg);
+    const Real& mass = at.mass_kg;
     const Real air = mu_kg_per_m2[0] * dot(at.area_m2, n);
     const Real along = dot(n, force_n + mass * at.gravity_m_per_s2);
     return force_n - air / (mass + air) * along * n;

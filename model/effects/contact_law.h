@@ -28,9 +28,9 @@ struct Contact {
 
   template <class Real>
   static Vector3<Real> force(const Real& depth_m, const Vector3<Real>& normal,
-                             const Vector3<Real>& velocity_m_per_s, double area_m2, double mass_kg,
-                             const Real& stiffness_pa_per_m, const Real& damping_pa_s_per_m,
-                             const Real& friction) {
+                             const Vector3<Real>& velocity_m_per_s, double area_m2,
+                             const Real& mass_kg, const Real& stiffness_pa_per_m,
+                             const Real& damping_pa_s_per_m, const Real& friction) {
     using std::sqrt;
     const Real none(0.0);
     const Real leaving = dot(normal, velocity_m_per_s);
@@ -41,7 +41,7 @@ struct Contact {
 
     const Vector3<Real> sliding = velocity_m_per_s - leaving * normal;
     const Real most_n = friction * press_n;
-    const Real viscous_speed = Real(1 / (kFrictionRate_per_s * mass_kg)) * most_n;
+    const Real viscous_speed = Real(1.0) / (Real(kFrictionRate_per_s) * mass_kg) * most_n;
     const Real square = dot(sliding, sliding) + viscous_speed * viscous_speed;
     // Where the root's derivative is infinite it must not be taken.
     const auto some = square > Real(1e-30);

@@ -18,12 +18,14 @@ Vector3<Real> vector(const Eigen::Vector3d& v) {
 
 struct Law {
   static constexpr int kParameters = Contact::kParameters;
+  /// What a force is differentiated by: position, velocity, mass, own parameters.
+  static constexpr int kMass = 6, kOwn = 7;
 
   /// The force on a vertex below the part `surface` of the obstacle.
   template <class Real>
   static Vector3<Real> force(const Nearest& surface, const Vector3<Real>& position_m,
-                             const Vector3<Real>& velocity_m_per_s, double area_m2, double mass_kg,
-                             const std::array<Real, kParameters>& p) {
+                             const Vector3<Real>& velocity_m_per_s, double area_m2,
+                             const Real& mass_kg, const std::array<Real, kParameters>& p) {
     Vector3<Real> outwards = vector<Real>(surface.place_m) - position_m;
     const Vector3<Real> along = vector<Real>(surface.direction);
     if (surface.kind == Nearest::edge) outwards = outwards - dot(along, outwards) * along;
@@ -52,7 +54,8 @@ struct Law {
     if (std::is_same_v<Real, double> && p[0] == Real(0.0) && p[1] == Real(0.0)) return;
     for_contacts(cloth, position_m,
                  [&](int k, const Nearest& surface, const Vector3<Real>& x, double area_m2) {
-                   add(k, force(surface, x, velocity_m_per_s(k), area_m2, cloth.mass_kg[k], p));
+                   add(k,
+                       force(surface, x, velocity_m_per_s(k), area_m2, Real(cloth.mass_kg[k]), p));
                  });
   }
 
@@ -60,21 +63,24 @@ struct Law {
   static void linearise(const Cloth& cloth, const Vectors& position_m,
                         const Vectors& velocity_m_per_s, const std::array<double, kParameters>& p,
                         EffectLinearisation& derivatives) {
-    using Dual = ceres::Jet<double, 6 + kParameters>;
+    using Dual = ceres::Jet<double, kOwn + kParameters>;
     const auto dual = [](const Vector3<double>& v, int first) -> Vector3<Dual> {
       return {Dual(v.x, first), Dual(v.y, first + 1), Dual(v.z, first + 2)};
     };
-    const std::array<Dual, kParameters> parameters{Dual(p[0], 6), Dual(p[1], 7), Dual(p[2], 8)};
-    for_contacts(cloth, position_m,
-                 [&](int k, const Nearest& surface, const Vector3<double>& x, double area_m2) {
-                   const Vector3<Dual> f = force(surface, dual(x, 0), dual(velocity_m_per_s(k), 3),
-                                                 area_m2, cloth.mass_kg[k], parameters);
-                   Eigen::Matrix<double, 3, 6 + kParameters> j;
-                   j << f.x.v.transpose(), f.y.v.transpose(), f.z.v.transpose();
-                   derivatives.by_motion.push_back({k, k, j.middleCols<3>(0), j.middleCols<3>(3)});
-                   for (int n = 0; n < kParameters; ++n)
-                     derivatives.by_parameter.push_back({k, ParameterNumber::own(n), j.col(6 + n)});
-                 });
+    const std::array<Dual, kParameters> parameters{Dual(p[0], kOwn), Dual(p[1], kOwn + 1),
+                                                   Dual(p[2], kOwn + 2)};
+    for_contacts(
+        cloth, position_m,
+        [&](int k, const Nearest& surface, const Vector3<double>& x, double area_m2) {
+          const Vector3<Dual> f = force(surface, dual(x, 0), dual(velocity_m_per_s(k), 3), area_m2,
+                                        Dual(cloth.mass_kg[k], kMass), parameters);
+          Eigen::Matrix<double, 3, kOwn + kParameters> j;
+          j << f.x.v.transpose(), f.y.v.transpose(), f.z.v.transpose();
+          derivatives.by_motion.push_back({k, k, j.middleCols<3>(0), j.middleCols<3>(3)});
+          derivatives.by_mass.push_back({k, j.col(kMass)});
+          for (int n = 0; n < kParameters; ++n)
+            derivatives.by_parameter.push_back({k, ParameterNumber::own(n), j.col(kOwn + n)});
+        });
   }
 
   static EffectRates rates(const Cloth& cloth, const SpringParameters&,

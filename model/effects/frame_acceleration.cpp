@@ -10,7 +10,7 @@ struct Law {
 
   template <class Real>
   static Vector3<Real> force(const VertexSight<Real>& at, const Harmonic::Parameters<Real>& p) {
-    return Real(-at.mass_kg) * Harmonic::sine(p, at.time_s) * Harmonic::amplitude(p);
+    return -at.mass_kg * Harmonic::sine(p, at.time_s) * Harmonic::amplitude(p);
   }
 
   static EffectRates rates(const Cloth&, const SpringParameters&, const std::vector<double>&) {

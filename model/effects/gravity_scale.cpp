@@ -9,7 +9,7 @@ struct Law {
 
   template <class Real>
   static Vector3<Real> force(const VertexSight<Real>& at, const std::array<Real, 1>& excess) {
-    return Real(at.mass_kg) * excess[0] * at.gravity_m_per_s2;
+    return at.mass_kg * excess[0] * at.gravity_m_per_s2;
   }
 
   static EffectRates rates(const Cloth&, const SpringParameters&, const std::vector<double>&) {

@@ -11,7 +11,7 @@ struct Law {
   static Vector3<Real> force(const VertexSight<Real>& at, const std::array<Real, 2>& angle_rad) {
     const Vector3<Real> w{Real(0.5) * angle_rad[0], Real(0.5) * angle_rad[1], Real(0.0)};
     const Vector3<Real> once = cross(w, at.gravity_m_per_s2);
-    return Real(2 * at.mass_kg) / (Real(1.0) + dot(w, w)) * (once + cross(w, once));
+    return Real(2.0) * at.mass_kg / (Real(1.0) + dot(w, w)) * (once + cross(w, once));
   }
 
   static EffectRates rates(const Cloth&, const SpringParameters&, const std::vector<double>&) {

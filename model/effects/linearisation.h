@@ -39,10 +39,16 @@ struct EffectLinearisation {
     int on;
     Eigen::Matrix3d derivative;
   };
+  /// By the mass of the same vertex (1/kg times what is acted on).
+  struct ByMass {
+    int on;
+    Eigen::Vector3d derivative;
+  };
   std::vector<ByMotion> by_motion;
   std::vector<ByParameter> by_parameter;
   std::vector<ByMemory> by_memory;
   std::vector<ByForce> by_force;
+  std::vector<ByMass> by_mass;
 
   // What the effect remembers after the step; without an entry a number stays as it is.
   struct MemoryByMotion {
@@ -71,6 +77,7 @@ struct EffectLinearisation {
     by_parameter.clear();
     by_memory.clear();
     by_force.clear();
+    by_mass.clear();
     memory_by_motion.clear();
     memory_by_parameter.clear();
     memory_by_memory.clear();

@@ -20,7 +20,7 @@ struct VertexSight {
   /// back (s x t), as long as the area is large.
   Vector3<Real> area_m2;
   Vector3<Real> gravity_m_per_s2;
-  double mass_kg = 0;
+  Real mass_kg;
   double flat_area_m2 = 0;  ///< that belongs to the vertex in the flat cloth
   double s = 0, t = 0;      ///< place on the cloth, shares of its width and height
   const Mesh* mesh = nullptr;
@@ -77,7 +77,7 @@ void for_vertices(const EffectScene<L>& scene, const Visit& visit) {
       sight.position_m = vector_at<L>(scene.position_m, k);
       sight.velocity_m_per_s = vector_at<L>(scene.velocity_m_per_s, k);
       sight.area_m2 = vector_area<L>(scene.position_m, stencil);
-      sight.mass_kg = cloth.mass_kg[k];
+      sight.mass_kg = RealOf<L>(static_cast<typename L::Number>(cloth.mass_kg[k]));
       sight.flat_area_m2 = flat_area_m2(mesh, i, j);
       sight.s = static_cast<double>(j) / (mesh.columns - 1);
       sight.t = static_cast<double>(i) / (mesh.rows - 1);
@@ -86,11 +86,12 @@ void for_vertices(const EffectScene<L>& scene, const Visit& visit) {
   }
 }
 
-/// Dual numbers over what a vertex law depends on: position, velocity, area, gravity, then
-/// `more` numbers, then the effect's parameters.
+/// Dual numbers over what a vertex law depends on: position, velocity, area, gravity, mass,
+/// then `more` numbers, then the effect's parameters.
 template <int more, int parameters>
 struct VertexDual {
-  static constexpr int kMore = 12, kParameters = 12 + more, kCount = kParameters + parameters;
+  static constexpr int kMass = 12, kMore = 13, kParameters = kMore + more;
+  static constexpr int kCount = kParameters + parameters;
   using Number = ceres::Jet<double, kCount>;
 
   static Vector3<Number> vector(const Vector3<double>& v, int first) {
@@ -101,7 +102,7 @@ struct VertexDual {
             .velocity_m_per_s = vector(at.velocity_m_per_s, 3),
             .area_m2 = vector(at.area_m2, 6),
             .gravity_m_per_s2 = vector(at.gravity_m_per_s2, 9),
-            .mass_kg = at.mass_kg,
+            .mass_kg = Number(at.mass_kg, kMass),
             .flat_area_m2 = at.flat_area_m2,
             .s = at.s,
             .t = at.t,
@@ -152,6 +153,7 @@ struct VertexDual {
       if (!j.col(column).isZero(0))
         derivatives.by_parameter.push_back({k, parameter, j.col(column)});
     };
+    if (!j.col(kMass).isZero(0)) derivatives.by_mass.push_back({k, j.col(kMass)});
     for (int axis = 0; axis < 3; ++axis) add_column(ParameterNumber::gravity(axis), 9 + axis);
     for (int p = 0; p < parameters; ++p) add_column(ParameterNumber::own(p), kParameters + p);
   }

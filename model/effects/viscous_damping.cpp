@@ -10,7 +10,7 @@ struct Law {
 
   template <class Real>
   static Vector3<Real> force(const VertexSight<Real>& at, const std::array<Real, 1>& rate_per_s) {
-    return Real(-at.mass_kg) * rate_per_s[0] * at.velocity_m_per_s;
+    return -at.mass_kg * rate_per_s[0] * at.velocity_m_per_s;
   }
 
   static EffectRates rates(const Cloth&, const SpringParameters&,

@@ -198,5 +198,45 @@ TEST(Adjoint, KnowsSingleSpringsMassesAndForces) {
                 difference(fields.force_n[f](1, 20), 1e-6, cost_now));
 }
 
+/// Checks the derivatives by some vertices' masses against differences over `share` of a mass.
+void expect_masses_to_agree(Swing& swing, double share, Uniform& uniform) {
+  const Cost cost(swing, uniform);
+  const CostGradient gradient =
+      simulate_with_gradient(swing.cloth, swing.set, swing.schedule, {}, cost.by_position())
+          .gradient;
+  const double scale = gradient.by_mass_kg.cwiseAbs().maxCoeff();
+  for (const int v : {0, 3, 9, 20, 35}) {  // 0 and 35 are held, a point between holds 3 and 9
+    SCOPED_TRACE(testing::Message() << "vertex " << v);
+    double& mass_kg = swing.cloth.mass_kg[v];
+    const double expected = difference(mass_kg, share * mass_kg, [&] {
+      return cost.of(simulate(swing.cloth, {&swing.set, 1}, swing.schedule).front().position_m);
+    });
+    EXPECT_NEAR(gradient.by_mass_kg[v], expected, 1e-6 * scale);
+  }
+}
+
+TEST(Adjoint, KnowsMassesUnderEveryEffect) {
+  for (const EffectEntry& entry : effect_registry()) {
+    SCOPED_TRACE(entry.name);
+    Uniform uniform(10);
+    Swing swing = swing_under(entry, uniform);
+    expect_masses_to_agree(swing, 1e-5, uniform);
+  }
+}
+
+TEST(Adjoint, KnowsMassesAtTheStrainLimit) {
+  for (const StrainLimitMode mode :
+       {StrainLimitMode::positions, StrainLimitMode::rates_first, StrainLimitMode::consistent}) {
+    SCOPED_TRACE(static_cast<int>(mode));
+    Uniform uniform(11);
+    Swing swing(uniform);
+    swing.cloth.strain_limit.mode = mode;
+    swing.set.springs.critical_elongation.fill(0.03);
+    swing.schedule.frame_time_s = {0, 0.002, 0.004};
+    // So little that no spring reaches or leaves its limit.
+    expect_masses_to_agree(swing, 1e-7, uniform);
+  }
+}
+
 }  // namespace
 }  // namespace clothfit
