@@ -152,8 +152,8 @@ SimulateResult run_or_explain(const Simulation& simulation, const StepChoice& ch
   if (result.usable()) return result;
   // A start that does not come to rest is looked at as the sheet is let go.
   const bool never_rested = result.diverged_frame == 0;
-  ParameterSet parameters = simulation.parameters;
-  if (!never_rested) parameters.start_position_m = result.position_m.front();
+  const ParameterSet parameters =
+      never_rested ? simulation.parameters : started(simulation, choice.time_step_s);
   const std::optional<Divergence> divergence =
       find_divergence(simulation.cloth, parameters,
                       {.frame_time_s = simulation.frame_time_s, .time_step_s = choice.time_step_s});
@@ -184,8 +184,39 @@ Json named_value(const std::string& name, const std::string& unit, double value)
   return {{"name", name}, {"unit", unit}, {"value", value}};
 }
 
+/// How the strain limit was kept; null without one.
+Json describe_strain_limit(const ModelDescription& model, const SimulateResult& result) {
+  if (model.strain_limit == StrainLimitKind::off) return nullptr;
+  return {{"mode", to_string(model.strain_limit)},
+          {"elongation", model.critical_elongation},
+          {"largest_excess", result.largest_excess},
+          {"unmet_steps", result.unmet_steps}};
+}
+
+/// Says so where springs went far beyond the limit that the model sets them.
+void warn_of_strain(const ModelDescription& model, const SimulateResult& result,
+                    const StepChoice& choice) {
+  if (model.strain_limit == StrainLimitKind::off) return;
+  const double elongation = model.critical_elongation;
+  if (result.largest_excess > std::max(elongation, 0.01)) {
+    spdlog::warn("a spring stretched by {} % where the strain limit allows {} %{}",
+                 significant(100 * (elongation + result.largest_excess), 3),
+                 significant(100 * elongation, 3),
+                 model.strain_limit == StrainLimitKind::consistent
+                     ? ""
+                     : ": one sweep a step does not hold this cloth; mode: consistent does, or "
+                       "shorter steps");
+  }
+  if (result.unmet_steps > 0)
+    spdlog::warn(
+        "the strain limit was not met in {} of {} steps: held points too far apart, or "
+        "more sweeps needed than a step is given",
+        result.unmet_steps, choice.steps);
+}
+
 Json describe_run(const ModelDescription& model, const Simulation& simulation,
-                  const StepChoice& choice, double stretch, const std::vector<std::string>& files) {
+                  const StepChoice& choice, const SimulateResult& result, double stretch,
+                  const std::vector<std::string>& files) {
   const Mesh& mesh = simulation.cloth.mesh;
   Json parameters = Json::array();
   parameters.push_back(
@@ -225,6 +256,7 @@ Json describe_run(const ModelDescription& model, const Simulation& simulation,
             {"substeps", choice.substeps},
             {"steps", choice.steps}}},
           {"largest_stretch", stretch},
+          {"strain_limit", describe_strain_limit(model, result)},
           {"stop", "reached_end"},
           {"files", files}};
 }
@@ -269,6 +301,7 @@ int run_simulate(const SimulateVerbOptions& options) {
     if (stretch > kLengthBeyondReason)
       spdlog::warn("a spring stretched to {} times its natural length: no fabric does",
                    significant(stretch, 3));
+    warn_of_strain(model, result, choice);
 
     model.time_step_s = choice.time_step_s;
     write_model(model, out->path());
@@ -277,7 +310,7 @@ int run_simulate(const SimulateVerbOptions& options) {
     files =
         write_simulation_files(written, result.position_m, options.formats, out->path(), progress);
     files.insert(files.begin(), "model.yaml");
-    write_json(describe_run(model, simulation, choice, stretch, files),
+    write_json(describe_run(model, simulation, choice, result, stretch, files),
                out->path() / "simulation.json");
   }
   if (interrupted()) throw Cancelled();

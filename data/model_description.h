@@ -33,6 +33,9 @@ struct SheetPose {
 
 enum class StrainLimitKind { off, positions, rates_first, consistent };
 
+/// As a model file has it.
+std::string to_string(StrainLimitKind kind);
+
 /// A prescribed point or edge; `motion` is fixed or path.
 struct ModelHeldPoint {
   HeldPoint point;

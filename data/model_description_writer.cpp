@@ -45,6 +45,10 @@ bool are_even(const ModelDescription& model) {
 
 }  // namespace
 
+std::string to_string(StrainLimitKind kind) {
+  return word_of(strain_limit_words(), kind);
+}
+
 void write_model(const ModelDescription& model, const std::filesystem::path& folder) {
   YamlWriter out;
   out.begin_map();
@@ -55,7 +59,7 @@ void write_model(const ModelDescription& model, const std::filesystem::path& fol
   write_fabric(out, model);
   if (model.strain_limit != StrainLimitKind::off) {
     out.key("strain_limit").begin_flow_map();
-    out.key("mode").value(word_of(strain_limit_words(), model.strain_limit));
+    out.key("mode").value(to_string(model.strain_limit));
     out.key("elongation").value(model.critical_elongation).end_map();
   }
   out.key("gravity").value(numbers(model.gravity_m_per_s2));

@@ -360,7 +360,8 @@ std::vector<std::vector<Eigen::Matrix3Xd>> run_model(const FitProblem& problem,
   std::vector<std::vector<Eigen::Matrix3Xd>> trajectories(values.size());
   if (sets.empty()) return trajectories;
   if (problem.start == StartKind::at_rest)
-    start_at_rest(problem.cloth, sets, problem.frame_time_s.front(), time_step_s);
+    start_at_rest(problem.cloth, sets, problem.gravity_m_per_s2.norm(),
+                  problem.frame_time_s.front(), time_step_s);
   const Schedule schedule{
       .frame_time_s = {problem.frame_time_s.begin(), problem.frame_time_s.begin() + frames},
       .time_step_s = time_step_s};

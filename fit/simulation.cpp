@@ -165,11 +165,17 @@ double default_time_step_s(const Simulation& simulation) {
   return std::min(stable_s / RefineOptions().stability_margin, longest_s);
 }
 
+ParameterSet started(const Simulation& simulation, double time_step_s) {
+  ParameterSet set = simulation.parameters;
+  if (simulation.start == StartKind::at_rest)
+    start_at_rest(simulation.cloth, {&set, 1}, set.gravity_m_per_s2.norm(),
+                  simulation.frame_time_s.front(), time_step_s);
+  return set;
+}
+
 SimulateResult run(const Simulation& simulation, double time_step_s,
                    const ProgressCallback& progress) {
-  std::vector<ParameterSet> sets{simulation.parameters};
-  if (simulation.start == StartKind::at_rest)
-    start_at_rest(simulation.cloth, sets, simulation.frame_time_s.front(), time_step_s);
+  const ParameterSet set = started(simulation, time_step_s);
   const Schedule schedule{.frame_time_s = simulation.frame_time_s, .time_step_s = time_step_s};
   const auto after_frame = [&](int frame) {
     return !progress || progress({.stage = "simulate",
@@ -179,7 +185,7 @@ SimulateResult run(const Simulation& simulation, double time_step_s,
                                   .note = ""});
   };
   return std::move(
-      simulate(simulation.cloth, sets, schedule, Precision::exact, after_frame).front());
+      simulate(simulation.cloth, {&set, 1}, schedule, Precision::exact, after_frame).front());
 }
 
 }  // namespace clothfit

@@ -35,6 +35,9 @@ ModelDescription describe_model(const FitProblem& problem, const Recording& reco
 /// see violently crumpled cloth.
 double default_time_step_s(const Simulation& simulation);
 
+/// The parameters as a run goes on from its start: one at rest is relaxed.
+ParameterSet started(const Simulation& simulation, double time_step_s);
+
 /// Positions of the mesh in every frame. A start at rest is relaxed first.
 SimulateResult run(const Simulation& simulation, double time_step_s,
                    const ProgressCallback& progress = {});

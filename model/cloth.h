@@ -57,7 +57,8 @@ struct ParameterSet {
   std::vector<std::vector<double>> effects;  ///< parameters of each effect of the cloth
   Eigen::Matrix3Xd start_position_m;         ///< 3 x vertices, world
   Eigen::Matrix3Xd start_velocity_m_per_s;   ///< the same; empty: at rest
-  /// What each effect of the cloth remembers at the start (EffectMemory's numbers); empty: nothing.
+  /// What each effect of the cloth remembers at the start (EffectMemory's numbers); empty, as a
+  /// whole or for an effect: nothing.
   std::vector<Eigen::VectorXd> start_effect_memory;
 };
 

@@ -12,7 +12,7 @@ namespace clothfit {
 struct ImplicitState {
   Eigen::Matrix3Xd position_m;
   Eigen::Matrix3Xd velocity_m_per_s;
-  std::vector<EffectMemory<SingleLane>> effect_memory;  ///< empty at the start
+  std::vector<EffectMemory<SingleLane>> effect_memory;  ///< empty: nothing remembered yet
 };
 
 /// The implicit scheme for stiff cloth at steps as long as a frame [baraff1998]:
@@ -34,8 +34,9 @@ class ImplicitStepper {
   /// inertia or shifts its supports: those belong to the explicit scheme.
   explicit ImplicitStepper(const Cloth& cloth);
 
-  /// One step of `time_step_s` > 0. `held_target_m` (3 x held) belongs to its end. False where the
-  /// numbers did not work out: `state` is then not finite.
+  /// One step of `time_step_s` > 0, from `state`, not from the start of `parameters`.
+  /// `held_target_m` (3 x held) belongs to its end. False where the numbers did not work out:
+  /// `state` is then not finite.
   bool step(const ParameterSet& parameters, const Eigen::Matrix3Xd& held_target_m, double time_s,
             double time_step_s, ImplicitState& state);
 

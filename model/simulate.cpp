@@ -38,8 +38,12 @@ class LaneRun {
     for (int n = 0; n < steps; ++n) {
       aim_held_points(from_s + (n + 1) * h, 1);
       stepper_.step(parameters_, held_target_m_, from_s + n * h, h, state_);
+      unmet_ += stepper_.limit_outcome().unmet;
     }
   }
+
+  /// Steps that left the strain limit unmet.
+  int unmet_steps(int lane) const { return static_cast<int>(unmet_[lane]); }
 
   /// Lets `steps` steps pass while time stands still at `time_s`. Held points glide from where they
   /// are to where they belong over the first fifth: a jump would hit the cloth like a hammer.
@@ -77,7 +81,23 @@ class LaneRun {
   LaneParameters<L> parameters_;
   LaneState<L> state_;
   LaneVectors<L> held_target_m_;
+  LaneValue<L> unmet_ = LaneValue<L>::Zero();
 };
+
+/// Largest elongation of any spring beyond its critical one; 0 where none is.
+double largest_excess(const Cloth& cloth, const SpringParameters& springs,
+                      const Eigen::Matrix3Xd& position_m) {
+  double largest = 0;
+  for (size_t type = 0; type < kSpringTypes; ++type) {
+    const double natural_m = springs.natural_length_m[type];
+    const double longest_m = natural_m * (1 + springs.critical_elongation[type]);
+    for (const auto& [a, b] : cloth.springs[type]) {
+      const double length_m = (position_m.col(b) - position_m.col(a)).norm();
+      largest = std::max(largest, (length_m - longest_m) / natural_m);
+    }
+  }
+  return largest;
+}
 
 /// Calls `run.operator()<L>(group, first)` for every group of parameter sets, in parallel: as many
 /// at once as lanes of a kind hold, a few left over one by one.
@@ -121,6 +141,7 @@ std::vector<SimulateResult> simulate(const Cloth& cloth, std::span<const Paramet
   assert(schedule.time_step_s > 0);
   std::vector<SimulateResult> results(parameters.size());
   const size_t frames = schedule.frame_time_s.size();
+  const bool limited = cloth.strain_limit.mode != StrainLimitMode::off;
   const auto run_group = [&]<class L>(std::span<const ParameterSet> group, size_t first) {
     LaneRun<L> run(cloth, group);
     for (size_t l = 0; l < group.size(); ++l) results[first + l].position_m.reserve(frames);
@@ -137,6 +158,11 @@ std::vector<SimulateResult> simulate(const Cloth& cloth, std::span<const Paramet
           result.diverged_frame = static_cast<int>(frame);
         }
         if (!result.usable()) now.setConstant(NAN);
+        if (limited && frame > 0 && result.usable()) {
+          result.largest_excess =
+              std::max(result.largest_excess, largest_excess(cloth, group[l].springs, now));
+          result.unmet_steps = run.unmet_steps(static_cast<int>(l));
+        }
         any_alive = any_alive || result.usable();
         result.position_m.push_back(std::move(now));
       }
@@ -159,11 +185,12 @@ std::vector<SimulateResult> simulate(const Cloth& cloth, std::span<const Paramet
 }
 
 std::vector<RelaxedCloth> relax(const Cloth& cloth, std::span<const ParameterSet> parameters,
-                                double time_s, double time_step_s) {
+                                double pendulum_gravity_m_per_s2, double time_s,
+                                double time_step_s) {
   if (parameters.empty()) return {};
   constexpr double kPendulumTimes = 7;  // (1 + 7) exp(-7) is left of the distance: 0.7 %
-  const double gravity = parameters.front().gravity_m_per_s2.norm();
-  const double pendulum_rate = std::sqrt(std::max(gravity, 1e-3) / cloth.mesh.height_m);
+  const double pendulum_rate =
+      std::sqrt(std::max(pendulum_gravity_m_per_s2, 1e-3) / cloth.mesh.height_m);
 
   // Supports shift in time, and time stands still here.
   Cloth heavy = cloth;
@@ -184,6 +211,7 @@ std::vector<RelaxedCloth> relax(const Cloth& cloth, std::span<const ParameterSet
     for (const size_t e : kept) damped[n].effects.push_back(parameters[n].effects[e]);
     damped[n].effects.push_back({2 * pendulum_rate});
     damped[n].start_effect_memory.clear();
+    damped[n].start_velocity_m_per_s.resize(3, 0);
   }
 
   const double duration_s = kPendulumTimes / pendulum_rate;
@@ -206,9 +234,10 @@ std::vector<RelaxedCloth> relax(const Cloth& cloth, std::span<const ParameterSet
   return relaxed;
 }
 
-void start_at_rest(const Cloth& cloth, std::span<ParameterSet> parameters, double time_s,
-                   double time_step_s) {
-  std::vector<RelaxedCloth> relaxed = relax(cloth, parameters, time_s, time_step_s);
+void start_at_rest(const Cloth& cloth, std::span<ParameterSet> parameters,
+                   double pendulum_gravity_m_per_s2, double time_s, double time_step_s) {
+  std::vector<RelaxedCloth> relaxed =
+      relax(cloth, parameters, pendulum_gravity_m_per_s2, time_s, time_step_s);
   for (size_t n = 0; n < parameters.size(); ++n) {
     parameters[n].start_position_m = std::move(relaxed[n].position_m);
     parameters[n].start_effect_memory = std::move(relaxed[n].effect_memory);

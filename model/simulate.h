@@ -22,6 +22,9 @@ enum class StopReason { reached_end, diverged, cancelled };
 struct SimulateResult {
   StopReason reason = StopReason::reached_end;
   int diverged_frame = -1;  ///< first frame that is not finite or left the scene
+  /// How well the strain limit was kept; 0 without one.
+  double largest_excess = 0;  ///< elongation beyond the critical one, of any spring at any frame
+  int unmet_steps = 0;        ///< of `consistent`: steps after which a spring was intolerably long
   /// Positions at every frame, 3 x vertices (world, m); NaN from where it diverged or was
   /// cancelled.
   std::vector<Eigen::Matrix3Xd> position_m;
@@ -33,8 +36,9 @@ struct SimulateResult {
 bool left_the_scene(const Eigen::Matrix3Xd& now, const Eigen::Matrix3Xd& start, const Mesh& mesh);
 
 /// `exact`: strict double, the same bits on every processor; what results come from. `fast`: float
-/// (a few left-over sets in double), for screening; a few tenths of a millimetre off after a second
-/// of a swinging cloth, and not the same bits on every processor.
+/// (a few left-over sets in double), for screening; after a second of a swinging cloth within
+/// 3 mm of `exact` without a strain limit, within 3 cm with one (docs/theory/model.md has what was
+/// seen), and not the same bits on every processor.
 enum class Precision { exact, fast };
 
 /// Called after each frame of each group of lanes, by several threads at once where there are
@@ -54,20 +58,22 @@ struct RelaxedCloth {
   std::vector<Eigen::VectorXd> effect_memory;  ///< as ParameterSet::start_effect_memory
 };
 
-/// The start positions relaxed under gravity with heavy viscous damping (critical for the pendulum
-/// of the cloth's height), held points where `motion` has them at `time_s`, and what the effects
-/// have come to remember on the way. A fixed number of steps, so that the shape depends smoothly on
-/// the parameters; their number follows from the first set's gravity. Of the pendulum's distance to
-/// equilibrium less than a percent is left, of slower motions (folds that open, a cloth that turns
-/// about a single support) more. Supports are where they are without effects that shift them, which
-/// remember nothing.
+/// The start positions relaxed under gravity with heavy viscous damping, from rest and without
+/// memory, held points where `motion` has them at `time_s`, and what the effects have come to
+/// remember on the way. The damping, critical for a pendulum of the cloth's height, and the fixed
+/// number of steps follow from `pendulum_gravity_m_per_s2`, a length that all sets share (at least
+/// 0.001), so that a shape depends on its own set alone, and smoothly. Of the pendulum's distance
+/// to equilibrium less than a percent is left, of slower motions (folds that open, a cloth that
+/// turns about a single support) more. Supports are where they are without effects that shift them,
+/// which remember nothing.
 std::vector<RelaxedCloth> relax(const Cloth& cloth, std::span<const ParameterSet> parameters,
-                                double time_s, double time_step_s);
+                                double pendulum_gravity_m_per_s2, double time_s,
+                                double time_step_s);
 
 /// Lets every set start from rest: relaxed from where it would have started, as relax() does it,
 /// with what its effects have come to remember, and without velocity. The exact minimum of the
 /// energy is not looked for: docs/theory/equilibrium.md says why.
-void start_at_rest(const Cloth& cloth, std::span<ParameterSet> parameters, double time_s,
-                   double time_step_s);
+void start_at_rest(const Cloth& cloth, std::span<ParameterSet> parameters,
+                   double pendulum_gravity_m_per_s2, double time_s, double time_step_s);
 
 }  // namespace clothfit

@@ -22,9 +22,14 @@ void set_start(int lane, const ParameterSet& set, LaneState<L>& state) {
   state.position_m.set_lane(lane, set.start_position_m);
   if (set.start_velocity_m_per_s.cols() > 0)
     state.velocity_m_per_s.set_lane(lane, set.start_velocity_m_per_s);
-  for (size_t e = 0; e < set.start_effect_memory.size(); ++e)
+  assert(set.start_effect_memory.size() <= state.effect_memory.size());
+  for (size_t e = 0; e < set.start_effect_memory.size(); ++e) {
+    const Eigen::VectorXd& memory = set.start_effect_memory[e];
+    if (memory.size() == 0) continue;
+    assert(memory.size() == state.effect_memory[e].cols());
     state.effect_memory[e].row(lane) =
-        set.start_effect_memory[e].transpose().array().template cast<typename L::Number>();
+        memory.transpose().array().template cast<typename L::Number>();
+  }
 }
 
 template <class L>

@@ -110,9 +110,9 @@ void TangentStepper::step(const DualParameters& parameters,
   force_n_.set_zero();
   for (size_t e = 0; e < effects; ++e) {
     const Effect& effect = *cloth_.effects[e];
-    const LaneVectors<SingleLane> before = force_n_.value;
+    force_before_ = force_n_.value;
     effect.add_force(scene, parameters.effects[e], state.effect_memory[e], force_n_);
-    force_n_.value = before;
+    force_n_.value = force_before_;
     effect.add_force(value_scene, parameters.value.effects[e], memory_[e], force_n_.value);
     keep_memory(e);
   }
@@ -141,10 +141,10 @@ void TangentStepper::step(const DualParameters& parameters,
       for (size_t e = 0; e < effects; ++e) {
         const Effect& effect = *cloth_.effects[e];
         if (!effect.shifts_supports()) continue;
-        const LaneVectors<SingleLane> before = target_m_.value;
+        target_before_ = target_m_.value;
         effect.shift_supports(scene, parameters.effects[e], pull_n_, state.effect_memory[e],
                               target_m_);
-        target_m_.value = before;
+        target_m_.value = target_before_;
         effect.shift_supports(value_scene, parameters.value.effects[e], pull_n_.value, memory_[e],
                               target_m_.value);
         keep_memory(e);
@@ -154,9 +154,9 @@ void TangentStepper::step(const DualParameters& parameters,
     for (size_t e = 0; e < effects; ++e) {
       const Effect& effect = *cloth_.effects[e];
       if (!effect.changes_force()) continue;
-      const LaneVectors<SingleLane> before = force_n_.value;
+      force_before_ = force_n_.value;
       effect.change_force(scene, parameters.effects[e], force_n_);
-      force_n_.value = before;
+      force_n_.value = force_before_;
       effect.change_force(value_scene, parameters.value.effects[e], force_n_.value);
     }
     move_by_forces(force_n_.tangent, parameters.tangent.gravity_m_per_s2, inverse_mass_per_kg_,

@@ -69,6 +69,7 @@ class TangentStepper {
   StrainLimiter<SingleLane> limiter_;
   std::vector<LimitMove> moves_;  ///< of the last step's strain limit
   LaneVectors<DualLanes> force_n_, pull_n_, target_m_;
+  LaneVectors<SingleLane> force_before_, target_before_;  ///< what an effect found
   std::vector<EffectMemory<SingleLane>> memory_;
 };
 

@@ -63,7 +63,8 @@ struct EffectScene {
 template <class L = ExactLanes>
 using EffectValues = std::vector<LaneValue<L>>;
 
-/// What an effect remembers from step to step, zero at the start: lanes x numbers.
+/// What an effect remembers from step to step: lanes x numbers; zero at the start unless
+/// ParameterSet::start_effect_memory says otherwise.
 template <class L = ExactLanes>
 using EffectMemory = LaneArray<L>;
 

@@ -9,11 +9,11 @@ namespace clothfit {
 /// Overrides what an effect does in lanes of each of the kinds L by what `Adapter` says once for
 /// all of them, in the templates that LawEffect names.
 template <class Adapter, class... L>
-class LawInLanes : public Effect {};
+class AdapterInLanes : public Effect {};
 
 template <class Adapter, class L, class... More>
-class LawInLanes<Adapter, L, More...> : public LawInLanes<Adapter, More...> {
-  using Rest = LawInLanes<Adapter, More...>;
+class AdapterInLanes<Adapter, L, More...> : public AdapterInLanes<Adapter, More...> {
+  using Rest = AdapterInLanes<Adapter, More...>;
 
  public:
   using Rest::add_force;
@@ -39,7 +39,7 @@ class LawInLanes<Adapter, L, More...> : public LawInLanes<Adapter, More...> {
 /// functions cannot be templates over the kind of lanes; an adapter writes the templates, each of
 /// which hides the one below, that does nothing.
 template <class Adapter, class Law>
-class LawEffect : public LawInLanes<Adapter, ExactLanes, FastLanes, SingleLane, DualLanes> {
+class LawEffect : public AdapterInLanes<Adapter, ExactLanes, FastLanes, SingleLane, DualLanes> {
  public:
   /// LaneEffect::add_force
   template <class L>

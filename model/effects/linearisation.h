@@ -18,7 +18,7 @@ struct ParameterNumber {
 };
 
 /// The derivatives of what an effect does to one simulation, as lists of small blocks that
-/// tangents, the adjoint and the implicit integrator multiply by. `on` names what is acted on: a
+/// the adjoint multiplies by. `on` names what is acted on: a
 /// vertex where forces are, a held point where the supports are. Several blocks in the same place
 /// add up.
 struct EffectLinearisation {

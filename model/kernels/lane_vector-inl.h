@@ -170,6 +170,16 @@ HWY_INLINE V squared_length(const Vector3<V>& a) {
     return dot(a, a);
 }
 
+/// The same with fused operations where there are any, in `double` too: not the same bits
+/// everywhere.
+template <class V>
+HWY_INLINE V fused_squared_length(const Vector3<V>& a) {
+  if constexpr (kMayContract<V>)
+    return squared_length(a);
+  else
+    return hn::MulAdd(a.z, a.z, hn::MulAdd(a.y, a.y, hn::Mul(a.x, a.x)));
+}
+
 }  // namespace HWY_NAMESPACE
 }  // namespace
 }  // namespace clothfit

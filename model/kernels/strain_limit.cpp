@@ -45,8 +45,7 @@ HWY_INLINE size_t list_long(const std::array<const typename L::Number*, 3>& posi
     const std::ptrdiff_t self = vertex * L::kCount + limit.lane;
     const Vector3<Vector<L>> along =
         load(d, position, self + limit.offset) - load(d, position, self);
-    const Vector<L> length2 =
-        hn::MulAdd(along.z, along.z, hn::MulAdd(along.y, along.y, hn::Mul(along.x, along.x)));
+    const Vector<L> length2 = fused_squared_length(along);
     found[count] = vertex;
     count += hn::AllFalse(d, hn::Gt(length2, from2)) ? 0 : 1;
   }
@@ -76,15 +75,15 @@ HWY_INLINE void shorten(LimitArrays<L>& arrays, const GroupLimit<L>& limit,
   const V one = hn::Set(d, Number{1});
   std::ptrdiff_t self[n];
   Vector3<V> along[n];
-  hn::Mask<Tag<L>> exceeds[n];
+  hn::Mask<Tag<L>> too_long[n];
   V length2[n], excess[n];
   for (size_t s = 0; s < n; ++s) {
     self[s] = vertices[s] * L::kCount + limit.lane;
     along[s] = load(d, position, self[s] + limit.offset) - load(d, position, self[s]);
     length2[s] = squared_length(along[s]);
-    exceeds[s] = lanes == nullptr ? hn::Gt(length2[s], limit.allowed2)
-                                  : hn::LoadMaskBits(d, lanes + s * kMaskBytes);
-    shortened = hn::Add(shortened, hn::IfThenElseZero(exceeds[s], one));
+    too_long[s] = lanes == nullptr ? hn::Gt(length2[s], limit.allowed2)
+                                   : hn::LoadMaskBits(d, lanes + s * kMaskBytes);
+    shortened = hn::Add(shortened, hn::IfThenElseZero(too_long[s], one));
   }
   if constexpr (kMayContract<V>) {
     twice_inverse_square_roots(length2, excess);
@@ -101,8 +100,8 @@ HWY_INLINE void shorten(LimitArrays<L>& arrays, const GroupLimit<L>& limit,
     const V second = hn::Mul(share, hn::Set(d, limit.second_share[vertices[s]]));
     const std::ptrdiff_t other = self[s] + limit.offset;
     const Vector3<V> a = load(d, of, self[s]), b = load(d, of, other);
-    store(select(exceeds[s], mul_add(first, along[s], a), a), d, of, self[s]);
-    store(select(exceeds[s], minus_product(b, second, along[s]), b), d, of, other);
+    store(select(too_long[s], mul_add(first, along[s], a), a), d, of, self[s]);
+    store(select(too_long[s], minus_product(b, second, along[s]), b), d, of, other);
   };
   for (size_t s = 0; s < n; ++s) move(s, position, excess[s]);
   if (velocity[0] != nullptr) {
@@ -204,17 +203,17 @@ void sweep_single(LimitArrays<SingleLane>& arrays) {
 void rates_first_exact(LimitArrays<ExactLanes>& arrays) {
   visit<ExactLanes, LimitPass::rates_first>(arrays);
 }
-void check_exact(LimitArrays<ExactLanes>& arrays) {
-  visit<ExactLanes, LimitPass::check>(arrays);
-}
 void rates_first_fast(LimitArrays<FastLanes>& arrays) {
   visit<FastLanes, LimitPass::rates_first>(arrays);
 }
-void check_fast(LimitArrays<FastLanes>& arrays) {
-  visit<FastLanes, LimitPass::check>(arrays);
-}
 void rates_first_single(LimitArrays<SingleLane>& arrays) {
   visit<SingleLane, LimitPass::rates_first>(arrays);
+}
+void check_exact(LimitArrays<ExactLanes>& arrays) {
+  visit<ExactLanes, LimitPass::check>(arrays);
+}
+void check_fast(LimitArrays<FastLanes>& arrays) {
+  visit<FastLanes, LimitPass::check>(arrays);
 }
 void check_single(LimitArrays<SingleLane>& arrays) {
   visit<SingleLane, LimitPass::check>(arrays);
@@ -234,10 +233,10 @@ HWY_EXPORT(sweep_exact);
 HWY_EXPORT(sweep_fast);
 HWY_EXPORT(sweep_single);
 HWY_EXPORT(rates_first_exact);
-HWY_EXPORT(check_exact);
 HWY_EXPORT(rates_first_fast);
-HWY_EXPORT(check_fast);
 HWY_EXPORT(rates_first_single);
+HWY_EXPORT(check_exact);
+HWY_EXPORT(check_fast);
 HWY_EXPORT(check_single);
 
 void sweep(LimitArrays<ExactLanes>& arrays) {
@@ -252,17 +251,17 @@ void sweep(LimitArrays<SingleLane>& arrays) {
 void sweep_by_first_rates(LimitArrays<ExactLanes>& arrays) {
   HWY_DYNAMIC_DISPATCH(rates_first_exact)(arrays);
 }
-void check(LimitArrays<ExactLanes>& arrays) {
-  HWY_DYNAMIC_DISPATCH(check_exact)(arrays);
-}
 void sweep_by_first_rates(LimitArrays<FastLanes>& arrays) {
   HWY_DYNAMIC_DISPATCH(rates_first_fast)(arrays);
 }
-void check(LimitArrays<FastLanes>& arrays) {
-  HWY_DYNAMIC_DISPATCH(check_fast)(arrays);
-}
 void sweep_by_first_rates(LimitArrays<SingleLane>& arrays) {
   HWY_DYNAMIC_DISPATCH(rates_first_single)(arrays);
+}
+void check(LimitArrays<ExactLanes>& arrays) {
+  HWY_DYNAMIC_DISPATCH(check_exact)(arrays);
+}
+void check(LimitArrays<FastLanes>& arrays) {
+  HWY_DYNAMIC_DISPATCH(check_fast)(arrays);
 }
 void check(LimitArrays<SingleLane>& arrays) {
   HWY_DYNAMIC_DISPATCH(check_single)(arrays);
@@ -304,7 +303,7 @@ StrainLimiter<L>::StrainLimiter(const Mesh& mesh, const Eigen::VectorXd& inverse
   }
   size_t springs = 0;
   for (const SpringGroup& group : groups_) springs += group.size();
-  found_.resize(springs + 1);  // one more than are found may be written
+  found_.resize(springs);
   found_lanes_.resize(springs * kMaskBytes);
   if constexpr (L::kCount == 1) {
     const size_t words = vertices / 64 + 2;

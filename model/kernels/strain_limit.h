@@ -87,9 +87,9 @@ struct LimitArrays;
 /// (columns) 0, 1, 4, 5, 8, ..., then the others. The springs of one such group share no vertex, so
 /// their order among themselves does not matter.
 ///
-/// In lanes every spring is measured as its group's turn comes. For a single simulation, most of
-/// whose springs are within their limits at most times, one look finds those that are not, and the
-/// sweeps then visit these and what hangs on a vertex that has moved since.
+/// In lanes each spring is measured once, as its group's turn comes or before. For a single
+/// simulation, most of whose springs are within their limits at most times, one look finds those
+/// that are not, and the sweeps then visit these and what hangs on a vertex that has moved since.
 ///
 /// In `double` strict IEEE, the same bits on every instruction set. A lane's result does not depend
 /// on what the others carry. Holds scratch memory: one object per thread.
@@ -116,7 +116,8 @@ class StrainLimiter {
 
   /// Sweeps until no spring of a lane is longer than tolerated, at most `most_sweeps` times; what a
   /// vertex is moved by, over the time step, is added to its velocity. Held points that are further
-  /// apart than the springs between them may reach leave the limit unmet.
+  /// apart than the springs between them may reach leave the limit unmet; a spring that is held at
+  /// both ends is not looked at.
   LimitOutcome<L> limit_consistently(const LaneLimits<L>& limits, int most_sweeps,
                                      double time_step_s, LaneVectors<L>& position_m,
                                      LaneVectors<L>& velocity_m_per_s,

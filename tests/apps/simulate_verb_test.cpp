@@ -204,6 +204,48 @@ TEST_F(Simulate, NamesTheSpringStepAndTimeOfADivergenceAndLeavesNothing) {
   EXPECT_THAT(names_in(here_.path()), ElementsAre("sheet.yaml"));
 }
 
+TEST_F(Simulate, ExplainsADivergenceOfTheRunThatWasMade) {
+  // The fabric remembers how it was let down: a run from rest goes another way without that.
+  std::string text =
+      model_text(kCorners, "[{effect: hysteresis, parameters: {ratio: 0.9, yield: 0.002}}]");
+  text.replace(text.find("released_flat"), 13, "at_rest");
+  write(text);
+
+  const ProgramRun stable = run({"sheet.yaml", "--format", "csv"});
+  ASSERT_EQ(stable.exit_code, 0) << stable.error;
+  const double step_s = result()["time_step"]["stable_s"];
+  const ProgramRun diverged =
+      run({"sheet.yaml", "--time-step", std::to_string(3 * step_s), "--allow-unstable"});
+
+  EXPECT_EQ(diverged.exit_code, 4);
+  EXPECT_THAT(diverged.error, HasSubstr("try --time-step"));
+}
+
+TEST_F(Simulate, SaysHowTheStrainLimitWasKept) {
+  for (const std::string mode : {"positions", "rates_first", "consistent"}) {
+    SCOPED_TRACE(mode);
+    std::string text =
+        model_text(kCorners, "[]", "strain_limit: {mode: " + mode + ", elongation: 0.001}\n");
+    text.replace(text.find("mass: 0.02"), 10, "mass: 0.5");
+    write(text);
+
+    const ProgramRun done = run({"sheet.yaml", "--format", "csv", "--out", mode});
+
+    ASSERT_EQ(done.exit_code, 0) << done.error;
+    const nlohmann::json limit = result(mode)["strain_limit"];
+    EXPECT_EQ(limit["mode"], mode);
+    EXPECT_EQ(limit["elongation"], 0.001);
+    const bool one_sweep = mode != "consistent";
+    EXPECT_EQ(limit["largest_excess"].get<double>() > 0.01, one_sweep);
+    EXPECT_EQ(
+        done.error.find("where the strain limit allows 0.1 %: one sweep") != std::string::npos,
+        one_sweep);
+    if (!one_sweep) {
+      EXPECT_LE(limit["largest_excess"].get<double>(), 1e-3 + 1e-9);
+    }
+  }
+}
+
 TEST_F(Simulate, RefusesBadInputWithItsPlace) {
   write(model_text("[{at: [0.5, 0], motion: fixed}]"));
   expect_refused({"sheet.yaml"}, "sheet.yaml:5: held[0].at = [0.5, 0] lies outside the cloth; ");

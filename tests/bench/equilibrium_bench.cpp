@@ -178,7 +178,8 @@ void time_rest_shapes() {
     const double step_s = 0.8 * stable_time_step_s(on.cloth, sets.back());
     std::vector<RelaxedCloth> relaxed;
     std::vector<Eigen::Matrix3Xd> rest;
-    const double relax_s = best_seconds_of(3, [&] { relaxed = relax(on.cloth, sets, 0, step_s); });
+    const double relax_s =
+        best_seconds_of(3, [&] { relaxed = relax(on.cloth, sets, 9.81, 0, step_s); });
     const double rest_s = best_seconds_of(3, [&] { rest = rest_shapes(on.cloth, sets, 0); });
     const auto imbalance = [&](const Eigen::Matrix3Xd& shape) {
       HangingEnergy energy(HangingCloth::of(on.cloth, sets[0]));

@@ -151,6 +151,22 @@ TEST_F(ModelFile, ReadsBackAsWrittenToTheLastBit) {
   EXPECT_EQ(again.start, model.start);
 }
 
+TEST_F(ModelFile, NamesEveryModeOfTheStrainLimit) {
+  std::filesystem::create_directories(folder_ / "out");
+  for (const auto& [word, kind] : {std::pair{"off", StrainLimitKind::off},
+                                   {"positions", StrainLimitKind::positions},
+                                   {"rates_first", StrainLimitKind::rates_first},
+                                   {"consistent", StrainLimitKind::consistent}}) {
+    const ModelDescription model = read(with("mode: consistent", std::string("mode: ") + word));
+    EXPECT_EQ(model.strain_limit, kind);
+    EXPECT_EQ(to_string(kind), word);
+
+    write_model(model, folder_ / "out");
+
+    EXPECT_EQ(read_model(folder_ / "out" / "model.yaml").strain_limit, kind);
+  }
+}
+
 TEST_F(ModelFile, KeepsUnevenTimes) {
   folder_.write("t.csv", "frame,time\n0,0.5\n1,0.6\n2,0.75\n");
   const ModelDescription model = read(with("{frame_rate: 50.0, duration: 0.7}", "{file: t.csv}"));

@@ -120,9 +120,16 @@ TEST(Simulation, LimitsStrainWhereTheModelSays) {
   };
 
   EXPECT_GT(longest_share(), 1.1);
-  model.strain_limit = StrainLimitKind::consistent;
   model.critical_elongation = 0.05;
+  model.strain_limit = StrainLimitKind::consistent;
   EXPECT_LT(longest_share(), 1.05 + 1.1e-3);  // the limit's tolerance is 1e-3
+  for (const auto& [kind, mode] : {std::pair{StrainLimitKind::off, StrainLimitMode::off},
+                                   {StrainLimitKind::positions, StrainLimitMode::positions},
+                                   {StrainLimitKind::rates_first, StrainLimitMode::rates_first},
+                                   {StrainLimitKind::consistent, StrainLimitMode::consistent}}) {
+    model.strain_limit = kind;
+    EXPECT_EQ(make_simulation(model).cloth.strain_limit.mode, mode);
+  }
 }
 
 TEST(Simulation, OfADescribedFitIsTheFitsOwn) {

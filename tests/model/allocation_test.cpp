@@ -11,6 +11,7 @@
 #include <new>
 
 #include "model/step.h"
+#include "model/tangent_step.h"
 #include "tests/model/random_cloth.h"
 
 namespace {
@@ -49,23 +50,31 @@ void operator delete(void* memory, std::size_t, std::align_val_t) noexcept {
 namespace clothfit {
 namespace {
 
-template <class L>
-long allocations_in_ten_steps(StrainLimitMode mode) {
+/// A cloth with an effect of each kind.
+struct Busy {
   Cloth cloth = square_cloth(7);
-  cloth.held = {held_at(cloth.mesh, 0, 0), held_at(cloth.mesh, 0.31, 0.02)};
-  cloth.strain_limit.mode = mode;
-  cloth.add_effect("wind", "test");
-  cloth.add_effect("hysteresis", "test");
-  cloth.add_effect("added_air_mass", "test");
-  cloth.add_effect("support_drift", "test");
   ParameterSet set{.springs = spring_parameters(cotton(), cloth.mesh),
                    .start_position_m = flat_positions(cloth.mesh)};
-  set.springs.critical_elongation.fill(0.01);
-  for (const EffectDescription& effect : cloth.effect_descriptions) {
-    set.effects.emplace_back();
-    for (const EffectParameter& p : effect.parameters)
-      set.effects.back().push_back(p.neutral + p.typical);
+
+  explicit Busy(StrainLimitMode mode) {
+    cloth.held = {held_at(cloth.mesh, 0, 0), held_at(cloth.mesh, 0.31, 0.02)};
+    cloth.strain_limit.mode = mode;
+    for (const char* name : {"wind", "hysteresis", "added_air_mass", "support_drift"})
+      cloth.add_effect(name, "test");
+    set.springs.critical_elongation.fill(0.01);
+    for (const EffectDescription& effect : cloth.effect_descriptions) {
+      set.effects.emplace_back();
+      for (const EffectParameter& p : effect.parameters)
+        set.effects.back().push_back(p.neutral + p.typical);
+    }
   }
+};
+
+template <class L>
+long allocations_in_ten_steps(StrainLimitMode mode) {
+  const Busy busy(mode);
+  const Cloth& cloth = busy.cloth;
+  const ParameterSet& set = busy.set;
   EulerStepper<L> stepper(cloth);
   const LaneParameters<L> parameters = lane_parameters<L>(cloth, {&set, 1});
   LaneState<L> state = LaneState<L>::of(cloth);
@@ -76,6 +85,24 @@ long allocations_in_ten_steps(StrainLimitMode mode) {
   const long before = allocations;
   for (int n = 1; n <= 10; ++n) stepper.step(parameters, target, n * 1e-4, 1e-4, state);
   return allocations - before;
+}
+
+long allocations_in_ten_steps_with_tangents() {
+  const Busy busy(StrainLimitMode::off);
+  TangentStepper stepper(busy.cloth);
+  const DualParameters parameters = DualParameters::of(busy.cloth, busy.set, {});
+  LaneState<DualLanes> state = LaneState<DualLanes>::of(busy.cloth);
+  state.position_m.value.set_lane(0, busy.set.start_position_m);
+  const LaneVectors<DualLanes> target = stepper.locate(state.position_m);
+  stepper.step(parameters, target, 0, 1e-4, state);
+
+  const long before = allocations;
+  for (int n = 1; n <= 10; ++n) stepper.step(parameters, target, n * 1e-4, 1e-4, state);
+  return allocations - before;
+}
+
+TEST(Step, AllocatesNothingWithTangents) {
+  EXPECT_EQ(allocations_in_ten_steps_with_tangents(), 0);
 }
 
 TEST(Step, AllocatesNothing) {

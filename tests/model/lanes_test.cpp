@@ -65,7 +65,9 @@ TEST_P(SingleLaneOn, GivesTheBitsOfExactLanes) {
 
       EXPECT_EQ(single.position_m(), lanes.position_m());
       EXPECT_EQ(single.velocity_m_per_s(), lanes.velocity_m_per_s());
-      EXPECT_EQ(too_long > 0, mode != StrainLimitMode::off);
+      if (mode != StrainLimitMode::off) {
+        EXPECT_GT(too_long, 0);
+      }
       EXPECT_GT((single.position_m() - hung.set.start_position_m).cwiseAbs().maxCoeff(), 1e-4);
     }
   }
@@ -122,8 +124,10 @@ class FastLanesOn : public testing::TestWithParam<InstructionSet> {};
 
 TEST_P(FastLanesOn, StayNearTheExactOnesForASecondOfSwinging) {
   const OnInstructionSet on(GetParam());
-  for (const StrainLimitMode mode : {StrainLimitMode::off, StrainLimitMode::positions}) {
+  for (const StrainLimitMode mode : {StrainLimitMode::off, StrainLimitMode::positions,
+                                     StrainLimitMode::rates_first, StrainLimitMode::consistent}) {
     SCOPED_TRACE(static_cast<int>(mode));
+    const bool limited = mode != StrainLimitMode::off;
     // Given a cloth like the bundled recordings', let go from 20 degrees beside where it hangs (one
     // that folds is chaotic: any difference grows),
     Cloth cloth = square_cloth(17);
@@ -133,7 +137,7 @@ TEST_P(FastLanesOn, StayNearTheExactOnesForASecondOfSwinging) {
     set.springs = spring_parameters(cotton(), cloth.mesh);
     set.start_position_m = Eigen::AngleAxisd(0.35, Eigen::Vector3d::UnitX()).toRotationMatrix() *
                            hung_flat(cloth.mesh);
-    if (mode == StrainLimitMode::positions) set.springs.critical_elongation.fill(0.002);
+    if (limited) set.springs.critical_elongation.fill(0.002);
     SteppedCloth<FastLanes> fast(cloth, set, at_rest(set.start_position_m));
     SteppedCloth<ExactLanes> exact(cloth, set, at_rest(set.start_position_m));
 
@@ -149,13 +153,21 @@ TEST_P(FastLanesOn, StayNearTheExactOnesForASecondOfSwinging) {
     }
 
     // then no vertex is far from where it should be. Rounding of 1e-8 m grows where the cloth
-    // buckles: 0.9 mm was seen; 3 um where the limit keeps it taut.
-    RecordProperty(mode == StrainLimitMode::off ? "off_um" : "positions_um",
+    // buckles, and where it decides which spring is too long: 0.9 mm was seen without a limit, 3 um
+    // where one sweep keeps the cloth taut, 2.7 mm by first rates, 7.2 mm with sweeps until all
+    // springs are tolerable.
+    RecordProperty("mode_" + std::to_string(static_cast<int>(mode)) + "_um",
                    std::to_string(1e6 * largest_m));
-    EXPECT_LT(largest_m, mode == StrainLimitMode::off ? 3e-3 : 1e-4);
+    const double bound_m = mode == StrainLimitMode::off           ? 3e-3
+                           : mode == StrainLimitMode::positions   ? 1e-4
+                           : mode == StrainLimitMode::rates_first ? 1e-2
+                                                                  : 3e-2;
+    EXPECT_LT(largest_m, bound_m);
     EXPECT_GT(largest_m, 0);
     EXPECT_GT(travelled_m, 0.1);
-    EXPECT_EQ(too_long > 0, mode == StrainLimitMode::positions);
+    if (limited) {
+      EXPECT_GT(too_long, 0);
+    }
   }
 }
 

@@ -228,7 +228,7 @@ TEST(Relax, AHangingChainStretchesByTheWeightBelowEachSpring) {
 
   // when it is relaxed,
   const Eigen::Matrix3Xd p =
-      relax(cloth, {&set, 1}, 0, 0.5 * stable_time_step_s(cloth, set)).front().position_m;
+      relax(cloth, {&set, 1}, 9.81, 0, 0.5 * stable_time_step_s(cloth, set)).front().position_m;
 
   // then each spring carries what hangs below it: l - l0 = weight / k.
   for (int j = 0; j < 2; ++j) {
@@ -262,7 +262,7 @@ TEST(Relax, BalancesTheForcesOfAClothHungByTwoCorners) {
   for (const Cloth* hung : {&cloth, static_cast<const Cloth*>(&sagging)}) {
     SCOPED_TRACE(hung == &cloth ? "straight" : "sagging");
     const double h = 0.5 * stable_time_step_s(*hung, set);
-    const Eigen::Matrix3Xd p = relax(*hung, {&set, 1}, 0, h).front().position_m;
+    const Eigen::Matrix3Xd p = relax(*hung, {&set, 1}, 9.81, 0, h).front().position_m;
 
     EXPECT_LT(residual_force(*hung, set, p), 0.01);
     EXPECT_GT(residual_force(*hung, set, set.start_position_m), 0.01);
@@ -277,7 +277,7 @@ TEST(Relax, PutsMovingHeldPointsWhereTheyAreAtThatTime) {
                          .start_position_m = hung_flat(cloth.mesh)};
 
   const Eigen::Matrix3Xd p =
-      relax(cloth, {&set, 1}, 0.5, 0.5 * stable_time_step_s(cloth, set)).front().position_m;
+      relax(cloth, {&set, 1}, 9.81, 0.5, 0.5 * stable_time_step_s(cloth, set)).front().position_m;
 
   EXPECT_LT((p.col(4) - Eigen::Vector3d(0.35, 0, 0)).norm(), 1e-15);
 }
@@ -293,7 +293,7 @@ TEST(Relax, IsSmoothInTheParameters) {
                       .start_position_m = hung_flat(cloth.mesh)});
       sets.back().springs.stiffness_n_per_m[type] *= 1 + sign * step;
     }
-    const auto shapes = relax(cloth, sets, 0, h);
+    const auto shapes = relax(cloth, sets, 9.81, 0, h);
     return Eigen::Matrix3Xd((shapes[0].position_m - shapes[1].position_m) / (2 * step));
   };
 
@@ -312,12 +312,13 @@ TEST(Relax, DependsNeitherOnTheNumberOfSetsNorOnTheirOrder) {
   for (ParameterSet& set : sets) set.effects.clear();
   const std::vector<ParameterSet> backwards(sets.rbegin(), sets.rend());
 
-  const auto shapes = relax(cloth, sets, 0, 2e-4);
-  const auto reversed = relax(cloth, backwards, 0, 2e-4);
+  const auto shapes = relax(cloth, sets, 9.81, 0, 2e-4);
+  const auto reversed = relax(cloth, backwards, 9.81, 0, 2e-4);
 
   for (size_t n = 0; n < sets.size(); ++n) {
     EXPECT_EQ(shapes[n].position_m, reversed[sets.size() - 1 - n].position_m) << n;
-    EXPECT_EQ(shapes[n].position_m, relax(cloth, {&sets[n], 1}, 0, 2e-4).front().position_m) << n;
+    EXPECT_EQ(shapes[n].position_m, relax(cloth, {&sets[n], 1}, 9.81, 0, 2e-4).front().position_m)
+        << n;
   }
 }
 
@@ -337,7 +338,7 @@ struct Curtain {
   double time_step_s() const { return 0.5 * stable_time_step_s(cloth, set); }
   ParameterSet at_rest() const {
     ParameterSet start = set;
-    start_at_rest(cloth, {&start, 1}, 0, time_step_s());
+    start_at_rest(cloth, {&start, 1}, 9.81, 0, time_step_s());
     return start;
   }
   /// How far any vertex comes from where it starts within half a second.
@@ -375,8 +376,8 @@ TEST(StartAtRest, HandsEveryEffectItsOwnMemory) {
   ParameterSet one = alone.set, still = among.set;
   still.start_velocity_m_per_s.setZero(3, among.cloth.mesh.vertex_count());
 
-  start_at_rest(alone.cloth, {&one, 1}, 0, among.time_step_s());
-  start_at_rest(among.cloth, {&still, 1}, 0, among.time_step_s());
+  start_at_rest(alone.cloth, {&one, 1}, 9.81, 0, among.time_step_s());
+  start_at_rest(among.cloth, {&still, 1}, 9.81, 0, among.time_step_s());
 
   ASSERT_EQ(still.start_effect_memory.size(), 3u);
   EXPECT_EQ(still.start_position_m, one.start_position_m);
@@ -395,15 +396,93 @@ TEST(StartAtRest, DependsNeitherOnTheOtherSetsNorOnTheThreads) {
     sets[n].springs.stiffness_n_per_m[structural_t] *= 1 + 0.01 * static_cast<double>(n);
   std::vector<ParameterSet> backwards(sets.rbegin(), sets.rend());
 
-  start_at_rest(curtain.cloth, sets, 0, 5e-4);
+  start_at_rest(curtain.cloth, sets, 9.81, 0, 5e-4);
   const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
-  start_at_rest(curtain.cloth, backwards, 0, 5e-4);
+  start_at_rest(curtain.cloth, backwards, 9.81, 0, 5e-4);
 
   for (size_t n = 0; n < sets.size(); ++n) {
     const ParameterSet& other = backwards[sets.size() - 1 - n];
     EXPECT_EQ(sets[n].start_position_m, other.start_position_m) << n;
     EXPECT_EQ(sets[n].start_effect_memory, other.start_effect_memory) << n;
   }
+}
+
+TEST(StartAtRest, DoesNotDependOnWhereTheGravityOfOthersPoints) {
+  // Turned vectors of one length differ in it by rounding.
+  Curtain curtain({});
+  std::vector<ParameterSet> sets(kLanes + 2, curtain.set);
+  std::vector<ParameterSet> alone = sets;
+  for (size_t n = 0; n < sets.size(); ++n) {
+    const Eigen::AngleAxisd turn(0.01 * static_cast<double>(n), Eigen::Vector3d(0.6, 0.8, 0));
+    alone[n].gravity_m_per_s2 = sets[n].gravity_m_per_s2 = turn * Eigen::Vector3d(0, 0, -9.81);
+  }
+
+  start_at_rest(curtain.cloth, sets, 9.81, 0, 5e-4);
+
+  for (size_t n = 0; n < sets.size(); ++n) {
+    start_at_rest(curtain.cloth, {&alone[n], 1}, 9.81, 0, 5e-4);
+    EXPECT_EQ(sets[n].start_position_m, alone[n].start_position_m) << n;
+  }
+}
+
+TEST(Simulate, LetsEverySetStartFromItsOwnMemory) {
+  const unsigned seed = 31;
+  SCOPED_TRACE(seed);
+  Uniform uniform(seed);
+  const Curtain curtain({{"hysteresis", {0.7, 5e-3}}, {"relaxation", {0.7, 0.1}}});
+  for (const Precision precision : {Precision::exact, Precision::fast}) {
+    SCOPED_TRACE(static_cast<int>(precision));
+    // Enough to fill lanes, and one more, which goes alone.
+    std::vector<ParameterSet> sets(
+        (precision == Precision::exact ? ExactLanes::kCount : FastLanes::kCount) + 1, curtain.set);
+    for (ParameterSet& set : sets)
+      for (const std::shared_ptr<const Effect>& effect : curtain.cloth.effects) {
+        set.start_effect_memory.emplace_back(effect->memory_size(curtain.cloth));
+        for (double& number : set.start_effect_memory.back()) number = uniform(-5e-3, 5e-3);
+      }
+    const Schedule schedule = frames(4, 60, curtain.time_step_s());
+
+    const std::vector<SimulateResult> together = simulate(curtain.cloth, sets, schedule, precision);
+
+    for (size_t n = 0; n < sets.size(); ++n) {
+      SCOPED_TRACE(n);
+      const SimulateResult alone = simulate(curtain.cloth, {&sets[n], 1}, schedule).front();
+      const double apart_m =
+          (together[n].position_m[3] - alone.position_m[3]).cwiseAbs().maxCoeff();
+      const double moved_m = (alone.position_m[3] - together[(n + 1) % sets.size()].position_m[3])
+                                 .cwiseAbs()
+                                 .maxCoeff();
+      EXPECT_GT(moved_m, 1e-4);  // memories matter
+      EXPECT_LE(apart_m, precision == Precision::exact ? 0 : 1e-6);
+    }
+  }
+}
+
+TEST(Simulate, SaysHowWellTheStrainLimitWasKept) {
+  // Given corners that are held 12.5 % further apart than the cloth is wide, springs limited to 10
+  // %,
+  Cloth cloth = square_cloth(5);
+  cloth.held = {held_at(cloth.mesh, 0, 0), held_at(cloth.mesh, 0.4, 0)};
+  ParameterSet set{.springs = spring_parameters(cotton(), cloth.mesh),
+                   .start_position_m = hung_flat(cloth.mesh)};
+  set.start_position_m.row(0) *= 1.125;
+  set.springs.critical_elongation.fill(0.1);
+  const Schedule schedule{.frame_time_s = {0, 0.01, 0.02}, .time_step_s = 1e-3};
+  const auto kept = [&](StrainLimitMode mode) {
+    cloth.strain_limit.mode = mode;
+    return simulate(cloth, {&set, 1}, schedule).front();
+  };
+
+  const SimulateResult free = kept(StrainLimitMode::off);
+  const SimulateResult consistent = kept(StrainLimitMode::consistent);
+  EXPECT_EQ(free.largest_excess, 0);
+  EXPECT_EQ(free.unmet_steps, 0);
+  EXPECT_EQ(consistent.unmet_steps, 20);
+  EXPECT_GT(consistent.largest_excess, 0.02);
+
+  set.start_position_m = hung_flat(cloth.mesh);  // within reach
+  EXPECT_EQ(kept(StrainLimitMode::consistent).unmet_steps, 0);
+  EXPECT_LE(kept(StrainLimitMode::consistent).largest_excess, 1e-3 + 1e-12);
 }
 
 TEST(Simulate, EndsEarlyWhereItIsAskedTo) {

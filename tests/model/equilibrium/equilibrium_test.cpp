@@ -165,7 +165,7 @@ TEST(Equilibrium, IsWhereTheTimeStepperComesToRest) {
   ParameterSet resting = hung.set;
   // Each relaxation leaves a percent of the distance, and more of slow folds.
   for (int n = 0; n < 12; ++n)
-    resting.start_position_m = relax(hung.cloth, {&resting, 1}, 0, h).front().position_m;
+    resting.start_position_m = relax(hung.cloth, {&resting, 1}, 9.81, 0, h).front().position_m;
 
   const EquilibriumResult result = find_equilibrium(hung.cloth, hung.set, {.tolerance = 1e-9});
 

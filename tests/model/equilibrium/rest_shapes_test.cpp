@@ -57,7 +57,7 @@ TEST(RestShapes, AreWhereRelaxationEnds) {
 
   const Eigen::Matrix3Xd shape = rest_shapes(cloth, {&set, 1}, 0).front();
   for (int n = 0; n < 12; ++n)
-    set.start_position_m = relax(cloth, {&set, 1}, 0, h).front().position_m;
+    set.start_position_m = relax(cloth, {&set, 1}, 9.81, 0, h).front().position_m;
 
   EXPECT_LT((shape - set.start_position_m).colwise().norm().maxCoeff(), 1e-5);
 }
