@@ -49,6 +49,7 @@ Recording copy_recording(const Recording& recording, const std::filesystem::path
   if (!copy.markers_file.empty()) move_in(copy.markers_file, "");
   if (copy.times_file) move_in(*copy.times_file, "");
   if (copy.reference_file) move_in(*copy.reference_file, "");
+  if (copy.obstacle_file) move_in(*copy.obstacle_file, "");
   if (copy.tracks3d) move_in(*copy.tracks3d, "");
   for (auto& [camera, file] : copy.tracks2d) move_in(file, "tracks2d");
   for (CameraEntry& camera : copy.cameras) {

@@ -180,6 +180,10 @@ double largest_stretch(const Simulation& simulation, const SimulateResult& resul
   return largest;
 }
 
+bool has_effect(const ModelDescription& model, const std::string& name) {
+  return std::ranges::find(model.effects, name, &DeclaredEffect::name) != model.effects.end();
+}
+
 Json named_value(const std::string& name, const std::string& unit, double value) {
   return {{"name", name}, {"unit", unit}, {"value", value}};
 }
@@ -286,6 +290,9 @@ int run_simulate(const SimulateVerbOptions& options) {
     out.emplace(name);
     model = requested_model(options.request, out->path() / "steps", progress);
     const Simulation simulation = make_simulation(model);
+    if (simulation.cloth.obstacle && !has_effect(model, "contact_mesh"))
+      spdlog::warn(
+          "the cloth passes through the obstacle: the effect contact_mesh is not declared");
     const StepChoice choice = choose_step(simulation, model, options.time_step_s);
     require_possible(choice, simulation, model, options.allow_unstable);
     said = fmt::format(

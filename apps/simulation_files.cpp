@@ -30,7 +30,7 @@ MarkerSet vertex_markers(const ModelDescription& model) {
 }
 
 /// The simulation as a recording: what was measured is where every vertex was. `written` is the
-/// model as it stands in the folder, with the files of its held points.
+/// model as it stands in the folder, with the files of its held points and its obstacle.
 void write_as_recording(const ModelDescription& written,
                         const std::vector<Eigen::Matrix3Xd>& position_m, const fs::path& folder) {
   Recording recording;
@@ -49,6 +49,7 @@ void write_as_recording(const ModelDescription& written,
   recording.times_s = written.frame_time_s;
   recording.gravity_m_per_s2 = written.gravity_m_per_s2;
   recording.tracks3d = folder / "tracks3d.csv";
+  if (written.obstacle) recording.obstacle_file = folder / "obstacle.obj";
   for (const ModelHeldPoint& held : written.held) recording.held.push_back(held.point);
   recording.start = written.start;
   recording.declared = written.effects;

@@ -128,7 +128,7 @@ ModelDescription read_model(const std::filesystem::path& file) {
   const RecordingFiles files(file.has_parent_path() ? file.parent_path() : ".");
   const YamlMap map =
       read_yaml(file).map({"format", "name", "cloth", "mesh", "fabric", "strain_limit", "gravity",
-                           "held", "effects", "start", "time", "time_step"});
+                           "obstacle", "held", "effects", "start", "time", "time_step"});
   map.at("format").one_of<int>({{kModelFormat, 0}});
 
   ModelDescription model;
@@ -151,6 +151,10 @@ ModelDescription read_model(const std::filesystem::path& file) {
   if (const YamlValue* limit = map.find("strain_limit")) read_strain_limit(*limit, model);
   if (const YamlValue* gravity = map.find("gravity")) {
     model.gravity_m_per_s2 = read_gravity(*gravity);
+  }
+  if (const YamlValue* obstacle = map.find("obstacle")) {
+    files.file(*obstacle);
+    model.obstacle = read_obj(files.shown(*obstacle));
   }
   if (const YamlValue* held = map.find("held")) {
     for (HeldPoint& point : read_held(*held, files, model.cloth, model_motion_words())) {

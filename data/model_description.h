@@ -54,6 +54,7 @@ struct ModelDescription {
   StrainLimitKind strain_limit = StrainLimitKind::off;
   double critical_elongation = 0;  ///< of every spring, as a share of its natural length
   Eigen::Vector3d gravity_m_per_s2{0, 0, -9.81};
+  std::optional<SurfaceMesh> obstacle;  ///< what the effect contact_mesh touches
   std::vector<ModelHeldPoint> held;
   std::vector<DeclaredEffect> effects;  ///< a parameter that is left out is at its neutral value
   StartKind start = StartKind::released_flat;  ///< not unknown
@@ -76,11 +77,13 @@ inline constexpr int kMostModelFrames = 1'000'000;
 /// two frames or more than kMostModelFrames.
 std::optional<std::vector<double>> frame_times(double frame_rate_hz, double duration_s);
 
-/// Reads a model file and the tables that it names. Throws InputError, with file and line.
+/// Reads a model file and the tables and the surface that it names. Throws InputError, with file
+/// and line.
 ModelDescription read_model(const std::filesystem::path& file);
 
 /// Writes `folder`/model.yaml that read_model reads back to the last bit, with held/NUMBER.csv for
-/// the paths of held points and times.csv where the frames are not evenly spaced.
+/// the paths of held points, obstacle.obj for the obstacle, and times.csv where the frames are not
+/// evenly spaced: nothing outside the folder is needed.
 void write_model(const ModelDescription& model, const std::filesystem::path& folder);
 
 }  // namespace clothfit

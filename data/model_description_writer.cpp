@@ -63,6 +63,10 @@ void write_model(const ModelDescription& model, const std::filesystem::path& fol
     out.key("elongation").value(model.critical_elongation).end_map();
   }
   out.key("gravity").value(numbers(model.gravity_m_per_s2));
+  if (model.obstacle) {
+    write_obj(*model.obstacle, folder / "obstacle.obj");
+    out.key("obstacle").value("obstacle.obj");
+  }
 
   const RelativePaths relative(folder);
   int paths = 0;

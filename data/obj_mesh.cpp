@@ -1,6 +1,10 @@
 #include "data/obj_mesh.h"
 
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -13,6 +17,9 @@
 namespace clothfit {
 namespace {
 
+/// Beyond this a coordinate is a slip in the unit or the exponent.
+constexpr double kFarthest_m = 1e6;
+
 /// The next word of `rest`, which shrinks to what follows it; empty at the end.
 std::string_view next_word(std::string_view& rest) {
   constexpr std::string_view kBlank = " \t";
@@ -20,6 +27,13 @@ std::string_view next_word(std::string_view& rest) {
   const std::string_view word = rest.substr(0, rest.find_first_of(kBlank));
   rest.remove_prefix(word.size());
   return word;
+}
+
+bool has_area(const SurfaceMesh& mesh) {
+  return std::ranges::any_of(mesh.triangle.colwise(), [&](const auto& corners) {
+    const Eigen::Matrix3d at_m = mesh.vertex_m(Eigen::all, corners);
+    return (at_m.col(1) - at_m.col(0)).cross(at_m.col(2) - at_m.col(0)).norm() > 0;
+  });
 }
 
 }  // namespace
@@ -41,6 +55,9 @@ SurfaceMesh read_obj(const std::filesystem::path& file) {
         if (!number)
           throw InputError(file.string(), line, "coordinate `" + shown_text(word) + "`",
                            "a vertex is three numbers, in metres");
+        if (std::abs(*number) > kFarthest_m)
+          throw InputError(file.string(), line, "coordinate `" + shown_text(word) + "`",
+                           fmt::format("metres, {:g} at most", kFarthest_m));
         coordinates.push_back(*number);
       }
     } else if (kind == "f") {
@@ -65,10 +82,24 @@ SurfaceMesh read_obj(const std::filesystem::path& file) {
   }
   if (corners.empty())
     throw InputError(file.string(), "no faces", "a surface of triangles: lines `f a b c`");
-  return {Eigen::Map<const Eigen::Matrix3Xd>(coordinates.data(), 3,
-                                             static_cast<Eigen::Index>(coordinates.size() / 3)),
-          Eigen::Map<const Eigen::Matrix3Xi>(corners.data(), 3,
-                                             static_cast<Eigen::Index>(corners.size() / 3))};
+  const SurfaceMesh mesh{
+      Eigen::Map<const Eigen::Matrix3Xd>(coordinates.data(), 3,
+                                         static_cast<Eigen::Index>(coordinates.size() / 3)),
+      Eigen::Map<const Eigen::Matrix3Xi>(corners.data(), 3,
+                                         static_cast<Eigen::Index>(corners.size() / 3))};
+  if (!has_area(mesh))
+    throw InputError(file.string(), "no face has an area",
+                     "a surface: faces whose corners do not lie on a line");
+  return mesh;
+}
+
+void write_obj(const SurfaceMesh& mesh, const std::filesystem::path& file) {
+  std::string text = "# metres, world axes\n";
+  for (const auto& p : mesh.vertex_m.colwise())
+    text += fmt::format("v {} {} {}\n", number_text(p.x()), number_text(p.y()), number_text(p.z()));
+  for (const auto& t : mesh.triangle.colwise())  // OBJ counts from 1
+    text += fmt::format("f {} {} {}\n", t[0] + 1, t[1] + 1, t[2] + 1);
+  write_text(text, file);
 }
 
 }  // namespace clothfit

@@ -18,7 +18,11 @@ struct SurfaceMesh {
 /// the face. Indices count from 1, or backwards from the last vertex so far where they are
 /// negative.
 ///
-/// Throws InputError: no file, no face, a number that is none, an index of no vertex.
+/// Throws InputError: no file, no face or none with an area, a number that is none or farther than
+/// any scene, an index of no vertex.
 SurfaceMesh read_obj(const std::filesystem::path& file);
+
+/// Writes a Wavefront OBJ file that read_obj reads back to the last bit.
+void write_obj(const SurfaceMesh& mesh, const std::filesystem::path& file);
 
 }  // namespace clothfit

@@ -182,7 +182,7 @@ Recording read_recording(const std::filesystem::path& folder) {
   const RecordingFiles files(file.has_parent_path() ? file.parent_path() : ".");
   const YamlMap map = read_yaml(file).map(
       {"format", "name", "origin", "cloth", "markers", "time", "gravity", "cameras", "observations",
-       "reference", "bodies", "clouds", "held", "start", "declared", "held_out"});
+       "reference", "bodies", "clouds", "obstacle", "held", "start", "declared", "held_out"});
   map.at("format").one_of<int>({{"clothfit-recording/1", 0}});
 
   Recording recording;
@@ -213,6 +213,10 @@ Recording read_recording(const std::filesystem::path& folder) {
     const YamlValue& camera = entry.at("camera");
     require_camera(recording, camera, camera.text());
     recording.clouds = Clouds{camera.text(), files.folder(entry.at("files"))};
+  }
+  if (const YamlValue* obstacle = map.find("obstacle")) {
+    recording.obstacle_file = files.file(*obstacle);
+    recording.obstacle = read_obj(files.shown(*obstacle));
   }
   if (const YamlValue* held = map.find("held")) {
     recording.held = read_held(*held, files, recording.cloth, held_motion_words());

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "data/markers.h"
+#include "data/obj_mesh.h"
 
 namespace clothfit {
 
@@ -101,8 +102,8 @@ struct Clouds {
   std::filesystem::path folder;
 };
 
-/// What recording.yaml says, checked, with markers, times and reference points read in.
-/// Tracks, cameras and pictures are read when they are needed. Paths are absolute.
+/// What recording.yaml says, checked, with markers, times, reference points and the obstacle read
+/// in. Tracks, cameras and pictures are read when they are needed. Paths are absolute.
 struct Recording {
   std::filesystem::path folder;
   std::string name;
@@ -121,6 +122,8 @@ struct Recording {
   std::vector<ReferencePoint> reference;
   std::vector<RigidBody> bodies;
   std::optional<Clouds> clouds;
+  std::optional<std::filesystem::path> obstacle_file;
+  std::optional<SurfaceMesh> obstacle;  ///< read from it: what the effect contact_mesh touches
   std::vector<HeldPoint> held;
   StartKind start = StartKind::at_rest;
   std::vector<DeclaredEffect> declared;
@@ -132,7 +135,7 @@ struct Recording {
   const CameraEntry* find_camera(const std::string& camera_name) const;
 };
 
-/// Reads `folder`/recording.yaml and the small tables it names. Throws InputError.
+/// Reads `folder`/recording.yaml and the small tables and the surface it names. Throws InputError.
 Recording read_recording(const std::filesystem::path& folder);
 
 /// Writes `folder`/recording.yaml. Files inside `folder` are named relative to it; others are named

@@ -20,7 +20,8 @@ void require(const YamlValue& value, bool found, const std::string& expected) {
   if (found) return;
   value.refuse(fmt::format("{} = {}: there is no such {}", value.name(), shown_text(value.text()),
                            expected.substr(expected.find(' ') + 1)),
-               expected + ", named relative to the recording's folder", "check the path");
+               expected + ", named relative to the folder of the file that names it",
+               "check the path");
 }
 
 }  // namespace

@@ -115,6 +115,7 @@ void write_recording(const Recording& recording, const std::filesystem::path& fo
     out.key("clouds").begin_flow_map().key("camera").value(recording.clouds->camera);
     out.key("files").value(relative(recording.clouds->folder)).end_map();
   }
+  if (recording.obstacle_file) out.key("obstacle").value(relative(*recording.obstacle_file));
   write_list(out, "held", recording.held,
              [&](const HeldPoint& point) { write_held_point(out, point, relative); });
   out.key("start").value(to_string(recording.start));

@@ -15,6 +15,11 @@ Cloth make_cloth(const ClothDescription& description, const Mesh& mesh, double m
                              : masses_by_area(mesh, mass_kg));
 }
 
+std::shared_ptr<const Obstacle> make_obstacle(const std::optional<SurfaceMesh>& surface) {
+  if (!surface) return nullptr;
+  return std::make_shared<const Obstacle>(TriangleMesh{surface->vertex_m, surface->triangle});
+}
+
 std::map<std::string, double> by_parameter(
     const EffectDescription& effect, const std::string& where,
     const std::map<std::string, std::vector<double>>& given) {

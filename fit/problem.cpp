@@ -299,6 +299,7 @@ FitProblem make_problem(const FitInput& input, const FitOptions& options, int me
 
   const Mesh mesh{mesh_columns, mesh_rows, recording.cloth.width_m, recording.cloth.height_m};
   add_masses(recording, mesh, problem);
+  problem.cloth.obstacle = make_obstacle(recording.obstacle);
   Drive drive = make_drive(recording, mesh, input.tracks3d, problem.frame_time_s);
   problem.cloth.held = std::move(drive.held);
   problem.driving_markers = std::move(drive.driving_markers);

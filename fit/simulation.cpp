@@ -86,6 +86,7 @@ Simulation make_simulation(const ModelDescription& model) {
   Cloth& cloth = simulation.cloth;
   cloth = make_cloth(model.cloth, mesh, model.cloth.mass_kg.value());
   cloth.strain_limit.mode = mode_of(model.strain_limit);
+  cloth.obstacle = make_obstacle(model.obstacle);
   for (const ModelHeldPoint& held : model.held) {
     const bool has_path = held.point.motion == HeldMotion::path;
     hold(held.point, has_path ? &held.path : nullptr, mesh, cloth.held);
@@ -132,6 +133,7 @@ ModelDescription describe_model(const FitProblem& problem, const Recording& reco
   model.mesh_rows = mesh.rows;
   model.fabric = named(fabric_of(problem, values));
   model.gravity_m_per_s2 = set.gravity_m_per_s2;
+  model.obstacle = recording.obstacle;
 
   size_t next = 0;  // an edge stands for a vertex each in problem.cloth.held
   for (const HeldPoint& point : recording.held) {

@@ -21,12 +21,13 @@ struct Simulation {
   std::vector<double> frame_time_s;
 };
 
-/// Throws InputError for an effect, or a parameter of one, that does not exist.
+/// Throws InputError for an effect, or a parameter of one, that does not exist, and for
+/// contact_mesh without an obstacle.
 Simulation make_simulation(const ModelDescription& model);
 
 /// A fitted, or given, model of a recording as a model file has it: the cloth on the problem's mesh
 /// with the parameters `values`, gravity and the sheet as they were fitted along, and the paths of
-/// held points, tracked ones as their smoothing splines have them at the frames.
+/// held points, tracked ones as their smoothing splines have them at the frames; its obstacle.
 ModelDescription describe_model(const FitProblem& problem, const Recording& recording,
                                 const Eigen::VectorXd& values);
 

@@ -48,8 +48,8 @@ void Cloth::add_effect(const std::string& name, const std::string& where) {
   const EffectEntry& entry = find_effect(name, where);
   if (name == "contact_mesh" && !obstacle)
     throw InputError(where, "effect 'contact_mesh' has no obstacle to touch",
-                     "recordings and model files cannot give one yet; contact_plane and "
-                     "contact_sphere need none");
+                     "the key `obstacle: FILE.obj` beside the effects, a surface of triangles",
+                     "add it; contact_plane and contact_sphere need none");
   effect_descriptions.push_back(entry.describe());
   effects.push_back(entry.make());
 }

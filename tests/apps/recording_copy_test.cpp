@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <fstream>
 
 #include "data/camera_parameters.h"
 #include "data/tracks.h"
@@ -46,6 +47,20 @@ TEST(CopyRecording, NamesPicturesWhereTheyLie) {
   ASSERT_TRUE(back.cameras[0].images);
   EXPECT_TRUE(fs::equivalent(*back.cameras[0].images, *original.cameras[0].images));
   EXPECT_EQ(back.reference.size(), original.reference.size());
+}
+
+TEST(CopyRecording, TakesItsObstacleAlong) {
+  const test::ScratchFolder elsewhere("copy_obstacle_from"), scratch("copy_obstacle");
+  std::ofstream(elsewhere.path() / "table.obj") << "v 0 0 0.7\nv 1 0 0.7\nv 1 1 0.7\nf 1 2 3\n";
+  Recording original = read_recording(kBundled / "swing_plain");
+  original.obstacle_file = elsewhere.path() / "table.obj";
+
+  write_recording(copy_recording(original, scratch.path()), scratch.path());
+  fs::remove(elsewhere.path() / "table.obj");
+  const Recording back = read_recording(scratch.path());
+
+  ASSERT_TRUE(back.obstacle);
+  EXPECT_EQ(back.obstacle->vertex_m.col(2), Eigen::Vector3d(1, 1, 0.7));
 }
 
 TEST(CopyRecording, GivesCamerasThatShareAFileOneEach) {

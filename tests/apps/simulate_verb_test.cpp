@@ -152,6 +152,46 @@ TEST_F(Simulate, GivesTheSameBytesAgainAndFromItsOwnModelFile) {
   }
 }
 
+TEST_F(Simulate, KeepsTheObstacleBesideTheResult) {
+  fs::create_directories(here_.path() / "scene");
+  std::ofstream(here_.path() / "scene" / "floor.obj")
+      << "v -2 -2 0.6\nv 2 -2 0.6\nv 2 2 0.6\nv -2 2 0.6\nf 1 2 3 4\n";
+  const std::string contact =
+      "[{effect: contact_mesh, parameters: {stiffness: 2e4, damping: 20, friction: 0.3}}]";
+  write(model_text("[]", contact, "obstacle: scene/floor.obj\n"));
+  fs::create_directories(here_.path() / "far");
+  const std::string there = (here_.path() / "far" / "sheet").string();
+
+  const ProgramRun done = run({"sheet.yaml", "--format", "csv", "--out", there});
+
+  ASSERT_EQ(done.exit_code, 0) << done.error;
+  fs::remove_all(here_.path() / "scene");
+  const Recording recording = read_recording(there);
+  ASSERT_TRUE(recording.obstacle);
+  EXPECT_EQ(recording.obstacle->vertex_m.col(2), Eigen::Vector3d(2, 2, 0.6));
+  double lowest_m = 1;
+  for (const Position3d& row : read_tracks3d(*recording.tracks3d, recording.markers))
+    lowest_m = std::min(lowest_m, row.position_m.z());
+  EXPECT_LT(lowest_m, 0.6);  // it touches: its lower edge began at 0.7
+  EXPECT_GT(lowest_m, 0.6 - 0.02);
+  const auto tracks = [&](const fs::path& folder) {
+    std::ifstream in(here_.path() / folder / "tracks3d.csv");
+    return std::string(std::istreambuf_iterator<char>(in), {});
+  };
+  ASSERT_EQ(run({there, "--format", "csv", "--out", "again"}).exit_code, 0);
+  EXPECT_TRUE(tracks("again") == tracks(there));
+}
+
+TEST_F(Simulate, SaysWhenTheClothPassesThroughTheObstacle) {
+  std::ofstream(here_.path() / "floor.obj") << "v -2 -2 0\nv 2 -2 0\nv 2 2 0\nf 1 2 3\n";
+  write(model_text(kCorners, "[]", "obstacle: floor.obj\n"));
+
+  const ProgramRun done = run({"sheet.yaml", "--format", "csv"});
+
+  EXPECT_EQ(done.exit_code, 0);
+  EXPECT_THAT(done.error, HasSubstr("the cloth passes through the obstacle: the effect contact_"));
+}
+
 TEST_F(Simulate, RefusesAStepThatIsNotStableAndNamesOneThatIs) {
   write(model_text(kCorners));
 
@@ -251,6 +291,10 @@ TEST_F(Simulate, RefusesBadInputWithItsPlace) {
   expect_refused({"sheet.yaml"}, "sheet.yaml:5: held[0].at = [0.5, 0] lies outside the cloth; ");
   write(model_text(kCorners, "[{effect: wnid}]"));
   expect_refused({"sheet.yaml"}, "sheet.yaml:6: there is no effect 'wnid'; known effects: ");
+  write(model_text(kCorners, "[{effect: contact_mesh}]"));
+  expect_refused({"sheet.yaml"}, "sheet.yaml:6: effect 'contact_mesh' has no obstacle to touch; ");
+  write(model_text(kCorners, "[]", "obstacle: table.obj\n"));
+  expect_refused({"sheet.yaml"}, "sheet.yaml:9: obstacle = table.obj: there is no such file; ");
 
   write(model_text(kCorners));
   expect_refused({"sheet.yaml", "--set", "shear=-1"}, "shear: -1 N/m; 0 or more");

@@ -9,6 +9,7 @@
 #include "data/camera_parameters.h"
 #include "data/fit_result.h"
 #include "data/model_description.h"
+#include "data/obj_mesh.h"
 #include "data/recording.h"
 #include "data/tracks.h"
 #include "tests/data/expect_refused.h"
@@ -171,6 +172,22 @@ TEST(DamagedModel, IsReadOrRefused) {
 
   EXPECT_GT(refused, 500);
   EXPECT_LT(refused, 2000);
+}
+
+TEST(DamagedSurface, IsReadOrRefused) {
+  const TemporaryFolder folder;
+  const std::string text =
+      "o table\nv 0 0 0.7\nv 1.5e0 0 0.7\nv 1.5 1 0.7\nv 0 1 0.7\nvn 0 0 1\n"
+      "f 1//1 2//1 3//1 4//1\nf -1 -2 -4\n";
+
+  const int refused = refusals(text, 4000, [&](const std::string& damaged) {
+    const SurfaceMesh mesh = read_obj(folder.write("table.obj", damaged));
+    EXPECT_GE(mesh.triangle.minCoeff(), 0);
+    EXPECT_LT(mesh.triangle.maxCoeff(), mesh.vertex_m.cols());
+  });
+
+  EXPECT_GT(refused, 250);
+  EXPECT_LT(refused, 4000);
 }
 
 }  // namespace

@@ -41,7 +41,8 @@ inline const std::string kFullRecording =
     "declared:\n"                                                                           // 31
     "  - {effect: wind, parameters: {q: [0.0, 0.25, 0.0], c: 0.5}}\n"                       // 32
     "  - effect: viscous_damping\n"                                                         // 33
-    "held_out: {from_frame: 2}\n";                                                          // 34
+    "held_out: {from_frame: 2}\n"                                                           // 34
+    "obstacle: scene/table.obj\n";                                                          // 35
 
 /// Writes that recording with every file it names.
 inline void write_full_recording(const TemporaryFolder& folder) {
@@ -57,6 +58,7 @@ inline void write_full_recording(const TemporaryFolder& folder) {
   folder.write("reference.csv", "point,x,y,z\nnail,1,2,3\n");
   folder.write("tool.csv", "time,x,y,z,qw,qx,qy,qz\n0,1,2,3,1,0,0,0\n");
   folder.write("clouds/000000.csv", "not read here");
+  folder.write("scene/table.obj", "v 0 0 0.7\nv 1 0 0.7\nv 1 1 0.7\nf 1 2 3\n");
   folder.write("held/right.csv", "time,x,y,z\n0,1,2,3\n");
 }
 

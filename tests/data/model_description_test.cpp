@@ -39,6 +39,7 @@ effects:
 start: {kind: at_rest, position: [0.1, 0.2, 1.0], orientation: [0.6, 0.8, 0.0, 0.0]}
 time: {frame_rate: 50.0, duration: 0.7}
 time_step: 0.0005
+obstacle: scene/table.obj
 )";
 
 class ModelFile : public testing::Test {
@@ -46,6 +47,7 @@ class ModelFile : public testing::Test {
   const TemporaryFolder folder_;
   void SetUp() override {
     folder_.write("right.csv", "time,x,y,z\n0,0,0,1\n0.5,0.1,0,1\n1,0,0,1\n");
+    folder_.write("scene/table.obj", "v 0 0 0.7\nv 1 0 0.7\nv 1 1 0.7\nv 0 1 0.7\nf 1 2 3 4\n");
   }
 
   ModelDescription read(const std::string& text) const {
@@ -93,6 +95,9 @@ TEST_F(ModelFile, HoldsEveryKeyOfTheFormat) {
   ASSERT_EQ(model.frame_time_s.size(), 36u);  // 0.7 * 50 is a little below 35 in binary
   EXPECT_EQ(model.frame_time_s.back(), 0.7);
   EXPECT_EQ(model.time_step_s, 0.0005);
+  ASSERT_TRUE(model.obstacle);
+  EXPECT_EQ(model.obstacle->vertex_m.col(1), Eigen::Vector3d(1, 0, 0.7));
+  EXPECT_EQ(model.obstacle->triangle.cols(), 2);
 }
 
 TEST_F(ModelFile, NeedsLittle) {
@@ -107,6 +112,7 @@ TEST_F(ModelFile, NeedsLittle) {
   EXPECT_TRUE(model.held.empty());
   EXPECT_FALSE(model.time_step_s);
   EXPECT_EQ(model.strain_limit, StrainLimitKind::off);
+  EXPECT_FALSE(model.obstacle);
 }
 
 TEST_F(ModelFile, OfTheDocumentsIsOne) {
@@ -126,6 +132,7 @@ TEST_F(ModelFile, ReadsBackAsWrittenToTheLastBit) {
   model.fabric["shear"] = 1.0 / 3;
   model.sheet.orientation = Eigen::Quaterniond(0.1, 0.2, 0.3, 0.4).normalized();
   model.held[1].path.position_m[0].x() = std::numeric_limits<double>::denorm_min();
+  model.obstacle->vertex_m(2, 3) = 1.0 / 3;
 
   std::filesystem::create_directories(folder_ / "out");
   write_model(model, folder_ / "out");
@@ -147,6 +154,9 @@ TEST_F(ModelFile, ReadsBackAsWrittenToTheLastBit) {
   EXPECT_EQ(again.held[1].path.time_s, model.held[1].path.time_s);
   EXPECT_EQ(again.held[1].path.position_m, model.held[1].path.position_m);
   EXPECT_EQ(again.held[2].point.edge, model.held[2].point.edge);
+  ASSERT_TRUE(again.obstacle);
+  EXPECT_EQ(again.obstacle->vertex_m, model.obstacle->vertex_m);
+  EXPECT_EQ(again.obstacle->triangle, model.obstacle->triangle);
   EXPECT_EQ(again.effects[0].parameters, model.effects[0].parameters);
   EXPECT_EQ(again.start, model.start);
 }
@@ -176,6 +186,20 @@ TEST_F(ModelFile, KeepsUnevenTimes) {
   write_model(model, folder_ / "out");
 
   EXPECT_EQ(read_model(folder_ / "out" / "model.yaml").frame_time_s, model.frame_time_s);
+}
+
+TEST_F(ModelFile, IsWholeInAFolderThatIsMovedAway) {
+  std::filesystem::create_directories(folder_ / "out");
+  write_model(read(kModel), folder_ / "out");
+
+  std::filesystem::create_directories(folder_ / "far/away");
+  std::filesystem::rename(folder_ / "out", folder_ / "far/away/out");
+  std::filesystem::remove_all(folder_ / "scene");
+  std::filesystem::remove(folder_ / "right.csv");
+
+  const ModelDescription model = read_model(folder_ / "far/away/out/model.yaml");
+  EXPECT_EQ(model.obstacle->vertex_m.col(1), Eigen::Vector3d(1, 0, 0.7));
+  EXPECT_EQ(model.held[1].path.position_m.size(), 3u);
 }
 
 TEST_F(ModelFile, IsRefusedWithFileAndLine) {
@@ -209,7 +233,18 @@ TEST_F(ModelFile, IsRefusedWithFileAndLine) {
   expect_refused_with("duration: 0.7", "duration: 1e9", "model.yaml:22: time.duration = ");
   expect_refused_with("duration: 0.7", "file: right.csv", "model.yaml:22: time has both ");
   expect_refused_with("time_step: 0.0005", "time_step: 0", "model.yaml:23: time_step = 0; ");
+  expect_refused_with("scene/table.obj", "scene/tabel.obj",
+                      "model.yaml:24: obstacle = scene/tabel.obj: there is no such file; ");
+  expect_refused_with("scene/table.obj", "scene",
+                      "model.yaml:24: obstacle = scene: there is no such file; ");
   expect_refused_with("clothfit-model/1", "clothfit-recording/1", "model.yaml:1: ");
+}
+
+TEST_F(ModelFile, IsRefusedWhereItsObstacleIsNoSurface) {
+  folder_.write("scene/table.obj", "");
+  expect_refused(folder_, "scene/table.obj: no faces; ", [&] { read(kModel); });
+  folder_.write("scene/table.obj", "v 0 0 0.7\nv 1 0 0.7\nf 1 2 3\n");
+  expect_refused(folder_, "scene/table.obj:3: corner `3`; ", [&] { read(kModel); });
 }
 
 TEST_F(ModelFile, IsRefusedWithoutAnyStiffness) {

@@ -3,6 +3,8 @@
 
 #include "data/obj_mesh.h"
 
+#include <limits>
+
 #include "tests/data/expect_refused.h"
 
 namespace clothfit {
@@ -46,6 +48,21 @@ TEST(ObjMesh, CutsFacesAndCountsBackwards) {
   EXPECT_EQ(mesh.triangle.col(2), Eigen::Vector3i(0, 1, 4));
 }
 
+TEST(ObjMesh, ReadsBackAsWrittenToTheLastBit) {
+  const TemporaryFolder folder;
+  SurfaceMesh mesh{Eigen::Matrix3Xd(3, 4), Eigen::Matrix3Xi(3, 2)};
+  mesh.vertex_m << 0, 1.0 / 3, 1e-300, -1e6,  //
+      0, 0, 0.1 + 0.2, 1,                     //
+      std::numeric_limits<double>::denorm_min(), -0.7, 0.7, 2;
+  mesh.triangle << 0, 3, 1, 2, 2, 0;
+
+  write_obj(mesh, folder / "body.obj");
+  const SurfaceMesh again = read_obj(folder / "body.obj");
+
+  EXPECT_EQ(again.vertex_m, mesh.vertex_m);
+  EXPECT_EQ(again.triangle, mesh.triangle);
+}
+
 TEST(ObjMesh, RefusesWhatIsNoSurface) {
   const TemporaryFolder folder;
   const auto refused = [&](const std::string& text, const std::string& beginning) {
@@ -57,7 +74,9 @@ TEST(ObjMesh, RefusesWhatIsNoSurface) {
   refused(corners, "body.obj: no faces");
   refused("v 0 0\n", "body.obj:1: coordinate ``");
   refused("v 0 0 nan\n", "body.obj:1: coordinate `nan`");
+  refused("v 0 0 2e6\n", "body.obj:1: coordinate `2e6`; metres, 1e+06 at most");
   refused("\nv 0 one 0\n", "body.obj:2: coordinate `one`");
+  refused(corners + "f 1 2 2\n", "body.obj: no face has an area");
   refused(corners + "f 1 2\n", "body.obj:4: a face with 2 corners");
   for (const char* corner : {"0", "4", "-4", "x", "1.5", "/1", "99999999999"})
     refused(corners + "f 1 2 " + corner + "\n", "body.obj:4: corner `" + std::string(corner) + "`");

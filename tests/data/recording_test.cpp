@@ -69,6 +69,11 @@ void expect_same(const Recording& a, const Recording& b) {
     EXPECT_EQ(a.clouds->camera, b.clouds->camera);
     EXPECT_EQ(a.clouds->folder, b.clouds->folder);
   }
+  EXPECT_EQ(a.obstacle_file, b.obstacle_file);
+  ASSERT_EQ(a.obstacle.has_value(), b.obstacle.has_value());
+  if (a.obstacle) {
+    EXPECT_EQ(a.obstacle->vertex_m, b.obstacle->vertex_m);
+  }
   ASSERT_EQ(a.held.size(), b.held.size());
   for (std::size_t i = 0; i < a.held.size(); ++i) {
     EXPECT_EQ(a.held[i].at_m, b.held[i].at_m);
@@ -133,6 +138,9 @@ TEST(Recording, HoldsEveryKeyOfTheFormat) {
   EXPECT_EQ(recording.declared[0].parameters.at("c"), std::vector<double>{0.5});
   EXPECT_TRUE(recording.declared[1].parameters.empty());
   EXPECT_EQ(recording.held_out_from_frame, 2);
+  EXPECT_EQ(recording.obstacle_file, folder / "scene/table.obj");
+  ASSERT_TRUE(recording.obstacle);
+  EXPECT_EQ(recording.obstacle->vertex_m.col(2), Eigen::Vector3d(1, 1, 0.7));
 }
 
 TEST(Recording, NeedsLittle) {
@@ -147,6 +155,8 @@ TEST(Recording, NeedsLittle) {
   EXPECT_TRUE(recording.cameras.empty());
   EXPECT_TRUE(recording.held.empty());
   EXPECT_EQ(recording.held_out_from_frame, std::nullopt);
+  EXPECT_EQ(recording.obstacle_file, std::nullopt);
+  EXPECT_FALSE(recording.obstacle);
   EXPECT_EQ(recording.frame_time_s(30), 0.5);
 }
 
@@ -231,7 +241,7 @@ TEST(Recording, IsWrittenInTheStyleOfTheFormat) {
         "  - {at: [0.4, 0], motion: path, file: held/right.csv}\n",
         "  - {edge: bottom, motion: fixed}\n",
         "  - {effect: wind, parameters: {c: 0.5, q: [0, 0.25, 0]}}\n",
-        "held_out: {from_frame: 2}\n"}) {
+        "obstacle: scene/table.obj\n", "held_out: {from_frame: 2}\n"}) {
     EXPECT_THAT(text, testing::HasSubstr(line));
   }
 }
@@ -363,6 +373,8 @@ TEST(Recording, IsRefusedWithFileAndLine) {
       {"from_frame: 2", "from: 2", ":34: unknown key `from` in held_out; known are `from_frame`"},
       {"held_out: {from_frame: 2}", "held_out: {from_frame: 2", ":35: not YAML: "},
       {"held_out: {from_frame: 2}", "\theld_out: 2", ":34: not YAML: "},
+      {"scene/table.obj", "table.obj", ":35: obstacle = table.obj: there is no such file; a file"},
+      {"scene/table.obj", "scene", ":35: obstacle = scene: there is no such file; a file"},
   };
   const TemporaryFolder folder;
   write_full_recording(folder);
@@ -384,6 +396,8 @@ TEST(Recording, IsRefusedWhereATableItNamesIsWrong) {
       {"times.csv", "frame,time\n0,1\n1,1\n", "times.csv:3: time = `1` after `1`; numbers that"},
       {"times.csv", "frame,time\n", "times.csv: the table holds no times"},
       {"reference.csv", "point,x,y\n", "reference.csv:1: column `z` is missing"},
+      {"scene/table.obj", "", "scene/table.obj: no faces; a surface of triangles"},
+      {"scene/table.obj", "v 0 0 x\n", "scene/table.obj:1: coordinate `x`; a vertex is three"},
   };
   for (const Case& test : cases) {
     const TemporaryFolder folder;

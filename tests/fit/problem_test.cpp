@@ -202,6 +202,13 @@ TEST(Problem, RefusesWhatCannotBeFitted) {
   EXPECT_THAT(refusal([&] { problem_of(good, {.effects = {"viscous_dampign"}}); }),
               testing::AllOf(HasSubstr("known effects: "), HasSubstr(", viscous_damping")));
 
+  EXPECT_THAT(refusal([&] { problem_of(good, {.effects = {"contact_mesh"}}); }),
+              HasSubstr("--effect: effect 'contact_mesh' has no obstacle to touch; the key "));
+  FitInput no_obstacle = good;
+  no_obstacle.recording.declared = {{.name = "contact_mesh", .parameters = {}, .line = 12}};
+  EXPECT_THAT(refusal([&] { problem_of(no_obstacle); }),
+              HasSubstr("recording.yaml:12: effect 'contact_mesh' has no obstacle to touch; "));
+
   FitInput wrong_parameter = good;
   wrong_parameter.recording.declared = {
       {.name = "viscous_damping", .parameters = {{"ratio", {1.5}}}}};

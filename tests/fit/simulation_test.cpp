@@ -9,6 +9,7 @@
 #include "data/input_error.h"
 #include "model/simulate.h"
 #include "model/stability.h"
+#include "tests/data/temporary_folder.h"
 #include "tests/fit/synthetic_cloth.h"
 
 namespace clothfit {
@@ -132,6 +133,54 @@ TEST(Simulation, LimitsStrainWhereTheModelSays) {
   }
 }
 
+TEST(Simulation, RestsOnTheObstacleThatAModelFileNames) {
+  // Given a table 0.7 m high, and a sheet let go level 1 cm above it
+  const TemporaryFolder folder;
+  folder.write("scene/table.obj",
+               "v -1 -1 0.5\nv 1 -1 0.5\nv 1 1 0.5\nv -1 1 0.5\n"
+               "v -1 -1 0.7\nv 1 -1 0.7\nv 1 1 0.7\nv -1 1 0.7\n"
+               "f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n");
+  const std::string falling =
+      "format: clothfit-model/1\nname: sheet\n"
+      "cloth: {size: [0.3, 0.4], mass: 0.024, mesh: {columns: 7, rows: 9}}\n"
+      "fabric: {tension_warp: 20, tension_weft: 20, shear: 10, flexion_warp: 5, flexion_weft: 5, "
+      "damping_warp: 1e-3, damping_weft: 1e-3}\n"
+      "start: {kind: released_flat, position: [0, 0, 0.71]}\n"
+      "time: {frame_rate: 50, duration: 1}\nobstacle: scene/table.obj\n";
+  const auto heights_m = [&](const std::string& text) -> Eigen::VectorXd {
+    const Simulation simulation = make_simulation(read_model(folder.write("sheet.yaml", text)));
+    const SimulateResult result = run(simulation, 2e-4);
+    EXPECT_TRUE(result.usable());
+    return result.position_m.back().row(2);
+  };
+
+  // When it may touch the table, and when it may not
+  const Eigen::VectorXd resting = heights_m(falling +
+                                            "effects: [{effect: contact_mesh, parameters: "
+                                            "{stiffness: 2e4, damping: 60, friction: 0.3}}]");
+  const Eigen::VectorXd passing = heights_m(falling);
+
+  // Then every vertex sinks in until its area's push, k A depth, carries its mass: 0.1 mm. After a
+  // second less than rounding is left of the bounce.
+  const double depth_m = 0.024 / (0.3 * 0.4) * 9.81 / 2e4;
+  EXPECT_LT((resting.array() - (0.7 - depth_m)).abs().maxCoeff(), 1e-12);
+  EXPECT_LT(passing.maxCoeff(), 0.71 - 0.5 * 9.81);
+}
+
+TEST(Simulation, RefusesContactWithAMeshWithoutAnObstacle) {
+  ModelDescription model = small_model();
+  model.file = "m.yaml";
+  model.effects = {{.name = "contact_mesh", .parameters = {{"stiffness", {1e4}}}, .line = 7}};
+
+  try {
+    make_simulation(model);
+    ADD_FAILURE() << "accepted";
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), testing::StartsWith("m.yaml:7: effect 'contact_mesh' has no obstacle "
+                                                  "to touch; the key `obstacle: FILE.obj`"));
+  }
+}
+
 TEST(Simulation, OfADescribedFitIsTheFitsOwn) {
   for (const double tilt : {0.0, 0.01}) {
     SCOPED_TRACE(tilt);
@@ -160,6 +209,37 @@ TEST(Simulation, OfADescribedFitIsTheFitsOwn) {
     EXPECT_LT(largest_difference_m(result.position_m, own), 1e-9);
     EXPECT_GT((own.back() - own.front()).norm(), 0.1);
   }
+}
+
+TEST(Simulation, OfADescribedFitTouchesTheRecordingsObstacle) {
+  // Given a cloth that swings from y > 0 towards a wall at y = -0.02 m
+  constexpr double kWall_m = -0.02;
+  FitInput input = synthetic_input({});
+  SurfaceMesh wall{Eigen::Matrix3Xd(3, 4), Eigen::Matrix3Xi(3, 2)};
+  wall.vertex_m << -1, 1, 1, -1,  //
+      kWall_m, kWall_m, kWall_m, kWall_m, -1, -1, 1, 1;
+  wall.triangle << 0, 0, 3, 2, 2, 1;
+  input.recording.obstacle = wall;
+  const FitProblem problem = make_problem(input, {.effects = {"contact_mesh"}}, 9, 9);
+  Eigen::VectorXd values = problem.space.start();
+  const auto rearmost_m = [&](double stiffness_pa_per_m) {
+    values[problem.space.index("contact_mesh.stiffness")] = stiffness_pa_per_m;
+    const double time_step_s =
+        0.5 * stable_time_step_s(problem.cloth, parameter_set(problem, values));
+    const auto own = run_model(problem, {values}, problem.frames(), time_step_s).front();
+    const Simulation simulation = make_simulation(describe_model(problem, input.recording, values));
+    // As above, where the sheet's pose is rounded.
+    EXPECT_LT(largest_difference_m(run(simulation, time_step_s).position_m, own), 1e-9);
+    double rearmost = 0;
+    for (const Eigen::Matrix3Xd& position_m : own)
+      rearmost = std::min(rearmost, position_m.row(1).minCoeff());
+    return rearmost;
+  };
+  for (const char* name : {"contact_mesh.damping", "contact_mesh.friction"})
+    values[problem.space.index(name)] = 0;
+
+  EXPECT_LT(rearmost_m(0), kWall_m - 0.05);
+  EXPECT_GT(rearmost_m(2e4), kWall_m - 0.01);
 }
 
 TEST(Simulation, StartsAtRestWhereTheModelSays) {

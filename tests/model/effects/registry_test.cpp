@@ -64,7 +64,7 @@ TEST(EffectRegistry, ContactWithAMeshIsRefusedWithoutOne) {
     FAIL() << "it would do nothing without a word";
   } catch (const InputError& error) {
     EXPECT_NE(std::string(error.what()).find("recording.yaml:7"), std::string::npos);
-    EXPECT_NE(std::string(error.what()).find("obstacle"), std::string::npos);
+    EXPECT_NE(std::string(error.what()).find("`obstacle: FILE.obj`"), std::string::npos);
   }
   EXPECT_TRUE(cloth.effects.empty());
 }
