@@ -278,7 +278,7 @@ TEST_F(Simulate, SaysHowTheStrainLimitWasKept) {
     const bool one_sweep = mode != "consistent";
     EXPECT_EQ(limit["largest_excess"].get<double>() > 0.01, one_sweep);
     EXPECT_EQ(
-        done.error.find("where the strain limit allows 0.1 %: one sweep") != std::string::npos,
+        done.error.find("where the strain limit allows 0.100 %: one sweep") != std::string::npos,
         one_sweep);
     if (!one_sweep) {
       EXPECT_LE(limit["largest_excess"].get<double>(), 1e-3 + 1e-9);
