@@ -86,12 +86,12 @@ void for_vertices(const EffectScene<L>& scene, const Visit& visit) {
   }
 }
 
-/// Dual numbers over what a vertex law depends on: position, velocity, area, gravity, mass,
-/// then `more` numbers, then the effect's parameters.
+/// Dual numbers over what a vertex law depends on: position, velocity, area, gravity, then
+/// `more` numbers, then the effect's parameters. The mass stands apart (MassDual): many laws do not
+/// look at it, and a vector of derivatives of odd length costs a third more.
 template <int more, int parameters>
 struct VertexDual {
-  static constexpr int kMass = 12, kMore = 13, kParameters = kMore + more;
-  static constexpr int kCount = kParameters + parameters;
+  static constexpr int kMore = 12, kParameters = 12 + more, kCount = kParameters + parameters;
   using Number = ceres::Jet<double, kCount>;
 
   static Vector3<Number> vector(const Vector3<double>& v, int first) {
@@ -102,7 +102,7 @@ struct VertexDual {
             .velocity_m_per_s = vector(at.velocity_m_per_s, 3),
             .area_m2 = vector(at.area_m2, 6),
             .gravity_m_per_s2 = vector(at.gravity_m_per_s2, 9),
-            .mass_kg = Number(at.mass_kg, kMass),
+            .mass_kg = Number(at.mass_kg),
             .flat_area_m2 = at.flat_area_m2,
             .s = at.s,
             .t = at.t,
@@ -153,9 +153,39 @@ struct VertexDual {
       if (!j.col(column).isZero(0))
         derivatives.by_parameter.push_back({k, parameter, j.col(column)});
     };
-    if (!j.col(kMass).isZero(0)) derivatives.by_mass.push_back({k, j.col(kMass)});
     for (int axis = 0; axis < 3; ++axis) add_column(ParameterNumber::gravity(axis), 9 + axis);
     for (int p = 0; p < parameters; ++p) add_column(ParameterNumber::own(p), kParameters + p);
+  }
+};
+
+/// Dual numbers over a vertex's mass.
+struct MassDual {
+  using Number = ceres::Jet<double, 1>;
+
+  static Vector3<Number> constant(const Vector3<double>& v) {
+    return {Number(v.x), Number(v.y), Number(v.z)};
+  }
+  static VertexSight<Number> sight(const VertexSight<double>& at) {
+    return {.position_m = constant(at.position_m),
+            .velocity_m_per_s = constant(at.velocity_m_per_s),
+            .area_m2 = constant(at.area_m2),
+            .gravity_m_per_s2 = constant(at.gravity_m_per_s2),
+            .mass_kg = Number(at.mass_kg, 0),
+            .flat_area_m2 = at.flat_area_m2,
+            .s = at.s,
+            .t = at.t,
+            .mesh = at.mesh,
+            .time_s = at.time_s};
+  }
+  template <int parameters>
+  static std::array<Number, parameters> parameters_of(const EffectValues<SingleLane>& values) {
+    std::array<Number, parameters> result;
+    for (size_t p = 0; p < parameters; ++p) result[p] = Number(values[p][0]);
+    return result;
+  }
+  static void add_block(int k, const Vector3<Number>& v, EffectLinearisation& derivatives) {
+    const Eigen::Vector3d derivative(v.x.v[0], v.y.v[0], v.z.v[0]);
+    if (!derivative.isZero(0)) derivatives.by_mass.push_back({k, derivative});
   }
 };
 
@@ -182,10 +212,12 @@ class VertexLawEffect final : public LawEffect<VertexLawEffect<Law>, Law> {
                        EffectLinearisation& derivatives) const override {
     using Dual = VertexDual<0, Law::kParameters>;
     const auto p = Dual::parameters_of(parameters);
+    const auto fixed = MassDual::parameters_of<Law::kParameters>(parameters);
     for_vertices<SingleLane>(
         scene, [&](int k, const AreaStencil& area, const VertexSight<double>& sight) {
           Dual::add_blocks(k, area, scene.position_m,
                            Dual::jacobian(Law::force(Dual::sight(sight), p)), derivatives);
+          MassDual::add_block(k, Law::force(MassDual::sight(sight), fixed), derivatives);
         });
   }
 };
@@ -215,13 +247,17 @@ class InertiaLawEffect final : public LawEffect<InertiaLawEffect<Law>, Law> {
                         EffectLinearisation& derivatives) const override {
     using Dual = VertexDual<3, Law::kParameters>;
     const auto p = Dual::parameters_of(parameters);
-    for_vertices<SingleLane>(
-        scene, [&](int k, const AreaStencil& area, const VertexSight<double>& sight) {
-          const auto force = Dual::vector(vector_at<SingleLane>(force_n, k), Dual::kMore);
-          const auto j = Dual::jacobian(Law::change(Dual::sight(sight), force, p));
-          Dual::add_blocks(k, area, scene.position_m, j, derivatives);
-          derivatives.by_force.push_back({k, j.template middleCols<3>(Dual::kMore)});
-        });
+    const auto fixed = MassDual::parameters_of<Law::kParameters>(parameters);
+    for_vertices<SingleLane>(scene, [&](int k, const AreaStencil& area,
+                                        const VertexSight<double>& sight) {
+      const Vector3<double> force_at = vector_at<SingleLane>(force_n, k);
+      const auto force = Dual::vector(force_at, Dual::kMore);
+      const auto j = Dual::jacobian(Law::change(Dual::sight(sight), force, p));
+      MassDual::add_block(
+          k, Law::change(MassDual::sight(sight), MassDual::constant(force_at), fixed), derivatives);
+      Dual::add_blocks(k, area, scene.position_m, j, derivatives);
+      derivatives.by_force.push_back({k, j.template middleCols<3>(Dual::kMore)});
+    });
   }
 };
 

@@ -371,7 +371,7 @@ int run(const std::string& targets_path, int turns) {
 int main(int argc, char** argv) {
   CLI::App app{"How fast a time step is beside Bullet's soft body"};
   std::string targets_path;
-  int turns = 30;
+  int turns = 300;
   app.add_option("--targets", targets_path, "file for the table of targets (clothfit-targets/1)");
   app.add_option("--turns", turns, "how often everything is timed")->check(CLI::PositiveNumber);
   app.allow_extras();  // what `./run bench` is given is for Google Benchmark too
