@@ -4,13 +4,12 @@
 #include <cassert>
 #include <cmath>
 #include <cstdint>
-#include <numbers>
 #include <optional>
-#include <random>
 #include <sstream>
 #include <utility>
 
 #include "data/input_error.h"
+#include "fit/draws.h"
 
 namespace clothfit {
 namespace {
@@ -24,63 +23,11 @@ std::string number(double value) {
   return text.str();
 }
 
-/// One round of splitmix64: neighbouring inputs give unrelated outputs.
-std::uint64_t splitmix64(std::uint64_t x) {
-  x += 0x9e3779b97f4a7c15u;
-  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
-  x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
-  return x ^ (x >> 31);
-}
-
-/// The random numbers of one new individual. The standard fixes what the engine returns but leaves
-/// the distributions to the library, so the mappings are written out here.
-class Draws {
- public:
-  Draws(std::uint64_t seed, int generation, int place)
-      : engine_(splitmix64(splitmix64(splitmix64(seed) + static_cast<std::uint64_t>(generation)) +
-                           static_cast<std::uint64_t>(place))) {}
-
-  /// Uniform in [0, 1), on the grid of 2^-53.
-  double uniform() { return static_cast<double>(engine_() >> 11) * 0x1p-53; }
-
-  /// Uniform in 0 ... count - 1, to 2^-53.
-  int index(int count) { return static_cast<int>(uniform() * count); }
-
-  /// Standard normal (Box and Muller; the second number is not used).
-  double normal() {
-    const double radius = std::sqrt(-2 * std::log1p(-uniform()));
-    return radius * std::cos(2 * std::numbers::pi * uniform());
-  }
-
- private:
-  std::mt19937_64 engine_;
-};
-
-/// Place of a value in its range, 0 at the lower end, 1 at the upper.
-double fraction_of_range(const SearchParameter& parameter, double value) {
-  if (!parameter.log_scale) return (value - parameter.lower) / (parameter.upper - parameter.lower);
-  return std::log(value / parameter.lower) / std::log(parameter.upper / parameter.lower);
-}
-
-double value_at(const SearchParameter& parameter, double fraction) {
-  const double value =
-      parameter.log_scale
-          ? parameter.lower * std::exp(fraction * std::log(parameter.upper / parameter.lower))
-          : parameter.lower + fraction * (parameter.upper - parameter.lower);
-  return std::clamp(value, parameter.lower, parameter.upper);
-}
-
-/// Folds the real line onto [0, 1] as between two mirrors.
-double reflect(double x) {
-  x = std::fmod(std::abs(x), 2.0);
-  return x > 1 ? 2 - x : x;
-}
-
 Individual random_individual(const std::vector<SearchParameter>& parameters, Draws& draws) {
   Individual individual;
   individual.values.resize(static_cast<Eigen::Index>(parameters.size()));
   for (std::size_t p = 0; p < parameters.size(); ++p) {
-    individual.values(static_cast<Eigen::Index>(p)) = value_at(parameters[p], draws.uniform());
+    individual.values(static_cast<Eigen::Index>(p)) = parameters[p].value_at(draws.uniform());
   }
   return individual;
 }
@@ -112,11 +59,11 @@ Individual mutated_individual(const std::vector<SearchParameter>& parameters,
   double& value = individual.values(chosen);
   switch (options.mutation) {
     case MutationLaw::redraw:
-      value = value_at(parameter, draws.uniform());
+      value = parameter.value_at(draws.uniform());
       break;
     case MutationLaw::gaussian:
-      value = value_at(parameter, reflect(fraction_of_range(parameter, value) +
-                                          options.mutation_step * draws.normal()));
+      value = parameter.value_at(
+          reflected(parameter.fraction(value) + options.mutation_step * draws.normal()));
       break;
   }
   return individual;
@@ -158,23 +105,6 @@ void evaluate_and_rank(const GenerationCost& cost, std::size_t first_new, Evolut
   std::stable_sort(state.population.begin(), state.population.end(),
                    [](const Individual& a, const Individual& b) { return a.cost < b.cost; });
   state.best_cost.push_back(state.population.front().cost);
-}
-
-void validate_parameters(const std::vector<SearchParameter>& parameters) {
-  if (parameters.empty()) {
-    throw InputError("search", "no parameter to search", "at least one");
-  }
-  for (const SearchParameter& parameter : parameters) {
-    const std::string range =
-        "range [" + number(parameter.lower) + ", " + number(parameter.upper) + "]";
-    if (!std::isfinite(parameter.lower) || !std::isfinite(parameter.upper) ||
-        !(parameter.lower < parameter.upper)) {
-      throw InputError(parameter.name, range, "a finite lower end below a finite upper end");
-    }
-    if (parameter.log_scale && !(parameter.lower > 0)) {
-      throw InputError(parameter.name, range, "a logarithmic scale needs a lower end above 0");
-    }
-  }
 }
 
 /// Share of itself by which the best cost fell over the last `window` generations.
@@ -281,7 +211,7 @@ EvolutionState first_generation(const std::vector<SearchParameter>& parameters,
                                 const EvolutionOptions& options, const GenerationCost& cost,
                                 const std::vector<Eigen::VectorXd>& given) {
   options.validate();
-  validate_parameters(parameters);
+  require_ranges(parameters);
   assert(static_cast<int>(given.size()) <= options.population);
 
   EvolutionState state;
@@ -327,7 +257,7 @@ EvolutionResult resume_evolution(const std::vector<SearchParameter>& parameters,
                                  const EvolutionOptions& options, const GenerationCost& cost,
                                  EvolutionState state, const ProgressCallback& progress) {
   options.validate();
-  validate_parameters(parameters);
+  require_ranges(parameters);
   assert(!state.population.empty());
 
   const int new_each = options.population - options.kept_count();

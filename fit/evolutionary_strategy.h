@@ -1,12 +1,12 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <functional>
 #include <limits>
 #include <string>
 #include <vector>
 
 #include "data/progress.h"
+#include "fit/search_parameter.h"
 
 namespace clothfit {
 
@@ -25,19 +25,6 @@ namespace clothfit {
 /// parents; equal costs rank older individuals first; the first generation is uniform over the
 /// ranges. The stopping rules beyond the number of generations follow the paper's own conclusion
 /// that its runs should have been stopped on the cost.
-
-/// A searched parameter and its range.
-struct SearchParameter {
-  std::string name;
-  double lower = 0;
-  double upper = 1;        ///< > lower
-  bool log_scale = false;  ///< draws are uniform in the logarithm; needs lower > 0
-};
-
-/// Costs of `individuals` (parameters x individuals, one column each, within their ranges), one per
-/// column: smaller is better. Whole generations come at once so that they can be simulated in lanes
-/// and threads. A cost that is not finite (the simulation diverged) ranks last.
-using GenerationCost = std::function<Eigen::VectorXd(const Eigen::MatrixXd& individuals)>;
 
 enum class MutationLaw {
   redraw,   ///< uniform over the parameter's range
