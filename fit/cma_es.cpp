@@ -265,8 +265,11 @@ CmaState next_cma_generation(const std::vector<SearchParameter>& parameters,
     Draws draws(options.seed, -1, static_cast<int>(state.optima.size()));
     Eigen::VectorXd mean(n);
     for (double& share : mean) share = draws.uniform();
-    begin_run(mean, static_cast<int>(std::lround(state.population * options.growth)), options,
-              state);
+    // A generation that alone uses up the evaluations is as large as one can be.
+    const double larger =
+        std::min(state.population * options.growth,
+                 static_cast<double>(std::min(options.most_evaluations, 1000000L)));
+    begin_run(mean, std::max(state.population, static_cast<int>(larger)), options, state);
   }
   return state;
 }

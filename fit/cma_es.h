@@ -21,7 +21,7 @@ struct CmaOptions {
   int population = 0;  ///< of the first run; 0: 4 + floor(3 ln n) for n parameters; else >= 4
   double initial_step = 0.3;  ///< standard deviation of the first generation, as a share of ranges
   int restarts = 9;           ///< at most
-  double growth = 2;          ///< of the population from one restart to the next
+  double growth = 2;  ///< of the population from one restart to the next, up to most_evaluations
   long most_evaluations = 100000;  ///< of all runs; the last generation may exceed it
   /// Stops once the best cost is at or below this.
   double cost_below = -std::numeric_limits<double>::infinity();

@@ -222,6 +222,25 @@ TEST(CmaEs, GoesOnFromASavedStateAsIfItHadNotStopped) {
   }
 }
 
+TEST(CmaEs, SearchesOneParameterToo) {
+  for (const unsigned long long seed : kSeeds) {
+    SCOPED_TRACE(seed);
+    EXPECT_EQ(
+        search(ranges(1, -5, 5), {.cost_below = 1e-12, .seed = seed}, one_by_one(sphere)).stop,
+        CmaStop::cost_below);
+  }
+}
+
+TEST(CmaEs, GrowsNoGenerationBeyondTheEvaluationsThatItMayUse) {
+  const CmaOptions options{.restarts = 100, .growth = 10, .most_evaluations = 5000};
+  const CmaResult result =
+      search(ranges(2, 0, 1), options, one_by_one([](const Eigen::VectorXd&) { return INFINITY; }));
+
+  EXPECT_EQ(result.stop, CmaStop::most_evaluations);
+  EXPECT_LE(result.state.population, 5000);
+  EXPECT_LE(result.state.evaluations, 10000);
+}
+
 TEST(CmaEs, StartsWhereItIsToldTo) {
   std::vector<SearchParameter> parameters = ranges(3, 0, 10);
   const CmaState start = start_cma(parameters, {}, Eigen::Vector3d(2, 20, -1));
