@@ -1,13 +1,10 @@
 #include "model/simulate.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cassert>
 #include <cmath>
-#include <type_traits>
 
-#include "model/effects/viscous_damping.h"
+#include "model/lane_groups.h"
 #include "model/step.h"
 
 namespace clothfit {
@@ -36,7 +33,7 @@ class LaneRun {
   void advance(double from_s, double to_s, int steps) {
     const double h = (to_s - from_s) / steps;
     for (int n = 0; n < steps; ++n) {
-      aim_held_points(from_s + (n + 1) * h, 1);
+      aim_held_points(from_s + (n + 1) * h);
       stepper_.step(parameters_, held_target_m_, from_s + n * h, h, state_);
       unmet_ += stepper_.limit_outcome().unmet;
     }
@@ -45,34 +42,16 @@ class LaneRun {
   /// Steps that left the strain limit unmet.
   int unmet_steps(int lane) const { return static_cast<int>(unmet_[lane]); }
 
-  /// Lets `steps` steps pass while time stands still at `time_s`. Held points glide from where they
-  /// are to where they belong over the first fifth: a jump would hit the cloth like a hammer.
-  void settle(double time_s, double time_step_s, int steps) {
-    const LaneVectors<L> from = held_target_m_;
-    for (int n = 0; n < steps; ++n) {
-      held_target_m_ = from;
-      aim_held_points(time_s, std::min(1.0, 5.0 * (n + 1) / steps));
-      stepper_.step(parameters_, held_target_m_, time_s, time_step_s, state_);
-    }
-  }
-
  private:
-  /// Moves the targets of held points that have a motion the share `share` of the way to it.
-  void aim_held_points(double time_s, double share) {
+  void aim_held_points(double time_s) {
     for (size_t h = 0; h < cloth_.held.size(); ++h) {
       if (!cloth_.held[h].motion) continue;
       const Eigen::Vector3d target = cloth_.held[h].motion(time_s);
       const auto column = static_cast<Eigen::Index>(h);
-      const auto move = [share](auto place, double goal) {
-        const auto there = static_cast<typename L::Number>(goal);
-        if (share == 1)
-          place.setConstant(there);
-        else
-          place += static_cast<typename L::Number>(share) * (there - place);
-      };
-      move(held_target_m_.x.col(column), target.x());
-      move(held_target_m_.y.col(column), target.y());
-      move(held_target_m_.z.col(column), target.z());
+      using Number = typename L::Number;
+      held_target_m_.x.col(column).setConstant(static_cast<Number>(target.x()));
+      held_target_m_.y.col(column).setConstant(static_cast<Number>(target.y()));
+      held_target_m_.z.col(column).setConstant(static_cast<Number>(target.z()));
     }
   }
 
@@ -97,27 +76,6 @@ double largest_excess(const Cloth& cloth, const SpringParameters& springs,
     }
   }
   return largest;
-}
-
-/// Calls `run.operator()<L>(group, first)` for every group of parameter sets, in parallel: as many
-/// at once as lanes of a kind hold, a few left over one by one.
-template <class L, class Run>
-void for_lane_groups(std::span<const ParameterSet> parameters, const Run& run) {
-  const size_t whole = parameters.size() / L::kCount, left = parameters.size() % L::kCount;
-  // What all lanes cost is what about this many simulations vectorised over the cloth cost.
-  constexpr size_t kWorthAGroup = std::is_same_v<L, FastLanes> ? 3 : 5;
-  const size_t groups = whole + (left > kWorthAGroup ? 1 : 0);
-  const size_t in_groups = std::min(groups * L::kCount, parameters.size());
-  tbb::parallel_for(size_t{0}, groups + parameters.size() - in_groups, [&](size_t g) {
-    if (g < groups) {
-      const size_t first = g * L::kCount;
-      run.template operator()<L>(
-          parameters.subspan(first, std::min<size_t>(L::kCount, in_groups - first)), first);
-    } else {
-      const size_t first = in_groups + g - groups;
-      run.template operator()<SingleLane>(parameters.subspan(first, 1), first);
-    }
-  });
 }
 
 }  // namespace
@@ -165,6 +123,10 @@ std::vector<SimulateResult> simulate(const Cloth& cloth, std::span<const Paramet
         }
         any_alive = any_alive || result.usable();
         result.position_m.push_back(std::move(now));
+        if (schedule.velocities) {
+          result.velocity_m_per_s.push_back(run.state().velocity_m_per_s.lane(static_cast<int>(l)));
+          if (!result.usable()) result.velocity_m_per_s.back().setConstant(NAN);
+        }
       }
       const bool stop = after_frame && frame + 1 < frames && !after_frame(static_cast<int>(frame));
       if (any_alive && !stop) continue;
@@ -173,6 +135,7 @@ std::vector<SimulateResult> simulate(const Cloth& cloth, std::span<const Paramet
         SimulateResult& result = results[first + l];
         if (result.usable() && frame + 1 < frames) result.reason = StopReason::cancelled;
         result.position_m.resize(frames, none);
+        if (schedule.velocities) result.velocity_m_per_s.resize(frames, none);
       }
       break;
     }
@@ -182,67 +145,6 @@ std::vector<SimulateResult> simulate(const Cloth& cloth, std::span<const Paramet
   else
     for_lane_groups<FastLanes>(parameters, run_group);
   return results;
-}
-
-std::vector<RelaxedCloth> relax(const Cloth& cloth, std::span<const ParameterSet> parameters,
-                                double pendulum_gravity_m_per_s2, double time_s,
-                                double time_step_s) {
-  if (parameters.empty()) return {};
-  constexpr double kPendulumTimes = 7;  // (1 + 7) exp(-7) is left of the distance: 0.7 %
-  const double pendulum_rate =
-      std::sqrt(std::max(pendulum_gravity_m_per_s2, 1e-3) / cloth.mesh.height_m);
-
-  // Supports shift in time, and time stands still here.
-  Cloth heavy = cloth;
-  std::vector<size_t> kept;
-  heavy.effects.clear();
-  heavy.effect_descriptions.clear();
-  for (size_t e = 0; e < cloth.effects.size(); ++e) {
-    if (cloth.effects[e]->shifts_supports()) continue;
-    kept.push_back(e);
-    heavy.effects.push_back(cloth.effects[e]);
-    heavy.effect_descriptions.push_back(cloth.effect_descriptions[e]);
-  }
-  heavy.effect_descriptions.push_back(viscous_damping::describe());
-  heavy.effects.push_back(viscous_damping::make());
-  std::vector<ParameterSet> damped(parameters.begin(), parameters.end());
-  for (size_t n = 0; n < damped.size(); ++n) {
-    damped[n].effects.clear();
-    for (const size_t e : kept) damped[n].effects.push_back(parameters[n].effects[e]);
-    damped[n].effects.push_back({2 * pendulum_rate});
-    damped[n].start_effect_memory.clear();
-    damped[n].start_velocity_m_per_s.resize(3, 0);
-  }
-
-  const double duration_s = kPendulumTimes / pendulum_rate;
-  const int steps = std::max(1, static_cast<int>(std::ceil(duration_s / time_step_s)));
-  std::vector<RelaxedCloth> relaxed(parameters.size());
-  for_lane_groups<ExactLanes>(
-      damped, [&]<class L>(std::span<const ParameterSet> group, size_t first) {
-        LaneRun<L> run(heavy, group);
-        run.settle(time_s, duration_s / steps, steps);
-        for (size_t l = 0; l < group.size(); ++l) {
-          RelaxedCloth& result = relaxed[first + l];
-          result.position_m = run.state().position_m.lane(static_cast<int>(l));
-          for (const std::shared_ptr<const Effect>& effect : cloth.effects)
-            result.effect_memory.emplace_back(Eigen::VectorXd::Zero(effect->memory_size(cloth)));
-          for (size_t k = 0; k < kept.size(); ++k)
-            result.effect_memory[kept[k]] =
-                run.state().effect_memory[k].row(static_cast<Eigen::Index>(l)).matrix();
-        }
-      });
-  return relaxed;
-}
-
-void start_at_rest(const Cloth& cloth, std::span<ParameterSet> parameters,
-                   double pendulum_gravity_m_per_s2, double time_s, double time_step_s) {
-  std::vector<RelaxedCloth> relaxed =
-      relax(cloth, parameters, pendulum_gravity_m_per_s2, time_s, time_step_s);
-  for (size_t n = 0; n < parameters.size(); ++n) {
-    parameters[n].start_position_m = std::move(relaxed[n].position_m);
-    parameters[n].start_effect_memory = std::move(relaxed[n].effect_memory);
-    parameters[n].start_velocity_m_per_s.resize(3, 0);
-  }
 }
 
 }  // namespace clothfit

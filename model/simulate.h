@@ -12,6 +12,7 @@ namespace clothfit {
 struct Schedule {
   std::vector<double> frame_time_s;  ///< rising; the first is the start
   double time_step_s = 0;            ///< at most this; each frame interval is cut into equal steps
+  bool velocities = false;           ///< hand on velocities beside positions
 
   /// Equal steps in the interval that ends at frame `frame` >= 1.
   int substeps(int frame) const;
@@ -28,6 +29,7 @@ struct SimulateResult {
   /// Positions at every frame, 3 x vertices (world, m); NaN from where it diverged or was
   /// cancelled.
   std::vector<Eigen::Matrix3Xd> position_m;
+  std::vector<Eigen::Matrix3Xd> velocity_m_per_s;  ///< the same, where the schedule asks for it
   bool usable() const { return reason == StopReason::reached_end; }
 };
 
@@ -51,29 +53,5 @@ std::vector<SimulateResult> simulate(const Cloth& cloth, std::span<const Paramet
                                      const Schedule& schedule,
                                      Precision precision = Precision::exact,
                                      const FrameCallback& after_frame = {});
-
-/// A cloth that has calmed down.
-struct RelaxedCloth {
-  Eigen::Matrix3Xd position_m;                 ///< 3 x vertices
-  std::vector<Eigen::VectorXd> effect_memory;  ///< as ParameterSet::start_effect_memory
-};
-
-/// The start positions relaxed under gravity with heavy viscous damping, from rest and without
-/// memory, held points where `motion` has them at `time_s`, and what the effects have come to
-/// remember on the way. The damping, critical for a pendulum of the cloth's height, and the fixed
-/// number of steps follow from `pendulum_gravity_m_per_s2`, a length that all sets share (at least
-/// 0.001), so that a shape depends on its own set alone, and smoothly. Of the pendulum's distance
-/// to equilibrium less than a percent is left, of slower motions (folds that open, a cloth that
-/// turns about a single support) more. Supports are where they are without effects that shift them,
-/// which remember nothing.
-std::vector<RelaxedCloth> relax(const Cloth& cloth, std::span<const ParameterSet> parameters,
-                                double pendulum_gravity_m_per_s2, double time_s,
-                                double time_step_s);
-
-/// Lets every set start from rest: relaxed from where it would have started, as relax() does it,
-/// with what its effects have come to remember, and without velocity. The exact minimum of the
-/// energy is not looked for: docs/theory/equilibrium.md says why.
-void start_at_rest(const Cloth& cloth, std::span<ParameterSet> parameters,
-                   double pendulum_gravity_m_per_s2, double time_s, double time_step_s);
 
 }  // namespace clothfit

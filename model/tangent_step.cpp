@@ -64,6 +64,30 @@ DualParameters DualParameters::of(const Cloth& cloth, const ParameterSet& set,
   return p;
 }
 
+LaneState<DualLanes> start_of(const Cloth& cloth, const ParameterSet& set,
+                              std::span<const Direction> directions) {
+  LaneState<DualLanes> state = LaneState<DualLanes>::of(cloth);
+  state.position_m.value.set_lane(0, set.start_position_m);
+  if (set.start_velocity_m_per_s.cols() > 0)
+    state.velocity_m_per_s.value.set_lane(0, set.start_velocity_m_per_s);
+  for (size_t d = 0; d < directions.size(); ++d) {
+    const auto lane = static_cast<int>(d);
+    if (directions[d].start_position_m.cols() > 0)
+      state.position_m.tangent.set_lane(lane, directions[d].start_position_m);
+    if (directions[d].start_velocity_m_per_s.cols() > 0)
+      state.velocity_m_per_s.tangent.set_lane(lane, directions[d].start_velocity_m_per_s);
+  }
+  for (size_t e = 0; e < set.start_effect_memory.size(); ++e)
+    for (Eigen::Index n = 0; n < set.start_effect_memory[e].size(); ++n)
+      state.effect_memory[e](0, n).a = set.start_effect_memory[e][n];
+  for (size_t d = 0; d < directions.size(); ++d)
+    for (size_t e = 0; e < directions[d].start_effect_memory.size(); ++e)
+      for (Eigen::Index n = 0; n < directions[d].start_effect_memory[e].size(); ++n)
+        state.effect_memory[e](0, n).v[static_cast<Eigen::Index>(d)] =
+            directions[d].start_effect_memory[e][n];
+  return state;
+}
+
 TangentStepper::TangentStepper(const Cloth& cloth)
     : cloth_(cloth),
       inverse_mass_per_kg_(cloth.mass_kg.cwiseInverse()),

@@ -40,6 +40,10 @@ struct DualParameters {
                            std::span<const Direction> directions);
 };
 
+/// Where one simulation and its derivatives along at most kLanes directions start.
+LaneState<DualLanes> start_of(const Cloth& cloth, const ParameterSet& set,
+                              std::span<const Direction> directions);
+
 /// Steps one simulation together with its derivatives along kLanes directions: exact for the
 /// discrete scheme, the springs at their strain limit included, where it is smooth. The simulation
 /// itself has the bits that EulerStepper gives it. Holds scratch memory: one object per thread.

@@ -13,25 +13,7 @@ TangentResult run_group(const Cloth& cloth, const ParameterSet& set,
                         std::span<const Direction> directions, const Schedule& schedule) {
   TangentStepper stepper(cloth);
   const DualParameters parameters = DualParameters::of(cloth, set, directions);
-  LaneState<DualLanes> state = LaneState<DualLanes>::of(cloth);
-  state.position_m.value.set_lane(0, set.start_position_m);
-  if (set.start_velocity_m_per_s.cols() > 0)
-    state.velocity_m_per_s.value.set_lane(0, set.start_velocity_m_per_s);
-  for (size_t d = 0; d < directions.size(); ++d) {
-    const auto lane = static_cast<int>(d);
-    if (directions[d].start_position_m.cols() > 0)
-      state.position_m.tangent.set_lane(lane, directions[d].start_position_m);
-    if (directions[d].start_velocity_m_per_s.cols() > 0)
-      state.velocity_m_per_s.tangent.set_lane(lane, directions[d].start_velocity_m_per_s);
-  }
-  for (size_t e = 0; e < set.start_effect_memory.size(); ++e)
-    for (Eigen::Index n = 0; n < set.start_effect_memory[e].size(); ++n)
-      state.effect_memory[e](0, n).a = set.start_effect_memory[e][n];
-  for (size_t d = 0; d < directions.size(); ++d)
-    for (size_t e = 0; e < directions[d].start_effect_memory.size(); ++e)
-      for (Eigen::Index n = 0; n < directions[d].start_effect_memory[e].size(); ++n)
-        state.effect_memory[e](0, n).v[static_cast<Eigen::Index>(d)] =
-            directions[d].start_effect_memory[e][n];
+  LaneState<DualLanes> state = start_of(cloth, set, directions);
   LaneVectors<DualLanes> target_m = stepper.locate(state.position_m);
   const auto aim = [&](double time_s) {
     for (size_t h = 0; h < cloth.held.size(); ++h) {
@@ -55,6 +37,7 @@ TangentResult run_group(const Cloth& cloth, const ParameterSet& set,
 
   TangentResult result;
   result.position_tangent.resize(directions.size());
+  if (schedule.velocities) result.velocity_tangent.resize(directions.size());
   const size_t frames = schedule.frame_time_s.size();
   for (size_t frame = 0; frame < frames; ++frame) {
     if (frame > 0 && result.run.usable()) {
@@ -78,6 +61,15 @@ TangentResult run_group(const Cloth& cloth, const ParameterSet& set,
       if (!result.run.usable()) tangent.setConstant(NAN);
       result.position_tangent[d].push_back(std::move(tangent));
     }
+    if (!schedule.velocities) continue;
+    const auto kept = [&](Eigen::Matrix3Xd values) {
+      if (!result.run.usable()) values.setConstant(NAN);
+      return values;
+    };
+    result.run.velocity_m_per_s.push_back(kept(state.velocity_m_per_s.value.lane(0)));
+    for (size_t d = 0; d < directions.size(); ++d)
+      result.velocity_tangent[d].push_back(
+          kept(state.velocity_m_per_s.tangent.lane(static_cast<int>(d))));
   }
   return result;
 }
@@ -96,8 +88,10 @@ TangentResult simulate_with_tangents(const Cloth& cloth, const ParameterSet& par
         directions.subspan(first, std::min<size_t>(kLanes, directions.size() - first)), schedule);
   });
   TangentResult result = std::move(results.front());
-  for (size_t g = 1; g < groups; ++g)
+  for (size_t g = 1; g < groups; ++g) {
     std::ranges::move(results[g].position_tangent, std::back_inserter(result.position_tangent));
+    std::ranges::move(results[g].velocity_tangent, std::back_inserter(result.velocity_tangent));
+  }
   return result;
 }
 

@@ -12,6 +12,8 @@ struct TangentResult {
   SimulateResult run;
   /// [direction][frame]: derivative of the positions, 3 x vertices; from a diverged frame on NaN.
   std::vector<std::vector<Eigen::Matrix3Xd>> position_tangent;
+  /// The same of the velocities, where the schedule asks for them.
+  std::vector<std::vector<Eigen::Matrix3Xd>> velocity_tangent;
 };
 
 /// Simulates one parameter set together with the derivatives of its positions along every

@@ -13,7 +13,7 @@ namespace clothfit {
 /// Cloth that can turn about the vertical without effort, because it hangs from a single point, is
 /// turned to where it lies closest to its start.
 ///
-/// As relax() of model/simulate.h, but without effects, among which is the wind, and without the
+/// As relax() of model/relax.h, but without effects, among which is the wind, and without the
 /// strain limit. A set whose equilibrium is not found gives the shape that was reached. A result
 /// does not depend on the other sets, their order or the number of threads.
 std::vector<Eigen::Matrix3Xd> rest_shapes(const Cloth& cloth,

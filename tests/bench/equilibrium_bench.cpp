@@ -21,6 +21,7 @@
 
 #include "model/equilibrium/equilibrium.h"
 #include "model/equilibrium/rest_shapes.h"
+#include "model/relax.h"
 #include "model/simulate.h"
 #include "model/stability.h"
 

@@ -3,6 +3,7 @@
 
 #include <benchmark/benchmark.h>
 
+#include "model/relax.h"
 #include "model/simulate.h"
 #include "model/stability.h"
 #include "tests/bench/swinging_cloth.h"

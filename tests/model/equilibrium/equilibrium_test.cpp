@@ -12,6 +12,7 @@
 #include <numbers>
 
 #include "data/input_error.h"
+#include "model/relax.h"
 #include "model/simulate.h"
 #include "model/stability.h"
 #include "tests/model/random_cloth.h"

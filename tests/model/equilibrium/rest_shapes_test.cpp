@@ -7,6 +7,7 @@
 #include <tbb/global_control.h>
 
 #include "model/equilibrium/equilibrium.h"
+#include "model/relax.h"
 #include "model/simulate.h"
 #include "model/stability.h"
 #include "tests/model/random_cloth.h"

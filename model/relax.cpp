@@ -1,0 +1,219 @@
+#include "model/relax.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "model/effects/viscous_damping.h"
+#include "model/lane_groups.h"
+#include "model/step.h"
+
+namespace clothfit {
+namespace {
+
+/// A cloth in heavy air: that of `cloth`, its own effects but those that shift supports (they shift
+/// in time, and time stands still here), and a viscous damping on top.
+struct HeavyAir {
+  Cloth cloth;
+  std::vector<size_t> kept;  ///< effects of the cloth, in the order they have here
+  double damping_per_s = 0;
+  double time_step_s = 0;
+  int steps = 0;
+
+  HeavyAir(const Cloth& light, double pendulum_gravity_m_per_s2, double longest_step_s)
+      : cloth(light) {
+    constexpr double kPendulumTimes = 7;  // (1 + 7) exp(-7) is left of the distance: 0.7 %
+    const double pendulum_rate =
+        std::sqrt(std::max(pendulum_gravity_m_per_s2, 1e-3) / light.mesh.height_m);
+    damping_per_s = 2 * pendulum_rate;
+    const double duration_s = kPendulumTimes / pendulum_rate;
+    steps = std::max(1, static_cast<int>(std::ceil(duration_s / longest_step_s)));
+    time_step_s = duration_s / steps;
+
+    cloth.effects.clear();
+    cloth.effect_descriptions.clear();
+    for (size_t e = 0; e < light.effects.size(); ++e) {
+      if (light.effects[e]->shifts_supports()) continue;
+      kept.push_back(e);
+      cloth.effects.push_back(light.effects[e]);
+      cloth.effect_descriptions.push_back(light.effect_descriptions[e]);
+    }
+    cloth.effect_descriptions.push_back(viscous_damping::describe());
+    cloth.effects.push_back(viscous_damping::make());
+  }
+
+  ParameterSet in_it(ParameterSet set) const {
+    std::vector<std::vector<double>> effects;
+    for (const size_t e : kept) effects.push_back(std::move(set.effects[e]));
+    effects.push_back({damping_per_s});
+    set.effects = std::move(effects);
+    set.start_effect_memory.clear();
+    set.start_velocity_m_per_s.resize(3, 0);
+    return set;
+  }
+
+  Direction in_it(Direction direction) const {
+    if (!direction.effects.empty()) {
+      std::vector<std::vector<double>> effects;
+      for (const size_t e : kept) effects.push_back(std::move(direction.effects[e]));
+      effects.push_back({0});
+      direction.effects = std::move(effects);
+    }
+    direction.start_effect_memory.clear();
+    direction.start_velocity_m_per_s.resize(3, 0);
+    return direction;
+  }
+
+  /// Held points glide from where they are to where they belong over the first fifth: a jump would
+  /// hit the cloth like a hammer. The share of the way after step `n`.
+  double way(int n) const { return std::min(1.0, 5.0 * (n + 1) / steps); }
+};
+
+/// Where a point is after `share` of the way; exactly there in the end.
+template <class Number>
+Number on_the_way(Number from, Number to, double share) {
+  return share == 1 ? to : from + static_cast<Number>(share) * (to - from);
+}
+
+/// Of numbers remembered in `heavy` air, those of each of the cloth's own effects.
+template <class Remembered>
+std::vector<Eigen::VectorXd> memory_of(const Cloth& cloth, const HeavyAir& heavy,
+                                       const Remembered& remembered) {
+  std::vector<Eigen::VectorXd> memory;
+  for (const std::shared_ptr<const Effect>& effect : cloth.effects)
+    memory.emplace_back(Eigen::VectorXd::Zero(effect->memory_size(cloth)));
+  for (size_t k = 0; k < heavy.kept.size(); ++k) memory[heavy.kept[k]] = remembered(k);
+  return memory;
+}
+
+template <class L>
+void settle(const HeavyAir& heavy, double time_s, std::span<const ParameterSet> group,
+            LaneState<L>& state) {
+  for (int l = 0; l < L::kCount; ++l)
+    set_start(l, group[std::min(static_cast<size_t>(l), group.size() - 1)], state);
+  EulerStepper<L> stepper(heavy.cloth);
+  const LaneParameters<L> parameters = lane_parameters<L>(heavy.cloth, group);
+  const LaneVectors<L> from_m = stepper.held().locate(state.position_m);
+  LaneVectors<L> target_m = from_m;
+  for (int n = 0; n < heavy.steps; ++n) {
+    for (size_t h = 0; h < heavy.cloth.held.size(); ++h) {
+      if (!heavy.cloth.held[h].motion) continue;
+      const Eigen::Vector3d there = heavy.cloth.held[h].motion(time_s);
+      for (Eigen::Index l = 0; l < L::kCount; ++l) {
+        const auto place = [&](auto& target, const auto& from, double to) {
+          const auto column = static_cast<Eigen::Index>(h);
+          target(l, column) =
+              on_the_way(from(l, column), static_cast<typename L::Number>(to), heavy.way(n));
+        };
+        place(target_m.x, from_m.x, there.x());
+        place(target_m.y, from_m.y, there.y());
+        place(target_m.z, from_m.z, there.z());
+      }
+    }
+    stepper.step(parameters, target_m, time_s, heavy.time_step_s, state);
+  }
+}
+
+/// One simulation and its derivatives along at most kLanes directions.
+void settle(const HeavyAir& heavy, double time_s, const ParameterSet& set,
+            std::span<const Direction> directions, LaneState<DualLanes>& state) {
+  state = start_of(heavy.cloth, set, directions);
+  TangentStepper stepper(heavy.cloth);
+  const DualParameters parameters = DualParameters::of(heavy.cloth, set, directions);
+  const LaneVectors<DualLanes> from_m = stepper.locate(state.position_m);
+  LaneVectors<DualLanes> target_m = from_m;
+  for (int n = 0; n < heavy.steps; ++n) {
+    for (size_t h = 0; h < heavy.cloth.held.size(); ++h) {
+      if (!heavy.cloth.held[h].motion) continue;
+      const auto column = static_cast<Eigen::Index>(h);
+      const auto place = [&](auto& target, const auto& from, Eigen::Index lane, double to) {
+        target(lane, column) = on_the_way(from(lane, column), to, heavy.way(n));
+      };
+      const Eigen::Vector3d there = heavy.cloth.held[h].motion(time_s);
+      place(target_m.value.x, from_m.value.x, 0, there.x());
+      place(target_m.value.y, from_m.value.y, 0, there.y());
+      place(target_m.value.z, from_m.value.z, 0, there.z());
+      for (size_t d = 0; d < directions.size(); ++d) {
+        const auto& motion = directions[d].held_motion;
+        const Eigen::Vector3d change =
+            motion.empty() || !motion[h] ? Eigen::Vector3d::Zero() : motion[h](time_s);
+        const auto lane = static_cast<Eigen::Index>(d);
+        place(target_m.tangent.x, from_m.tangent.x, lane, change.x());
+        place(target_m.tangent.y, from_m.tangent.y, lane, change.y());
+        place(target_m.tangent.z, from_m.tangent.z, lane, change.z());
+      }
+    }
+    stepper.step(parameters, target_m, time_s, heavy.time_step_s, state);
+  }
+}
+
+}  // namespace
+
+std::vector<RelaxedCloth> relax(const Cloth& cloth, std::span<const ParameterSet> parameters,
+                                double pendulum_gravity_m_per_s2, double time_s,
+                                double time_step_s) {
+  if (parameters.empty()) return {};
+  const HeavyAir heavy(cloth, pendulum_gravity_m_per_s2, time_step_s);
+  std::vector<ParameterSet> sets;
+  for (const ParameterSet& set : parameters) sets.push_back(heavy.in_it(set));
+  std::vector<RelaxedCloth> relaxed(sets.size());
+  for_lane_groups<ExactLanes>(
+      sets, [&]<class L>(std::span<const ParameterSet> group, size_t first) {
+        LaneState<L> state = LaneState<L>::of(heavy.cloth);
+        settle<L>(heavy, time_s, group, state);
+        for (size_t l = 0; l < group.size(); ++l) {
+          RelaxedCloth& result = relaxed[first + l];
+          result.position_m = state.position_m.lane(static_cast<int>(l));
+          result.effect_memory = memory_of(cloth, heavy, [&](size_t k) -> Eigen::VectorXd {
+            return state.effect_memory[k].row(static_cast<Eigen::Index>(l)).matrix();
+          });
+        }
+      });
+  return relaxed;
+}
+
+void start_at_rest(const Cloth& cloth, std::span<ParameterSet> parameters,
+                   double pendulum_gravity_m_per_s2, double time_s, double time_step_s) {
+  std::vector<RelaxedCloth> relaxed =
+      relax(cloth, parameters, pendulum_gravity_m_per_s2, time_s, time_step_s);
+  for (size_t n = 0; n < parameters.size(); ++n) {
+    parameters[n].start_position_m = std::move(relaxed[n].position_m);
+    parameters[n].start_effect_memory = std::move(relaxed[n].effect_memory);
+    parameters[n].start_velocity_m_per_s.resize(3, 0);
+  }
+}
+
+void start_at_rest_with_tangents(const Cloth& cloth, ParameterSet& set,
+                                 std::span<Direction> directions, double pendulum_gravity_m_per_s2,
+                                 double time_s, double time_step_s) {
+  const HeavyAir heavy(cloth, pendulum_gravity_m_per_s2, time_step_s);
+  const ParameterSet damped = heavy.in_it(set);
+  std::vector<Direction> moved;
+  for (const Direction& direction : directions) moved.push_back(heavy.in_it(direction));
+  const size_t groups = std::max<size_t>(1, (directions.size() + kLanes - 1) / kLanes);
+  tbb::parallel_for(size_t{0}, groups, [&](size_t g) {
+    const size_t first = g * kLanes;
+    const size_t count = std::min<size_t>(kLanes, directions.size() - first);
+    LaneState<DualLanes> state;
+    settle(heavy, time_s, damped, std::span(moved).subspan(first, count), state);
+    for (size_t d = 0; d < count; ++d) {
+      const auto lane = static_cast<int>(d);
+      directions[first + d].start_position_m = state.position_m.tangent.lane(lane);
+      directions[first + d].start_velocity_m_per_s.resize(3, 0);
+      directions[first + d].start_effect_memory =
+          memory_of(cloth, heavy, [&](size_t k) -> Eigen::VectorXd {
+            return state.effect_memory[k].row(0).unaryExpr(
+                [&](const auto& number) { return number.v[lane]; });
+          });
+    }
+    if (g > 0) return;
+    set.start_position_m = state.position_m.value.lane(0);
+    set.start_velocity_m_per_s.resize(3, 0);
+    set.start_effect_memory = memory_of(cloth, heavy, [&](size_t k) -> Eigen::VectorXd {
+      return state.effect_memory[k].row(0).unaryExpr([](const auto& number) { return number.a; });
+    });
+  });
+}
+
+}  // namespace clothfit
