@@ -40,24 +40,23 @@ constexpr double kSearchSpringSteps = 1.2e9;
 struct Effort {
   int rounds = 0;
   double least_gain = 0;
-  Differences differences = Differences::forward;
+  Derivatives derivatives = Derivatives::tangents;
   double difference_step = 0;
   double most_spring_steps = 0;  ///< a stage stops there: a wrong model may lead it on for hours
 };
 constexpr Effort kCoarseEffort{.rounds = 1,
                                .least_gain = 1e-3,
-                               .differences = Differences::forward,
+                               .derivatives = Derivatives::forward,
                                .difference_step = 2e-2,
                                .most_spring_steps = 1e9};
 constexpr Effort kRoughEffort{.rounds = 2,
                               .least_gain = 1e-4,
-                              .differences = Differences::forward,
+                              .derivatives = Derivatives::forward,
                               .difference_step = 5e-3,
                               .most_spring_steps = 5e9};
 constexpr Effort kFinalEffort{.rounds = 6,
                               .least_gain = 1e-7,
-                              .differences = Differences::central,
-                              .difference_step = 1e-3,
+                              .derivatives = Derivatives::tangents,
                               .most_spring_steps = 2e10};
 
 /// A log-parameter less certain than this (a factor of e^0.7 = 2 either way) is undetermined.
@@ -102,7 +101,8 @@ struct Search {
 Search search(const FitProblem& problem, const FitOptions& options,
               const ProgressCallback& progress, FitReport& report) {
   const int frames = horizon_frames(problem, kSearchShare);
-  const Objective objective(problem, frames, search_time_step_s(problem, options, frames));
+  const TrajectoryObjective objective(problem, frames,
+                                      search_time_step_s(problem, options, frames));
 
   std::vector<SearchParameter> ranges;
   std::vector<int> searched;
@@ -170,7 +170,7 @@ RefineResult refine_stage(const FitProblem& problem, const FitOptions& options, 
                           const ProgressCallback& progress, FitReport& report) {
   const RefineOptions refine_options{.rounds = effort.rounds,
                                      .least_gain = effort.least_gain,
-                                     .differences = effort.differences,
+                                     .derivatives = effort.derivatives,
                                      .difference_step = effort.difference_step,
                                      .most_spring_steps = options.work * effort.most_spring_steps,
                                      .substep_scale = options.substep_scale};
@@ -267,7 +267,7 @@ void fill_parameters(const FitProblem& problem, const FitOptions& options,
   for (int p = 0; p < problem.space.size(); ++p) {
     const FitParameter& parameter = problem.space.parameters[static_cast<size_t>(p)];
     if (parameter.role == ParameterRole::effect) continue;
-    auto& list = parameter.role == ParameterRole::fabric ? result.parameters : result.nuisance;
+    auto& list = parameter.role == ParameterRole::springs ? result.parameters : result.nuisance;
     list.push_back(estimate_of(p, parameter.name));
   }
   if (options.forecast) {
@@ -356,8 +356,8 @@ FitReport fit(const FitInput& input, const FitOptions& options, const ProgressCa
     result.time_step_s = refined.time_step_s;
     report.stop = refined.converged ? FitStop::converged : FitStop::reached_limit;
     report.message = refined.message;
-    const Objective objective(problem, problem.first_held_out, result.time_step_s);
-    uncertainty = estimate_uncertainty(problem, objective, values);
+    const TrajectoryObjective objective(problem, problem.first_held_out, result.time_step_s);
+    uncertainty = estimate_uncertainty(objective, values);
     if (!uncertainty.usable)
       return stopped(std::move(report), FitStop::diverged,
                      "the derivatives at the optimum could not be computed");

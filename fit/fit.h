@@ -12,6 +12,7 @@
 #include "data/progress.h"
 #include "data/recording.h"
 #include "data/tracks.h"
+#include "model/spring_set.h"
 
 namespace clothfit {
 
@@ -28,8 +29,9 @@ enum class ObservationKind { automatic, tracks3d, tracks2d };
 
 struct FitOptions {
   ObservationKind observations = ObservationKind::automatic;  ///< automatic: 3D where there are any
-  std::vector<std::string> effects;  ///< effects to fit beside those the recording declares
-  int mesh_columns = 0;              ///< 0: the recording's suggestion
+  SpringSet spring_set = SpringSet::fabric;  ///< others come with the paper's strain limit
+  std::vector<std::string> effects;          ///< effects to fit beside those the recording declares
+  int mesh_columns = 0;                      ///< 0: the recording's suggestion
   int mesh_rows = 0;
   unsigned long long seed = 1;
   int population = 100;      ///< individuals of the evolutionary search [louchet1995]

@@ -4,61 +4,30 @@
 #include <cmath>
 #include <limits>
 
+#include "model/relax.h"
 #include "model/simulate.h"
 #include "model/stability.h"
+#include "model/tangents.h"
 
 namespace clothfit {
 
-Objective::Objective(const FitProblem& problem, int frames, double time_step_s)
-    : problem_(problem), frames_(frames), time_step_s_(time_step_s) {
-  assert(frames >= 1 && frames <= problem.frames());
-  for (size_t s = 0; s < problem.observations.size(); ++s) {
-    const ObservationSet& set = problem.observations[s];
-    for (size_t r = 0; r < set.rows.size(); ++r) {
-      if (set.rows[r].frame >= frames) break;  // rows are sorted by frame
-      blocks_.push_back({static_cast<int>(s), static_cast<int>(r), residual_count_, set.dimension});
-      residual_count_ += set.dimension;
-    }
-  }
+void Objective::add_block(Block block) {
+  block.offset = residual_count_;
+  residual_count_ += block.dimension;
+  blocks_.push_back(block);
 }
 
-double Objective::spring_steps_per_run() const {
-  const Schedule schedule{.frame_time_s = problem_.frame_time_s, .time_step_s = time_step_s_};
-  double steps = 0;
-  for (int frame = 1; frame < frames_; ++frame) steps += schedule.substeps(frame);
-  return steps * static_cast<double>(problem_.cloth.spring_count());
+bool Objective::is_stable(const Eigen::VectorXd& values) const {
+  return !needs_stable_step() ||
+         stable_time_step_s(problem_.cloth, parameter_set(problem_, values)) >= time_step_s_;
 }
 
-std::vector<Eigen::VectorXd> Objective::residuals(
-    const std::vector<Eigen::VectorXd>& values) const {
-  const auto trajectories = run_model(problem_, values, frames_, time_step_s_);
-  std::vector<Eigen::VectorXd> results(values.size());
-  for (size_t n = 0; n < values.size(); ++n) {
-    if (trajectories[n].empty()) continue;
-    const auto markers = marker_positions(problem_.vertex_weights, trajectories[n]);
-    Eigen::VectorXd residual(residual_count_);
-    bool visible = true;
-    for (const Block& block : blocks_) {
-      const ObservationSet& set = problem_.observations[static_cast<size_t>(block.set)];
-      const Observation& row = set.rows[static_cast<size_t>(block.row)];
-      const auto predicted = set.predict(markers[static_cast<size_t>(row.frame)].col(row.marker));
-      if (!predicted) {
-        visible = false;
-        break;
-      }
-      residual.segment(block.offset, block.dimension) =
-          (*predicted - row.observed).head(block.dimension) / row.sigma;
-    }
-    if (visible && residual.allFinite()) results[n] = std::move(residual);
-  }
-  return results;
-}
-
-Linearisation Objective::linearise(const Eigen::VectorXd& values, Differences differences,
+Linearisation Objective::linearise(const Eigen::VectorXd& values, Derivatives derivatives,
                                    double step) const {
+  if (derivatives == Derivatives::tangents) return linearise(values);
   Linearisation result;
   const int parameters = problem_.space.size();
-  const bool central = differences == Differences::central;
+  const bool central = derivatives == Derivatives::central;
   const Eigen::VectorXd coordinates = problem_.space.coordinates(values);
   std::vector<Eigen::VectorXd> points{values};
   const auto add_point = [&](int p, double offset) {
@@ -72,8 +41,7 @@ Linearisation Objective::linearise(const Eigen::VectorXd& values, Differences di
   }
   // One whose time step would not be stable spoils all; the others need not run then.
   for (const Eigen::VectorXd& point : points)
-    if (stable_time_step_s(problem_.cloth, parameter_set(problem_, point)) < time_step_s_)
-      return result;
+    if (!is_stable(point)) return result;
   std::vector<Eigen::VectorXd> residuals_of = residuals(points);
   result.runs = static_cast<int>(points.size());
   for (const Eigen::VectorXd& residual : residuals_of)
@@ -96,6 +64,100 @@ double Objective::mean_length(const Eigen::VectorXd& residual) const {
   double sum = 0;
   for (const Block& block : blocks_) sum += residual.segment(block.offset, block.dimension).norm();
   return sum / static_cast<double>(blocks_.size());
+}
+
+TrajectoryObjective::TrajectoryObjective(const FitProblem& problem, int frames, double time_step_s)
+    : Objective(problem, time_step_s), frames_(frames) {
+  assert(frames >= 1 && frames <= problem.frames());
+  for (size_t s = 0; s < problem.observations.size(); ++s) {
+    const ObservationSet& set = problem.observations[s];
+    for (size_t r = 0; r < set.rows.size(); ++r) {
+      if (set.rows[r].frame >= frames) break;  // rows are sorted by frame
+      add_block({.set = static_cast<int>(s),
+                 .row = static_cast<int>(r),
+                 .marker = set.rows[r].marker,
+                 .frame = set.rows[r].frame,
+                 .dimension = set.dimension});
+    }
+  }
+}
+
+std::string TrajectoryObjective::name() const {
+  return "over " + std::to_string(frames_) + " frames";
+}
+
+double TrajectoryObjective::spring_steps_per_run() const {
+  const Schedule schedule{.frame_time_s = problem().frame_time_s, .time_step_s = time_step_s()};
+  double steps = 0;
+  for (int frame = 1; frame < frames_; ++frame) steps += schedule.substeps(frame);
+  return steps * static_cast<double>(problem().cloth.spring_count());
+}
+
+std::vector<Eigen::VectorXd> TrajectoryObjective::residuals(
+    const std::vector<Eigen::VectorXd>& values) const {
+  const auto trajectories = run_model(problem(), values, frames_, time_step_s());
+  std::vector<Eigen::VectorXd> results(values.size());
+  for (size_t n = 0; n < values.size(); ++n) {
+    if (trajectories[n].empty()) continue;
+    const auto markers = marker_positions(problem().vertex_weights, trajectories[n]);
+    Eigen::VectorXd residual(residual_count());
+    bool visible = true;
+    for (const Block& block : blocks()) {
+      const ObservationSet& set = problem().observations[static_cast<size_t>(block.set)];
+      const Observation& row = set.rows[static_cast<size_t>(block.row)];
+      const auto predicted = set.predict(markers[static_cast<size_t>(row.frame)].col(row.marker));
+      if (!predicted) {
+        visible = false;
+        break;
+      }
+      residual.segment(block.offset, block.dimension) =
+          (*predicted - row.observed).head(block.dimension) / row.sigma;
+    }
+    if (visible && residual.allFinite()) results[n] = std::move(residual);
+  }
+  return results;
+}
+
+Linearisation TrajectoryObjective::linearise(const Eigen::VectorXd& values) const {
+  Linearisation result;
+  if (!is_stable(values)) return result;
+  const FitProblem& of = problem();
+  ParameterSet set = parameter_set(of, values);
+  std::vector<Direction> along = directions(of, values);
+  if (of.start == StartKind::at_rest)
+    start_at_rest_with_tangents(of.cloth, set, along, of.gravity_m_per_s2.norm(),
+                                of.frame_time_s.front(), time_step_s());
+  const Schedule schedule{
+      .frame_time_s = {of.frame_time_s.begin(), of.frame_time_s.begin() + frames_},
+      .time_step_s = time_step_s()};
+  const TangentResult run = simulate_with_tangents(of.cloth, set, along, schedule);
+  result.runs = 1 + of.space.size();
+  if (!run.run.usable()) return result;
+
+  const auto markers = marker_positions(of.vertex_weights, run.run.position_m);
+  const auto parameters = static_cast<size_t>(of.space.size());
+  std::vector<std::vector<Eigen::Matrix3Xd>> marker_tangents(parameters);
+  for (size_t p = 0; p < parameters; ++p)
+    marker_tangents[p] = marker_positions(of.vertex_weights, run.position_tangent[p]);
+  result.residual.resize(residual_count());
+  result.residual_by_coordinate.resize(residual_count(), of.space.size());
+  for (const Block& block : blocks()) {
+    const ObservationSet& observed = of.observations[static_cast<size_t>(block.set)];
+    const Observation& row = observed.rows[static_cast<size_t>(block.row)];
+    const auto frame = static_cast<size_t>(row.frame);
+    Eigen::Matrix3d by_position;
+    const auto predicted = observed.predict(markers[frame].col(row.marker), &by_position);
+    if (!predicted) return result;
+    result.residual.segment(block.offset, block.dimension) =
+        (*predicted - row.observed).head(block.dimension) / row.sigma;
+    for (size_t p = 0; p < parameters; ++p) {
+      const Eigen::Vector3d change = by_position * marker_tangents[p][frame].col(row.marker);
+      result.residual_by_coordinate.col(static_cast<Eigen::Index>(p))
+          .segment(block.offset, block.dimension) = change.head(block.dimension) / row.sigma;
+    }
+  }
+  result.usable = result.residual.allFinite() && result.residual_by_coordinate.allFinite();
+  return result;
 }
 
 }  // namespace clothfit

@@ -1,71 +1,115 @@
 #pragma once
 
+#include <Eigen/Core>
+#include <string>
 #include <vector>
 
 #include "fit/problem.h"
 
 namespace clothfit {
 
-enum class Differences {
-  forward,  ///< one run per parameter; error O(step)
-  central   ///< two runs per parameter; error O(step^2)
-};
-
 /// A cost near one parameter vector, to first order.
 struct Linearisation {
   bool usable = false;
-  int runs = 0;  ///< simulations that it took
+  /// Simulations that it took; one with exact derivatives counts as one more for each of these.
+  int runs = 0;
   Eigen::VectorXd residual;
-  Eigen::MatrixXd residual_by_coordinate;  ///< residuals x parameters
+  Eigen::MatrixXd residual_by_coordinate;  ///< residuals x coordinates
 };
 
-/// The trajectory cost: what a free run from the start leaves of the observations in the first
-/// `frames` frames, each coordinate divided by its sigma.
+/// How derivatives are had.
+enum class Derivatives {
+  tangents,  ///< exact for the discrete scheme (model/tangents.h)
+  forward,   ///< differences, one run per coordinate; error O(step)
+  central    ///< differences, two runs per coordinate; error O(step^2)
+};
+
+/// A cost of a fit: half the sum of squares (or a robust sum) of whitened residuals, which are a
+/// function of the parameters. Its parts are blocks, one for each thing observed.
+///
+/// Every cost has one time step for all parameter vectors: a cost that cut time anew for each of
+/// them would jump.
 class Objective {
  public:
-  /// `time_step_s` stays the same for all parameter vectors: a cost that cut time anew for each of
-  /// them would jump.
-  Objective(const FitProblem& problem, int frames, double time_step_s);
+  virtual ~Objective() = default;
 
   /// Where the residuals of one observation lie.
   struct Block {
-    int set = 0;
-    int row = 0;
+    int set = 0;     ///< of the problem's observations; -1: none of these
+    int row = 0;     ///< in the set
+    int marker = 0;  ///< or vertex
+    int frame = 0;
     int offset = 0;
     int dimension = 0;
   };
   const std::vector<Block>& blocks() const { return blocks_; }
   int residual_count() const { return residual_count_; }
-  int frames() const { return frames_; }
   double time_step_s() const { return time_step_s_; }
+  const FitProblem& problem() const { return problem_; }
+  virtual std::string name() const = 0;  ///< for a person
 
   /// Springs times time steps of one run: what it costs, on any machine. (Relaxing a start at rest
   /// comes on top.)
-  double spring_steps_per_run() const;
+  virtual double spring_steps_per_run() const = 0;
+
+  /// Whether a time step that is not stable spoils it, as it does any run of many steps.
+  virtual bool needs_stable_step() const { return true; }
 
   /// Whitened residuals for each parameter vector; empty where there are none because the run
   /// diverged, its step would not be stable, or a point fell behind a camera.
-  std::vector<Eigen::VectorXd> residuals(const std::vector<Eigen::VectorXd>& values) const;
+  virtual std::vector<Eigen::VectorXd> residuals(
+      const std::vector<Eigen::VectorXd>& values) const = 0;
+
+  /// Residuals at `values` and their exact derivatives by the space's coordinates. Not usable where
+  /// there are none.
+  virtual Linearisation linearise(const Eigen::VectorXd& values) const = 0;
 
   /// Truncation of central differences falls with the step's square, rounding (the run's, about
   /// 1e-13) rises with its inverse: 1e-4 leaves both near 1e-8.
   static constexpr double kDifferenceStep = 1e-4;
 
-  /// Residuals at `values` and their derivative by the space's coordinates, by differences over
-  /// `step` (all perturbed runs side by side in lanes). Not usable where there are none.
-  Linearisation linearise(const Eigen::VectorXd& values, Differences differences,
+  /// The same, with derivatives as asked for; differences over `step` in the coordinates, all
+  /// perturbed runs side by side in lanes.
+  Linearisation linearise(const Eigen::VectorXd& values, Derivatives derivatives,
                           double step = kDifferenceStep) const;
 
   /// Mean length of the residual of an observation: a robust cost for the evolutionary search.
   /// Infinite where there are no residuals.
   double mean_length(const Eigen::VectorXd& residual) const;
 
+ protected:
+  /// `problem` must outlive the objective.
+  Objective(const FitProblem& problem, double time_step_s)
+      : problem_(problem), time_step_s_(time_step_s) {}
+  Objective(const Objective&) = default;
+
+  /// Adds a block behind those there are; its offset is filled in.
+  void add_block(Block block);
+  /// Whether the scheme is stable for these values at the objective's time step.
+  bool is_stable(const Eigen::VectorXd& values) const;
+
  private:
   const FitProblem& problem_;
-  int frames_;
   double time_step_s_;
   std::vector<Block> blocks_;
   int residual_count_ = 0;
+};
+
+/// The trajectory cost: what a free run from the start leaves of the observations in the first
+/// `frames` frames, each coordinate divided by its sigma.
+class TrajectoryObjective final : public Objective {
+ public:
+  TrajectoryObjective(const FitProblem& problem, int frames, double time_step_s);
+
+  int frames() const { return frames_; }
+  std::string name() const override;
+  double spring_steps_per_run() const override;
+  std::vector<Eigen::VectorXd> residuals(const std::vector<Eigen::VectorXd>& values) const override;
+  using Objective::linearise;
+  Linearisation linearise(const Eigen::VectorXd& values) const override;
+
+ private:
+  int frames_;
 };
 
 }  // namespace clothfit

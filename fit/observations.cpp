@@ -45,10 +45,20 @@ void finish(ObservationSet& set) {
 
 }  // namespace
 
-std::optional<Eigen::Vector3d> ObservationSet::predict(const Eigen::Vector3d& position_m) const {
-  if (!camera) return position_m;
-  const auto pixel = project(*camera, camera_from_world(*camera) * position_m);
+std::optional<Eigen::Vector3d> ObservationSet::predict(const Eigen::Vector3d& position_m,
+                                                       Eigen::Matrix3d* by_position) const {
+  if (!camera) {
+    if (by_position != nullptr) by_position->setIdentity();
+    return position_m;
+  }
+  const Rigid3 camera_from = camera_from_world(*camera);
+  Eigen::Matrix<double, 2, 3> pixel_by_point;
+  const auto pixel = project(*camera, camera_from * position_m, &pixel_by_point);
   if (!pixel) return std::nullopt;
+  if (by_position != nullptr) {
+    by_position->topRows<2>() = pixel_by_point * camera_from.rotation.toRotationMatrix();
+    by_position->row(2).setZero();
+  }
   return Eigen::Vector3d(pixel->x(), pixel->y(), 0.0);
 }
 

@@ -29,8 +29,10 @@ struct ObservationSet {
   std::vector<Observation> rows;
   double noise = 0;  ///< root mean square of the rows' sigma
 
-  /// Where the set's observer sees a point of the world; nothing behind a camera.
-  std::optional<Eigen::Vector3d> predict(const Eigen::Vector3d& position_m) const;
+  /// Where the set's observer sees a point of the world; nothing behind a camera. `by_position`,
+  /// where given, is set to the derivative (for pixels, its third row is 0).
+  std::optional<Eigen::Vector3d> predict(const Eigen::Vector3d& position_m,
+                                         Eigen::Matrix3d* by_position = nullptr) const;
 };
 
 /// The frames of a recording: their times, and the first one that is held out (= their number when

@@ -9,13 +9,13 @@
 
 namespace clothfit {
 
-enum class ParameterRole { fabric, effect, nuisance };
+enum class ParameterRole { springs, effect, nuisance };
 
 /// A number that a fit may change.
 struct FitParameter {
   std::string name;
   std::string unit;
-  ParameterRole role = ParameterRole::fabric;
+  ParameterRole role = ParameterRole::springs;
   ParameterScale scale = ParameterScale::linear;
   double lower = 0;    ///< widest bounds, in `unit`
   double upper = 0;    ///< > lower

@@ -1,5 +1,8 @@
 #include "fit/problem.h"
 
+#include <ceres/jet.h>
+#include <ceres/rotation.h>
+
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -11,6 +14,8 @@
 #include "fit/cloth_setup.h"
 #include "fit/sheet_placement.h"
 #include "model/effects/registry.h"
+#include "model/fabric_conversion.h"
+#include "model/relax.h"
 #include "model/simulate.h"
 #include "model/stability.h"
 
@@ -90,46 +95,66 @@ void add_masses(const Recording& recording, const Mesh& mesh, FitProblem& proble
   problem.cloth = make_cloth(cloth, mesh, problem.cloth_mass_kg);
 }
 
-/// Ranges of the search, from what the cloth must carry: a spring beside a held corner bears about
-/// half the weight F. Tension stiffness lies between F / a (twice as long) and 100 F / a (1 %
-/// longer), for the recording's own spacing a; shear and flexion reach far below.
-void add_fabric(const Recording& recording, const FitOptions& options, FitProblem& problem) {
+/// A range of the search.
+struct Range {
+  double lower = 0, upper = 0;
+};
+
+/// From what the cloth must carry: a spring beside a held corner bears about half the weight F.
+/// Tension stiffness lies between F / a (twice as long) and 100 F / a (1 % longer), for the
+/// recording's own spacing a; shear and flexion reach far below, and so do all where a strain limit
+/// carries the rest.
+Range range_of(const SpringNumber& number, SpringSet set, double unit_n_per_m, double flat_m) {
+  switch (number.quantity) {
+    case SpringQuantity::retardation_time:
+      return {1e-5, 2e-2};
+    case SpringQuantity::natural_length:
+      return {0.8 * flat_m, 1.25 * flat_m};
+    case SpringQuantity::critical_elongation:
+      return {0.01, 1};
+    case SpringQuantity::stiffness:
+      break;
+  }
+  if (set != SpringSet::fabric) return {0.02 * unit_n_per_m, 100 * unit_n_per_m};
+  if (number.type <= structural_s) return {unit_n_per_m, 100 * unit_n_per_m};
+  if (number.type <= shear_up) return {0.02 * unit_n_per_m, 50 * unit_n_per_m};
+  return {0.01 * unit_n_per_m, 25 * unit_n_per_m};
+}
+
+void add_springs(const Recording& recording, const FitOptions& options, FitProblem& problem) {
   const ClothDescription& cloth = recording.cloth;
   const double spacing_m =
       0.5 * (cloth.width_m / (cloth.mesh_columns - 1) + cloth.height_m / (cloth.mesh_rows - 1));
   const double gravity = std::max(problem.gravity_m_per_s2.norm(), 1.0);
-  const double unit = 0.5 * problem.cloth_mass_kg * gravity / spacing_m;
+  const double unit_n_per_m = 0.5 * problem.cloth_mass_kg * gravity / spacing_m;
+  const std::array<double, kSpringTypes> flat_m = flat_lengths(problem.cloth.mesh);
 
-  const auto bind = [&](const std::string& name, const std::string& text_unit, double lower,
-                        double upper) {
+  problem.spring_set = options.spring_set;
+  if (problem.spring_set != SpringSet::fabric)
+    problem.cloth.strain_limit.mode = StrainLimitMode::positions;
+  for (const SpringNumber& number : numbers_of(problem.spring_set)) {
     Binding binding;
     if (options.forecast) {
       const auto& known = options.forecast->parameters;
-      const auto found = std::ranges::find(known, name, &ParameterEstimate::name);
+      const auto found = std::ranges::find(known, number.name, &ParameterEstimate::name);
       if (found == known.end())
-        throw InputError("--forecast", "the fit holds no parameter '" + name + "'",
-                         "a fit.json of the parameter set fabric");
+        throw InputError("--forecast", "the fit holds no parameter '" + number.name + "'",
+                         "a fit.json of the parameter set " + to_string(problem.spring_set));
       binding.constant = found->value;
-      return binding;
+    } else {
+      const Range range = range_of(number, problem.spring_set, unit_n_per_m,
+                                   flat_m[static_cast<size_t>(number.type)]);
+      binding.parameter = problem.space.size();
+      problem.space.parameters.push_back({.name = number.name,
+                                          .unit = number.unit,
+                                          .role = ParameterRole::springs,
+                                          .scale = ParameterScale::logarithmic,
+                                          .lower = range.lower,
+                                          .upper = range.upper,
+                                          .start = std::sqrt(range.lower * range.upper)});
     }
-    binding.parameter = problem.space.size();
-    problem.space.parameters.push_back({.name = name,
-                                        .unit = text_unit,
-                                        .role = ParameterRole::fabric,
-                                        .scale = ParameterScale::logarithmic,
-                                        .lower = lower,
-                                        .upper = upper,
-                                        .start = std::sqrt(lower * upper)});
-    return binding;
-  };
-  FabricBindings& fabric = problem.fabric;
-  fabric.tension_warp = bind("tension_warp", "N/m", unit, 100 * unit);
-  fabric.tension_weft = bind("tension_weft", "N/m", unit, 100 * unit);
-  fabric.shear = bind("shear", "N/m", 0.02 * unit, 50 * unit);
-  fabric.flexion_warp = bind("flexion_warp", "N/m", 0.01 * unit, 25 * unit);
-  fabric.flexion_weft = bind("flexion_weft", "N/m", 0.01 * unit, 25 * unit);
-  fabric.damping_warp = bind("damping_warp", "s", 1e-5, 2e-2);
-  fabric.damping_weft = bind("damping_weft", "s", 1e-5, 2e-2);
+    problem.spring_numbers.push_back(binding);
+  }
 }
 
 /// Adds an effect to the cloth and binds its parameters: to `given` values, else to the fit.
@@ -248,17 +273,51 @@ void add_sheet_motion(FitProblem& problem) {
   for (const char* name : {"sheet_shift_x", "sheet_shift_y", "sheet_shift_z"}) add(name, "m", 0.05);
 }
 
-Eigen::Matrix3Xd moved_sheet(const FitProblem& problem, const Eigen::VectorXd& values) {
-  if (problem.sheet_motion.empty()) return problem.placed_sheet_m;
-  Eigen::Vector3d turn, shift;
-  for (size_t c = 0; c < 3; ++c) {
-    turn[static_cast<Eigen::Index>(c)] = problem.sheet_motion[c].value(values);
-    shift[static_cast<Eigen::Index>(c)] = problem.sheet_motion[c + 3].value(values);
+Eigen::VectorXd spring_numbers(const FitProblem& problem, const Eigen::VectorXd& values) {
+  Eigen::VectorXd numbers(static_cast<Eigen::Index>(problem.spring_numbers.size()));
+  for (size_t n = 0; n < problem.spring_numbers.size(); ++n)
+    numbers[static_cast<Eigen::Index>(n)] = problem.spring_numbers[n].value(values);
+  return numbers;
+}
+
+Eigen::Vector3d three(const std::vector<Binding>& bindings, size_t first,
+                      const Eigen::VectorXd& values) {
+  return {bindings[first].value(values), bindings[first + 1].value(values),
+          bindings[first + 2].value(values)};
+}
+
+Eigen::Vector3d sheet_turn(const FitProblem& problem, const Eigen::VectorXd& values) {
+  return three(problem.sheet_motion, 0, values);
+}
+
+Eigen::Vector3d sheet_shift(const FitProblem& problem, const Eigen::VectorXd& values) {
+  return three(problem.sheet_motion, 3, values);
+}
+
+/// The rotation vector by which gravity is turned.
+Eigen::Vector3d gravity_turn(const FitProblem& problem, const Eigen::VectorXd& values) {
+  return problem.level_axes *
+         Eigen::Vector2d(problem.tilt[0].value(values), problem.tilt[1].value(values));
+}
+
+struct Turned {
+  Eigen::Vector3d value;
+  Eigen::Matrix3d by_turn;
+};
+
+/// A vector turned by a rotation vector, with its derivative by the latter.
+Turned turned(const Eigen::Vector3d& turn, const Eigen::Vector3d& vector) {
+  using Jet = ceres::Jet<double, 3>;
+  const Jet angle_axis[3] = {{turn.x(), 0}, {turn.y(), 1}, {turn.z(), 2}};
+  const Jet before[3] = {Jet(vector.x()), Jet(vector.y()), Jet(vector.z())};
+  Jet after[3];
+  ceres::AngleAxisRotatePoint(angle_axis, before, after);
+  Turned result;
+  for (int c = 0; c < 3; ++c) {
+    result.value[c] = after[c].a;
+    result.by_turn.row(c) = after[c].v;
   }
-  const Eigen::Vector3d middle = problem.placed_sheet_m.rowwise().mean();
-  const Eigen::Matrix3d rotation =
-      Eigen::AngleAxisd(turn.norm(), turn.stableNormalized()).toRotationMatrix();
-  return (rotation * (problem.placed_sheet_m.colwise() - middle)).colwise() + (middle + shift);
+  return result;
 }
 
 void place_sheet_of(const Recording& recording, FitProblem& problem) {
@@ -307,7 +366,7 @@ FitProblem make_problem(const FitInput& input, const FitOptions& options, int me
   problem.vertex_weights = vertex_weights(make_surface(
       mesh.columns, mesh.rows, mesh.width_m, mesh.height_m, marker_places(recording.markers)));
   place_sheet_of(recording, problem);
-  add_fabric(recording, options, problem);
+  add_springs(recording, options, problem);
   add_effects(recording, options, problem);
   if (!options.forecast) {
     add_gravity_direction(problem);
@@ -317,34 +376,88 @@ FitProblem make_problem(const FitInput& input, const FitOptions& options, int me
 }
 
 Fabric fabric_of(const FitProblem& problem, const Eigen::VectorXd& values) {
-  const FabricBindings& f = problem.fabric;
-  return {.tension_warp_n_per_m = f.tension_warp.value(values),
-          .tension_weft_n_per_m = f.tension_weft.value(values),
-          .shear_n_per_m = f.shear.value(values),
-          .flexion_warp_n_per_m = f.flexion_warp.value(values),
-          .flexion_weft_n_per_m = f.flexion_weft.value(values),
-          .damping_warp_s = f.damping_warp.value(values),
-          .damping_weft_s = f.damping_weft.value(values)};
+  assert(problem.spring_set == SpringSet::fabric);
+  return fabric_of(FabricVector(spring_numbers(problem, values)));
 }
 
 ParameterSet parameter_set(const FitProblem& problem, const Eigen::VectorXd& values) {
   ParameterSet set;
-  set.springs = spring_parameters(fabric_of(problem, values), problem.cloth.mesh);
+  set.springs = springs_of(problem.spring_set, spring_numbers(problem, values), problem.cloth.mesh);
   set.gravity_m_per_s2 = problem.gravity_m_per_s2;
-  if (!problem.tilt.empty()) {
-    const Eigen::Vector3d turn =
-        problem.level_axes *
-        Eigen::Vector2d(problem.tilt[0].value(values), problem.tilt[1].value(values));
-    set.gravity_m_per_s2 =
-        Eigen::AngleAxisd(turn.norm(), turn.stableNormalized()) * problem.gravity_m_per_s2;
-  }
+  if (!problem.tilt.empty())
+    set.gravity_m_per_s2 = turned(gravity_turn(problem, values), problem.gravity_m_per_s2).value;
   for (const std::vector<Binding>& effect : problem.effects) {
     std::vector<double> numbers;
     for (const Binding& binding : effect) numbers.push_back(binding.value(values));
     set.effects.push_back(std::move(numbers));
   }
-  set.start_position_m = moved_sheet(problem, values);
+  set.start_position_m = problem.placed_sheet_m;
+  if (!problem.sheet_motion.empty()) {
+    const Eigen::Vector3d middle = problem.placed_sheet_m.rowwise().mean();
+    const Eigen::Vector3d turn = sheet_turn(problem, values), shift = sheet_shift(problem, values);
+    for (Eigen::Index v = 0; v < set.start_position_m.cols(); ++v)
+      set.start_position_m.col(v) =
+          turned(turn, problem.placed_sheet_m.col(v) - middle).value + middle + shift;
+  }
   return set;
+}
+
+std::vector<Direction> directions(const FitProblem& problem, const Eigen::VectorXd& values) {
+  Direction still;
+  for (const std::vector<Binding>& effect : problem.effects)
+    still.effects.emplace_back(effect.size(), 0.0);
+  std::vector<Direction> result(static_cast<size_t>(problem.space.size()), still);
+  const Eigen::VectorXd slope = problem.space.value_by_coordinate(values);
+  const auto along = [&](const Binding& binding) -> Direction& {
+    return result[static_cast<size_t>(binding.parameter)];
+  };
+
+  const Eigen::MatrixXd springs =
+      springs_by_numbers(problem.spring_set, spring_numbers(problem, values));
+  for (size_t n = 0; n < problem.spring_numbers.size(); ++n) {
+    const Binding& binding = problem.spring_numbers[n];
+    if (binding.parameter < 0) continue;
+    const SpringParameters change = springs_of(
+        SpringVector(slope[binding.parameter] * springs.col(static_cast<Eigen::Index>(n))));
+    Direction& direction = along(binding);
+    direction.natural_length_m = change.natural_length_m;
+    direction.stiffness_n_per_m = change.stiffness_n_per_m;
+    direction.damping_ns_per_m = change.damping_ns_per_m;
+    direction.critical_elongation = change.critical_elongation;
+  }
+  if (!problem.tilt.empty()) {
+    const Eigen::Matrix<double, 3, 2> by_tilt =
+        turned(gravity_turn(problem, values), problem.gravity_m_per_s2).by_turn *
+        problem.level_axes;
+    for (size_t axis = 0; axis < 2; ++axis) {
+      const Binding& binding = problem.tilt[axis];
+      along(binding).gravity_m_per_s2 =
+          slope[binding.parameter] * by_tilt.col(static_cast<Eigen::Index>(axis));
+    }
+  }
+  for (size_t e = 0; e < problem.effects.size(); ++e)
+    for (size_t k = 0; k < problem.effects[e].size(); ++k)
+      if (const Binding& binding = problem.effects[e][k]; binding.parameter >= 0)
+        along(binding).effects[e][k] = slope[binding.parameter];
+  if (!problem.sheet_motion.empty()) {
+    const Eigen::Index vertices = problem.placed_sheet_m.cols();
+    const Eigen::Vector3d middle = problem.placed_sheet_m.rowwise().mean();
+    const Eigen::Vector3d turn = sheet_turn(problem, values);
+    for (const Binding& binding : problem.sheet_motion)
+      along(binding).start_position_m.resize(3, vertices);
+    for (Eigen::Index v = 0; v < vertices; ++v) {
+      const Eigen::Matrix3d by_turn = turned(turn, problem.placed_sheet_m.col(v) - middle).by_turn;
+      for (size_t axis = 0; axis < 3; ++axis) {
+        const auto column = static_cast<Eigen::Index>(axis);
+        const Binding& turning = problem.sheet_motion[axis];
+        const Binding& shifting = problem.sheet_motion[axis + 3];
+        along(turning).start_position_m.col(v) = slope[turning.parameter] * by_turn.col(column);
+        along(shifting).start_position_m.col(v) =
+            slope[shifting.parameter] * Eigen::Vector3d::Unit(column);
+      }
+    }
+  }
+  return result;
 }
 
 std::vector<std::vector<Eigen::Matrix3Xd>> run_model(const FitProblem& problem,

@@ -10,14 +10,11 @@
 #include "fit/parameter_space.h"
 #include "model/cloth.h"
 #include "model/fabric.h"
+#include "model/spring_set.h"
 #include "model/surface.h"
+#include "model/tangent_step.h"
 
 namespace clothfit {
-
-/// Parameters of the set `fabric`, in the order of the model's struct.
-struct FabricBindings {
-  Binding tension_warp, tension_weft, shear, flexion_warp, flexion_weft, damping_warp, damping_weft;
-};
 
 /// A recording made ready to be fitted on one mesh: everything that stays the same while parameters
 /// change.
@@ -36,7 +33,8 @@ struct FitProblem {
   std::vector<int> driving_markers;
 
   ParameterSpace space;
-  FabricBindings fabric;
+  SpringSet spring_set = SpringSet::fabric;
+  std::vector<Binding> spring_numbers;        ///< in the order of the set
   std::vector<std::vector<Binding>> effects;  ///< [effect of the cloth][parameter]
   std::vector<Binding> tilt;                  ///< rotation of gravity about two level axes; or none
   Eigen::Matrix<double, 3, 2> level_axes;
@@ -51,11 +49,15 @@ struct FitProblem {
 FitProblem make_problem(const FitInput& input, const FitOptions& options, int mesh_columns,
                         int mesh_rows);
 
-/// The fabric for values of the parameters.
+/// The fabric for values of the parameters, whose spring set it is.
 Fabric fabric_of(const FitProblem& problem, const Eigen::VectorXd& values);
 
 /// The model's numbers for values of the parameters. The start shape is the placed sheet.
 ParameterSet parameter_set(const FitProblem& problem, const Eigen::VectorXd& values);
+
+/// How the model's numbers change along each coordinate of the space (fit/parameter_space.h): the
+/// derivatives of what parameter_set() returns.
+std::vector<Direction> directions(const FitProblem& problem, const Eigen::VectorXd& values);
 
 /// Simulated mesh positions in frames [0, frames) for each parameter vector; empty where the run
 /// diverged or the time step would not be stable. A start at rest is relaxed first.

@@ -32,15 +32,13 @@ struct Box {
   }
 };
 
-/// The residuals and their Jacobian at the point that Ceres looks at, simulated once for all
-/// blocks. Both are computed whenever the point is new: a trial step's run alone would leave most
-/// lanes idle, and most trial steps are accepted and need the Jacobian next.
+/// The residuals and, when it asks for it, their Jacobian at the point that Ceres looks at,
+/// simulated once for all blocks.
 class SharedEvaluation final : public ceres::EvaluationCallback {
  public:
-  SharedEvaluation(const FitProblem& problem, const Objective& objective,
-                   const RefineOptions& options, const Box& box, double huber_threshold,
-                   const Eigen::VectorXd& coordinates)
-      : problem_(problem),
+  SharedEvaluation(const Objective& objective, const RefineOptions& options, const Box& box,
+                   double huber_threshold, const Eigen::VectorXd& coordinates)
+      : problem_(objective.problem()),
         objective_(objective),
         options_(options),
         box_(box),
@@ -48,14 +46,23 @@ class SharedEvaluation final : public ceres::EvaluationCallback {
         coordinates_(coordinates),
         held_(static_cast<size_t>(coordinates.size()), false) {}
 
-  /// Ceres asks again for a point that it has accepted.
-  void PrepareForEvaluation(bool, bool) override {
-    if (evaluated_.size() == coordinates_.size() && evaluated_ == coordinates_) return;
+  /// Ceres asks again, with the Jacobian, for a point that it has accepted. Differences come with
+  /// the residuals at once: a trial step's run alone would leave most lanes idle, and most trial
+  /// steps are accepted.
+  void PrepareForEvaluation(bool evaluate_jacobians, bool) override {
+    const bool is_new = evaluated_.size() != coordinates_.size() || evaluated_ != coordinates_;
+    if (!is_new && (has_jacobian_ || !evaluate_jacobians)) return;
     evaluated_ = coordinates_;
-    now_ = objective_.linearise(problem_.space.values(coordinates_), options_.differences,
-                                options_.difference_step);
+    const Eigen::VectorXd values = problem_.space.values(coordinates_);
+    has_jacobian_ = evaluate_jacobians || options_.derivatives != Derivatives::tangents;
+    if (has_jacobian_) {
+      now_ = objective_.linearise(values, options_.derivatives, options_.difference_step);
+      if (now_.usable) hold_at_bounds();
+    } else {
+      now_ = {.runs = 1, .residual = objective_.residuals({values}).front()};
+      now_.usable = now_.residual.size() == objective_.residual_count();
+    }
     simulations_ += now_.runs;
-    if (now_.usable) hold_at_bounds();
   }
 
   /// The derivatives by coordinates that are held at a bound are zero.
@@ -102,6 +109,7 @@ class SharedEvaluation final : public ceres::EvaluationCallback {
   const Eigen::VectorXd& coordinates_;
   Eigen::VectorXd evaluated_;
   Linearisation now_;
+  bool has_jacobian_ = false;
   std::vector<bool> held_;
   int simulations_ = 0;
 };
@@ -214,24 +222,26 @@ struct Round {
   int simulations = 0;
 };
 
-Round solve(const FitProblem& problem, const Objective& objective, const Eigen::VectorXd& start,
-            double huber_threshold, const RefineOptions& refine_options, double most_spring_steps,
+Round solve(const Objective& objective, const Eigen::VectorXd& start, double huber_threshold,
+            const RefineOptions& refine_options, double most_spring_steps,
             const ProgressCallback& progress) {
+  const FitProblem& problem = objective.problem();
   const ParameterSpace& space = problem.space;
   Eigen::VectorXd coordinates = space.coordinates(start);
   const Box box(space);
   coordinates = coordinates.cwiseMax(box.lower).cwiseMin(box.upper);
-  SharedEvaluation shared(problem, objective, refine_options, box, huber_threshold, coordinates);
+  SharedEvaluation shared(objective, refine_options, box, huber_threshold, coordinates);
 
   ceres::Problem::Options problem_options;
   problem_options.evaluation_callback = &shared;
   problem_options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
   ceres::Problem least_squares(problem_options);
-  ceres::HuberLoss loss(huber_threshold);
+  ceres::HuberLoss huber(huber_threshold);
+  ceres::LossFunction* const loss = refine_options.loss == Loss::huber ? &huber : nullptr;
   double* const block = coordinates.data();
   least_squares.AddParameterBlock(block, space.size());
   for (const Objective::Block& rows : objective.blocks())
-    least_squares.AddResidualBlock(new ObservationCost(shared, rows, space.size()), &loss, block);
+    least_squares.AddResidualBlock(new ObservationCost(shared, rows, space.size()), loss, block);
   for (const GaussianPrior& prior : problem.priors)
     least_squares.AddResidualBlock(new PriorCost(shared, space, prior), nullptr, block);
   for (int p = 0; p < space.size(); ++p) {
@@ -244,13 +254,13 @@ Round solve(const FitProblem& problem, const Objective& objective, const Eigen::
   options.logging_type = ceres::SILENT;
   options.max_num_iterations = refine_options.iterations;
   options.function_tolerance = refine_options.least_gain;
-  options.parameter_tolerance = 1e-6;
+  options.parameter_tolerance = refine_options.least_step;
   options.initial_trust_region_radius = 1e2;
   // A step that fails is shortened by the trust region, with a new direction; Ceres' line search
   // along the bounds would first try the old one up to twenty times, a linearisation each.
   options.max_num_line_search_step_size_iterations = 0;
   Reporter reporter(progress,
-                    {.stage = "refining over " + std::to_string(objective.frames()) + " frames",
+                    {.stage = "refining " + objective.name(),
                      .done = 0,
                      .total = static_cast<double>(refine_options.iterations),
                      .unit = "iterations",
@@ -274,28 +284,31 @@ double robust_scale(const Eigen::VectorXd& residual) {
   return std::max(1.0, kMadToSigma * median(std::move(sizes)));
 }
 
-RefineResult refine(const FitProblem& problem, int frames, const Eigen::VectorXd& start,
-                    const RefineOptions& options, const ProgressCallback& progress) {
+RefineResult refine(const FitProblem& problem, const ObjectiveMaker& make_objective,
+                    const Eigen::VectorXd& start, const RefineOptions& options,
+                    const ProgressCallback& progress) {
   RefineResult result;
   result.values = start;
   double spring_steps_left = options.most_spring_steps;
+  const auto stable_s = [&] {
+    return stable_time_step_s(problem.cloth, parameter_set(problem, result.values));
+  };
   for (int n = 0; n < options.rounds; ++n) {
     result.converged = false;
-    const double stable_s =
-        stable_time_step_s(problem.cloth, parameter_set(problem, result.values));
-    result.time_step_s = stable_s / (options.stability_margin * options.substep_scale);
-    const Objective objective(problem, frames, result.time_step_s);
-    const Eigen::VectorXd before = objective.residuals({result.values}).front();
+    const std::unique_ptr<Objective> objective =
+        make_objective(stable_s() / (options.stability_margin * options.substep_scale));
+    result.time_step_s = objective->time_step_s();
+    const Eigen::VectorXd before = objective->residuals({result.values}).front();
     ++result.simulations;
     if (before.size() == 0) {
       result.message = "the simulation from the starting values did not work out";
       return result;
     }
     result.robust_scale = robust_scale(before);
-    const Round round = solve(problem, objective, result.values, kHuberScales * result.robust_scale,
+    const Round round = solve(*objective, result.values, kHuberScales * result.robust_scale,
                               options, spring_steps_left, progress);
     result.simulations += round.simulations;
-    spring_steps_left -= round.simulations * objective.spring_steps_per_run();
+    spring_steps_left -= round.simulations * objective->spring_steps_per_run();
     result.solver_iterations += static_cast<int>(round.summary.iterations.size());
     result.message = ending(round.summary);
     if (round.summary.termination_type == ceres::USER_FAILURE) {
@@ -309,15 +322,17 @@ RefineResult refine(const FitProblem& problem, int frames, const Eigen::VectorXd
             .cwiseAbs()
             .maxCoeff();
     result.values = round.values;
-    result.cost = round.summary.final_cost / objective.residual_count();
+    result.cost = round.summary.final_cost / objective->residual_count();
     const bool settled = round.summary.termination_type == ceres::CONVERGENCE;
     // Done when neither the step limit nor the loss's scale had a say in where the round ended.
-    const double room = stable_time_step_s(problem.cloth, parameter_set(problem, result.values)) /
-                        result.time_step_s;
-    const Eigen::VectorXd after = objective.residuals({result.values}).front();
-    const double scale_now = after.size() > 0 ? robust_scale(after) : result.robust_scale;
-    const bool same_scale = scale_now > 0.8 * result.robust_scale;
-    result.converged = room > 1.05 && settled && (same_scale || moved < 1e-3);
+    const bool has_room = !objective->needs_stable_step() || stable_s() > 1.05 * result.time_step_s;
+    bool same_scale = true;
+    if (options.loss == Loss::huber) {
+      const Eigen::VectorXd after = objective->residuals({result.values}).front();
+      const double scale_now = after.size() > 0 ? robust_scale(after) : result.robust_scale;
+      same_scale = scale_now > 0.8 * result.robust_scale;
+    }
+    result.converged = has_room && settled && (same_scale || moved < 1e-3);
     if (result.converged) break;
     if (spring_steps_left <= 0) {
       result.message = kOutOfWork;
@@ -326,6 +341,16 @@ RefineResult refine(const FitProblem& problem, int frames, const Eigen::VectorXd
     if (settled) result.message = "each round led on to another";
   }
   return result;
+}
+
+RefineResult refine(const FitProblem& problem, int frames, const Eigen::VectorXd& start,
+                    const RefineOptions& options, const ProgressCallback& progress) {
+  return refine(
+      problem,
+      [&](double time_step_s) {
+        return std::make_unique<TrajectoryObjective>(problem, frames, time_step_s);
+      },
+      start, options, progress);
 }
 
 }  // namespace clothfit

@@ -10,6 +10,7 @@
 #include "fit/cloth_setup.h"
 #include "fit/drive.h"
 #include "fit/refine.h"
+#include "model/relax.h"
 #include "model/stability.h"
 
 namespace clothfit {

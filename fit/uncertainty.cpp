@@ -34,11 +34,12 @@ Eigen::MatrixXd prior_information(const FitProblem& problem, const Eigen::Vector
 
 }  // namespace
 
-Uncertainty estimate_uncertainty(const FitProblem& problem, const Objective& objective,
+Uncertainty estimate_uncertainty(const TrajectoryObjective& objective,
                                  const Eigen::VectorXd& values) {
   Uncertainty result;
+  const FitProblem& problem = objective.problem();
   const int parameters = problem.space.size();
-  const Linearisation linear = objective.linearise(values, Differences::central);
+  const Linearisation linear = objective.linearise(values);
   if (!linear.usable) return result;
   const Eigen::VectorXd& residual = linear.residual;
   const Eigen::MatrixXd& jacobian = linear.residual_by_coordinate;
@@ -46,7 +47,7 @@ Uncertainty estimate_uncertainty(const FitProblem& problem, const Objective& obj
   const double threshold = kHuberScales * robust_scale(residual);
   Eigen::MatrixXd information = Eigen::MatrixXd::Zero(parameters, parameters);
   std::map<std::pair<int, int>, Eigen::VectorXd> gradient_of_marker;
-  const Objective half(problem, objective.frames(), 0.5 * objective.time_step_s());
+  const TrajectoryObjective half(problem, objective.frames(), 0.5 * objective.time_step_s());
   const Eigen::VectorXd half_step_residual = half.residuals({values}).front();
   if (half_step_residual.size() != residual.size()) return result;
   Eigen::VectorXd step_gradient = Eigen::VectorXd::Zero(parameters);
@@ -57,11 +58,8 @@ Uncertainty estimate_uncertainty(const FitProblem& problem, const Objective& obj
     const auto j = jacobian.middleRows(block.offset, block.dimension);
     const double weight = std::min(1.0, threshold / std::max(r.norm(), 1e-300));
     information += weight * j.transpose() * j;
-    const int marker = problem.observations[static_cast<size_t>(block.set)]
-                           .rows[static_cast<size_t>(block.row)]
-                           .marker;
-    auto [gradient, is_new] =
-        gradient_of_marker.try_emplace({block.set, marker}, Eigen::VectorXd::Zero(parameters));
+    auto [gradient, is_new] = gradient_of_marker.try_emplace({block.set, block.marker},
+                                                             Eigen::VectorXd::Zero(parameters));
     gradient->second += weight * j.transpose() * r;
     step_gradient += weight * j.transpose() * 2 *
                      (half_step_residual.segment(block.offset, block.dimension) - r);
@@ -91,7 +89,7 @@ Uncertainty estimate_uncertainty(const FitProblem& problem, const Objective& obj
 
   constexpr double kWideStep = 0.02;
   result.roughness = Eigen::VectorXd::Ones(parameters);
-  const Linearisation wide = objective.linearise(values, Differences::central, kWideStep);
+  const Linearisation wide = objective.linearise(values, Derivatives::central, kWideStep);
   if (wide.usable) {
     for (int p = 0; p < parameters; ++p)
       result.roughness[p] =

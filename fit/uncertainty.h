@@ -30,7 +30,7 @@ struct Uncertainty {
 /// Neither sees what all markers share. One such thing can be measured: the time step. Residuals at
 /// half the step differ by d; the scheme is of first order, so at step zero they would differ by 2
 /// d, and the optimum by step_shift = -H^-1 J' W 2 d, which is added in square.
-Uncertainty estimate_uncertainty(const FitProblem& problem, const Objective& objective,
+Uncertainty estimate_uncertainty(const TrajectoryObjective& objective,
                                  const Eigen::VectorXd& values);
 
 }  // namespace clothfit

@@ -42,8 +42,8 @@ TEST(Refine, FindsTheTruthFromAStartThatIsOffByAFactor) {
 
   ASSERT_TRUE(result.usable) << result.message;
   EXPECT_TRUE(result.converged);
-  const Objective objective(problem, problem.frames(), result.time_step_s);
-  const Uncertainty uncertainty = estimate_uncertainty(problem, objective, result.values);
+  const TrajectoryObjective objective(problem, problem.frames(), result.time_step_s);
+  const Uncertainty uncertainty = estimate_uncertainty(objective, result.values);
   ASSERT_TRUE(uncertainty.usable);
   for (int p = 0; p < 7; ++p) {
     SCOPED_TRACE(problem.space.parameters[static_cast<size_t>(p)].name);
@@ -75,8 +75,8 @@ TEST(Refine, FindsTheBestOfTheOthersWhenOneEndsAtItsBound) {
   const RefineResult given = refine(problem, problem.frames(), start, {}, {});
   ASSERT_TRUE(given.converged) << given.message;
   EXPECT_NEAR(result.cost, given.cost, 1e-3 * given.cost);  // their time steps differ
-  const Objective objective(problem, problem.frames(), result.time_step_s);
-  const Uncertainty uncertainty = estimate_uncertainty(problem, objective, given.values);
+  const TrajectoryObjective objective(problem, problem.frames(), result.time_step_s);
+  const Uncertainty uncertainty = estimate_uncertainty(objective, given.values);
   for (int p = 1; p < 7; ++p)
     EXPECT_NEAR(result.values[p], given.values[p], 0.05 * uncertainty.sigma[p]) << p;
 }
@@ -87,7 +87,8 @@ TEST(Refine, EndsAtTheLimitOfWorkWithWhatItHasReached) {
   for (int p = 0; p < 7; ++p) start[p] *= p % 2 == 0 ? 1.6 : 0.65;
   const RefineResult whole = refine(problem, problem.frames(), start, {}, {});
   ASSERT_GT(whole.solver_iterations, 3);
-  const double run = Objective(problem, problem.frames(), whole.time_step_s).spring_steps_per_run();
+  const double run =
+      TrajectoryObjective(problem, problem.frames(), whole.time_step_s).spring_steps_per_run();
   const double first_two_points = 1.5 * (1 + 2 * problem.space.size()) * run;
 
   const RefineResult cut =
@@ -112,8 +113,8 @@ TEST(Refine, ScatterOverNoiseIsWhatTheCovariancePredicts) {
         refine(problem, problem.frames(), truth, {.least_gain = 1e-5, .substep_scale = 6}, {});
 
     ASSERT_TRUE(result.usable) << result.message;
-    const Objective objective(problem, problem.frames(), result.time_step_s);
-    const Uncertainty uncertainty = estimate_uncertainty(problem, objective, result.values);
+    const TrajectoryObjective objective(problem, problem.frames(), result.time_step_s);
+    const Uncertainty uncertainty = estimate_uncertainty(objective, result.values);
     squared_pull +=
         ((result.values - truth).array() / uncertainty.sigma.array()).head<7>().square() / kTrials;
   }
@@ -135,8 +136,8 @@ TEST(Uncertainty, ForeseesWhatALongTimeStepDoesToTheParameters) {
   const RefineResult fine = refine(problem, problem.frames(), truth, {.substep_scale = 10}, {});
   ASSERT_TRUE(rough.usable && fine.usable);
 
-  const Objective objective(problem, problem.frames(), rough.time_step_s);
-  const Uncertainty uncertainty = estimate_uncertainty(problem, objective, rough.values);
+  const TrajectoryObjective objective(problem, problem.frames(), rough.time_step_s);
+  const Uncertainty uncertainty = estimate_uncertainty(objective, rough.values);
 
   // Then the shift is foreseen: to first order in the step, and 9/10 of it was taken away
   ASSERT_TRUE(uncertainty.usable);
@@ -179,8 +180,8 @@ TEST(Refine, PriorHoldsWhatTheDataLeaveOpen) {
 
   // Then the data and the prior bring it back: it truly points down
   ASSERT_TRUE(result.usable) << result.message;
-  const Objective objective(problem, problem.frames(), result.time_step_s);
-  const Uncertainty uncertainty = estimate_uncertainty(problem, objective, result.values);
+  const TrajectoryObjective objective(problem, problem.frames(), result.time_step_s);
+  const Uncertainty uncertainty = estimate_uncertainty(objective, result.values);
   for (const int p : {tilt_a, tilt_b}) {
     EXPECT_LT(std::abs(result.values[p]), 4 * uncertainty.sigma[p]);
     EXPECT_LE(uncertainty.sigma[p], 3e-3 * 1.0001);
@@ -201,9 +202,9 @@ TEST(Refine, EndsSoonWhenItIsCancelled) {
 TEST(Uncertainty, SaysSoWhenTheDataHoldNothingAboutAParameter) {
   // Given two frames: the cloth has hardly begun to fall
   const FitProblem problem = tiny_problem(5);
-  const Objective objective(problem, 2, 1.0 / 60 / 100);
+  const TrajectoryObjective objective(problem, 2, 1.0 / 60 / 100);
 
-  const Uncertainty uncertainty = estimate_uncertainty(problem, objective, truth_of(problem));
+  const Uncertainty uncertainty = estimate_uncertainty(objective, truth_of(problem));
 
   ASSERT_TRUE(uncertainty.usable);
   const int flexion = problem.space.index("flexion_warp");

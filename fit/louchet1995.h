@@ -1,0 +1,68 @@
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "fit/problem.h"
+#include "fit/search_parameter.h"
+#include "fit/state_objective.h"
+#include "model/louchet5.h"
+
+namespace clothfit {
+
+/// How the founding paper's cloth begins, which the paper does not say.
+enum class PaperRelease {
+  level,   ///< flat and level, let go
+  upright  ///< flat in the vertical plane below its held corners
+};
+
+/// The founding paper's experiment [louchet1995, section 3.4]: a cloth of 17 x 17 equal masses held
+/// by two neighbouring corners, moved by gravity. What the paper does not say has a value here that
+/// makes the cost functions agree best with the costs it prints (docs/theory/louchet1995.md).
+struct PaperExperiment {
+  Louchet5 reference{.natural_length_01_m = 0.09375,
+                     .natural_length_23_m = 0.132582521472478,  ///< l01 sqrt(2); 0.132583 printed
+                     .natural_length_45_m = 0.1875,
+                     .stiffness_n_per_m = 4,
+                     .critical_elongation = 0.5};
+  int vertices_per_side = 17;
+
+  double vertex_mass_kg = 0.01;  ///< > 0
+  double time_step_s = 0.01;     ///< > 0
+  double duration_s = 2;         ///< >= time_step_s
+  double damping_per_s = 0.5;    ///< C_visc / mass, >= 0
+  PaperRelease release = PaperRelease::level;
+  StrainLimitMode limit = StrainLimitMode::positions;
+
+  void validate() const;  ///< throws InputError
+};
+
+/// The reference motion, at every time step.
+RecordedStates paper_states(const PaperExperiment& experiment);
+
+/// The search for `set` (louchet5 or louchet18) in this experiment, ranges around the lengths that
+/// the states show: the natural lengths of each type from 0.6 to 1.2 times its springs' mean length
+/// over all states ("around the average length values observed on the reference data"), K from 0.1
+/// to 40 N/m, tau from 0.01 to 1.
+FitProblem paper_problem(const PaperExperiment& experiment, const RecordedStates& states,
+                         SpringSet set);
+
+/// The reference as values of that problem.
+Eigen::VectorXd paper_truth(const PaperExperiment& experiment, SpringSet set);
+
+/// Ranges of a problem's parameters, as a search takes them.
+std::vector<SearchParameter> search_ranges(const FitProblem& problem);
+
+/// The sum of squared residuals as a search's cost.
+GenerationCost sum_of_squares(const Objective& objective);
+
+/// A line of the paper's listing of the ten best individuals after 49 generations.
+struct PaperIndividual {
+  int candidate = 0;
+  Louchet5 set;
+  double cost = 0;
+};
+/// In its good and in its bad situation, in the order printed.
+extern const std::array<PaperIndividual, 10> kPaperGoodListing, kPaperBadListing;
+
+}  // namespace clothfit
