@@ -38,6 +38,7 @@ constexpr double kSearchSpringSteps = 1.2e9;
 /// before only lead there, and look at slopes over wider spans: the cost of folding cloth is rough,
 /// and its trend is what a start far away needs.
 struct Effort {
+  int iterations = RefineOptions().iterations;
   int rounds = 0;
   double least_gain = 0;
   Derivatives derivatives = Derivatives::tangents;
@@ -49,11 +50,16 @@ constexpr Effort kCoarseEffort{.rounds = 1,
                                .derivatives = Derivatives::forward,
                                .difference_step = 2e-2,
                                .most_spring_steps = 1e9};
-constexpr Effort kRoughEffort{.rounds = 2,
+constexpr Effort kTrendEffort{.rounds = 2,
                               .least_gain = 1e-4,
                               .derivatives = Derivatives::forward,
                               .difference_step = 5e-3,
                               .most_spring_steps = 5e9};
+constexpr Effort kApproachEffort{.iterations = 6,  // the coarse mesh's derivatives lead no further
+                                 .rounds = 1,
+                                 .least_gain = 1e-3,
+                                 .derivatives = Derivatives::tangents,
+                                 .most_spring_steps = 1e10};
 constexpr Effort kFinalEffort{.rounds = 6,
                               .least_gain = 1e-7,
                               .derivatives = Derivatives::tangents,
@@ -164,28 +170,50 @@ Search search(const FitProblem& problem, const FitOptions& options,
   return found;
 }
 
+/// A stage of the refinement: which mesh, how much of the recording, how hard.
+struct Stage {
+  const FitProblem& problem;
+  const FitProblem* derivatives_of = nullptr;  ///< a coarser mesh's; null: its own
+  double share = 1;                            ///< of the fitted frames
+  const Effort& effort;
+};
+
 /// One refinement, with its line in the report.
-RefineResult refine_stage(const FitProblem& problem, const FitOptions& options, double share,
-                          const Effort& effort, const Eigen::VectorXd& start,
-                          const ProgressCallback& progress, FitReport& report) {
-  const RefineOptions refine_options{.rounds = effort.rounds,
-                                     .least_gain = effort.least_gain,
-                                     .derivatives = effort.derivatives,
-                                     .difference_step = effort.difference_step,
-                                     .most_spring_steps = options.work * effort.most_spring_steps,
-                                     .substep_scale = options.substep_scale};
-  const int frames = horizon_frames(problem, share);
-  RefineResult result = refine(problem, frames, start, refine_options, progress);
+RefineResult refine_stage(const Stage& stage, const FitOptions& options,
+                          const Eigen::VectorXd& start, const ProgressCallback& progress,
+                          FitReport& report) {
+  const FitProblem& problem = stage.problem;
+  const RefineOptions refine_options{
+      .iterations = stage.effort.iterations,
+      .rounds = stage.effort.rounds,
+      .least_gain = stage.effort.least_gain,
+      .derivatives = stage.effort.derivatives,
+      .difference_step = stage.effort.difference_step,
+      .most_spring_steps = options.work * stage.effort.most_spring_steps,
+      .substep_scale = options.substep_scale};
+  const int frames = horizon_frames(problem, stage.share);
+  const auto make_objective = [&](double time_step_s) -> std::unique_ptr<Objective> {
+    if (stage.derivatives_of == nullptr)
+      return std::make_unique<TrajectoryObjective>(problem, frames, time_step_s);
+    // What is stable for the fine mesh is far more so for the coarse one.
+    const double coarser =
+        problem.cloth.mesh.spacing_s_m() / stage.derivatives_of->cloth.mesh.spacing_s_m();
+    return std::make_unique<CoarselyDifferentiated>(problem, *stage.derivatives_of, frames,
+                                                    time_step_s, time_step_s / coarser);
+  };
+  RefineResult result = refine(problem, make_objective, start, refine_options, progress);
   report.stages.push_back(fmt::format(
-      "refinement on {} x {} over {} frames: {} iterations, {} simulations, time step {:.3g} s, "
+      "refinement on {} x {}{} over {} frames: {} iterations, {} simulations, time step {:.3g} s, "
       "residuals of {:.2f} sigma; {}",
-      problem.cloth.mesh.columns, problem.cloth.mesh.rows, frames, result.solver_iterations,
-      result.simulations, result.time_step_s, result.robust_scale, result.message));
+      problem.cloth.mesh.columns, problem.cloth.mesh.rows,
+      stage.derivatives_of == nullptr ? "" : " with the coarse mesh's derivatives", frames,
+      result.solver_iterations, result.simulations, result.time_step_s, result.robust_scale,
+      result.message));
   return result;
 }
 
-/// The best few individuals on the coarse mesh over a short horizon; the best of them on the fit's
-/// own mesh over growing ones.
+/// The best few individuals over a short horizon, the best of them over growing ones, all on the
+/// coarse mesh; then on the fit's own mesh, first with the coarse one's derivatives.
 RefineResult refine_best(const FitProblem& coarse_problem, const FitProblem& problem,
                          const FitOptions& options, const std::vector<Eigen::VectorXd>& candidates,
                          const ProgressCallback& progress, FitReport& report) {
@@ -193,14 +221,20 @@ RefineResult refine_best(const FitProblem& coarse_problem, const FitProblem& pro
   best.values = candidates.front();
   best.cost = std::numeric_limits<double>::infinity();
   for (const Eigen::VectorXd& candidate : candidates) {
-    RefineResult result = refine_stage(coarse_problem, options, kSearchShare, kCoarseEffort,
-                                       candidate, progress, report);
+    RefineResult result =
+        refine_stage({.problem = coarse_problem, .share = kSearchShare, .effort = kCoarseEffort},
+                     options, candidate, progress, report);
     if (result.cancelled) return result;
     if (result.usable && result.cost < best.cost) best = std::move(result);
   }
-  for (const double share : kHorizonShares) {
-    const Effort& effort = share < 1 ? kRoughEffort : kFinalEffort;
-    best = refine_stage(problem, options, share, effort, best.values, progress, report);
+  std::vector<Stage> stages;
+  for (const double share : kHorizonShares)
+    stages.push_back({.problem = coarse_problem, .share = share, .effort = kTrendEffort});
+  stages.push_back(
+      {.problem = problem, .derivatives_of = &coarse_problem, .effort = kApproachEffort});
+  stages.push_back({.problem = problem, .effort = kFinalEffort});
+  for (const Stage& stage : stages) {
+    best = refine_stage(stage, options, best.values, progress, report);
     if (best.cancelled || !best.usable) return best;
   }
   return best;

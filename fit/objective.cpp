@@ -160,4 +160,30 @@ Linearisation TrajectoryObjective::linearise(const Eigen::VectorXd& values) cons
   return result;
 }
 
+CoarselyDifferentiated::CoarselyDifferentiated(const FitProblem& problem,
+                                               const FitProblem& coarse_problem, int frames,
+                                               double time_step_s, double coarse_time_step_s)
+    : Objective(problem, time_step_s),
+      fine_(problem, frames, time_step_s),
+      coarse_(coarse_problem, frames, coarse_time_step_s) {
+  assert(problem.space.size() == coarse_problem.space.size());
+  assert(fine_.residual_count() == coarse_.residual_count());
+  for (const Block& block : fine_.blocks()) add_block(block);
+}
+
+std::vector<Eigen::VectorXd> CoarselyDifferentiated::residuals(
+    const std::vector<Eigen::VectorXd>& values) const {
+  return fine_.residuals(values);
+}
+
+Linearisation CoarselyDifferentiated::linearise(const Eigen::VectorXd& values) const {
+  Linearisation result = coarse_.linearise(values);
+  if (!result.usable) return result;
+  result.residual = fine_.residuals({values}).front();
+  const double share = coarse_.spring_steps_per_run() / fine_.spring_steps_per_run();
+  result.runs = 1 + static_cast<int>(std::lround(share * result.runs));
+  result.usable = result.residual.size() == residual_count();
+  return result;
+}
+
 }  // namespace clothfit

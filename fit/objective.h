@@ -55,6 +55,9 @@ class Objective {
   /// Whether a time step that is not stable spoils it, as it does any run of many steps.
   virtual bool needs_stable_step() const { return true; }
 
+  /// Whether derivatives cost little beside the residuals, so that both are best had together.
+  virtual bool has_cheap_derivatives() const { return false; }
+
   /// Whitened residuals for each parameter vector; empty where there are none because the run
   /// diverged, its step would not be stable, or a point fell behind a camera.
   virtual std::vector<Eigen::VectorXd> residuals(
@@ -110,6 +113,27 @@ class TrajectoryObjective final : public Objective {
 
  private:
   int frames_;
+};
+
+/// The same cost with the derivatives of a coarser mesh: half the vertices a side cost a
+/// sixteenth, and near the optimum the two meshes move alike, so that most of the way there is had
+/// at the price of plain runs. Its gradient is not quite the cost's: the last steps need the exact
+/// derivatives.
+class CoarselyDifferentiated final : public Objective {
+ public:
+  /// Both problems have the same parameters and observations. Each takes a time step of its own.
+  CoarselyDifferentiated(const FitProblem& problem, const FitProblem& coarse_problem, int frames,
+                         double time_step_s, double coarse_time_step_s);
+
+  std::string name() const override { return fine_.name(); }
+  bool has_cheap_derivatives() const override { return true; }
+  double spring_steps_per_run() const override { return fine_.spring_steps_per_run(); }
+  std::vector<Eigen::VectorXd> residuals(const std::vector<Eigen::VectorXd>& values) const override;
+  using Objective::linearise;
+  Linearisation linearise(const Eigen::VectorXd& values) const override;
+
+ private:
+  TrajectoryObjective fine_, coarse_;
 };
 
 }  // namespace clothfit

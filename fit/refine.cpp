@@ -54,7 +54,8 @@ class SharedEvaluation final : public ceres::EvaluationCallback {
     if (!is_new && (has_jacobian_ || !evaluate_jacobians)) return;
     evaluated_ = coordinates_;
     const Eigen::VectorXd values = problem_.space.values(coordinates_);
-    has_jacobian_ = evaluate_jacobians || options_.derivatives != Derivatives::tangents;
+    has_jacobian_ = evaluate_jacobians || options_.derivatives != Derivatives::tangents ||
+                    objective_.has_cheap_derivatives();
     if (has_jacobian_) {
       now_ = objective_.linearise(values, options_.derivatives, options_.difference_step);
       if (now_.usable) hold_at_bounds();
