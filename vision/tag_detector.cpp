@@ -1,56 +1,17 @@
 #include "vision/tag_detector.h"
 
 #include <apriltag/apriltag.h>
-#include <apriltag/tag16h5.h>
-#include <apriltag/tag25h9.h>
-#include <apriltag/tag36h10.h>
-#include <apriltag/tag36h11.h>
-#include <apriltag/tagCircle21h7.h>
-#include <apriltag/tagCircle49h12.h>
-#include <apriltag/tagCustom48h12.h>
-#include <apriltag/tagStandard41h12.h>
-#include <apriltag/tagStandard52h13.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cassert>
 #include <map>
 #include <tuple>
 
-#include "data/input_error.h"
+#include "vision/tag_family.h"
 #include "vision/tag_refine.h"
 
 namespace clothfit {
 namespace {
-
-struct Family {
-  const char* name;
-  apriltag_family_t* (*create)();
-  void (*destroy)(apriltag_family_t*);
-};
-
-constexpr std::array kFamilies = {
-    // alphabetical
-    Family{"tag16h5", tag16h5_create, tag16h5_destroy},
-    Family{"tag25h9", tag25h9_create, tag25h9_destroy},
-    Family{"tag36h10", tag36h10_create, tag36h10_destroy},
-    Family{"tag36h11", tag36h11_create, tag36h11_destroy},
-    Family{"tagCircle21h7", tagCircle21h7_create, tagCircle21h7_destroy},
-    Family{"tagCircle49h12", tagCircle49h12_create, tagCircle49h12_destroy},
-    Family{"tagCustom48h12", tagCustom48h12_create, tagCustom48h12_destroy},
-    Family{"tagStandard41h12", tagStandard41h12_create, tagStandard41h12_destroy},
-    Family{"tagStandard52h13", tagStandard52h13_create, tagStandard52h13_destroy},
-};
-
-const Family& find_family(const std::string& name) {
-  const auto found = std::find_if(kFamilies.begin(), kFamilies.end(),
-                                  [&](const Family& family) { return name == family.name; });
-  if (found == kFamilies.end()) {
-    throw InputError("markers", fmt::format("unknown tag family '{}'", name),
-                     fmt::format("one of {}", fmt::join(tag_families(), ", ")));
-  }
-  return *found;
-}
 
 /// The library keeps a table of every code with every correctable error, 16 bytes or more an entry.
 /// Bits that may be corrected before that table outgrows a few million entries.
@@ -74,20 +35,6 @@ Eigen::Matrix3d pixel_from_tag(const matd_t& homography) {
   return shift * Eigen::Map<const RowMajor>(homography.data);
 }
 
-TagPattern printed_pattern(apriltag_family_t* family, int id) {
-  const std::unique_ptr<image_u8_t, void (*)(image_u8_t*)> image(apriltag_to_image(family, id),
-                                                                 image_u8_destroy);
-  TagPattern pattern{
-      .border_cells = family->width_at_border, .total_cells = family->total_width, .white = {}};
-  assert(image->width == pattern.total_cells && image->height == pattern.total_cells);
-  for (int row = 0; row < image->height; ++row) {
-    for (int column = 0; column < image->width; ++column) {
-      pattern.white.push_back(image->buf[row * image->stride + column] > 127 ? 1.0F : 0.0F);
-    }
-  }
-  return pattern;
-}
-
 /// A code with b wrong bits is still twice as near to its own word as to any other while
 /// 3 b < distance; a quarter of the distance leaves room for what is no tag at all.
 int safe_corrected_bits(const apriltag_family_t& family) {
@@ -96,31 +43,25 @@ int safe_corrected_bits(const apriltag_family_t& family) {
 
 }  // namespace
 
-std::vector<std::string> tag_families() {
-  std::vector<std::string> names;
-  for (const Family& family : kFamilies) names.emplace_back(family.name);
-  return names;
-}
-
 struct TagDetector::Library {
-  explicit Library(const Family& kind)
-      : family(kind.create(), kind.destroy),
+  explicit Library(const std::string& name)
+      : family(make_tag_family(name)),
         detector(apriltag_detector_create(), apriltag_detector_destroy) {}
 
   const TagPattern& pattern(int id) {
     const auto known = patterns.find(id);
     if (known != patterns.end()) return known->second;
-    return patterns.emplace(id, printed_pattern(family.get(), id)).first->second;
+    return patterns.emplace(id, printed_tag(*family, id)).first->second;
   }
 
   // The detector is destroyed first: it holds a pointer into the family.
-  std::unique_ptr<apriltag_family_t, void (*)(apriltag_family_t*)> family;
+  TagFamily family;
   std::unique_ptr<apriltag_detector_t, void (*)(apriltag_detector_t*)> detector;
   std::map<int, TagPattern> patterns;  ///< of the tags seen so far
 };
 
 TagDetector::TagDetector(const std::string& family, int max_corrected_bits)
-    : library_(std::make_unique<Library>(find_family(family))) {
+    : library_(std::make_unique<Library>(family)) {
   const apriltag_family_t& kind = *library_->family;
   const int bits =
       std::min({max_corrected_bits, safe_corrected_bits(kind), affordable_corrected_bits(kind)});

@@ -22,9 +22,6 @@ struct TagDetection {
   double explained = 0;  ///< share of the tag's pixels that its pattern explains; about 0.9 is all
 };
 
-/// Names of all tag families that can be read, such as tag36h11; alphabetical.
-std::vector<std::string> tag_families();
-
 /// Reads the tags of one family in pictures. Not to be shared between threads: each has its own.
 class TagDetector {
  public:

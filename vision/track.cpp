@@ -17,6 +17,7 @@
 #include "vision/image_source.h"
 #include "vision/overlay.h"
 #include "vision/tag_detector.h"
+#include "vision/tag_family.h"
 #include "vision/tag_history.h"
 
 namespace clothfit {

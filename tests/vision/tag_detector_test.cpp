@@ -13,6 +13,7 @@
 
 #include "data/input_error.h"
 #include "tests/vision/synthetic_tag.h"
+#include "vision/tag_family.h"
 
 namespace clothfit {
 namespace {

@@ -1,0 +1,82 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "data/markers.h"
+
+namespace clothfit {
+
+/// Reflectances, 0 (black) to 1 (returns all light).
+struct PrintOptions {
+  double paper = 0.85;         ///< the cloth where nothing is printed, and its back
+  double ink = 0.08;           ///< of tags and dots
+  double dot_radius_m = 4e-3;  ///< > 0; of the discs around markers of kind `dots`
+  void validate() const;       ///< throws InputError
+};
+
+/// What a sheet shows on its printed side, as reflectance over material coordinates (s to the
+/// right, t down, metres).
+///
+/// Markers of kind `apriltag` are corners of tags: the printed tag, whose border ends at the four
+/// corners, is laid out between them, with the cells outside the border that its family has. Ink
+/// wins where white margins overlap a neighbour. Markers of kind `dots` are the centres of filled
+/// circles, those of kind `none` show nothing.
+class SheetPrint {
+ public:
+  /// Throws InputError for a cloth without size, an unknown family, a tag that it does not have or
+  /// that lacks one of its four corners, corners that are not those of a rectangle in the order of
+  /// data/markers.h, and markers of kind `texture`.
+  SheetPrint(const MarkerSet& markers, double width_m, double height_m,
+             const PrintOptions& options = {});
+
+  double width_m() const { return width_m_; }
+  double height_m() const { return height_m_; }
+  /// Of the other side, which is blank.
+  double back_reflectance() const { return options_.paper; }
+  /// Mean around a place, over the parallelogram that the columns of `footprint_m` span and that
+  /// the place is the middle of; zero: at the place itself. Edges that cross it are weighed by what
+  /// they cover of a rectangle along the tag's own axes (of a dot: along its radius) with the same
+  /// second moments: where an edge seems to lie is exact, its softness nearly so. Footprints reach
+  /// no further than a hundredth of the sheet.
+  double reflectance(const Eigen::Vector2d& place_m,
+                     const Eigen::Matrix2d& footprint_m = Eigen::Matrix2d::Zero()) const;
+
+ private:
+  /// A square of cells. `cell_from_material` takes (s - s0, t - t0) to (column, row) counted from
+  /// the top left of everything that is printed.
+  struct Tag {
+    Eigen::Vector2d origin_m;
+    Eigen::Matrix2d cell_from_material;
+    int cells = 0;            ///< across
+    std::vector<bool> black;  ///< row by row from the top left
+
+    double ink_share(const Eigen::Vector2d& place_m, const Eigen::Matrix2d& footprint_m) const;
+  };
+  struct Dot {
+    Eigen::Vector2d centre_m;
+    double radius_m = 0;
+
+    double ink_share(const Eigen::Vector2d& place_m, const Eigen::Matrix2d& footprint_m) const;
+  };
+  /// What may cover a place: the sheet is divided into bins so that a look-up reads few items.
+  struct Bin {
+    std::vector<int> tags;
+    std::vector<int> dots;
+  };
+
+  void add_tags(const MarkerSet& markers);
+  void add_dots(const MarkerSet& markers);
+  void list_in_bins(const Eigen::Vector2d& low_m, const Eigen::Vector2d& high_m, int item,
+                    std::vector<int> Bin::*list);
+  int bin_along(double x_m, double length_m) const;
+
+  double width_m_ = 0;
+  double height_m_ = 0;
+  PrintOptions options_;
+  std::vector<Tag> tags_;
+  std::vector<Dot> dots_;
+  std::vector<Bin> bins_;
+};
+
+}  // namespace clothfit
