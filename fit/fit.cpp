@@ -60,6 +60,10 @@ constexpr Effort kApproachEffort{.iterations = 6,  // the coarse mesh's derivati
                                  .least_gain = 1e-3,
                                  .derivatives = Derivatives::tangents,
                                  .most_spring_steps = 1e10};
+constexpr Effort kRoughEffort{.rounds = 2,
+                              .least_gain = 1e-2,
+                              .derivatives = Derivatives::tangents,
+                              .most_spring_steps = 1e10};
 constexpr Effort kFinalEffort{.rounds = 6,
                               .least_gain = 1e-7,
                               .derivatives = Derivatives::tangents,
@@ -230,8 +234,11 @@ RefineResult refine_best(const FitProblem& coarse_problem, const FitProblem& pro
   std::vector<Stage> stages;
   for (const double share : kHorizonShares)
     stages.push_back({.problem = coarse_problem, .share = share, .effort = kTrendEffort});
-  stages.push_back(
-      {.problem = problem, .derivatives_of = &coarse_problem, .effort = kApproachEffort});
+  stages.push_back({.problem = problem,
+                    .derivatives_of = &coarse_problem,
+                    .share = kSearchShare,
+                    .effort = kApproachEffort});
+  stages.push_back({.problem = problem, .share = kSearchShare, .effort = kRoughEffort});
   stages.push_back({.problem = problem, .effort = kFinalEffort});
   for (const Stage& stage : stages) {
     best = refine_stage(stage, options, best.values, progress, report);
