@@ -15,6 +15,7 @@
 
 #include "data/input_error.h"
 #include "data/number_text.h"
+#include "data/sync_to_disk.h"
 #include "data/text_file.h"
 
 namespace clothfit {
@@ -77,24 +78,16 @@ void remove_stale(const fs::path& final_path) {
                    "a writable folder with room on its disk", "choose another --out");
 }
 
-/// Forces a file or folder onto the disk.
-void sync(const fs::path& path, int flags) {
-  const int descriptor = open(path.c_str(), flags | O_CLOEXEC);
-  if (descriptor < 0) refuse(path, "cannot be opened", errno);
-  const int status = fsync(descriptor);
-  const int error_number = errno;
-  close(descriptor);
-  // Some file systems cannot sync a folder and say so.
-  if (status != 0 && error_number != EINVAL) refuse(path, "cannot be synced", error_number);
+void sync(const fs::path& path) {
+  if (const int error_number = sync_to_disk(path)) refuse(path, "cannot be synced", error_number);
 }
 
 void sync_tree(const fs::path& folder) {
   for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder)) {
     if (entry.is_symlink()) continue;
-    if (entry.is_regular_file()) sync(entry.path(), O_RDONLY);
-    if (entry.is_directory()) sync(entry.path(), O_RDONLY | O_DIRECTORY);
+    if (entry.is_regular_file() || entry.is_directory()) sync(entry.path());
   }
-  sync(folder, O_RDONLY | O_DIRECTORY);
+  sync(folder);
 }
 
 /// Swaps two folders in one step, or in two where the file system knows no swap.
@@ -161,7 +154,7 @@ void OutputFolder::publish() {
       replaces ? exchange(work_path_, final_path_) : move_to_free(work_path_, final_path_);
   if (!moved) refuse(final_path_, "cannot be put in place", errno);
   published_ = true;
-  sync(final_path_.parent_path(), O_RDONLY | O_DIRECTORY);
+  sync(final_path_.parent_path());
   if (replaces) fs::remove_all(work_path_, error);
 }
 

@@ -276,13 +276,14 @@ CmaState next_cma_generation(const std::vector<SearchParameter>& parameters,
 
 CmaResult search_by_cma(const std::vector<SearchParameter>& parameters, const CmaOptions& options,
                         const GenerationCost& cost, CmaState state,
-                        const ProgressCallback& progress) {
+                        const ProgressCallback& progress, const CmaWatcher& after_generation) {
   options.validate();
   require_ranges(parameters);
   CmaResult result;
   std::optional<CmaStop> stop = stop_reason(options, state);
   while (!stop) {
     state = next_cma_generation(parameters, options, cost, std::move(state));
+    if (after_generation) after_generation(state);
     stop = stop_reason(options, state);
     std::ostringstream note;
     note << "best cost " << state.best().cost << ", step " << state.step;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <functional>
 #include <limits>
 #include <string>
 #include <vector>
@@ -90,11 +91,16 @@ struct CmaResult {
   bool usable() const;  ///< at least one finite cost
 };
 
+/// Sees the state after a generation, to save it, say.
+using CmaWatcher = std::function<void(const CmaState&)>;
+
 /// Generations until a stopping rule holds, from `state`: a start, or one that was saved, which
-/// leads to the same end as a search that was not interrupted. `progress`, when given, is told
-/// after each generation. Throws InputError for options or ranges that make no sense.
+/// leads to the same end as a search that was not interrupted. After each generation
+/// `after_generation`, when given, sees the state, then `progress`, when given,
+/// is told. Throws InputError for options or ranges that make no sense.
 CmaResult search_by_cma(const std::vector<SearchParameter>& parameters, const CmaOptions& options,
                         const GenerationCost& cost, CmaState state,
-                        const ProgressCallback& progress = {});
+                        const ProgressCallback& progress = {},
+                        const CmaWatcher& after_generation = {});
 
 }  // namespace clothfit

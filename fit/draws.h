@@ -7,14 +7,26 @@
 
 namespace clothfit {
 
+/// One round of splitmix64, a bijection: neighbouring inputs give unrelated outputs.
+constexpr std::uint64_t splitmix64(std::uint64_t x) {
+  x += 0x9e3779b97f4a7c15u;
+  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
+  x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
+  return x ^ (x >> 31);
+}
+
+/// The seed of one place under a seed, a function of the two alone: no two places share one.
+constexpr std::uint64_t derived_seed(std::uint64_t seed, int place) {
+  return splitmix64(splitmix64(seed) + static_cast<std::uint64_t>(place));
+}
+
 /// The random numbers of one thing among many: they depend on (seed, series, place) alone, so that
 /// no order of work and no number of workers changes them. The standard fixes what the engine
 /// returns but leaves the distributions to the library, so the mappings are written out here.
 class Draws {
  public:
   Draws(std::uint64_t seed, int series, int place)
-      : engine_(splitmix64(splitmix64(splitmix64(seed) + static_cast<std::uint64_t>(series)) +
-                           static_cast<std::uint64_t>(place))) {}
+      : engine_(derived_seed(splitmix64(seed) + static_cast<std::uint64_t>(series), place)) {}
 
   /// Uniform in [0, 1), on the grid of 2^-53.
   double uniform() { return static_cast<double>(engine_() >> 11) * 0x1p-53; }
@@ -29,14 +41,6 @@ class Draws {
   }
 
  private:
-  /// One round: neighbouring inputs give unrelated outputs.
-  static std::uint64_t splitmix64(std::uint64_t x) {
-    x += 0x9e3779b97f4a7c15u;
-    x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
-    x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
-    return x ^ (x >> 31);
-  }
-
   std::mt19937_64 engine_;
 };
 

@@ -255,7 +255,8 @@ EvolutionState next_generation(const std::vector<SearchParameter>& parameters,
 
 EvolutionResult resume_evolution(const std::vector<SearchParameter>& parameters,
                                  const EvolutionOptions& options, const GenerationCost& cost,
-                                 EvolutionState state, const ProgressCallback& progress) {
+                                 EvolutionState state, const ProgressCallback& progress,
+                                 const EvolutionWatcher& after_generation) {
   options.validate();
   require_ranges(parameters);
   assert(!state.population.empty());
@@ -282,6 +283,7 @@ EvolutionResult resume_evolution(const std::vector<SearchParameter>& parameters,
       break;
     }
     state = next_generation(parameters, options, cost, state);
+    if (after_generation) after_generation(state);
   }
   result.message = describe(result.stop, options, state);
   result.state = std::move(state);
@@ -290,10 +292,11 @@ EvolutionResult resume_evolution(const std::vector<SearchParameter>& parameters,
 
 EvolutionResult evolve(const std::vector<SearchParameter>& parameters,
                        const EvolutionOptions& options, const GenerationCost& cost,
-                       const ProgressCallback& progress,
-                       const std::vector<Eigen::VectorXd>& given) {
-  return resume_evolution(parameters, options, cost,
-                          first_generation(parameters, options, cost, given), progress);
+                       const ProgressCallback& progress, const std::vector<Eigen::VectorXd>& given,
+                       const EvolutionWatcher& after_generation) {
+  EvolutionState state = first_generation(parameters, options, cost, given);
+  if (after_generation) after_generation(state);
+  return resume_evolution(parameters, options, cost, std::move(state), progress, after_generation);
 }
 
 }  // namespace clothfit

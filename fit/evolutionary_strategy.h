@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <functional>
 #include <limits>
 #include <string>
 #include <vector>
@@ -103,16 +104,22 @@ struct EvolutionResult {
   const Individual& best() const { return state.population.front(); }
 };
 
-/// Generations until a stopping rule holds. `progress`, when given, is told after each generation.
-/// Throws InputError for options or ranges that make no sense.
+/// Sees the state after a generation, to save it, say.
+using EvolutionWatcher = std::function<void(const EvolutionState&)>;
+
+/// Generations until a stopping rule holds. After each generation `after_generation`, when given,
+/// sees the state, then `progress`, when given, is told. Throws InputError for options or ranges
+/// that make no sense.
 EvolutionResult evolve(const std::vector<SearchParameter>& parameters,
                        const EvolutionOptions& options, const GenerationCost& cost,
                        const ProgressCallback& progress = {},
-                       const std::vector<Eigen::VectorXd>& given = {});
+                       const std::vector<Eigen::VectorXd>& given = {},
+                       const EvolutionWatcher& after_generation = {});
 
 /// Goes on from a saved state, to the same end as a search that was not interrupted.
 EvolutionResult resume_evolution(const std::vector<SearchParameter>& parameters,
                                  const EvolutionOptions& options, const GenerationCost& cost,
-                                 EvolutionState state, const ProgressCallback& progress = {});
+                                 EvolutionState state, const ProgressCallback& progress = {},
+                                 const EvolutionWatcher& after_generation = {});
 
 }  // namespace clothfit

@@ -1,0 +1,22 @@
+#pragma once
+
+#include <algorithm>
+#include <string>
+#include <string_view>
+
+#include "data/shown_text.h"
+
+namespace clothfit {
+
+/// What an error message shows of `text` where it is not `other`: all of it when it is short, else
+/// from the word on in which they first differ.
+inline std::string shown_difference(std::string_view text, std::string_view other) {
+  constexpr std::size_t kShort = 60;
+  if (text.size() <= kShort) return shown_text(text);
+  const auto differs = std::ranges::mismatch(text, other).in1 - text.begin();
+  const std::size_t space = text.substr(0, static_cast<std::size_t>(differs)).rfind(' ');
+  if (space == std::string_view::npos) return shown_text(text);
+  return "... " + shown_text(text.substr(space + 1));
+}
+
+}  // namespace clothfit
