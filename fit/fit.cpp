@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <span>
 
 #include "data/input_error.h"
 #include "fit/evolutionary_strategy.h"
@@ -29,6 +30,8 @@ constexpr int kSmallestMesh = 5;
 /// whole trajectories of folding cloth diverge from a start that is only roughly right.
 constexpr double kSearchShare = 0.4;
 constexpr double kHorizonShares[] = {0.3, 0.6, 1.0};
+/// A given start may be far off, and nothing has been simulated yet.
+constexpr double kGivenShares[] = {0.1, 0.2, 0.4, 0.7};
 constexpr int kFewestFrames = 8;
 
 /// Spring-steps that a search may cost; its time step is cut no finer than that.
@@ -43,6 +46,7 @@ struct Effort {
   double least_gain = 0;
   Derivatives derivatives = Derivatives::tangents;
   double difference_step = 0;
+  double trust_region_radius = RefineOptions().trust_region_radius;
   double most_spring_steps = 0;  ///< a stage stops there: a wrong model may lead it on for hours
 };
 constexpr Effort kCoarseEffort{.rounds = 1,
@@ -67,6 +71,7 @@ constexpr Effort kRoughEffort{.rounds = 2,
 constexpr Effort kFinalEffort{.rounds = 6,
                               .least_gain = 1e-7,
                               .derivatives = Derivatives::tangents,
+                              .trust_region_radius = 1e6,
                               .most_spring_steps = 2e10};
 
 /// A log-parameter less certain than this (a factor of e^0.7 = 2 either way) is undetermined.
@@ -81,8 +86,12 @@ int horizon_frames(const FitProblem& problem, double share) {
                     problem.first_held_out);
 }
 
-int coarse(int count) {
-  return std::max(std::min(count, kSmallestMesh), (count - 1) / kCoarsening + 1);
+/// Natural lengths, where they are fitted, are those of one mesh.
+int coarse(const FitProblem& problem, const FitOptions& options, int count) {
+  if (problem.spring_set != SpringSet::fabric) return count;
+  int smallest = kSmallestMesh;
+  if (problem.start == StartKind::unknown) smallest = std::max(smallest, options.start_nodes + 1);
+  return std::max(std::min(count, smallest), (count - 1) / kCoarsening + 1);
 }
 
 /// The time step of a search: stable at the upper corner of the ranges if the budget allows; else
@@ -90,7 +99,7 @@ int coarse(int count) {
 double search_time_step_s(const FitProblem& problem, const FitOptions& options, int frames) {
   Eigen::VectorXd corner = problem.space.start();
   for (int p = 0; p < problem.space.size(); ++p)
-    if (problem.space.parameters[static_cast<size_t>(p)].role != ParameterRole::nuisance)
+    if (is_physical(problem.space.parameters[static_cast<size_t>(p)].role))
       corner[p] = problem.space.parameters[static_cast<size_t>(p)].upper;
   const double stable_s = stable_time_step_s(problem.cloth, parameter_set(problem, corner));
   const double simulated_s =
@@ -106,9 +115,9 @@ struct Search {
   bool cancelled = false;
 };
 
-/// The evolutionary strategy over everything but nuisance parameters, on a coarse mesh and a short
-/// window.
-Search search(const FitProblem& problem, const FitOptions& options,
+/// The evolutionary strategy over the physical parameters, the others at `start`, on a coarse mesh
+/// and a short window.
+Search search(const FitProblem& problem, const FitOptions& options, const Eigen::VectorXd& start,
               const ProgressCallback& progress, FitReport& report) {
   const int frames = horizon_frames(problem, kSearchShare);
   const TrajectoryObjective objective(problem, frames,
@@ -118,7 +127,7 @@ Search search(const FitProblem& problem, const FitOptions& options,
   std::vector<int> searched;
   for (int p = 0; p < problem.space.size(); ++p) {
     const FitParameter& parameter = problem.space.parameters[static_cast<size_t>(p)];
-    if (parameter.role == ParameterRole::nuisance) continue;
+    if (!is_physical(parameter.role)) continue;
     searched.push_back(p);
     ranges.push_back({.name = parameter.name,
                       .lower = parameter.lower,
@@ -126,7 +135,7 @@ Search search(const FitProblem& problem, const FitOptions& options,
                       .log_scale = parameter.scale == ParameterScale::logarithmic});
   }
   const auto all_values = [&](const Eigen::VectorXd& individual) {
-    Eigen::VectorXd values = problem.space.start();
+    Eigen::VectorXd values = start;
     for (size_t n = 0; n < searched.size(); ++n)
       values[searched[n]] = individual[static_cast<Eigen::Index>(n)];
     return values;
@@ -193,6 +202,8 @@ RefineResult refine_stage(const Stage& stage, const FitOptions& options,
       .least_gain = stage.effort.least_gain,
       .derivatives = stage.effort.derivatives,
       .difference_step = stage.effort.difference_step,
+      .loss = options.loss,
+      .trust_region_radius = stage.effort.trust_region_radius,
       .most_spring_steps = options.work * stage.effort.most_spring_steps,
       .substep_scale = options.substep_scale};
   const int frames = horizon_frames(problem, stage.share);
@@ -216,11 +227,34 @@ RefineResult refine_stage(const Stage& stage, const FitOptions& options,
   return result;
 }
 
-/// The best few individuals over a short horizon, the best of them over growing ones, all on the
-/// coarse mesh; then on the fit's own mesh, first with the coarse one's derivatives.
-RefineResult refine_best(const FitProblem& coarse_problem, const FitProblem& problem,
-                         const FitOptions& options, const std::vector<Eigen::VectorXd>& candidates,
-                         const ProgressCallback& progress, FitReport& report) {
+/// Refinement, stage after stage: on the coarse mesh over growing horizons, then on the fit's own
+/// mesh, first with the coarse one's derivatives.
+RefineResult refine_on(const FitProblem& coarse_problem, const FitProblem& problem,
+                       const FitOptions& options, const Eigen::VectorXd& start,
+                       std::span<const double> coarse_shares, const ProgressCallback& progress,
+                       FitReport& report) {
+  std::vector<Stage> stages;
+  for (const double share : coarse_shares)
+    stages.push_back({.problem = coarse_problem, .share = share, .effort = kTrendEffort});
+  stages.push_back({.problem = problem,
+                    .derivatives_of = &coarse_problem,
+                    .share = kSearchShare,
+                    .effort = kApproachEffort});
+  stages.push_back({.problem = problem, .share = kSearchShare, .effort = kRoughEffort});
+  stages.push_back({.problem = problem, .effort = kFinalEffort});
+  RefineResult best;
+  best.values = start;
+  for (const Stage& stage : stages) {
+    best = refine_stage(stage, options, best.values, progress, report);
+    if (best.cancelled || !best.usable) return best;
+  }
+  return best;
+}
+
+/// The one of the best few individuals that gets furthest over a short horizon on the coarse mesh.
+RefineResult pick_best(const FitProblem& coarse_problem, const FitOptions& options,
+                       const std::vector<Eigen::VectorXd>& candidates,
+                       const ProgressCallback& progress, FitReport& report) {
   RefineResult best;
   best.values = candidates.front();
   best.cost = std::numeric_limits<double>::infinity();
@@ -231,20 +265,55 @@ RefineResult refine_best(const FitProblem& coarse_problem, const FitProblem& pro
     if (result.cancelled) return result;
     if (result.usable && result.cost < best.cost) best = std::move(result);
   }
-  std::vector<Stage> stages;
-  for (const double share : kHorizonShares)
-    stages.push_back({.problem = coarse_problem, .share = share, .effort = kTrendEffort});
-  stages.push_back({.problem = problem,
-                    .derivatives_of = &coarse_problem,
-                    .share = kSearchShare,
-                    .effort = kApproachEffort});
-  stages.push_back({.problem = problem, .share = kSearchShare, .effort = kRoughEffort});
-  stages.push_back({.problem = problem, .effort = kFinalEffort});
-  for (const Stage& stage : stages) {
-    best = refine_stage(stage, options, best.values, progress, report);
-    if (best.cancelled || !best.usable) return best;
-  }
   return best;
+}
+
+/// Where a fit begins without a search: the values given, within their ranges.
+Eigen::VectorXd given_start(const FitProblem& problem, const std::map<std::string, double>& given) {
+  Eigen::VectorXd values = problem.space.start();
+  for (const auto& [name, value] : given) {
+    const int p = problem.space.index(name);
+    if (p < 0)
+      throw InputError("--start", "the fit has no parameter '" + name + "'",
+                       "a fit of the same parameter set and effects");
+    const FitParameter& parameter = problem.space.parameters[static_cast<size_t>(p)];
+    values[p] = std::clamp(value, parameter.lower, parameter.upper);
+  }
+  return values;
+}
+
+/// The whole way from the ranges, or from a given start, to the optimum.
+RefineResult identify(const FitInput& input, const FitProblem& problem, const FitOptions& options,
+                      const ProgressCallback& progress, FitReport& report) {
+  const FitProblem coarse_problem =
+      make_problem(input, options, coarse(problem, options, problem.cloth.mesh.columns),
+                   coarse(problem, options, problem.cloth.mesh.rows));
+  Eigen::VectorXd start = problem.space.start();
+  if (options.start) {
+    start = given_start(problem, *options.start);
+    return refine_on(coarse_problem, problem, options, start, kGivenShares, progress, report);
+  }
+  if (problem.start == StartKind::unknown) {
+    // A search needs to know where the cloth begins: from the middle of the ranges, over the first
+    // frames, which say more of the start than of the fabric.
+    const RefineResult first =
+        refine_stage({.problem = coarse_problem, .share = 0, .effort = kCoarseEffort}, options,
+                     start, progress, report);
+    if (first.cancelled || !first.usable) return first;
+    for (int p = 0; p < problem.space.size(); ++p)
+      if (problem.space.parameters[static_cast<size_t>(p)].role == ParameterRole::start)
+        start[p] = first.values[p];
+  }
+  const Search found = search(coarse_problem, options, start, progress, report);
+  if (found.best.empty()) {
+    RefineResult none;
+    none.cancelled = found.cancelled;
+    none.message = "no individual of the search could be simulated to the end of its window";
+    return none;
+  }
+  const RefineResult best = pick_best(coarse_problem, options, found.best, progress, report);
+  if (best.cancelled) return best;
+  return refine_on(coarse_problem, problem, options, best.values, kHorizonShares, progress, report);
 }
 
 ParameterEstimate estimate(const FitParameter& parameter, const std::string& name, double value,
@@ -307,7 +376,7 @@ void fill_parameters(const FitProblem& problem, const FitOptions& options,
 
   for (int p = 0; p < problem.space.size(); ++p) {
     const FitParameter& parameter = problem.space.parameters[static_cast<size_t>(p)];
-    if (parameter.role == ParameterRole::effect) continue;
+    if (parameter.role == ParameterRole::effect || parameter.role == ParameterRole::start) continue;
     auto& list = parameter.role == ParameterRole::springs ? result.parameters : result.nuisance;
     list.push_back(estimate_of(p, parameter.name));
   }
@@ -329,6 +398,18 @@ void fill_parameters(const FitProblem& problem, const FitOptions& options,
     }
     result.effects.push_back(std::move(effect));
   }
+}
+
+/// Of all parameters but those of the start, of which there may be hundreds.
+void fill_correlation(const ParameterSpace& space, const Uncertainty& uncertainty,
+                      FitReport& report) {
+  std::vector<int> shown;
+  for (int p = 0; p < space.size(); ++p) {
+    if (space.parameters[static_cast<size_t>(p)].role == ParameterRole::start) continue;
+    shown.push_back(p);
+    report.correlation_names.push_back(space.parameters[static_cast<size_t>(p)].name);
+  }
+  report.correlation = uncertainty.correlation(shown, shown);
 }
 
 FitReport stopped(FitReport report, FitStop stop, const std::string& message) {
@@ -380,31 +461,21 @@ FitReport fit(const FitInput& input, const FitOptions& options, const ProgressCa
   Eigen::VectorXd values = problem.space.start();
   Uncertainty uncertainty;
   if (!options.forecast) {
-    const FitProblem coarse_problem =
-        make_problem(input, options, coarse(result.mesh_columns), coarse(result.mesh_rows));
-    const Search found = search(coarse_problem, options, progress, report);
-    if (found.cancelled) return stopped(std::move(report), FitStop::cancelled, "cancelled");
-    if (found.best.empty())
-      return stopped(std::move(report), FitStop::diverged,
-                     "no individual of the search could be simulated to the end of its window");
-    const RefineResult refined =
-        refine_best(coarse_problem, problem, options, found.best, progress, report);
+    const RefineResult refined = identify(input, problem, options, progress, report);
     if (refined.cancelled) return stopped(std::move(report), FitStop::cancelled, "cancelled");
     if (!refined.usable)
-      return stopped(std::move(report), FitStop::diverged,
-                     "no refinement worked out: " + report.stages.back());
+      return stopped(std::move(report), FitStop::diverged, "no fit worked out: " + refined.message);
     values = refined.values;
     result.time_step_s = refined.time_step_s;
     report.stop = refined.converged ? FitStop::converged : FitStop::reached_limit;
     report.message = refined.message;
     const TrajectoryObjective objective(problem, problem.first_held_out, result.time_step_s);
-    uncertainty = estimate_uncertainty(objective, values);
+    uncertainty =
+        estimate_uncertainty(objective, values, options.loss, refined.residual_by_coordinate);
     if (!uncertainty.usable)
       return stopped(std::move(report), FitStop::diverged,
                      "the derivatives at the optimum could not be computed");
-    report.correlation = uncertainty.correlation;
-    for (const FitParameter& parameter : problem.space.parameters)
-      report.correlation_names.push_back(parameter.name);
+    fill_correlation(problem.space, uncertainty, report);
     report.stages.push_back(
         fmt::format("chi-square per degree of freedom {:.3g}", uncertainty.chi_square_per_dof));
   } else {

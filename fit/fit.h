@@ -24,6 +24,9 @@ struct FitInput {
   std::vector<CameraParameters> cameras;     ///< those of tracks2d, with poses
 };
 
+/// What large residuals weigh: as all others, or less (Huber).
+enum class Loss { squared, huber };
+
 /// Which observations a fit uses.
 enum class ObservationKind { automatic, tracks3d, tracks2d };
 
@@ -34,9 +37,14 @@ struct FitOptions {
   int mesh_columns = 0;                      ///< 0: the recording's suggestion
   int mesh_rows = 0;
   unsigned long long seed = 1;
-  int population = 100;      ///< individuals of the evolutionary search [louchet1995]
-  int generations = 40;      ///< at most; the search stops earlier when it no longer gains
-  int refine_best = 3;       ///< individuals that go to refinement
+  int population = 100;  ///< individuals of the evolutionary search [louchet1995]
+  int generations = 40;  ///< at most; the search stops earlier when it no longer gains
+  int refine_best = 3;   ///< individuals that go to refinement
+  /// Values of parameters by name, from an earlier fit: there is no search, and what has none
+  /// starts where it would.
+  std::optional<std::map<std::string, double>> start;
+  Loss loss = Loss::huber;
+  int start_nodes = 6;       ///< per side, of the corrections of a start that is unknown
   double work = 1;           ///< > 0; times the limits of work of the refinement's stages
   double substep_scale = 1;  ///< >= 1; more cuts time finer than stability asks
   int threads = 0;           ///< 0: as many as the machine has

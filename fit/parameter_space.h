@@ -9,7 +9,14 @@
 
 namespace clothfit {
 
-enum class ParameterRole { springs, effect, nuisance };
+/// What a parameter is of: the fabric's springs, an effect, how things were measured, or where the
+/// cloth was when the recording began.
+enum class ParameterRole { springs, effect, nuisance, start };
+
+/// Whether it says something of the cloth's physics, which is what searches look for.
+inline bool is_physical(ParameterRole role) {
+  return role == ParameterRole::springs || role == ParameterRole::effect;
+}
 
 /// A number that a fit may change.
 struct FitParameter {

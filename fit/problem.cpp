@@ -280,6 +280,13 @@ Eigen::VectorXd spring_numbers(const FitProblem& problem, const Eigen::VectorXd&
   return numbers;
 }
 
+/// 3 x nodes.
+Eigen::Matrix3Xd corrections(const std::vector<Binding>& bindings, const Eigen::VectorXd& values) {
+  Eigen::Matrix3Xd at_nodes(3, static_cast<Eigen::Index>(bindings.size() / 3));
+  for (size_t n = 0; n < bindings.size(); ++n) at_nodes.data()[n] = bindings[n].value(values);
+  return at_nodes;
+}
+
 Eigen::Vector3d three(const std::vector<Binding>& bindings, size_t first,
                       const Eigen::VectorXd& values) {
   return {bindings[first].value(values), bindings[first + 1].value(values),
@@ -320,11 +327,7 @@ Turned turned(const Eigen::Vector3d& turn, const Eigen::Vector3d& vector) {
   return result;
 }
 
-void place_sheet_of(const Recording& recording, FitProblem& problem) {
-  if (recording.start == StartKind::unknown)
-    throw InputError(recording_file(recording), "start: unknown cannot be fitted by this version",
-                     "released_flat or at_rest",
-                     "cut the recording so that it begins with the cloth at rest");
+Rigid3 place_sheet_of(const Recording& recording, FitProblem& problem) {
   const Eigen::Matrix2Xd places = marker_places(recording.markers);
   const int frames = recording.start == StartKind::at_rest ? kRestFrames : 1;
   const auto world_from_sheet = place_flat_sheet(problem.observations, places, frames);
@@ -338,6 +341,7 @@ void place_sheet_of(const Recording& recording, FitProblem& problem) {
   problem.placed_sheet_m.resize(3, flat.cols());
   for (Eigen::Index v = 0; v < flat.cols(); ++v)
     problem.placed_sheet_m.col(v) = *world_from_sheet * Eigen::Vector3d(flat.col(v));
+  return *world_from_sheet;
 }
 
 }  // namespace
@@ -365,12 +369,22 @@ FitProblem make_problem(const FitInput& input, const FitOptions& options, int me
   add_observations(input, options, problem);
   problem.vertex_weights = vertex_weights(make_surface(
       mesh.columns, mesh.rows, mesh.width_m, mesh.height_m, marker_places(recording.markers)));
-  place_sheet_of(recording, problem);
+  const Rigid3 world_from_sheet = place_sheet_of(recording, problem);
   add_springs(recording, options, problem);
   add_effects(recording, options, problem);
   if (!options.forecast) {
     add_gravity_direction(problem);
     add_sheet_motion(problem);
+  }
+  if (problem.start == StartKind::unknown) {
+    if (options.forecast)
+      throw InputError("--forecast", "the recording begins with the cloth in motion",
+                       "a start that is known without a fit",
+                       "fit the recording, or cut it so that it begins with the cloth at rest");
+    problem.start_state =
+        make_start_state(problem.observations, marker_places(recording.markers),
+                         problem.frame_time_s, problem.first_held_out, mesh, world_from_sheet,
+                         {.nodes = options.start_nodes}, problem.space, problem.priors);
   }
   return problem;
 }
@@ -392,6 +406,13 @@ ParameterSet parameter_set(const FitProblem& problem, const Eigen::VectorXd& val
     set.effects.push_back(std::move(numbers));
   }
   set.start_position_m = problem.placed_sheet_m;
+  if (problem.start == StartKind::unknown) {
+    const StartState& start = problem.start_state;
+    set.start_position_m =
+        start.position_m + corrections(start.position, values) * start.basis.transpose();
+    set.start_velocity_m_per_s =
+        start.velocity_m_per_s + corrections(start.velocity, values) * start.basis.transpose();
+  }
   if (!problem.sheet_motion.empty()) {
     const Eigen::Vector3d middle = problem.placed_sheet_m.rowwise().mean();
     const Eigen::Vector3d turn = sheet_turn(problem, values), shift = sheet_shift(problem, values);
@@ -439,6 +460,16 @@ std::vector<Direction> directions(const FitProblem& problem, const Eigen::Vector
     for (size_t k = 0; k < problem.effects[e].size(); ++k)
       if (const Binding& binding = problem.effects[e][k]; binding.parameter >= 0)
         along(binding).effects[e][k] = slope[binding.parameter];
+  for (int n = 0; n < 3 * problem.start_state.nodes(); ++n) {
+    const Eigen::RowVectorXd field = problem.start_state.basis.col(n / 3).transpose();
+    const auto move = [&](const Binding& binding, Eigen::Matrix3Xd& of) {
+      of = slope[binding.parameter] * Eigen::Vector3d::Unit(n % 3) * field;
+    };
+    const Binding& position = problem.start_state.position[static_cast<size_t>(n)];
+    const Binding& velocity = problem.start_state.velocity[static_cast<size_t>(n)];
+    move(position, along(position).start_position_m);
+    move(velocity, along(velocity).start_velocity_m_per_s);
+  }
   if (!problem.sheet_motion.empty()) {
     const Eigen::Index vertices = problem.placed_sheet_m.cols();
     const Eigen::Vector3d middle = problem.placed_sheet_m.rowwise().mean();

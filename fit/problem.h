@@ -8,6 +8,7 @@
 #include "fit/fit.h"
 #include "fit/observations.h"
 #include "fit/parameter_space.h"
+#include "fit/start_state.h"
 #include "model/cloth.h"
 #include "model/fabric.h"
 #include "model/spring_set.h"
@@ -24,6 +25,7 @@ struct FitProblem {
   bool mass_assumed = false;
   StartKind start = StartKind::at_rest;
   Eigen::Matrix3Xd placed_sheet_m;  ///< the flat sheet on the first frame's markers, 3 x vertices
+  StartState start_state;           ///< of a start that is unknown
   Eigen::Vector3d gravity_m_per_s2;
   std::vector<double> frame_time_s;  ///< of frames 0 .. last observed
   int first_held_out = 0;            ///< = number of frames when nothing is held out

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "data/median.h"
 #include "model/stability.h"
@@ -59,17 +60,24 @@ class SharedEvaluation final : public ceres::EvaluationCallback {
     if (has_jacobian_) {
       now_ = objective_.linearise(values, options_.derivatives, options_.difference_step);
       if (now_.usable) hold_at_bounds();
+      linearised_at_ = coordinates_;
     } else {
-      now_ = {.runs = 1, .residual = objective_.residuals({values}).front()};
+      now_.runs = 1;
+      now_.residual = objective_.residuals({values}).front();
       now_.usable = now_.residual.size() == objective_.residual_count();
     }
     simulations_ += now_.runs;
   }
 
-  /// The derivatives by coordinates that are held at a bound are zero.
   const Linearisation& now() const { return now_; }
+  /// Coordinates that are held at a bound.
   bool is_held(int p) const { return held_[static_cast<size_t>(p)]; }
   int simulations() const { return simulations_; }
+  /// The last derivatives, where they belong to `coordinates`.
+  bool is_linearised_at(const Eigen::VectorXd& coordinates) const {
+    return now_.usable && linearised_at_.size() == coordinates.size() &&
+           linearised_at_ == coordinates;
+  }
   double spring_steps() const { return simulations_ * objective_.spring_steps_per_run(); }
 
  private:
@@ -95,11 +103,8 @@ class SharedEvaluation final : public ceres::EvaluationCallback {
             prior.sqrt_information.col(static_cast<Eigen::Index>(n)).dot(r);
     }
     held_.assign(static_cast<size_t>(coordinates_.size()), false);
-    for (int p = 0; p < coordinates_.size(); ++p) {
-      if (!box_.blocks(p, coordinates_[p], gradient[p])) continue;
-      held_[static_cast<size_t>(p)] = true;
-      now_.residual_by_coordinate.col(p).setZero();
-    }
+    for (int p = 0; p < coordinates_.size(); ++p)
+      held_[static_cast<size_t>(p)] = box_.blocks(p, coordinates_[p], gradient[p]);
   }
 
   const FitProblem& problem_;
@@ -108,7 +113,7 @@ class SharedEvaluation final : public ceres::EvaluationCallback {
   const Box& box_;
   double huber_threshold_;
   const Eigen::VectorXd& coordinates_;
-  Eigen::VectorXd evaluated_;
+  Eigen::VectorXd evaluated_, linearised_at_;
   Linearisation now_;
   bool has_jacobian_ = false;
   std::vector<bool> held_;
@@ -131,8 +136,11 @@ class ObservationCost final : public ceres::CostFunction {
         now.residual.segment(block_.offset, block_.dimension);
     if (jacobians != nullptr && jacobians[0] != nullptr) {
       using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-      Eigen::Map<RowMajor>(jacobians[0], block_.dimension, now.residual_by_coordinate.cols()) =
-          now.residual_by_coordinate.middleRows(block_.offset, block_.dimension);
+      const Eigen::Index parameters = now.residual_by_coordinate.cols();
+      Eigen::Map<RowMajor> jacobian(jacobians[0], block_.dimension, parameters);
+      jacobian = now.residual_by_coordinate.middleRows(block_.offset, block_.dimension);
+      for (Eigen::Index p = 0; p < parameters; ++p)
+        if (shared_.is_held(static_cast<int>(p))) jacobian.col(p).setZero();
     }
     return true;
   }
@@ -220,6 +228,7 @@ std::string ending(const ceres::Solver::Summary& summary) {
 struct Round {
   ceres::Solver::Summary summary;
   Eigen::VectorXd values;
+  Eigen::MatrixXd residual_by_coordinate;  ///< there; empty where it was not had exactly
   int simulations = 0;
 };
 
@@ -256,7 +265,7 @@ Round solve(const Objective& objective, const Eigen::VectorXd& start, double hub
   options.max_num_iterations = refine_options.iterations;
   options.function_tolerance = refine_options.least_gain;
   options.parameter_tolerance = refine_options.least_step;
-  options.initial_trust_region_radius = 1e2;
+  options.initial_trust_region_radius = refine_options.trust_region_radius;
   // A step that fails is shortened by the trust region, with a new direction; Ceres' line search
   // along the bounds would first try the old one up to twenty times, a linearisation each.
   options.max_num_line_search_step_size_iterations = 0;
@@ -272,6 +281,10 @@ Round solve(const Objective& objective, const Eigen::VectorXd& start, double hub
   ceres::Solve(options, &least_squares, &round.summary);
   round.values = space.values(coordinates);
   round.simulations = shared.simulations();
+  const bool exact =
+      refine_options.derivatives == Derivatives::tangents && !objective.has_cheap_derivatives();
+  if (exact && shared.is_linearised_at(coordinates))
+    round.residual_by_coordinate = shared.now().residual_by_coordinate;
   return round;
 }
 
@@ -306,8 +319,11 @@ RefineResult refine(const FitProblem& problem, const ObjectiveMaker& make_object
       return result;
     }
     result.robust_scale = robust_scale(before);
-    const Round round = solve(*objective, result.values, kHuberScales * result.robust_scale,
-                              options, spring_steps_left, progress);
+    const double huber_threshold = options.loss == Loss::huber
+                                       ? kHuberScales * result.robust_scale
+                                       : std::numeric_limits<double>::infinity();
+    Round round =
+        solve(*objective, result.values, huber_threshold, options, spring_steps_left, progress);
     result.simulations += round.simulations;
     spring_steps_left -= round.simulations * objective->spring_steps_per_run();
     result.solver_iterations += static_cast<int>(round.summary.iterations.size());
@@ -323,6 +339,7 @@ RefineResult refine(const FitProblem& problem, const ObjectiveMaker& make_object
             .cwiseAbs()
             .maxCoeff();
     result.values = round.values;
+    result.residual_by_coordinate = std::move(round.residual_by_coordinate);
     result.cost = round.summary.final_cost / objective->residual_count();
     const bool settled = round.summary.termination_type == ceres::CONVERGENCE;
     // Done when neither the step limit nor the loss's scale had a say in where the round ended.

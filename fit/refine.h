@@ -8,9 +8,6 @@
 
 namespace clothfit {
 
-/// What large residuals weigh.
-enum class Loss { squared, huber };
-
 struct RefineOptions {
   int iterations = 25;       ///< of one Ceres solve
   int rounds = 6;            ///< solves, each with a time step chosen anew
@@ -19,6 +16,9 @@ struct RefineOptions {
   Derivatives derivatives = Derivatives::tangents;
   double difference_step = Objective::kDifferenceStep;  ///< in coordinates; wider sees the trend
   Loss loss = Loss::huber;
+  /// Of a round's first step, as Ceres has it: large where the start is near, so that directions
+  /// that the data hardly determine are not held back.
+  double trust_region_radius = 1e2;
   /// Springs times time steps of the linearisations' runs: looked at after each iteration but the
   /// first.
   double most_spring_steps = 1e18;
@@ -31,6 +31,8 @@ struct RefineResult {
   bool cancelled = false;
   bool converged = false;
   Eigen::VectorXd values;
+  /// The exact derivatives there, residuals x coordinates; empty where they were not had.
+  Eigen::MatrixXd residual_by_coordinate;
   double cost = 0;          ///< robust cost per residual
   double robust_scale = 1;  ///< residuals beyond three times this were weighed down by Huber's loss
   double time_step_s = 0;

@@ -3,9 +3,8 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
-
-#include "fit/refine.h"
 
 namespace clothfit {
 
@@ -32,19 +31,52 @@ Eigen::MatrixXd prior_information(const FitProblem& problem, const Eigen::Vector
   return information;
 }
 
+/// See Uncertainty::roughness. Only physics makes folds.
+Eigen::VectorXd roughness(const Objective& objective, const Eigen::VectorXd& values,
+                          const Linearisation& linear) {
+  constexpr double kWideStep = 0.02;
+  const ParameterSpace& space = objective.problem().space;
+  Eigen::VectorXd result = Eigen::VectorXd::Ones(space.size());
+  std::vector<int> moved;
+  std::vector<Eigen::VectorXd> points;
+  for (int p = 0; p < space.size(); ++p) {
+    if (!is_physical(space.parameters[static_cast<size_t>(p)].role)) continue;
+    Eigen::VectorXd coordinates = space.coordinates(values);
+    coordinates[p] += kWideStep;
+    points.push_back(space.values(coordinates));
+    moved.push_back(p);
+  }
+  const std::vector<Eigen::VectorXd> residuals = objective.residuals(points);
+  for (size_t n = 0; n < moved.size(); ++n) {
+    if (residuals[n].size() != linear.residual.size()) continue;
+    const double wide = (residuals[n] - linear.residual).norm() / kWideStep;
+    result[moved[n]] = linear.residual_by_coordinate.col(moved[n]).norm() / std::max(wide, 1e-300);
+  }
+  return result;
+}
+
 }  // namespace
 
 Uncertainty estimate_uncertainty(const TrajectoryObjective& objective,
-                                 const Eigen::VectorXd& values) {
+                                 const Eigen::VectorXd& values, Loss loss,
+                                 const Eigen::MatrixXd& residual_by_coordinate) {
   Uncertainty result;
   const FitProblem& problem = objective.problem();
   const int parameters = problem.space.size();
-  const Linearisation linear = objective.linearise(values);
+  Linearisation linear;
+  if (residual_by_coordinate.rows() == objective.residual_count()) {
+    linear.residual = objective.residuals({values}).front();
+    linear.residual_by_coordinate = residual_by_coordinate;
+    linear.usable = linear.residual.size() == objective.residual_count();
+  } else {
+    linear = objective.linearise(values);
+  }
   if (!linear.usable) return result;
   const Eigen::VectorXd& residual = linear.residual;
   const Eigen::MatrixXd& jacobian = linear.residual_by_coordinate;
 
-  const double threshold = kHuberScales * robust_scale(residual);
+  const double threshold = loss == Loss::huber ? kHuberScales * robust_scale(residual)
+                                               : std::numeric_limits<double>::infinity();
   Eigen::MatrixXd information = Eigen::MatrixXd::Zero(parameters, parameters);
   std::map<std::pair<int, int>, Eigen::VectorXd> gradient_of_marker;
   const TrajectoryObjective half(problem, objective.frames(), 0.5 * objective.time_step_s());
@@ -87,14 +119,7 @@ Uncertainty estimate_uncertainty(const TrajectoryObjective& objective,
                      .cwiseSqrt()
                      .cwiseProduct(slope);
 
-  constexpr double kWideStep = 0.02;
-  result.roughness = Eigen::VectorXd::Ones(parameters);
-  const Linearisation wide = objective.linearise(values, Derivatives::central, kWideStep);
-  if (wide.usable) {
-    for (int p = 0; p < parameters; ++p)
-      result.roughness[p] =
-          jacobian.col(p).norm() / std::max(wide.residual_by_coordinate.col(p).norm(), 1e-300);
-  }
+  result.roughness = roughness(objective, values, linear);
   result.usable = true;
   return result;
 }

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "fit/objective.h"
+#include "fit/refine.h"
 
 namespace clothfit {
 
@@ -30,7 +30,10 @@ struct Uncertainty {
 /// Neither sees what all markers share. One such thing can be measured: the time step. Residuals at
 /// half the step differ by d; the scheme is of first order, so at step zero they would differ by 2
 /// d, and the optimum by step_shift = -H^-1 J' W 2 d, which is added in square.
+///
+/// `residual_by_coordinate`: exact derivatives at `values` that are known already, or empty.
 Uncertainty estimate_uncertainty(const TrajectoryObjective& objective,
-                                 const Eigen::VectorXd& values);
+                                 const Eigen::VectorXd& values, Loss loss = Loss::huber,
+                                 const Eigen::MatrixXd& residual_by_coordinate = {});
 
 }  // namespace clothfit

@@ -180,10 +180,6 @@ TEST(Problem, AVectorIsDeclaredAsOne) {
 TEST(Problem, RefusesWhatCannotBeFitted) {
   const FitInput good = synthetic_input({});
 
-  FitInput unknown_start = good;
-  unknown_start.recording.start = StartKind::unknown;
-  EXPECT_THAT(refusal([&] { problem_of(unknown_start); }), HasSubstr("start: unknown"));
-
   FitInput no_first_frame = good;
   std::erase_if(no_first_frame.tracks3d,
                 [](const Position3d& row) { return row.frame == 0 && row.marker > 2; });
