@@ -24,7 +24,7 @@ namespace {
 /// The search runs on a mesh of half the resolution: a run costs a sixteenth (a quarter of the
 /// springs, and a quarter of the steps where damping limits them), and the basin is the same.
 constexpr int kCoarsening = 2;
-constexpr int kSmallestMesh = 5;
+constexpr int kSmallestMesh = 7;
 
 /// Share of the fitted frames that the search looks at, and those of the refinement's stages:
 /// whole trajectories of folding cloth diverge from a start that is only roughly right.
@@ -476,6 +476,14 @@ FitReport fit(const FitInput& input, const FitOptions& options, const ProgressCa
       return stopped(std::move(report), FitStop::diverged,
                      "the derivatives at the optimum could not be computed");
     fill_correlation(problem.space, uncertainty, report);
+    for (int p = 0; p < problem.space.size(); ++p)
+      if (const FitParameter& parameter = problem.space.parameters[static_cast<size_t>(p)];
+          is_physical(parameter.role))
+        report.sigma_parts.push_back({.name = parameter.name,
+                                      .value = values[p],
+                                      .noise = uncertainty.noise_sigma[p],
+                                      .robust = uncertainty.robust_sigma[p],
+                                      .step_shift = uncertainty.step_shift[p]});
     report.stages.push_back(
         fmt::format("chi-square per degree of freedom {:.3g}", uncertainty.chi_square_per_dof));
   } else {
