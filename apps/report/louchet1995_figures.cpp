@@ -21,6 +21,11 @@ const std::array<LineStyle, 5> kStyles{{{"#1f4e79", ""},
                                         {"#8a5a9e", "8 3 2 3"},
                                         {"#b58900", "1 3"}}};
 
+/// Where the curves of the searches are cut off: the race of the small populations, and a cost
+/// below which only rounding is left to win.
+constexpr double kMostAsked = 12500;
+constexpr double kLowestShown = 1e-8;
+
 constexpr std::array kShortNames{"l01", "l23", "l45", "K", "tau"};
 
 Wireframe cloth_of(const Louchet1995Study& study, const RecordedStates& states, int state,
@@ -165,7 +170,7 @@ std::string races_svg(const Louchet1995Study& study) {
         at_once.push_back(race.relative_cost[k]);
         asked.push_back(static_cast<double>(race.evaluations[k]));
       }
-      if (quantile(asked, 0.5) > 12500) break;
+      if (quantile(asked, 0.5) > kMostAsked || quantile(at_once, 0.5) < kLowestShown) break;
       series.x.push_back(quantile(asked, 0.5));
       series.y.push_back(quantile(at_once, 0.5));
     }

@@ -172,8 +172,9 @@ std::string claims_section(const Louchet1995Study& study) {
       or_never(median_generations(study, Racer::strategy_18_large, kMark, true)),
       or_never(median_generations(study, Racer::cma_5, kMark, true)),
       or_never(median_generations(study, Racer::cma_18, kMark, true))));
-  content += figure(races_svg(study),
-                    "Median best cost, relative to the median of 100 random individuals.");
+  content += figure(
+      races_svg(study),
+      "Median best cost, relative to the median of 100 random individuals; cut off below 1e-8.");
   content += html_table(race_table(study),
                         "Medians (quartiles) over the seeds; one that was not reached counts as "
                         "endless.");
