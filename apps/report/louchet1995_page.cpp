@@ -54,9 +54,9 @@ std::string setting_section(const Louchet1995Study& study) {
       "individuals run from the original, in l01; the paper says about 0.05 and slightly less "
       "than half.");
   content += paragraph(
-      "The listing alone does not fix the setting: several come about as near. The one taken has "
-      "round numbers and agrees with the paper's words on both individuals; what follows holds "
-      "for it.");
+      "The listing alone does not fix the setting: several come about as near. The one taken is "
+      "the "
+      "nearest point of the whole grid; what follows holds for it.");
   return content;
 }
 
@@ -200,7 +200,7 @@ std::string motion_section(const Louchet1995Study& study) {
       "Of its good case the paper says that the error is about one twentieth of the springs' "
       "natural length, of the bad one slightly less than half. The printed individuals, "
       "run freely from the start, are off by {} and {} natural lengths here; these words took no "
-      "part in the choice of the setting.",
+      "part in the scan.",
       significant(good.rms_m / length_m, 2), significant(bad.rms_m / length_m, 2)));
   content += figure(
       reconstructions_svg(study),
