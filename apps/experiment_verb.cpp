@@ -91,7 +91,9 @@ void add_experiment_verb(CLI::App& program, VerbAction& action) {
   CLI::App* verb =
       program.add_subcommand("experiment", "Run an experiment of the literature, with a report");
   verb->require_subcommand(1);
-  verb->footer("Each experiment explains itself: clothfit experiment louchet1995 --help");
+  verb->footer(
+      "Example:\n"
+      "  clothfit experiment louchet1995 --help");
 
   const auto options = std::make_shared<ExperimentVerbOptions>();
   CLI::App* louchet1995 = verb->add_subcommand(
