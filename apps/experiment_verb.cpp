@@ -7,6 +7,7 @@
 
 #include "apps/csv_table.h"
 #include "apps/exit_code.h"
+#include "apps/identification_experiment.h"
 #include "apps/interrupt.h"
 #include "apps/progress_line.h"
 #include "apps/report/louchet1995_page.h"
@@ -88,13 +89,14 @@ int run_louchet1995(const ExperimentVerbOptions& options) {
 }
 
 void add_experiment_verb(CLI::App& program, VerbAction& action) {
-  CLI::App* verb =
-      program.add_subcommand("experiment", "Run an experiment of the literature, with a report");
+  CLI::App* verb = program.add_subcommand(
+      "experiment", "Run an experiment of the literature or of our own, with a report");
   verb->require_subcommand(1);
   verb->footer(
       "Example:\n"
       "  clothfit experiment louchet1995 --help");
 
+  add_identification_experiment(*verb, action);
   const auto options = std::make_shared<ExperimentVerbOptions>();
   CLI::App* louchet1995 = verb->add_subcommand(
       "louchet1995", "The founding paper's identification of a simulated cloth, section 3");

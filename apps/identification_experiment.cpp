@@ -1,0 +1,124 @@
+#include "apps/identification_experiment.h"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <memory>
+
+#include "apps/csv_table.h"
+#include "apps/exit_code.h"
+#include "apps/interrupt.h"
+#include "apps/progress_line.h"
+#include "apps/report/html.h"
+#include "apps/report/recover_tables.h"
+#include "apps/text_table.h"
+#include "data/output_folder.h"
+#include "data/text_file.h"
+
+namespace clothfit {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kDefaultFolder = "identification.experiment";
+
+std::string state_text(TargetState state) {
+  switch (state) {
+    case TargetState::met:
+      return "met";
+    case TargetState::missed:
+      return "MISSED";
+    case TargetState::not_measured:
+      break;
+  }
+  return "not measured";
+}
+
+Table targets_table(const std::vector<TargetRow>& rows) {
+  Table table{.header = {"target", "measured", "", "command"}, .rows = {}};
+  for (const TargetRow& row : rows)
+    table.rows.push_back({row.target, row.measured, state_text(row.state), row.command});
+  return table;
+}
+
+std::string page_html(const Table& targets, const TargetsResult& result) {
+  std::string body = "<h1>What identification reaches</h1>\n";
+  body += html_table(targets, "Targets, what was measured, and how to measure it again.");
+  for (const auto& [study, found] : result.studies) {
+    body += section(study.name, paragraph(study.what + ".") +
+                                    html_table(recovery_counts(found), "Counts.") +
+                                    html_table(recovery_table(found), "Errors and intervals."));
+  }
+  return html_page("What identification reaches", body);
+}
+
+}  // namespace
+
+int run_identification(const IdentificationOptions& options) {
+  options.targets.validate();
+  OutputFolder out(out_folder(options.out, kDefaultFolder));
+  const bool own_journals = options.journals.empty();
+  const fs::path journals =
+      own_journals ? fs::path(out.final_path().string() + ".journals") : options.journals;
+  fs::create_directories(journals);
+  TargetsResult result;
+  {
+    ProgressLine line;
+    result =
+        measure_targets(options.targets, journals,
+                        options.resume ? JournalStart::resume : JournalStart::anew, watch(line));
+  }
+  if (result.cancelled || interrupted()) {
+    spdlog::info("what was finished is in {}; go on with the same command and --resume",
+                 shown_path(journals));
+    throw Cancelled();
+  }
+  const Table targets = targets_table(result.rows);
+  write_csv_table(targets.header, targets.rows, out.path() / "targets.csv");
+  for (const auto& [study, found] : result.studies) {
+    const Table parameters = recovery_table(found);
+    const Table trials = recovery_trials_table(found);
+    write_csv_table(parameters.header, parameters.rows, out.path() / (study.name + ".csv"));
+    write_csv_table(trials.header, trials.rows, out.path() / (study.name + "_trials.csv"));
+  }
+  write_text(page_html(targets, result), out.path() / "report.html");
+  out.publish();
+  if (own_journals) fs::remove_all(journals);
+  for (const TargetRow& row : result.rows)
+    fmt::print("{}\n    {}: {}\n    {}\n", row.target, state_text(row.state), row.measured,
+               row.command);
+  fmt::print("Report: {}\n", shown_path(out.final_path() / "report.html"));
+  return kExitGood;
+}
+
+void add_identification_experiment(CLI::App& experiment, VerbAction& action) {
+  const auto options = std::make_shared<IdentificationOptions>();
+  CLI::App* verb = experiment.add_subcommand(
+      "identification", "What identification is meant to reach: every target, measured");
+  verb->add_option("--share", options->targets.share,
+                   "Share of the trials that the targets ask for (all take hours)")
+      ->capture_default_str();
+  verb->add_option(
+          "--only", options->targets.only,
+          "Studies to do: tracks3d, one_camera, spoiled, clean, drag, drag_fitted, seconds")
+      ->type_name("NAME");
+  verb->add_option("--seed", options->targets.seed, "Seed of all studies")->capture_default_str();
+  verb->add_option("--threads", options->targets.threads,
+                   "Threads; 0 for as many as the machine has")
+      ->capture_default_str();
+  verb->add_option(
+          "--journals", options->journals,
+          "Folder that keeps finished trials, and stays (default: beside the results, gone "
+          "with success)")
+      ->type_name("FOLDER");
+  verb->add_flag("--resume", options->resume, "Go on where the journals end");
+  add_out_option(*verb, options->out, kDefaultFolder);
+  verb->footer(
+      "Examples:\n"
+      "  clothfit experiment identification\n"
+      "  clothfit experiment identification --share 0.05 --only tracks3d seconds");
+  verb->callback(
+      [options, &action] { action = [options] { return run_identification(*options); }; });
+}
+
+}  // namespace clothfit
