@@ -1,0 +1,26 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+namespace clothfit {
+
+/// How far predicted tracks lie from observed ones. Tracks are a matrix per marker, coordinates x
+/// frames (metres in space or pixels of a camera), NaN where there is nothing. A place counts where
+/// it is both observed and predicted; where no place counts, an error is NaN.
+
+/// Root mean square of the distance, over all places.
+double rms_distance(const std::vector<Eigen::MatrixXd>& observed,
+                    const std::vector<Eigen::MatrixXd>& predicted);
+
+/// The same with markers that count differently,
+///
+///   sqrt( sum_m w_m mean_f |x_m(f) - y_m(f)|^2  /  sum_m w_m ),
+///
+/// the mean of marker m over the frames that it counts in, the sums over markers that count in any.
+/// One weight >= 0 per marker.
+double weighted_rms_distance(const std::vector<Eigen::MatrixXd>& observed,
+                             const std::vector<Eigen::MatrixXd>& predicted,
+                             const std::vector<double>& weights);
+
+}  // namespace clothfit
