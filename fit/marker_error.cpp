@@ -1,5 +1,6 @@
 #include "fit/marker_error.h"
 
+#include <algorithm>
 #include <cassert>
 #include <cmath>
 #include <limits>
@@ -40,6 +41,24 @@ double rms_distance(const std::vector<Eigen::MatrixXd>& observed,
     all.count += marker.count;
   }
   return root_of_mean(all.sum, all.count);
+}
+
+std::vector<Eigen::MatrixXd> centred(const std::vector<Eigen::MatrixXd>& observed,
+                                     std::vector<Eigen::MatrixXd> predicted, int held_out_from) {
+  assert(observed.size() == predicted.size());
+  for (std::size_t m = 0; m < observed.size(); ++m) {
+    Eigen::VectorXd sum = Eigen::VectorXd::Zero(observed[m].rows());
+    int count = 0;
+    for (Eigen::Index frame = 0; frame < std::min<Eigen::Index>(held_out_from, observed[m].cols());
+         ++frame) {
+      const Eigen::VectorXd difference = observed[m].col(frame) - predicted[m].col(frame);
+      if (!difference.allFinite()) continue;
+      sum += difference;
+      ++count;
+    }
+    if (count > 0) predicted[m].colwise() += sum / count;
+  }
+  return predicted;
 }
 
 double weighted_rms_distance(const std::vector<Eigen::MatrixXd>& observed,

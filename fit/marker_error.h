@@ -13,7 +13,14 @@ namespace clothfit {
 double rms_distance(const std::vector<Eigen::MatrixXd>& observed,
                     const std::vector<Eigen::MatrixXd>& predicted);
 
-/// The same with markers that count differently,
+/// Predictions shifted, marker by marker, by a constant: the mean of observed - predicted over the
+/// frames before `held_out_from`. What is left of the error is motion; what went is a wrong place
+/// of the marker on the cloth, or a wrong shape of the cloth at rest. A marker that does not count
+/// in these frames is not shifted.
+std::vector<Eigen::MatrixXd> centred(const std::vector<Eigen::MatrixXd>& observed,
+                                     std::vector<Eigen::MatrixXd> predicted, int held_out_from);
+
+/// rms_distance() with markers that count differently,
 ///
 ///   sqrt( sum_m w_m mean_f |x_m(f) - y_m(f)|^2  /  sum_m w_m ),
 ///

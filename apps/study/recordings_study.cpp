@@ -90,6 +90,17 @@ MarkerTracks driving_markers(const FitInput& input, std::size_t markers, int fra
   return tracks;
 }
 
+/// The error on the frames from `held_out_from` on, with the mean error before taken off.
+double centred_held_out_rms(const Tracks& observed, const Tracks& predicted, int held_out_from) {
+  Tracks later, foreseen = centred(observed, predicted, held_out_from);
+  for (std::size_t m = 0; m < observed.size(); ++m) {
+    const Eigen::Index count = observed[m].cols() - held_out_from;
+    later.push_back(observed[m].rightCols(count));
+    foreseen[m] = foreseen[m].rightCols(count).eval();
+  }
+  return rms_distance(later, foreseen);
+}
+
 /// Errors over all frames, of the model and of what moves rigidly with the driven points.
 void judge_whole(const FitInput& input, const FitReport::Residuals& residuals,
                  const std::optional<MarkerWeights>& weights, StudyRow& row) {
@@ -99,22 +110,28 @@ void judge_whole(const FitInput& input, const FitReport::Residuals& residuals,
   if (tracks.observed.empty() || tracks.observed.front().rows() != 3) return;
 
   const auto frames = static_cast<int>(residuals.rms_by_frame.size());
+  const int held_out_from = std::min(input.recording.held_out_from_frame.value_or(frames), frames);
+  row.centred_held_out_rms = centred_held_out_rms(tracks.observed, tracks.predicted, held_out_from);
   const MarkerTracks driving = driving_markers(input, markers, frames);
   Tracks driven;
   for (const Eigen::MatrixXd& track : driving.predicted)
     if (track.allFinite()) driven.push_back(track);
   const Eigen::MatrixXd displacement =
       driven.empty() ? Eigen::MatrixXd::Zero(3, frames) : mean_displacement(driven);
-  row.whole_rigid_rms =
-      rms_distance(tracks.observed, predict_rigid(tracks.observed, displacement, frames).predicted);
+  const Tracks rigid = predict_rigid(tracks.observed, displacement, held_out_from).predicted;
+  row.whole_rigid_rms = rms_distance(tracks.observed, rigid);
+  row.centred_rigid_rms = centred_held_out_rms(tracks.observed, rigid, held_out_from);
   if (!weights) return;
 
+  Tracks shifted = centred(tracks.observed, tracks.predicted, held_out_from);
   for (std::size_t m = 0; m < markers; ++m) {
     if (!driving.predicted[m].allFinite()) continue;
+    shifted[m] = driving.predicted[m];
     tracks.observed[m] = driving.observed[m];
     tracks.predicted[m] = driving.predicted[m];
   }
   const std::vector<double> by_marker = weights_of(input.recording.markers, *weights);
+  row.centred_weighted_rms = weighted_rms_distance(tracks.observed, shifted, by_marker);
   row.weighted_rms = weighted_rms_distance(tracks.observed, tracks.predicted, by_marker);
   row.weighted_rigid_rms = weighted_rms_distance(
       tracks.observed, predict_rigid(tracks.observed, displacement, frames).predicted, by_marker);
@@ -149,6 +166,7 @@ std::vector<StudyRow> rows_of(const FitInput& input, const FitReport& report,
     one.rigid_rms = judged ? points * errors.trivial.rigid : kNan;
     one.noise = points * errors.noise;
     one.whole_rigid_rms = one.weighted_rms = one.weighted_rigid_rms = kNan;
+    one.centred_held_out_rms = one.centred_rigid_rms = one.centred_weighted_rms = kNan;
     judge_whole(input, report.residuals[k], options.weights, one);
     rows.push_back(std::move(one));
   }

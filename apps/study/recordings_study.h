@@ -52,6 +52,10 @@ struct StudyRow {
   /// model and of the rigid guess. NaN without weights.
   double weighted_rms = 0, weighted_rigid_rms = 0;
 
+  /// With each marker's mean error on the fitted frames taken off the predictions: held out, of the
+  /// model and of the rigid guess; all frames, weighed, of the model.
+  double centred_held_out_rms = 0, centred_rigid_rms = 0, centred_weighted_rms = 0;
+
   std::map<std::string, double> parameters;  ///< by name; EFFECT.NAME of an effect
   double seconds = 0;                        ///< of the fit
 };

@@ -30,6 +30,9 @@ constexpr ErrorColumn kErrors[] = {
     {"noise", "noise", &StudyRow::noise},
     {"weighted_rms", "weighted", &StudyRow::weighted_rms},
     {"weighted_rigid_rms", "rigidly, weighted", &StudyRow::weighted_rigid_rms},
+    {"centred_held_out_rms", "held out, centred", &StudyRow::centred_held_out_rms},
+    {"centred_rigid_rms", "rigidly, centred", &StudyRow::centred_rigid_rms},
+    {"centred_weighted_rms", "weighted, centred", &StudyRow::centred_weighted_rms},
 };
 
 std::string shown(double error, const std::string& unit) {
