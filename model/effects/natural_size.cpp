@@ -1,0 +1,66 @@
+#include "model/effects/natural_size.h"
+
+#include <algorithm>
+
+#include "model/effects/spring_law.h"
+#include "model/network_bound.h"
+
+namespace clothfit::natural_size {
+namespace {
+
+template <class Real>
+Real change(SpringType type, const std::array<Real, 2>& along) {
+  switch (type) {
+    case structural_t:
+    case flexion_t:
+      return along[0];
+    case structural_s:
+    case flexion_s:
+      return along[1];
+    default:
+      return Real(0.5) * (along[0] + along[1]);
+  }
+}
+
+struct Law {
+  static constexpr int kParameters = 2, kMemory = 0;
+
+  template <class Real>
+  static Real tension(const SpringSight<Real>& at, const std::array<Real, 2>& along,
+                      std::array<Real, 0>&) {
+    return -at.stiffness_n_per_m * at.natural_length_m * change(at.type, along);
+  }
+
+  // A constant pull stiffens a spring across itself, by k l0 |e| / l. Where springs are shorter
+  // than l0 that is more than is said here, but then they are stiff along themselves only.
+  static EffectRates rates(const Cloth& cloth, const SpringParameters& springs,
+                           const std::vector<double>& p) {
+    const std::array<double, 2> along{p[0], p[1]};
+    return {.frequency2_per_s2 = network_bound(cloth, [&](SpringType type, const Spring&) {
+              return std::max(0.0, -change(type, along)) *
+                     springs.stiffness_n_per_m[static_cast<size_t>(type)];
+            })};
+  }
+};
+
+}  // namespace
+
+EffectDescription describe() {
+  return {
+      .name = "natural_size",
+      .summary = "natural lengths l0 (1 + e), T = -k l0 e",
+      .parameters = {
+          {.name = "warp", .unit = "1", .neutral = 0, .lower = -0.2, .upper = 0.1, .typical = 0.02},
+          {.name = "weft",
+           .unit = "1",
+           .neutral = 0,
+           .lower = -0.2,
+           .upper = 0.1,
+           .typical = 0.02}}};
+}
+
+std::unique_ptr<Effect> make() {
+  return std::make_unique<SpringLawEffect<Law>>();
+}
+
+}  // namespace clothfit::natural_size

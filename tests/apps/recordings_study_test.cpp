@@ -1,0 +1,241 @@
+// Many recordings, one table. Not checked here: the fits themselves (tests/fit), threads and
+// journals in general (tests/fit/executor_test.cpp, journal_test.cpp).
+
+#include "apps/study/recordings_study.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+
+#include "apps/exit_code.h"
+#include "apps/steps.h"
+#include "apps/study/recordings_tables.h"
+#include "apps/study/study_row_json.h"
+#include "data/input_error.h"
+#include "tests/apps/scratch_folder.h"
+
+namespace clothfit {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::ThrowsMessage;
+
+const fs::path kBundled = fs::path(CLOTHFIT_SOURCE_DIR) / "data" / "recordings";
+
+class RecordingsStudy : public ::testing::Test {
+ protected:
+  const test::ScratchFolder scratch_{
+      std::string("recordings_study_") +
+      ::testing::UnitTest::GetInstance()->current_test_info()->name()};
+  const fs::path folder_ = scratch_.path() / "recordings";
+
+  /// The first 24 frames of the 3D tracks of a bundled recording, the last 8 of them held out.
+  void copy(const std::string& bundled, const std::string& to,
+            HeldMotion motion = HeldMotion::fixed) const {
+    Recording recording = read_recording(kBundled / bundled);
+    Tracks3d tracks = read_tracks3d(*recording.tracks3d, recording.markers);
+    std::erase_if(tracks, [](const Position3d& row) { return row.frame >= 24; });
+    recording.held_out_from_frame = 16;
+    recording.tracks2d.clear();
+    recording.cameras.clear();
+    for (HeldPoint& point : recording.held) point.motion = motion;
+    fs::create_directories(folder_ / to);
+    recording.tracks3d = folder_ / to / "tracks3d.csv";
+    write_tracks3d(tracks, recording.markers, *recording.tracks3d);
+    write_recording(recording, folder_ / to);
+  }
+  /// A recording that names a file which is not there.
+  void add_broken(const std::string& to) const {
+    fs::create_directories(folder_ / to);
+    fs::copy(kBundled / "swing_plain" / "recording.yaml", folder_ / to / "recording.yaml");
+  }
+  /// Fits that are rough but quick: what is asked here is how they are told, not how good they are.
+  RecordingsStudyOptions quick() const {
+    RecordingsStudyOptions options;
+    options.recordings = find_recordings({folder_});
+    options.models = {{.name = "base", .effects = {}}};
+    options.fit.mesh_columns = options.fit.mesh_rows = 5;
+    options.fit.population = 8;
+    options.fit.generations = 2;
+    options.fit.refine_best = 1;
+    options.fit.work = 1e-3;
+    options.threads = 1;
+    return options;
+  }
+};
+
+/// All digits of rows but the seconds.
+std::string text_of(std::vector<StudyRow> rows) {
+  for (StudyRow& row : rows) row.seconds = 0;
+  return rows_to_text(rows);
+}
+
+TEST_F(RecordingsStudy, FindsRecordingsAtAnyDepthInTheOrderOfTheirPaths) {
+  copy("swing_plain", "b/inner");
+  fs::create_directories(folder_ / "empty");
+  copy("swing_plain", "a");
+
+  EXPECT_THAT(find_recordings({folder_}), ElementsAre(folder_ / "a", folder_ / "b" / "inner"));
+  EXPECT_THAT(find_recordings({folder_ / "b"}), ElementsAre(folder_ / "b" / "inner"));
+  EXPECT_THAT(find_recordings({folder_ / "a" / ""}), ElementsAre(folder_ / "a"));
+  EXPECT_THAT([&] { find_recordings({folder_ / "empty"}); },
+              ThrowsMessage<InputError>(HasSubstr("holds no recording")));
+}
+
+TEST_F(RecordingsStudy, SaysWhatTheSingleFitSays) {
+  copy("swing_plain", "plain");
+  RecordingsStudyOptions options = quick();
+  options.models.push_back({.name = "damped", .effects = {"viscous_damping"}});
+
+  const std::vector<StudyRow> rows = study_recordings(options, {});
+
+  ASSERT_EQ(rows.size(), 2u);
+  const FitInput input =
+      read_fit_input(read_recording(folder_ / "plain"), ObservationKind::automatic);
+  for (size_t m = 0; m < rows.size(); ++m) {
+    FitOptions single = options.fit;
+    single.effects = options.models[m].effects;
+    const FitReport report = fit(input, single, {});
+    const ObservationErrors& errors = report.result.errors.front();
+    const StudyRow& row = rows[m];
+    EXPECT_TRUE(row.fitted) << row.reason;
+    EXPECT_EQ(row.model, options.models[m].name);
+    EXPECT_EQ(row.fitted_rms, errors.fitted.rms_distance);
+    EXPECT_EQ(row.held_out_rms, errors.held_out.rms_distance);
+    EXPECT_DOUBLE_EQ(row.first_frame_rms, std::sqrt(3) * errors.trivial.first_frame);
+    EXPECT_EQ(row.parameters.at("shear"), report.result.parameters[3].value);
+    EXPECT_EQ(row.parameters.contains("viscous_damping.rate"), m == 1);
+    // The whole recording is its fitted and its held-out part.
+    const double squares = errors.fitted.count * std::pow(errors.fitted.rms_distance, 2) +
+                           errors.held_out.count * std::pow(errors.held_out.rms_distance, 2);
+    EXPECT_NEAR(row.whole_rms, std::sqrt(squares / (errors.fitted.count + errors.held_out.count)),
+                1e-12 * row.whole_rms);
+  }
+}
+
+TEST_F(RecordingsStudy, ABrokenRecordingHasItsReasonAndStopsNoOther) {
+  add_broken("broken");
+  copy("swing_plain", "plain");
+
+  const std::vector<StudyRow> rows = study_recordings(quick(), {});
+
+  ASSERT_EQ(rows.size(), 2u);
+  EXPECT_FALSE(rows[0].fitted);
+  EXPECT_EQ(rows[0].recording, "broken");
+  EXPECT_THAT(rows[0].reason, HasSubstr("there is no such file"));
+  EXPECT_TRUE(rows[1].fitted) << rows[1].reason;
+  EXPECT_EQ(study_summary(rows).rows.front()[2], "1");
+  EXPECT_THAT(study_page_html(rows, "command"), HasSubstr("there is no such file"));
+}
+
+TEST_F(RecordingsStudy, TheSameBytesOnOneThreadAndOnThree) {
+  copy("swing_plain", "a");
+  copy("swing_breeze", "b");
+  RecordingsStudyOptions options = quick();
+  const std::string one = text_of(study_recordings(options, {}));
+
+  options.threads = 3;
+
+  EXPECT_EQ(text_of(study_recordings(options, {})), one);
+}
+
+TEST_F(RecordingsStudy, GoesOnWhereItWasCancelled) {
+  copy("swing_plain", "a");
+  copy("swing_breeze", "b");
+  RecordingsStudyOptions options = quick();
+  const std::string whole = text_of(study_recordings(options, {}));
+  options.journal = scratch_.path() / "journal";
+  const auto one_fit = [](const Progress& progress) { return progress.done < 1; };
+  EXPECT_THROW(study_recordings(options, one_fit), Cancelled);
+
+  double first_seen = -1;
+  const std::vector<StudyRow> resumed = study_recordings(options, [&](const Progress& progress) {
+    if (first_seen < 0) first_seen = progress.done;
+    return true;
+  });
+
+  EXPECT_EQ(first_seen, 1);  // one of the two fits was there
+  EXPECT_EQ(text_of(resumed), whole);
+  // Nothing is left to do: even the seconds are those of the journal.
+  EXPECT_EQ(rows_to_text(study_recordings(options, {})), rows_to_text(resumed));
+}
+
+TEST_F(RecordingsStudy, RefusesTheJournalOfAnotherStudy) {
+  add_broken("broken");
+  RecordingsStudyOptions options = quick();
+  options.journal = scratch_.path() / "journal";
+  study_recordings(options, {});
+
+  options.fit.seed = 2;
+  EXPECT_THROW(study_recordings(options, {}), InputError);
+  options.fit.seed = 1;
+  std::ofstream(folder_ / "broken" / "recording.yaml", std::ios::app) << "# changed\n";
+  EXPECT_THROW(study_recordings(options, {}), InputError);
+}
+
+TEST_F(RecordingsStudy, WeightsOfOneForEveryMarkerLeaveTheErrorOfTheWholeRecording) {
+  copy("swing_plain", "plain");
+  RecordingsStudyOptions options = quick();
+  options.weights.emplace();
+  for (const Marker& marker : read_recording(folder_ / "plain").markers.markers)
+    (*options.weights)[marker.name] = 1;
+
+  const StudyRow row = study_recordings(options, {}).front();
+
+  // No marker drives the cloth here, and hardly one is missed in any frame: means over markers of
+  // means over frames are the mean over all to a few thousandths.
+  ASSERT_TRUE(row.fitted) << row.reason;
+  EXPECT_NEAR(row.weighted_rms, row.whole_rms, 5e-3 * row.whole_rms);
+  EXPECT_NEAR(row.weighted_rigid_rms, row.whole_rigid_rms, 5e-3 * row.whole_rigid_rms);
+}
+
+TEST_F(RecordingsStudy, AMarkerThatDrivesTheClothIsOffByWhatSmoothingItsTrackTookAway) {
+  copy("swing_plain", "plain", HeldMotion::tracked);
+  RecordingsStudyOptions options = quick();
+  const Recording recording = read_recording(folder_ / "plain");
+  const Eigen::Vector2d at_m = recording.held.front().at_m;
+  options.weights.emplace();
+  for (const Marker& marker : recording.markers.markers)
+    if (std::hypot(marker.s_m - at_m.x(), marker.t_m - at_m.y()) < 1e-6)
+      (*options.weights)[marker.name] = 1;
+  ASSERT_EQ(options.weights->size(), 1u);
+
+  const StudyRow row = study_recordings(options, {}).front();
+
+  // The corner stands still, so what is left is its noise, 0.5 mm in each coordinate.
+  ASSERT_TRUE(row.fitted) << row.reason;
+  EXPECT_NEAR(row.weighted_rms, std::sqrt(3) * 5e-4, 3e-4);
+}
+
+TEST_F(RecordingsStudy, WeightsForAnotherSetOfMarkersAreAReasonInTheTable) {
+  copy("swing_plain", "plain");
+  RecordingsStudyOptions options = quick();
+  options.weights = MarkerWeights{{"nobody", 1.0}};
+
+  const StudyRow row = study_recordings(options, {}).front();
+
+  EXPECT_FALSE(row.fitted);
+  EXPECT_THAT(row.reason, HasSubstr("nobody"));
+}
+
+TEST(MarkerWeightsFile, IsRefusedWhereItMakesNoSense) {
+  const test::ScratchFolder scratch("marker_weights");
+  const fs::path file = scratch.path() / "weights.csv";
+  const auto read = [&](const std::string& rows) {
+    std::ofstream(file) << "marker,weight\n" << rows;
+    return read_marker_weights(file);
+  };
+
+  EXPECT_EQ(read("a,1\nb,0.25\n"), (MarkerWeights{{"a", 1}, {"b", 0.25}}));
+  EXPECT_THROW(read("a,-1\n"), InputError);
+  EXPECT_THROW(read("a,1\na,1\n"), InputError);
+  EXPECT_THROW(read("a,0\n"), InputError);
+  EXPECT_THROW(read(""), InputError);
+}
+
+}  // namespace
+}  // namespace clothfit
