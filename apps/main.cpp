@@ -31,6 +31,8 @@ int run(int argc, char** argv) {
   clothfit::add_track_verb(program, action);
   clothfit::add_fit_verb(program, action);
   clothfit::add_simulate_verb(program, action);
+  clothfit::add_recover_verb(program, action);
+  clothfit::add_experiment_verb(program, action);
   std::vector<std::string> verbs;
   for (const CLI::App* verb : program.get_subcommands({})) verbs.push_back(verb->get_name());
   const std::string first = argc > 1 ? argv[1] : "-";

@@ -16,7 +16,9 @@ void add_calibrate_verb(CLI::App& program, VerbAction& action);
 void add_track_verb(CLI::App& program, VerbAction& action);
 void add_fit_verb(CLI::App& program, VerbAction& action);
 void add_simulate_verb(CLI::App& program, VerbAction& action);
+void add_recover_verb(CLI::App& program, VerbAction& action);
 void add_demo_verb(CLI::App& program, VerbAction& action);
+void add_experiment_verb(CLI::App& program, VerbAction& action);
 
 /// Binds --out, whose default is `default_name` in the current directory.
 void add_out_option(CLI::App& verb, std::filesystem::path& out, const std::string& default_name);

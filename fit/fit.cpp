@@ -27,14 +27,15 @@ namespace {
 /// The search runs on a mesh of half the resolution: a run costs a sixteenth (a quarter of the
 /// springs, and a quarter of the steps where damping limits them), and the basin is the same.
 constexpr int kCoarsening = 2;
-constexpr int kSmallestMesh = 5;
+constexpr int kSmallestMesh = 7;
 
 /// Share of the fitted frames that the search looks at, and those of the refinement's stages:
 /// whole trajectories of folding cloth diverge from a start that is only roughly right.
 constexpr double kSearchShare = 0.4;
-constexpr double kHorizonShares[] = {0.3, 0.6, 1.0};
+constexpr double kHorizonShares[] = {0.4, 0.7};
+constexpr double kFineShares[] = {kSearchShare, 0.7};
 /// A given start may be far off, and nothing has been simulated yet.
-constexpr double kGivenShares[] = {0.1, 0.2, 0.4, 0.7};
+constexpr double kGivenShares[] = {0.1, 0.2, 0.4};
 constexpr int kFewestFrames = 8;
 
 /// Spring-steps that a search may cost; its time step is cut no finer than that.
@@ -68,8 +69,9 @@ constexpr Effort kApproachEffort{.iterations = 6,  // the coarse mesh's derivati
                                  .derivatives = Derivatives::tangents,
                                  .most_spring_steps = 1e10};
 constexpr Effort kRoughEffort{.rounds = 2,
-                              .least_gain = 1e-2,
+                              .least_gain = 1e-4,
                               .derivatives = Derivatives::tangents,
+                              .trust_region_radius = 1e4,
                               .most_spring_steps = 1e10};
 constexpr Effort kFinalEffort{.rounds = 6,
                               .least_gain = 1e-7,
@@ -195,7 +197,8 @@ RefineResult refine_on(const FitProblem& coarse_problem, const FitProblem& probl
                     .derivatives_of = &coarse_problem,
                     .share = kSearchShare,
                     .effort = kApproachEffort});
-  stages.push_back({.problem = problem, .share = kSearchShare, .effort = kRoughEffort});
+  for (const double share : kFineShares)
+    stages.push_back({.problem = problem, .share = share, .effort = kRoughEffort});
   stages.push_back({.problem = problem, .effort = kFinalEffort});
   RefineResult best;
   best.values = start;
@@ -587,6 +590,14 @@ FitReport fit(const FitInput& input, const FitOptions& options, const ProgressCa
                      "the derivatives at the optimum could not be computed");
     fill_correlation(problem.space, uncertainty, report);
     result.basins = basins_of(problem.space, std::move(candidates), values, uncertainty);
+    for (int p = 0; p < problem.space.size(); ++p)
+      if (const FitParameter& parameter = problem.space.parameters[static_cast<size_t>(p)];
+          is_physical(parameter.role))
+        report.sigma_parts.push_back({.name = parameter.name,
+                                      .value = values[p],
+                                      .noise = uncertainty.noise_sigma[p],
+                                      .robust = uncertainty.robust_sigma[p],
+                                      .step_shift = uncertainty.step_shift[p]});
     report.stages.push_back(
         fmt::format("chi-square per degree of freedom {:.3g}", uncertainty.chi_square_per_dof));
   } else {

@@ -75,6 +75,14 @@ struct FitReport {
   bool usable() const { return stop == FitStop::converged || stop == FitStop::reached_limit; }
   ModelDescription model;  ///< what was found, with all that a simulation needs
 
+  /// What the sigma of each parameter of the physics is made of (fit/uncertainty.h).
+  struct SigmaParts {
+    std::string name;
+    double value = 0;
+    double noise = 0, robust = 0, step_shift = 0;  ///< in the parameter's unit
+  };
+  std::vector<SigmaParts> sigma_parts;
+
   /// Correlations between the fitted parameters, in the order of `correlation_names`.
   std::vector<std::string> correlation_names;
   Eigen::MatrixXd correlation;

@@ -1,5 +1,6 @@
 #include "fit/louchet1995.h"
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -44,6 +45,20 @@ std::array<double, kSpringTypes> mean_lengths(const SpringNet& springs,
   return mean;
 }
 
+/// Largest deformation rate of a spring in the last state.
+double largest_rate(const SpringNet& springs, const Louchet5& reference,
+                    const RecordedStates& states) {
+  const SpringParameters numbers = spring_parameters(reference);
+  const Eigen::Matrix3Xd& position_m = states.position_m.back();
+  double largest = 0;
+  for (size_t type = 0; type < kSpringTypes; ++type)
+    for (const auto& [a, b] : springs[type])
+      largest = std::max(
+          largest,
+          (position_m.col(b) - position_m.col(a)).norm() / numbers.natural_length_m[type] - 1);
+  return largest;
+}
+
 FitParameter searched(const SpringNumber& number, const std::array<double, kSpringTypes>& mean_m) {
   FitParameter parameter{.name = number.name, .unit = number.unit};
   switch (number.quantity) {
@@ -84,6 +99,23 @@ void PaperExperiment::validate() const {
           "0 or more, and less than one over the time step");
 }
 
+std::string to_string(PaperCost cost) {
+  return cost == PaperCost::full ? "full" : "small";
+}
+
+std::vector<int> transitions_of(PaperCost cost, const RecordedStates& states) {
+  return cost == PaperCost::full ? full_cost_transitions(states) : small_cost_transitions(states);
+}
+
+std::vector<int> thinned_out(const std::vector<int>& transitions, int most) {
+  const auto count = static_cast<int>(transitions.size());
+  if (most <= 0 || count <= most) return transitions;
+  std::vector<int> kept;
+  for (int n = 1; n <= most; ++n)
+    kept.push_back(transitions[static_cast<size_t>(static_cast<long>(n) * count / most - 1)]);
+  return kept;
+}
+
 RecordedStates paper_states(const PaperExperiment& experiment) {
   const Cloth cloth = paper_cloth(experiment);
   const ParameterSet set{.springs = spring_parameters(experiment.reference),
@@ -115,6 +147,24 @@ FitProblem paper_problem(const PaperExperiment& experiment, const RecordedStates
 Eigen::VectorXd paper_truth(const PaperExperiment& experiment, SpringSet set) {
   if (set == SpringSet::louchet5) return to_vector(experiment.reference);
   return to_vector(nearest_louchet18(spring_parameters(experiment.reference)).set);
+}
+
+double rms_distance_m(const RecordedStates& a, const RecordedStates& b) {
+  if (a.position_m.size() != b.position_m.size()) return INFINITY;
+  double sum_m2 = 0;
+  for (size_t n = 0; n < a.position_m.size(); ++n)
+    sum_m2 += (a.position_m[n] - b.position_m[n]).squaredNorm();
+  const auto count =
+      static_cast<double>(a.position_m.size()) * static_cast<double>(a.position_m.front().cols());
+  return std::isfinite(sum_m2) ? std::sqrt(sum_m2 / count) : INFINITY;
+}
+
+double free_run_distance_m(const PaperExperiment& experiment, const Louchet5& set) {
+  const RecordedStates original = paper_states(experiment);
+  const FitProblem problem = paper_problem(experiment, original, SpringSet::louchet5);
+  return rms_distance_m(simulate_states(problem.cloth, parameter_set(problem, to_vector(set)),
+                                        experiment.time_step_s, experiment.duration_s),
+                        original);
 }
 
 std::vector<SearchParameter> search_ranges(const FitProblem& problem) {
@@ -166,5 +216,50 @@ const std::array<PaperIndividual, 10> kPaperBadListing{{
     {40, {0.086170, 0.132668, 0.199821, 0.406031, 0.630850}, 0.644202},
     {51, {0.086170, 0.132671, 0.200991, 0.435233, 0.630850}, 0.642728},
 }};
+
+std::vector<Eigen::VectorXd> listed_individuals() {
+  std::vector<Eigen::VectorXd> values;
+  for (const auto* listing : {&kPaperGoodListing, &kPaperBadListing})
+    for (const PaperIndividual& individual : *listing) values.push_back(to_vector(individual.set));
+  return values;
+}
+
+std::vector<double> listed_costs() {
+  std::vector<double> costs;
+  for (const auto* listing : {&kPaperGoodListing, &kPaperBadListing})
+    for (const PaperIndividual& individual : *listing) costs.push_back(individual.cost);
+  return costs;
+}
+
+double ListingMatch::distance() const {
+  return usable ? std::hypot(spread, std::log(factor)) : spread;
+}
+
+ListingMatch match_listing(const PaperExperiment& experiment, PaperCost cost,
+                           int most_transitions) {
+  ListingMatch match;
+  const RecordedStates states = paper_states(experiment);
+  if (states.position_m.size() != states.time_s.size() || !states.position_m.back().allFinite())
+    return match;
+  const FitProblem problem = paper_problem(experiment, states, SpringSet::louchet5);
+  const std::vector<int> all = transitions_of(cost, states);
+  const std::vector<int> transitions = thinned_out(all, most_transitions);
+  const double weight = static_cast<double>(all.size()) / static_cast<double>(transitions.size());
+  const StateObjective objective(problem, states, transitions, experiment.time_step_s);
+  const std::vector<double> printed = listed_costs();
+  Eigen::ArrayXd log_ratio(printed.size());
+  for (const Eigen::VectorXd& residual : objective.residuals(listed_individuals())) {
+    if (residual.size() == 0 || residual.squaredNorm() == 0) return match;
+    const size_t n = match.cost.size();
+    match.cost.push_back(weight * residual.squaredNorm());
+    log_ratio[static_cast<Eigen::Index>(n)] = std::log(match.cost[n] / printed[n]);
+  }
+  match.usable = true;
+  match.overshoot = largest_rate(problem.cloth.springs, experiment.reference, states) /
+                    experiment.reference.critical_elongation;
+  match.factor = std::exp(log_ratio.mean());
+  match.spread = std::sqrt((log_ratio - log_ratio.mean()).square().mean());
+  return match;
+}
 
 }  // namespace clothfit

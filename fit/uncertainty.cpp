@@ -115,6 +115,8 @@ Uncertainty estimate_uncertainty(const TrajectoryObjective& objective,
       sigma.cwiseInverse().asDiagonal() * covariance * sigma.cwiseInverse().asDiagonal();
   const Eigen::VectorXd shift = -bread * step_gradient;
   result.step_shift = shift.cwiseProduct(slope);
+  result.noise_sigma = sigma.cwiseProduct(slope);
+  result.robust_sigma = robust_variance.cwiseSqrt().cwiseProduct(slope);
   result.sigma = (covariance.diagonal().cwiseMax(robust_variance) + shift.cwiseAbs2())
                      .cwiseSqrt()
                      .cwiseProduct(slope);

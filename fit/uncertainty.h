@@ -6,8 +6,10 @@ namespace clothfit {
 
 struct Uncertainty {
   bool usable = false;
-  Eigen::VectorXd sigma;        ///< of each parameter, in its unit
-  Eigen::MatrixXd correlation;  ///< of the coordinates
+  Eigen::VectorXd sigma;         ///< of each parameter, in its unit: all below together
+  Eigen::VectorXd noise_sigma;   ///< from independent residuals
+  Eigen::VectorXd robust_sigma;  ///< from residuals that are correlated in time
+  Eigen::MatrixXd correlation;   ///< of the coordinates
   double chi_square_per_dof = 0;
   /// How far each parameter would move (in its unit) if the time step went to zero: the
   /// discretisation's share, part of sigma.

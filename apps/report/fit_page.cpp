@@ -15,21 +15,6 @@
 namespace clothfit {
 namespace {
 
-std::string section(const std::string& title, const std::string& content) {
-  if (content.empty()) return "";
-  return fmt::format("<section>\n<h2>{}</h2>\n{}</section>\n", escape_xml(title), content);
-}
-
-std::string paragraph(const std::string& text) {
-  return fmt::format("<p>{}</p>\n", escape_xml(text));
-}
-
-std::string figure(const std::string& svg, const std::string& caption) {
-  if (svg.empty()) return "";
-  return fmt::format("<figure>\n{}<figcaption>{}</figcaption>\n</figure>\n", svg,
-                     escape_xml(caption));
-}
-
 std::string heading(const FitReport& report) {
   const FitResult& result = report.result;
   const FitSummary summary = summarise(report);

@@ -136,6 +136,21 @@ std::string data_uri(std::string_view media_type, std::string_view bytes) {
   return uri;
 }
 
+std::string section(const std::string& title, const std::string& content) {
+  if (content.empty()) return "";
+  return fmt::format("<section>\n<h2>{}</h2>\n{}</section>\n", escape_xml(title), content);
+}
+
+std::string paragraph(const std::string& text) {
+  return fmt::format("<p>{}</p>\n", escape_xml(text));
+}
+
+std::string figure(const std::string& svg, const std::string& caption) {
+  if (svg.empty()) return "";
+  return fmt::format("<figure>\n{}<figcaption>{}</figcaption>\n</figure>\n", svg,
+                     escape_xml(caption));
+}
+
 std::string html_page(const std::string& title, const std::string& body) {
   return fmt::format(
       "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n"

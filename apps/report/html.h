@@ -17,6 +17,11 @@ std::string typeset_number(const std::string& text);
 /// The table as HTML; columns whose cells are all numbers stand right.
 std::string html_table(const Table& table, const std::string& caption);
 
+/// Parts of a page; nothing where the content is empty. Titles, texts and captions are plain text.
+std::string section(const std::string& title, const std::string& content);
+std::string paragraph(const std::string& text);
+std::string figure(const std::string& svg, const std::string& caption);
+
 /// `bytes` as a data: URI.
 std::string data_uri(std::string_view media_type, std::string_view bytes);
 

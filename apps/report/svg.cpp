@@ -9,29 +9,10 @@
 #include "apps/report/colour_map.h"
 #include "apps/report/html.h"
 #include "apps/report/number_text.h"
+#include "apps/report/svg_parts.h"
 
 namespace clothfit {
 namespace {
-
-constexpr const char* kInk = "#1c1e21";
-constexpr const char* kSoft = "#5b616b";
-constexpr const char* kGrid = "#e4e7eb";
-
-/// Places values on the page, linearly or by their logarithm.
-struct Axis {
-  double low = 0;
-  double high = 1;
-  double from_px = 0;  ///< where `low` stands
-  double to_px = 1;    ///< where `high` stands
-  bool logarithmic = false;
-
-  double operator()(double value) const {
-    const double fraction =
-        logarithmic ? std::log(value / low) / std::log(high / low) : (value - low) / (high - low);
-    return from_px + fraction * (to_px - from_px);
-  }
-  bool shows(double value) const { return std::isfinite(value) && (!logarithmic || value > 0); }
-};
 
 struct Extent {
   double low = std::numeric_limits<double>::infinity();
@@ -42,30 +23,6 @@ struct Extent {
   }
   bool empty() const { return low > high; }
 };
-
-std::string open_svg(double width, double height, const std::string& title,
-                     const std::string& description) {
-  return fmt::format(
-      "<svg xmlns=\"http://www.w3.org/2000/svg\" role=\"img\" viewBox=\"0 0 {:.0f} {:.0f}\" "
-      "font-family=\"Helvetica Neue, Arial, Liberation Sans, DejaVu Sans, sans-serif\" "
-      "font-size=\"12\" fill=\"{}\">\n<title>{}</title>\n<desc>{}</desc>\n",
-      width, height, kInk, escape_xml(title), escape_xml(description));
-}
-
-std::string text_at(double x, double y, const std::string& text, const char* anchor = "start",
-                    const char* colour = kInk) {
-  return fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"{}\" fill=\"{}\">{}</text>\n",
-                     x, y, anchor, colour, escape_xml(text));
-}
-
-std::string line_at(double x1, double y1, double x2, double y2, const LineStyle& style) {
-  const std::string dashes =
-      style.dashes.empty() ? "" : fmt::format(" stroke-dasharray=\"{}\"", style.dashes);
-  return fmt::format(
-      "<line x1=\"{:.1f}\" y1=\"{:.1f}\" x2=\"{:.1f}\" y2=\"{:.1f}\" stroke=\"{}\" "
-      "stroke-width=\"{}\"{}/>\n",
-      x1, y1, x2, y2, style.colour, style.width_px, dashes);
-}
 
 std::string polylines(const Series& series, const Axis& x_axis, const Axis& y_axis) {
   std::string svg;
@@ -141,11 +98,6 @@ double usual_spacing(const std::vector<ClothValue>& values) {
   const auto middle = nearest.begin() + static_cast<std::ptrdiff_t>(nearest.size() / 2);
   std::nth_element(nearest.begin(), middle, nearest.end());
   return *middle;
-}
-
-std::string tick_text(double value) {
-  std::string text = fmt::format("{:.6g}", value);
-  return text.starts_with('-') ? "−" + text.substr(1) : text;
 }
 
 }  // namespace

@@ -130,7 +130,7 @@ TEST_F(Program, NamesTheNearestVerb) {
 }
 
 TEST_F(Program, ExplainsEveryVerbWithAnExample) {
-  for (const char* verb : {"calibrate", "track", "fit", "simulate", "demo"}) {
+  for (const char* verb : {"calibrate", "track", "fit", "simulate", "experiment", "demo"}) {
     const ProgramRun run = run_program({verb, "--help"}, here_);
     EXPECT_EQ(run.exit_code, 0);
     EXPECT_THAT(run.out, HasSubstr("Example"));

@@ -13,7 +13,11 @@ namespace {
 
 /// A small cloth of the paper's kind after half a second, many of its springs at the limit.
 struct SmallExperiment {
-  PaperExperiment experiment{.vertices_per_side = 7, .duration_s = 0.5};
+  PaperExperiment experiment{.vertices_per_side = 7,
+                             .time_step_s = 0.01,
+                             .duration_s = 0.5,
+                             .damping_per_s = 0.5,
+                             .limit = StrainLimitMode::positions};
   RecordedStates states;
   FitProblem problem;
 

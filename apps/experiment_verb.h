@@ -1,0 +1,20 @@
+#pragma once
+
+#include <filesystem>
+
+#include "apps/study/louchet1995.h"
+
+namespace clothfit {
+
+struct ExperimentVerbOptions {
+  Louchet1995Options study;
+  std::filesystem::path out;      ///< empty: louchet1995.experiment
+  std::filesystem::path journal;  ///< empty: beside the output folder, gone with success
+  bool resume = false;
+};
+
+/// Runs the founding paper's experiment, writes the result folder, prints the targets. Returns an
+/// exit code; throws InputError, Cancelled.
+int run_louchet1995(const ExperimentVerbOptions& options);
+
+}  // namespace clothfit

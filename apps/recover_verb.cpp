@@ -1,0 +1,148 @@
+#include <fmt/format.h>
+
+#include <cmath>
+#include <memory>
+
+#include "apps/csv_table.h"
+#include "apps/exit_code.h"
+#include "apps/grid_size.h"
+#include "apps/interrupt.h"
+#include "apps/progress_line.h"
+#include "apps/report/recover_page.h"
+#include "apps/report/recover_tables.h"
+#include "apps/study/recover.h"
+#include "apps/text_table.h"
+#include "apps/verb.h"
+#include "data/output_folder.h"
+#include "data/text_file.h"
+
+namespace clothfit {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct RecoverFlags {
+  RecoverOptions study;
+  std::string observations = "tracks3d", loss = "squared";
+  double seconds = 1, noise_mm = 1;
+  int mesh = 17;
+  fs::path out, journal;
+  bool resume = false;
+};
+
+/// The options given that shape the result.
+std::string command_text(const CLI::App& verb) {
+  std::string text = "clothfit recover";
+  for (const CLI::Option* option : verb.get_options()) {
+    const std::string name = option->get_name();
+    if (option->count() == 0 || name == "--out" || name == "--journal" || name == "--resume" ||
+        name == "--threads")
+      continue;
+    text += " " + name;
+    if (option->get_items_expected_max() > 0)
+      for (const std::string& value : option->results()) text += " " + value;
+  }
+  return text;
+}
+
+RecoverOptions options_of(const RecoverFlags& flags) {
+  RecoverOptions options = flags.study;
+  options.scene.frames =
+      1 + static_cast<int>(std::lround(flags.seconds * options.scene.frame_rate_hz));
+  options.scene.noise_m = 1e-3 * flags.noise_mm;
+  options.fit.mesh_columns = options.fit.mesh_rows = flags.mesh;
+  options.fit.observations =
+      flags.observations == "tracks2d" ? ObservationKind::tracks2d : ObservationKind::tracks3d;
+  options.fit.loss = flags.loss == "huber" ? Loss::huber : Loss::squared;
+  return options;
+}
+
+int run_recover(const RecoverFlags& flags, const std::string& command) {
+  const RecoverOptions options = options_of(flags);
+  options.validate();
+  OutputFolder out(out_folder(flags.out, "recover"));
+  const fs::path journal_file =
+      flags.journal.empty() ? fs::path(out.final_path().string() + ".journal") : flags.journal;
+  Journal journal(journal_file, options.key(),
+                  flags.resume ? JournalStart::resume : JournalStart::anew);
+  RecoverResult result;
+  {
+    ProgressLine line;
+    result = recover(options, &journal, watch(line));
+  }
+  if (result.stop == ExecuteStop::cancelled || interrupted()) {
+    fmt::print(stderr, "{} of {} trials are kept in {}; the same command with --resume goes on\n",
+               journal.finished().size(), options.trials, shown_path(journal_file));
+    throw Cancelled();
+  }
+  const Table parameters = recovery_table(result);
+  const Table counts = recovery_counts(result);
+  const Table trials = recovery_trials_table(result);
+  write_csv_table(parameters.header, parameters.rows, out.path() / "parameters.csv");
+  write_csv_table(trials.header, trials.rows, out.path() / "trials.csv");
+  write_text(recover_page_html(options, result, command), out.path() / "report.html");
+  out.publish();
+  if (flags.journal.empty()) fs::remove(journal_file);
+  fmt::print("{}\n{}\nReport: {}\n", text_table(counts.header, counts.rows),
+             text_table(parameters.header, parameters.rows),
+             shown_path(out.final_path() / "report.html"));
+  return kExitGood;
+}
+
+}  // namespace
+
+void add_recover_verb(CLI::App& program, VerbAction& action) {
+  const auto flags = std::make_shared<RecoverFlags>();
+  CLI::App* verb = program.add_subcommand(
+      "recover", "Simulate cloth whose numbers are known, fit it, hold the fits against the truth");
+  SyntheticScene& scene = flags->study.scene;
+  const auto add = [&](const char* name, auto& value, const char* what) {
+    return verb->add_option(name, value, what)->capture_default_str();
+  };
+  add("--trials", flags->study.trials, "Recordings, each released another way");
+  add("--observations", flags->observations, "What to fit to")
+      ->check(CLI::IsMember({"tracks3d", "tracks2d"}));
+  add("--noise-mm", flags->noise_mm, "Noise of 3D tracks, standard deviation per coordinate");
+  add("--noise-px", scene.noise_px, "Noise of pixels");
+  add("--cameras", scene.cameras, "Cameras, 1 to 4");
+  add("--rate", scene.frame_rate_hz, "Frames per second");
+  add("--seconds", flags->seconds, "Length of a recording");
+  add("--before", scene.before_s,
+      "Seconds that the cloth has been swinging when the recording begins: its start is then "
+      "unknown to the fit");
+  add("--markers", scene.markers, "Markers a side");
+  add("--mesh", flags->mesh, "Vertices a side of the fit");
+  add("--truth-mesh", scene.truth_mesh, "Vertices a side of the truth");
+  add("--truth-steps", scene.truth_steps, "As many times more time steps in the truth");
+  add("--drag", scene.drag_per_s,
+      "Viscous damping of the truth that the recordings do not declare");
+  add("--missing", scene.missing, "Share of the observations that are lost");
+  verb->add_flag("--hand", scene.hand,
+                 "A hand hides a quarter of the cloth for a third of the time");
+  add("--outliers", scene.outliers, "Share of the observations that are far off");
+  add("--start-factor", flags->study.start_factor,
+      "Fits begin off by this factor, without a search; 0: from scratch");
+  add("--loss", flags->loss, "What large residuals weigh")
+      ->check(CLI::IsMember({"squared", "huber"}));
+  verb->add_option("--effect", flags->study.fit.effects, "Effect to fit; may be repeated")
+      ->type_name("NAME");
+  add("--start-nodes", flags->study.fit.start_nodes,
+      "Nodes a side of the corrections of a start that is unknown");
+  add("--seed", flags->study.seed, "Seed of releases, noise and searches");
+  add("--threads", flags->study.threads, "Threads; 0 for as many as the machine has");
+  verb->add_option("--journal", flags->journal,
+                   "Where finished trials are kept (default: OUT.journal)")
+      ->type_name("FILE");
+  verb->add_flag("--resume", flags->resume, "Go on from the journal of an interrupted run");
+  add_out_option(*verb, flags->out, "recover");
+  verb->footer(
+      "Examples:\n"
+      "  clothfit recover --trials 100 --start-factor 5\n"
+      "  clothfit recover --observations tracks2d --before 0.25 --trials 20\n"
+      "  clothfit recover --drag 0.5 --trials 50");
+  verb->callback([flags, verb, &action] {
+    action = [flags, command = command_text(*verb)] { return run_recover(*flags, command); };
+  });
+}
+
+}  // namespace clothfit
