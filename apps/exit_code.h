@@ -1,6 +1,7 @@
 #pragma once
 
 #include <stdexcept>
+#include <string>
 
 namespace clothfit {
 
@@ -20,10 +21,12 @@ class NoResult : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// The user asked to stop; nothing is left behind.
+/// The user asked to stop; nothing is left behind but what `remedy`, where given, names.
 class Cancelled : public std::runtime_error {
  public:
-  Cancelled() : std::runtime_error("cancelled; no results were written") {}
+  explicit Cancelled(const std::string& remedy = "")
+      : std::runtime_error("cancelled; no results were written" +
+                           (remedy.empty() ? "" : "; " + remedy)) {}
 };
 
 }  // namespace clothfit

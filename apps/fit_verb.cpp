@@ -34,6 +34,10 @@ struct FitFlags {
   std::string observations = "automatic";
   std::string mesh;
   fs::path forecast;
+  std::string springs;  ///< empty: the earlier fit's, or the fabric
+  std::string search = "paper";
+  std::string loss = "huber";
+  fs::path start;
 };
 
 /// Nothing where the text is not a mesh that a fit takes.
@@ -59,6 +63,48 @@ ObservationKind parse_observations(const std::string& text) {
   return ObservationKind::automatic;
 }
 
+/// The parameter set that is asked for, or that of the earlier fit which `flag` names.
+SpringSet chosen_springs(const std::string& asked, const char* flag, const FitResult* earlier) {
+  const std::optional<SpringSet> wanted = spring_set_named(asked);
+  if (earlier == nullptr) return wanted.value_or(SpringSet::fabric);
+  const std::optional<SpringSet> known = spring_set_named(earlier->parameter_set);
+  if (!known)
+    throw InputError(flag, "the fit has the unknown parameter set '" + earlier->parameter_set + "'",
+                     "fabric, louchet5 or louchet18");
+  if (wanted && *wanted != *known)
+    throw InputError("--springs",
+                     asked + ", but the fit of " + flag + " has " + earlier->parameter_set,
+                     "the same parameter set", "leave --springs out");
+  return *known;
+}
+
+/// What an earlier fit says of the cloth; its measurement unknowns were those of its recording.
+std::map<std::string, double> known_values(const FitResult& earlier) {
+  std::map<std::string, double> values;
+  for (const ParameterEstimate& parameter : earlier.parameters)
+    if (parameter.name != "areal_density") values[parameter.name] = parameter.value;
+  for (const EffectEstimate& effect : earlier.effects)
+    for (const ParameterEstimate& parameter : effect.parameters)
+      if (parameter.state != ParameterState::fixed)
+        values[effect.name + "." + parameter.name] = parameter.value;
+  return values;
+}
+
+/// Hours of searching are not written over.
+void require_new_checkpoint(const FitOptions& options) {
+  if (options.checkpoint.empty() || options.resume || !fs::exists(options.checkpoint)) return;
+  throw InputError("--checkpoint", options.checkpoint.string() + " exists already",
+                   "the name of a new file, or --resume to go on from this one",
+                   "remove it to search anew");
+}
+
+/// What a cancelled fit leaves for the next one.
+std::string how_to_go_on(const FitOptions& options) {
+  if (options.checkpoint.empty() || !fs::exists(options.checkpoint)) return "";
+  return fmt::format("the search stands in {}: the same command{} goes on from there",
+                     options.checkpoint.string(), options.resume ? "" : " with --resume");
+}
+
 /// What fit.json keeps of the command line: the options that shape the result, in fixed order.
 std::string command_text(const FitVerbOptions& options, const FitFlags& flags) {
   const FitOptions defaults;
@@ -67,6 +113,10 @@ std::string command_text(const FitVerbOptions& options, const FitFlags& flags) {
   if (flags.observations != "automatic") text += " --observations " + flags.observations;
   if (!flags.mesh.empty()) text += " --mesh " + flags.mesh;
   if (!flags.forecast.empty()) text += " --forecast " + flags.forecast.string();
+  if (!flags.start.empty()) text += " --start " + flags.start.string();
+  if (!flags.springs.empty()) text += " --springs " + flags.springs;
+  if (flags.search != "paper") text += " --search " + flags.search;
+  if (flags.loss != "huber") text += " --loss " + flags.loss;
   const auto add = [&](const char* flag, const auto& value, const auto& default_value) {
     if (value != default_value) text += fmt::format(" {} {}", flag, value);
   };
@@ -74,6 +124,8 @@ std::string command_text(const FitVerbOptions& options, const FitFlags& flags) {
   add("--population", options.fit.population, defaults.population);
   add("--generations", options.fit.generations, defaults.generations);
   add("--refine-best", options.fit.refine_best, defaults.refine_best);
+  add("--stop-cost", options.fit.stop_cost, defaults.stop_cost);
+  add("--start-nodes", options.fit.start_nodes, defaults.start_nodes);
   add("--work", options.fit.work, defaults.work);
   add("--substep-scale", options.fit.substep_scale, defaults.substep_scale);
   return text;
@@ -108,6 +160,7 @@ void print_result(const FitReport& report, const fs::path& folder) {
 int run_fit(const FitVerbOptions& options) {
   const auto begin = std::chrono::steady_clock::now();
   options.fit.validate();
+  require_new_checkpoint(options.fit);
   const Recording given = read_recording(recording_folder(options.recording));
 
   OutputFolder out(out_folder(options.out, given.name + ".fit"));
@@ -121,7 +174,8 @@ int run_fit(const FitVerbOptions& options) {
     const FitInput input = read_fit_input(recording, options.fit.observations);
     report = fit(input, options.fit, progress);
   }
-  if (report.stop == FitStop::cancelled || interrupted()) throw Cancelled();
+  if (report.stop == FitStop::cancelled || interrupted())
+    throw Cancelled(how_to_go_on(options.fit));
   if (!report.usable()) throw NoResult("no fit: " + report.message);
 
   report.result.version = program_version();
@@ -129,7 +183,7 @@ int run_fit(const FitVerbOptions& options) {
   report.result.seconds =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   write_results(report, recording, out.path());
-  if (interrupted()) throw Cancelled();
+  if (interrupted()) throw Cancelled(how_to_go_on(options.fit));
   out.publish();
   print_result(report, out.final_path());
   return kExitGood;
@@ -161,12 +215,39 @@ void add_fit_verb(CLI::App& program, VerbAction& action) {
                    "Take the parameters of this fit.json, fit nothing, forecast the recording from "
                    "its own first frame")
       ->type_name("FIT.json");
+  verb->add_option("--start", flags->start,
+                   "Begin with the parameters of this fit.json instead of a search")
+      ->type_name("FIT.json")
+      ->excludes("--forecast");
+  verb->add_option("--springs", flags->springs,
+                   "Parameter set of the springs: fabric (default), or the founding paper's 5 or "
+                   "18 numbers with its strain limit")
+      ->check(CLI::IsMember({"fabric", "louchet5", "louchet18"}));
+  verb->add_option("--start-nodes", options->fit.start_nodes,
+                   "Nodes per side of the corrections of a start in motion (start: unknown)")
+      ->capture_default_str();
+  verb->add_option("--loss", flags->loss,
+                   "What large residuals weigh: less than others, or as much")
+      ->check(CLI::IsMember({"huber", "squared"}))
+      ->capture_default_str();
+  verb->add_option("--search", flags->search,
+                   "The founding paper's evolutionary strategy, or CMA-ES with restarts and as "
+                   "many simulations")
+      ->check(CLI::IsMember({"paper", "cma"}))
+      ->capture_default_str();
   verb->add_option("--population", options->fit.population, "Individuals of the search")
       ->capture_default_str();
   verb->add_option("--generations", options->fit.generations, "Generations of the search, at most")
       ->capture_default_str();
   verb->add_option("--refine-best", options->fit.refine_best, "Individuals that go to refinement")
       ->capture_default_str();
+  verb->add_option("--stop-cost", options->fit.stop_cost,
+                   "End the search once the mean error over its window is this low, in sigmas");
+  CLI::Option* checkpoint = verb->add_option("--checkpoint", options->fit.checkpoint,
+                                             "Save the search here after each generation")
+                                ->type_name("FILE");
+  verb->add_flag("--resume", options->fit.resume, "Go on from the checkpoint, to the same result")
+      ->needs(checkpoint);
   verb->add_option("--work", options->fit.work,
                    "Times as much work as refinement is allowed before it ends unconverged")
       ->capture_default_str();
@@ -180,6 +261,7 @@ void add_fit_verb(CLI::App& program, VerbAction& action) {
       "Examples:\n"
       "  clothfit fit data/recordings/tags_onecam\n"
       "  clothfit fit data/recordings/swing_breeze --effect wind --seed 7\n"
+      "  clothfit fit data/recordings/swing_plain --search cma --checkpoint search.txt\n"
       "  clothfit fit OTHER_RECORDING --forecast swing_plain.fit/fit.json");
   verb->callback([options, flags, &action] {
     action = [options, flags] {
@@ -188,7 +270,16 @@ void add_fit_verb(CLI::App& program, VerbAction& action) {
         options->fit.mesh_columns = mesh->columns;
         options->fit.mesh_rows = mesh->rows;
       }
-      if (!flags->forecast.empty()) options->fit.forecast = read_fit_result(flags->forecast);
+      const bool starts = !flags->start.empty();
+      const fs::path& file = starts ? flags->start : flags->forecast;
+      std::optional<FitResult> earlier;
+      if (!file.empty()) earlier = read_fit_result(file);
+      options->fit.spring_set = chosen_springs(flags->springs, starts ? "--start" : "--forecast",
+                                               earlier ? &*earlier : nullptr);
+      if (starts) options->fit.start = known_values(*earlier);
+      if (!starts) options->fit.forecast = std::move(earlier);
+      options->fit.search = flags->search == "cma" ? SearchMethod::cma : SearchMethod::paper;
+      options->fit.loss = flags->loss == "squared" ? Loss::squared : Loss::huber;
       options->command = command_text(*options, *flags);
       return run_fit(*options);
     };

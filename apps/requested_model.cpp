@@ -15,6 +15,7 @@
 #include "fit/problem.h"
 #include "fit/simulation.h"
 #include "model/effects/registry.h"
+#include "model/spring_vector.h"
 
 namespace clothfit {
 namespace {
@@ -26,13 +27,15 @@ constexpr const char* kHowToGive = "--fit FIT.json, --model MODEL.yaml or --set 
 
 /// Parameters that somebody gave.
 struct GivenParameters {
-  std::map<std::string, double> fabric;
-  std::vector<DeclaredEffect> effects;
+  std::optional<SpringSet> set = SpringSet::fabric;  ///< nothing: springs without such parameters
+  std::map<std::string, double> springs;             ///< parameters of the set, by name
+  std::vector<DeclaredEffect> effects = {};
 };
 
-bool is_fabric_parameter(const std::string& name) {
-  return std::ranges::any_of(kFabricParameters,
-                             [&](const FabricParameterName& known) { return name == known.name; });
+std::vector<std::string> names_of(SpringSet set) {
+  std::vector<std::string> names;
+  for (const SpringNumber& number : numbers_of(set)) names.push_back(number.name);
+  return names;
 }
 
 DeclaredEffect& effect_named(const std::string& name, std::vector<DeclaredEffect>& effects) {
@@ -49,9 +52,16 @@ fs::path fit_file(const fs::path& given) {
 
 GivenParameters parameters_of_fit(const fs::path& fit) {
   const FitResult result = read_fit_result(fit_file(fit));
-  GivenParameters given;
+  GivenParameters given{.set = spring_set_named(result.parameter_set), .springs = {}};
+  if (!given.set) {
+    throw InputError(fit_file(fit).string(),
+                     "has the unknown parameter set '" + result.parameter_set + "'",
+                     "fabric, louchet5 or louchet18");
+  }
+  const std::vector<std::string> names = names_of(*given.set);
   for (const ParameterEstimate& parameter : result.parameters) {
-    if (is_fabric_parameter(parameter.name)) given.fabric[parameter.name] = parameter.value;
+    if (std::ranges::find(names, parameter.name) != names.end())
+      given.springs[parameter.name] = parameter.value;
   }
   for (const EffectEstimate& estimate : result.effects) {
     DeclaredEffect& effect = effect_named(estimate.name, given.effects);
@@ -75,18 +85,25 @@ void set_parameter(const std::string& text, GivenParameters& given) {
     effect_named(effect, given.effects).parameters[parameter] = {value};
     return;
   }
-  if (!is_fabric_parameter(name)) {
-    std::vector<std::string> known;
-    for (const FabricParameterName& parameter : kFabricParameters) known.push_back(parameter.name);
+  if (!given.set) {
+    throw InputError("--set " + text, "the model has its springs type by type, not by parameters",
+                     "a model with a fabric, or --fit", "edit the model file");
+  }
+  const std::vector<std::string> known = names_of(*given.set);
+  if (std::ranges::find(known, name) == known.end()) {
     throw InputError("--set " + text, "there is no parameter '" + name + "'",
                      known_names(name, known),
                      "an effect's is set as --set EFFECT.PARAMETER=NUMBER");
   }
-  given.fabric[name] = value;
+  given.springs[name] = value;
 }
 
 void add(const GivenParameters& more, GivenParameters& given) {
-  for (const auto& [name, value] : more.fabric) given.fabric[name] = value;
+  if (!more.springs.empty() && more.set != given.set) {
+    given.set = more.set;
+    given.springs.clear();
+  }
+  for (const auto& [name, value] : more.springs) given.springs[name] = value;
   for (const DeclaredEffect& effect : more.effects) {
     DeclaredEffect& known = effect_named(effect.name, given.effects);
     for (const auto& [name, values] : effect.parameters) known.parameters[name] = values;
@@ -94,14 +111,17 @@ void add(const GivenParameters& more, GivenParameters& given) {
   }
 }
 
-/// What the options give, without the input's own.
-GivenParameters given_parameters(const ModelRequest& request) {
-  GivenParameters given;
+/// What the options give, in front of the input's own.
+GivenParameters given_parameters(const ModelRequest& request, GivenParameters given = {}) {
   if (!request.fit.empty()) add(parameters_of_fit(request.fit), given);
   if (!request.model.empty()) {
     ModelDescription model = read_model(request.model);
+    if (model.springs) {
+      throw InputError(request.model.string(), "has springs type by type instead of a fabric",
+                       "a model file with a fabric", "simulate that model itself");
+    }
     for (DeclaredEffect& effect : model.effects) effect.line = 0;  // of another file
-    add({model.fabric, model.effects}, given);
+    add({SpringSet::fabric, model.fabric, model.effects}, given);
   }
   for (const std::string& assignment : request.set) set_parameter(assignment, given);
   return given;
@@ -137,21 +157,22 @@ FitResult complete_parameters(const Recording& recording, GivenParameters given)
   const std::string file = (recording.folder / "recording.yaml").string();
   std::string missing;
   FitResult result;
-  for (const FabricParameterName& parameter : kFabricParameters) {
-    const auto found = given.fabric.find(parameter.name);
-    if (found == given.fabric.end()) {
-      missing += (missing.empty() ? "" : ", ") + std::string(parameter.name);
+  for (const std::string& name : names_of(given.set.value())) {
+    const auto found = given.springs.find(name);
+    if (found == given.springs.end()) {
+      missing += (missing.empty() ? "" : ", ") + name;
     } else {
-      result.parameters.push_back({.name = parameter.name, .value = found->second});
+      result.parameters.push_back({.name = name, .value = found->second});
     }
   }
+  result.parameter_set = to_string(*given.set);
   if (!missing.empty()) {
     throw InputError(file, "a recording has no parameters, and nobody gave " + missing,
                      "a number for each parameter of the fabric", kHowToGive);
   }
   // What is declared, where the options say nothing else.
   GivenParameters all;
-  add({{}, recording.declared}, all);
+  all.effects = recording.declared;
   for (DeclaredEffect& effect : all.effects) {
     const std::string where = fmt::format("{}:{}", file, effect.line);
     const auto numbers =
@@ -181,11 +202,17 @@ FitResult complete_parameters(const Recording& recording, GivenParameters given)
   return result;
 }
 
+InputError other_mesh() {
+  return {"--mesh", "natural lengths, and starts in motion, are those of one mesh",
+          "the model's own mesh", "leave --mesh out"};
+}
+
 ModelDescription model_of_recording(const ModelRequest& request, const fs::path& steps,
                                     const ProgressCallback& progress) {
   const Recording given = read_recording(recording_folder(request.input));
   FitOptions options;
   options.forecast = complete_parameters(given, given_parameters(request));
+  options.spring_set = spring_set_named(options.forecast->parameter_set).value();
   if (!given.tracks3d && given.tracks2d.empty() && given.cameras.empty()) {
     throw InputError((given.folder / "recording.yaml").string(),
                      "has no tracks, so nothing says where the cloth starts",
@@ -200,6 +227,8 @@ ModelDescription model_of_recording(const ModelRequest& request, const fs::path&
     const FitResult fit = read_fit_result(fit_file(request.fit));
     mesh = {fit.mesh_columns, fit.mesh_rows};
   }
+  if (request.mesh && *request.mesh != mesh && options.spring_set != SpringSet::fabric)
+    throw other_mesh();
   if (request.mesh) mesh = *request.mesh;
   const FitProblem problem = make_problem(input, options, mesh.columns, mesh.rows);
   return describe_model(problem, recording, problem.space.start());
@@ -222,6 +251,32 @@ void set_frames(const ModelRequest& request, ModelDescription& model) {
   }
   model.frame_rate_hz = rate_hz;
   model.frame_time_s = *times;
+}
+
+/// Puts the parameters in the place of the model's springs.
+void set_springs(const GivenParameters& given, ModelDescription& model) {
+  if (!given.set) return;
+  const std::vector<std::string> names = names_of(*given.set);
+  Eigen::VectorXd numbers(static_cast<Eigen::Index>(names.size()));
+  for (std::size_t n = 0; n < names.size(); ++n) {
+    const auto found = given.springs.find(names[n]);
+    if (found == given.springs.end())
+      throw InputError("--fit", "the fit holds no parameter '" + names[n] + "'",
+                       "each of the set " + to_string(*given.set));
+    numbers[static_cast<Eigen::Index>(n)] = found->second;
+  }
+  if (*given.set == SpringSet::fabric) {
+    if (model.springs) model.strain_limit = StrainLimitKind::off;  // it was that of the springs
+    model.springs.reset();
+    model.fabric = given.springs;
+    return;
+  }
+  const Mesh mesh{model.mesh_columns, model.mesh_rows, model.cloth.width_m, model.cloth.height_m};
+  const SpringParameters springs = springs_of(*given.set, numbers, mesh);
+  require_possible(springs, "--fit");
+  model.springs = springs_of(springs);
+  model.fabric.clear();
+  model.strain_limit = StrainLimitKind::positions;  // as in the fits of these sets
 }
 
 void require_possible_fabric(const std::map<std::string, double>& fabric) {
@@ -268,12 +323,21 @@ ModelDescription requested_model(const ModelRequest& request, const fs::path& st
     model = model_of_recording(request, steps, progress);
   } else {
     model = file ? read_model(*file) : model_of_fit(request.fit);
-    GivenParameters all{model.fabric, model.effects};
+    GivenParameters own{SpringSet::fabric, model.fabric, model.effects};
+    if (model.springs) {
+      own.set.reset();
+      if (!file && !request.set.empty()) own = parameters_of_fit(request.fit);
+      own.effects = model.effects;
+    }
     ModelRequest options = request;
     if (!file) options.fit.clear();  // its model holds them already
-    add(given_parameters(options), all);
-    model.fabric = all.fabric;
+    const GivenParameters all = given_parameters(options, std::move(own));
+    set_springs(all, model);
     model.effects = all.effects;
+    const bool of_one_mesh = model.springs || model.start_state;
+    if (request.mesh && of_one_mesh &&
+        *request.mesh != GridSize{model.mesh_columns, model.mesh_rows})
+      throw other_mesh();
     // A step was chosen for the springs and the mesh that it stands beside.
     const bool changed =
         request.mesh || !request.set.empty() || !options.fit.empty() || !request.model.empty();
@@ -283,7 +347,7 @@ ModelDescription requested_model(const ModelRequest& request, const fs::path& st
       model.mesh_rows = request.mesh->rows;
     }
   }
-  require_possible_fabric(model.fabric);
+  if (!model.springs) require_possible_fabric(model.fabric);
   set_frames(request, model);
   return model;
 }

@@ -16,7 +16,7 @@ struct ModelRequest {
   std::filesystem::path input;   ///< a recording, a model file or a folder with one; may be empty
   std::filesystem::path fit;     ///< fit.json or its folder; may be empty
   std::filesystem::path model;   ///< model file whose fabric and effects are taken; may be empty
-  std::vector<std::string> set;  ///< NAME=NUMBER, NAME of the fabric or EFFECT.PARAMETER
+  std::vector<std::string> set;  ///< NAME=NUMBER, NAME of the springs or EFFECT.PARAMETER
   std::optional<GridSize> mesh;
   std::optional<double> duration_s;
   std::optional<double> frame_rate_hz;

@@ -188,11 +188,24 @@ Json named_value(const std::string& name, const std::string& unit, double value)
   return {{"name", name}, {"unit", unit}, {"value", value}};
 }
 
+/// The springs' own numbers, named by type.
+void add_springs(const ModelSprings& springs, Json& parameters) {
+  const auto add = [&](const char* name, const char* unit, const ModelSprings::ByType& numbers) {
+    for (std::size_t type = 0; type < numbers.size(); ++type)
+      parameters.push_back(named_value(fmt::format("{}_{}", name, type), unit, numbers[type]));
+  };
+  add("natural_length", "m", springs.natural_length_m);
+  add("stiffness", "N/m", springs.stiffness_n_per_m);
+  add("damping", "N s/m", springs.damping_ns_per_m);
+  if (springs.critical_elongation) add("critical_elongation", "", *springs.critical_elongation);
+}
+
 /// How the strain limit was kept; null without one.
 Json describe_strain_limit(const ModelDescription& model, const SimulateResult& result) {
   if (model.strain_limit == StrainLimitKind::off) return nullptr;
   return {{"mode", to_string(model.strain_limit)},
-          {"elongation", model.critical_elongation},
+          {"elongation", model.springs ? Json(model.springs->critical_elongation.value())
+                                       : Json(model.critical_elongation)},
           {"largest_excess", result.largest_excess},
           {"unmet_steps", result.unmet_steps}};
 }
@@ -201,7 +214,9 @@ Json describe_strain_limit(const ModelDescription& model, const SimulateResult& 
 void warn_of_strain(const ModelDescription& model, const SimulateResult& result,
                     const StepChoice& choice) {
   if (model.strain_limit == StrainLimitKind::off) return;
-  const double elongation = model.critical_elongation;
+  const double elongation = model.springs
+                                ? std::ranges::max(model.springs->critical_elongation.value())
+                                : model.critical_elongation;
   if (result.largest_excess > std::max(elongation, 0.01)) {
     spdlog::warn("a spring stretched by {} % where the strain limit allows {} %{}",
                  significant(100 * (elongation + result.largest_excess), 3),
@@ -225,13 +240,18 @@ Json describe_run(const ModelDescription& model, const Simulation& simulation,
   Json parameters = Json::array();
   parameters.push_back(
       named_value("areal_density", "kg/m2", *model.cloth.mass_kg / (mesh.width_m * mesh.height_m)));
-  for (const FabricParameterName& parameter : kFabricParameters)
-    parameters.push_back(
-        named_value(parameter.name, parameter.unit, model.fabric.at(parameter.name)));
-  const Continuum c = continuum(simulation.fabric);
-  const Json constants = {
-      named_value("c11", "N/m", c.c11_n_per_m), named_value("c22", "N/m", c.c22_n_per_m),
-      named_value("c12", "N/m", c.c12_n_per_m), named_value("c33", "N/m", c.c33_n_per_m)};
+  Json constants = nullptr;
+  if (model.springs) {
+    add_springs(*model.springs, parameters);
+  } else {
+    for (const FabricParameterName& parameter : kFabricParameters)
+      parameters.push_back(
+          named_value(parameter.name, parameter.unit, model.fabric.at(parameter.name)));
+    const Continuum c = continuum(simulation.fabric.value());
+    constants = {named_value("c11", "N/m", c.c11_n_per_m), named_value("c22", "N/m", c.c22_n_per_m),
+                 named_value("c12", "N/m", c.c12_n_per_m),
+                 named_value("c33", "N/m", c.c33_n_per_m)};
+  }
   Json effects = Json::array();
   for (std::size_t e = 0; e < simulation.cloth.effect_descriptions.size(); ++e) {
     const EffectDescription& description = simulation.cloth.effect_descriptions[e];
@@ -241,28 +261,29 @@ Json describe_run(const ModelDescription& model, const Simulation& simulation,
                                  simulation.parameters.effects[e][p]));
     effects.push_back({{"name", description.name}, {"parameters", list}});
   }
-  return {{"format", "clothfit-simulation/1"},
-          {"model", model.name},
-          {"version", program_version()},
-          {"mesh", {{"columns", mesh.columns}, {"rows", mesh.rows}}},
-          {"parameter_set", "fabric"},
-          {"parameters", parameters},
-          {"continuum", constants},
-          {"effects", effects},
-          {"integrator", "euler"},
-          {"start", to_string(simulation.start)},
-          {"frames", simulation.frame_time_s.size()},
-          {"duration_s", simulation.frame_time_s.back() - simulation.frame_time_s.front()},
-          {"time_step",
-           {{"used_s", choice.longest_s},
-            {"stable_s", std::isfinite(choice.stable_s) ? Json(choice.stable_s) : Json(nullptr)},
-            {"chosen_by", choice.source},
-            {"substeps", choice.substeps},
-            {"steps", choice.steps}}},
-          {"largest_stretch", stretch},
-          {"strain_limit", describe_strain_limit(model, result)},
-          {"stop", "reached_end"},
-          {"files", files}};
+  return {
+      {"format", "clothfit-simulation/1"},
+      {"model", model.name},
+      {"version", program_version()},
+      {"mesh", {{"columns", mesh.columns}, {"rows", mesh.rows}}},
+      {"parameter_set", model.springs ? "springs" : "fabric"},
+      {"parameters", parameters},
+      {"continuum", constants},
+      {"effects", effects},
+      {"integrator", "euler"},
+      {"start", simulation.start == StartKind::unknown ? "in_motion" : to_string(simulation.start)},
+      {"frames", simulation.frame_time_s.size()},
+      {"duration_s", simulation.frame_time_s.back() - simulation.frame_time_s.front()},
+      {"time_step",
+       {{"used_s", choice.longest_s},
+        {"stable_s", std::isfinite(choice.stable_s) ? Json(choice.stable_s) : Json(nullptr)},
+        {"chosen_by", choice.source},
+        {"substeps", choice.substeps},
+        {"steps", choice.steps}}},
+      {"largest_stretch", stretch},
+      {"strain_limit", describe_strain_limit(model, result)},
+      {"stop", "reached_end"},
+      {"files", files}};
 }
 
 std::string step_text(const StepChoice& choice) {

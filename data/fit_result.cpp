@@ -58,6 +58,15 @@ Json to_json(const ObservationErrors& errors) {
             {"rigid", finite(errors.trivial.rigid)}}}};
 }
 
+Json to_json(const Basin& basin) {
+  Json parameters = Json::object();
+  for (const auto& [name, value] : basin.parameters) parameters[name] = finite(value);
+  return {{"cost", finite(basin.cost)},
+          {"ended", basin.ended},
+          {"refined", basin.refined},
+          {"parameters", parameters}};
+}
+
 /// A value of a JSON file that knows its place, such as /parameters/2/value.
 class JsonValue {
  public:
@@ -93,6 +102,10 @@ class JsonValue {
   }
   std::string text_or_empty(const std::string& key) const {
     return has(key) ? at(key).text() : std::string();
+  }
+  bool truth() const {
+    if (!json_.is_boolean()) refuse("is not a truth", "true or false");
+    return json_.get<bool>();
   }
   double number() const {
     if (!json_.is_number()) refuse("is not a number", "a number");
@@ -163,6 +176,17 @@ ObservationErrors read_errors(const JsonValue& json) {
   return errors;
 }
 
+Basin read_basin(const JsonValue& json) {
+  Basin basin;
+  basin.cost = json.at("cost").number();
+  basin.ended = json.at("ended").count();
+  basin.refined = json.at("refined").truth();
+  const JsonValue parameters = json.at("parameters");
+  for (const std::string& name : parameters.keys())
+    basin.parameters.push_back({.name = name, .value = parameters.at(name).number()});
+  return basin;
+}
+
 Json parse(const std::filesystem::path& file) {
   const std::string text = read_text(file);
   try {
@@ -199,6 +223,8 @@ void write_fit_result(const FitResult& result, const std::filesystem::path& file
   Json errors = Json::array();
   for (const ObservationErrors& kind : result.errors) errors.push_back(to_json(kind));
   if (errors.size() == 1) errors = Json(errors.front());
+  Json basins = Json::array();
+  for (const Basin& basin : result.basins) basins.push_back(to_json(basin));
   Json rejected = Json::object();
   for (const auto& [reason, count] : result.observations_rejected) rejected[reason] = count;
 
@@ -219,6 +245,7 @@ void write_fit_result(const FitResult& result, const std::filesystem::path& file
       {"parameters", to_json(result.parameters)},
       {"effects", effects},
       {"nuisance", to_json(result.nuisance)},
+      {"basins", basins},
       {"errors", errors},
       {"observations", {{"used", result.observations_used}, {"rejected", rejected}}}};
   // A recording's name may hold bytes that are no UTF-8; JSON may not.
@@ -253,6 +280,10 @@ FitResult read_fit_result(const std::filesystem::path& file) {
     result.effects.push_back({effect.at("name").text(), read_parameters(effect.at("parameters"))});
   }
   if (json.has("nuisance")) result.nuisance = read_parameters(json.at("nuisance"));
+  if (json.has("basins")) {
+    for (const JsonValue& basin : json.at("basins").items())
+      result.basins.push_back(read_basin(basin));
+  }
   const JsonValue errors = json.at("errors");
   if (errors.is_list()) {
     for (const JsonValue& kind : errors.items()) result.errors.push_back(read_errors(kind));

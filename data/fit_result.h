@@ -24,6 +24,20 @@ struct EffectEstimate {
   std::vector<ParameterEstimate> parameters;
 };
 
+/// A place in the space of parameters where runs of a search, or refinements of what it found,
+/// ended. Several of them say that the recording can be explained in several ways, or that the
+/// search did not get through.
+struct Basin {
+  struct Number {
+    std::string name;  ///< of a spring parameter, or EFFECT.PARAMETER
+    double value = 0;  ///< in the parameter's unit
+  };
+  double cost = 0;      ///< mean error over the search's window, in sigmas, on the search's mesh
+  int ended = 0;        ///< runs of CMA-ES, or individuals of the paper's strategy, that lead there
+  bool refined = true;  ///< by least squares; else as a run of the search ended
+  std::vector<Number> parameters;
+};
+
 /// `rms` is over coordinates, `rms_distance` over points.
 struct ErrorSummary {
   double rms = 0;
@@ -65,6 +79,7 @@ struct FitResult {
   std::vector<ParameterEstimate> parameters;
   std::vector<EffectEstimate> effects;
   std::vector<ParameterEstimate> nuisance;  ///< measurement unknowns fitted along
+  std::vector<Basin> basins;                ///< best first; empty without a search
   std::vector<ObservationErrors> errors;
   int observations_used = 0;
   std::map<std::string, int> observations_rejected;  ///< reason -> count

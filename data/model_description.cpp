@@ -4,8 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <string_view>
 #include <tuple>
 
+#include "data/csv_table.h"
+#include "data/input_error.h"
 #include "data/model_words.h"
 #include "data/recording_parts.h"
 #include "data/unit_quaternion.h"
@@ -18,6 +22,7 @@ namespace {
 constexpr double kStiffest_n_per_m = 1e9;
 constexpr double kLongestRetardation_s = 1e3;
 constexpr double kLongest_s = 1e6;
+constexpr double kMostElongation = 100;
 
 bool is_stiffness(const FabricParameterName& parameter) {
   return std::string_view(parameter.unit) == "N/m";
@@ -47,13 +52,60 @@ std::map<std::string, double> read_fabric(const YamlValue& value) {
   return fabric;
 }
 
+ModelSprings read_springs(const YamlValue& value) {
+  const YamlMap map = value.map({"natural_length", "stiffness", "damping", "critical_elongation"});
+  const auto six = [&](const char* key, double least, double most, const char* what) {
+    return map.at(key).numbers_between<6>(least, most, what);
+  };
+  ModelSprings springs{
+      .natural_length_m = six("natural_length", 1e-9, kLargest_m, "natural lengths in metres"),
+      .stiffness_n_per_m = six("stiffness", 0, kStiffest_n_per_m, "stiffness in newtons per metre"),
+      .damping_ns_per_m = six("damping", 0, kStiffest_n_per_m * kLongestRetardation_s,
+                              "dampings in newton seconds per metre")};
+  if (map.find("critical_elongation") != nullptr) {
+    springs.critical_elongation =
+        six("critical_elongation", 0, kMostElongation, "elongations as shares of the lengths");
+  }
+  if (std::ranges::max(springs.stiffness_n_per_m) == 0) {
+    value.refuse("springs: every stiffness is 0", "at least one type of springs that pulls");
+  }
+  return springs;
+}
+
+/// The fabric, or the springs instead.
+void read_cloth_springs(const YamlMap& map, ModelDescription& model) {
+  const YamlValue* springs = map.find("springs");
+  if (springs == nullptr) {
+    const YamlValue& fabric = map.at("fabric");
+    model.fabric = read_fabric(fabric);
+    model.fabric_line = fabric.line();
+    return;
+  }
+  if (const YamlValue* fabric = map.find("fabric")) {
+    fabric->refuse("the model has both a fabric and springs", "one of the two");
+  }
+  model.springs = read_springs(*springs);
+  model.fabric_line = springs->line();
+}
+
 void read_strain_limit(const YamlValue& value, ModelDescription& model) {
   const YamlMap map = value.map({"mode", "elongation"});
   model.strain_limit = map.at("mode").one_of(strain_limit_words());
+  if (model.springs) {
+    if (const YamlValue* elongation = map.find("elongation")) {
+      elongation->refuse("strain_limit.elongation stands beside springs",
+                         "springs.critical_elongation, a number for each type");
+    }
+    if (model.strain_limit != StrainLimitKind::off && !model.springs->critical_elongation) {
+      value.refuse("the strain is limited, and the springs have no limits",
+                   "springs.critical_elongation, a number for each type");
+    }
+    return;
+  }
   const bool needed = model.strain_limit != StrainLimitKind::off;
   if (const YamlValue* elongation = needed ? &map.at("elongation") : map.find("elongation")) {
-    model.critical_elongation =
-        elongation->number_between(0, 100, "an elongation as a share of the natural length");
+    model.critical_elongation = elongation->number_between(
+        0, kMostElongation, "an elongation as a share of the natural length");
   }
 }
 
@@ -74,6 +126,57 @@ SheetPose read_sheet(const YamlMap& start) {
     sheet.orientation = *unit;
   }
   return sheet;
+}
+
+/// Position and velocity of every vertex.
+ModelStartState read_start_state(const std::filesystem::path& file, int columns, int rows) {
+  enum Column { kRow, kColumn, kX, kY, kZ, kVx, kVy, kVz };
+  const CsvTable table(file, {{"row"}, {"column"}, {"x"}, {"y"}, {"z"}, {"vx"}, {"vy"}, {"vz"}});
+  const std::string expected =
+      fmt::format("one row for each of the mesh's {} x {} vertices", columns, rows);
+  constexpr double kUnset = std::numeric_limits<double>::quiet_NaN();
+  ModelStartState state;
+  state.position_m.setConstant(3, columns * rows, kUnset);
+  state.velocity_m_per_s = state.position_m;
+  for (int n = 0; n < table.rows(); ++n) {
+    const int row = table.whole_number(n, kRow, 0), column = table.whole_number(n, kColumn, 0);
+    if (row >= rows || column >= columns) {
+      table.refuse(n, fmt::format("there is no vertex [{}, {}]", row, column), expected,
+                   "count rows and columns from 0");
+    }
+    const int vertex = row * columns + column;
+    if (!std::isnan(state.position_m(0, vertex))) {
+      table.refuse(n, fmt::format("vertex [{}, {}] comes twice", row, column), expected);
+    }
+    state.position_m.col(vertex) << table.number(n, kX), table.number(n, kY), table.number(n, kZ);
+    state.velocity_m_per_s.col(vertex) << table.number(n, kVx), table.number(n, kVy),
+        table.number(n, kVz);
+  }
+  if (table.rows() != columns * rows) {
+    throw InputError(file.string(), fmt::format("has {} rows", table.rows()), expected);
+  }
+  return state;
+}
+
+void read_start(const YamlMap& map, const RecordingFiles& files, ModelDescription& model) {
+  model.start = map.at("kind").one_of(model_start_words());
+  const bool in_motion = model.start == StartKind::unknown;
+  for (const char* key : {"position", "orientation", "file"}) {
+    const YamlValue* value = map.find(key);
+    if (value != nullptr && in_motion != (std::string_view(key) == "file")) {
+      value->refuse(fmt::format("{} stands beside {}", value->name(),
+                                word_of(model_start_words(), model.start)),
+                    in_motion ? "a file, which says where each vertex is"
+                              : "position and orientation of the flat sheet");
+    }
+  }
+  if (!in_motion) {
+    model.sheet = read_sheet(map);
+    return;
+  }
+  const YamlValue& file = map.at("file");
+  files.file(file);
+  model.start_state = read_start_state(files.shown(file), model.mesh_columns, model.mesh_rows);
 }
 
 void read_model_time(const YamlValue& value, const RecordingFiles& files, ModelDescription& model) {
@@ -127,8 +230,8 @@ std::optional<std::vector<double>> frame_times(double frame_rate_hz, double dura
 ModelDescription read_model(const std::filesystem::path& file) {
   const RecordingFiles files(file.has_parent_path() ? file.parent_path() : ".");
   const YamlMap map =
-      read_yaml(file).map({"format", "name", "cloth", "mesh", "fabric", "strain_limit", "gravity",
-                           "obstacle", "held", "effects", "start", "time", "time_step"});
+      read_yaml(file).map({"format", "name", "cloth", "mesh", "fabric", "springs", "strain_limit",
+                           "gravity", "obstacle", "held", "effects", "start", "time", "time_step"});
   map.at("format").one_of<int>({{kModelFormat, 0}});
 
   ModelDescription model;
@@ -145,9 +248,7 @@ ModelDescription read_model(const std::filesystem::path& file) {
   if (const YamlValue* mesh = map.find("mesh")) {
     std::tie(model.mesh_columns, model.mesh_rows) = read_mesh(*mesh);
   }
-  const YamlValue& fabric = map.at("fabric");
-  model.fabric = read_fabric(fabric);
-  model.fabric_line = fabric.line();
+  read_cloth_springs(map, model);
   if (const YamlValue* limit = map.find("strain_limit")) read_strain_limit(*limit, model);
   if (const YamlValue* gravity = map.find("gravity")) {
     model.gravity_m_per_s2 = read_gravity(*gravity);
@@ -164,9 +265,7 @@ ModelDescription read_model(const std::filesystem::path& file) {
     }
   }
   if (const YamlValue* effects = map.find("effects")) model.effects = read_declared(*effects);
-  const YamlMap start = map.at("start").map({"kind", "position", "orientation"});
-  model.start = start.at("kind").one_of(model_start_words());
-  model.sheet = read_sheet(start);
+  read_start(map.at("start").map({"kind", "position", "orientation", "file"}), files, model);
   read_model_time(map.at("time"), files, model);
   if (const YamlValue* step = map.find("time_step")) {
     model.time_step_s = step->number_between(1e-9, kLongest_s, "a time step in seconds");

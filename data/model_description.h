@@ -25,6 +25,24 @@ inline constexpr std::array<FabricParameterName, 7> kFabricParameters = {{{"tens
                                                                           {"damping_warp", "s"},
                                                                           {"damping_weft", "s"}}};
 
+/// The springs of six types, 0 to 5, where a model file gives their own numbers instead of a
+/// fabric's. They belong to one mesh.
+struct ModelSprings {
+  using ByType = std::array<double, 6>;
+  ByType natural_length_m{};                    ///< > 0
+  ByType stiffness_n_per_m{};                   ///< not all 0
+  ByType damping_ns_per_m{};                    ///< along the spring
+  std::optional<ByType> critical_elongation{};  ///< there where strain is limited
+  bool operator==(const ModelSprings&) const = default;
+};
+
+/// Where a cloth that is moving already is, and how fast, when its simulation begins: 3 x vertices,
+/// column i * columns + j is vertex [i, j]; world.
+struct ModelStartState {
+  Eigen::Matrix3Xd position_m;
+  Eigen::Matrix3Xd velocity_m_per_s;
+};
+
 /// Where the flat, unstretched sheet lies: x_world = orientation * (s, t, 0) + position_m.
 struct SheetPose {
   Eigen::Vector3d position_m = Eigen::Vector3d::Zero();
@@ -50,21 +68,24 @@ struct ModelDescription {
   ClothDescription cloth;  ///< with its mass
   int mesh_columns = 0;    ///< of the simulation
   int mesh_rows = 0;
-  std::map<std::string, double> fabric;  ///< a value for each of kFabricParameters
+  std::map<std::string, double> fabric;  ///< a value for each of kFabricParameters; or
+  std::optional<ModelSprings> springs;   ///< instead of a fabric
   StrainLimitKind strain_limit = StrainLimitKind::off;
-  double critical_elongation = 0;  ///< of every spring, as a share of its natural length
+  /// Of every spring, as a share of its natural length; `springs` have their own.
+  double critical_elongation = 0;
   Eigen::Vector3d gravity_m_per_s2{0, 0, -9.81};
   std::optional<SurfaceMesh> obstacle;  ///< what the effect contact_mesh touches
   std::vector<ModelHeldPoint> held;
   std::vector<DeclaredEffect> effects;  ///< a parameter that is left out is at its neutral value
-  StartKind start = StartKind::released_flat;  ///< not unknown
-  SheetPose sheet;
-  std::vector<double> frame_time_s;     ///< rising, at least two
-  std::optional<double> frame_rate_hz;  ///< when they are evenly spaced
-  std::optional<double> time_step_s;    ///< absent: as stability allows
+  StartKind start = StartKind::released_flat;
+  SheetPose sheet;                             ///< of the other starts than
+  std::optional<ModelStartState> start_state;  ///< one that is `unknown` to recordings
+  std::vector<double> frame_time_s;            ///< rising, at least two
+  std::optional<double> frame_rate_hz;         ///< when they are evenly spaced
+  std::optional<double> time_step_s;           ///< absent: as stability allows
 
   /// Where things stand in the file, for messages; 0 when unknown.
-  int fabric_line = 0;
+  int fabric_line = 0;  ///< or that of `springs`
   int time_step_line = 0;
   /// FILE:LINE of a thing of this model, as InputError has it.
   std::string where(int line) const;
@@ -82,8 +103,8 @@ std::optional<std::vector<double>> frame_times(double frame_rate_hz, double dura
 ModelDescription read_model(const std::filesystem::path& file);
 
 /// Writes `folder`/model.yaml that read_model reads back to the last bit, with held/NUMBER.csv for
-/// the paths of held points, obstacle.obj for the obstacle, and times.csv where the frames are not
-/// evenly spaced: nothing outside the folder is needed.
+/// the paths of held points, obstacle.obj for the obstacle, start.csv for a start in motion, and
+/// times.csv where the frames are not evenly spaced: nothing outside the folder is needed.
 void write_model(const ModelDescription& model, const std::filesystem::path& folder);
 
 }  // namespace clothfit

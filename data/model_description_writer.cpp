@@ -20,7 +20,41 @@ void write_fabric(YamlWriter& out, const ModelDescription& model) {
   out.end_map();
 }
 
-void write_start(YamlWriter& out, const ModelDescription& model) {
+void write_springs(YamlWriter& out, const ModelSprings& springs) {
+  out.key("springs").begin_map();
+  out.key("natural_length").value(springs.natural_length_m);
+  out.key("stiffness").value(springs.stiffness_n_per_m);
+  out.key("damping").value(springs.damping_ns_per_m);
+  if (springs.critical_elongation)
+    out.key("critical_elongation").value(*springs.critical_elongation);
+  out.end_map();
+}
+
+void write_start_state(const ModelDescription& model, const std::filesystem::path& file) {
+  const ModelStartState& state = model.start_state.value();
+  std::string text = "row,column,x,y,z,vx,vy,vz\n";
+  for (int row = 0; row < model.mesh_rows; ++row) {
+    for (int column = 0; column < model.mesh_columns; ++column) {
+      const int vertex = row * model.mesh_columns + column;
+      text += fmt::format("{},{}", row, column);
+      for (const double number : state.position_m.col(vertex)) text += "," + number_text(number);
+      for (const double number : state.velocity_m_per_s.col(vertex))
+        text += "," + number_text(number);
+      text += "\n";
+    }
+  }
+  write_text(text, file);
+}
+
+void write_start(YamlWriter& out, const ModelDescription& model,
+                 const std::filesystem::path& folder) {
+  if (model.start == StartKind::unknown) {
+    write_start_state(model, folder / "start.csv");
+    out.key("start").begin_flow_map();
+    out.key("kind").value(word_of(model_start_words(), model.start));
+    out.key("file").value("start.csv").end_map();
+    return;
+  }
   const Eigen::Quaterniond& q = model.sheet.orientation;
   out.key("start").begin_map();
   out.key("kind").value(word_of(model_start_words(), model.start));
@@ -56,11 +90,16 @@ void write_model(const ModelDescription& model, const std::filesystem::path& fol
   out.key("name").value(model.name);
   write_cloth(out, model.cloth);
   write_mesh(out, model.mesh_columns, model.mesh_rows);
-  write_fabric(out, model);
+  if (model.springs) {
+    write_springs(out, *model.springs);
+  } else {
+    write_fabric(out, model);
+  }
   if (model.strain_limit != StrainLimitKind::off) {
     out.key("strain_limit").begin_flow_map();
     out.key("mode").value(to_string(model.strain_limit));
-    out.key("elongation").value(model.critical_elongation).end_map();
+    if (!model.springs) out.key("elongation").value(model.critical_elongation);
+    out.end_map();
   }
   out.key("gravity").value(numbers(model.gravity_m_per_s2));
   if (model.obstacle) {
@@ -81,7 +120,7 @@ void write_model(const ModelDescription& model, const std::filesystem::path& fol
   });
   write_list(out, "effects", model.effects,
              [&](const DeclaredEffect& effect) { write_declared_effect(out, effect); });
-  write_start(out, model);
+  write_start(out, model, folder);
 
   out.key("time").begin_flow_map();
   if (are_even(model)) {

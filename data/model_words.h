@@ -13,7 +13,9 @@ inline Words<HeldMotion> model_motion_words() {
 }
 
 inline Words<StartKind> model_start_words() {
-  return {{"at_rest", StartKind::at_rest}, {"released_flat", StartKind::released_flat}};
+  return {{"at_rest", StartKind::at_rest},
+          {"released_flat", StartKind::released_flat},
+          {"in_motion", StartKind::unknown}};
 }
 
 inline Words<StrainLimitKind> strain_limit_words() {

@@ -203,6 +203,11 @@ bool CmaResult::usable() const {
   return std::isfinite(state.best().cost);
 }
 
+double diversity(const CmaState& state) {
+  // The trace is the sum of the eigenvalues.
+  return state.step * std::sqrt(state.covariance.trace() / static_cast<double>(state.mean.size()));
+}
+
 CmaState start_cma(const std::vector<SearchParameter>& parameters, const CmaOptions& options,
                    const Eigen::VectorXd& given) {
   options.validate();
@@ -286,7 +291,7 @@ CmaResult search_by_cma(const std::vector<SearchParameter>& parameters, const Cm
     if (after_generation) after_generation(state);
     stop = stop_reason(options, state);
     std::ostringstream note;
-    note << "best cost " << state.best().cost << ", step " << state.step;
+    note << "best cost " << state.best().cost << ", diversity " << diversity(state);
     if (!stop && progress &&
         !progress({.stage = "search",
                    .done = static_cast<double>(state.evaluations),

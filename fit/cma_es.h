@@ -73,6 +73,11 @@ struct CmaState {
   const CmaOptimum& best() const;  ///< of all runs, the one at hand included
 };
 
+/// How far the individuals of a generation differ: sigma times the square root of the covariance's
+/// mean eigenvalue, the root mean square over the parameters of the individuals' standard deviation
+/// as a share of the range (before they are folded into it).
+double diversity(const CmaState& state);
+
 /// The start: nothing evaluated. The first mean is `given` (in the parameters' units, moved into
 /// the ranges), or the middle of the ranges.
 CmaState start_cma(const std::vector<SearchParameter>& parameters, const CmaOptions& options,

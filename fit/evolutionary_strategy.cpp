@@ -226,6 +226,20 @@ EvolutionState first_generation(const std::vector<SearchParameter>& parameters,
   return state;
 }
 
+double diversity(const std::vector<SearchParameter>& parameters, const EvolutionState& state) {
+  const auto individuals = static_cast<Eigen::Index>(state.population.size());
+  double sum = 0;
+  for (std::size_t p = 0; p < parameters.size(); ++p) {
+    Eigen::ArrayXd shares(individuals);
+    for (Eigen::Index n = 0; n < individuals; ++n) {
+      const Individual& individual = state.population[static_cast<std::size_t>(n)];
+      shares[n] = parameters[p].fraction(individual.values(static_cast<Eigen::Index>(p)));
+    }
+    sum += std::sqrt((shares - shares.mean()).square().mean());
+  }
+  return sum / static_cast<double>(parameters.size());
+}
+
 EvolutionState next_generation(const std::vector<SearchParameter>& parameters,
                                const EvolutionOptions& options, const GenerationCost& cost,
                                const EvolutionState& state) {
@@ -270,7 +284,8 @@ EvolutionResult resume_evolution(const std::vector<SearchParameter>& parameters,
                 .total = static_cast<double>(options.population +
                                              static_cast<long>(options.generations - 1) * new_each),
                 .unit = "evaluations",
-                .note = "best cost " + number(state.best_cost.back())});
+                .note = "best cost " + number(state.best_cost.back()) + ", diversity " +
+                        number(diversity(parameters, state))});
   };
 
   EvolutionResult result;

@@ -78,6 +78,11 @@ struct EvolutionState {
   int generations() const { return static_cast<int>(best_cost.size()); }
 };
 
+/// How far the individuals still differ: the standard deviation over the population of a
+/// parameter's place in its range, as a share of the range, averaged over the parameters. 0.29 for
+/// a uniform draw, 0 for copies of one individual.
+double diversity(const std::vector<SearchParameter>& parameters, const EvolutionState& state);
+
 /// The random first generation. The first individuals are `given` ones, moved into the ranges where
 /// they lie outside; at most as many as the population.
 EvolutionState first_generation(const std::vector<SearchParameter>& parameters,

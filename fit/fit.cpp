@@ -4,18 +4,21 @@
 #include <tbb/global_control.h>
 
 #include <algorithm>
+#include <cassert>
 #include <chrono>
 #include <cmath>
 #include <limits>
 #include <span>
 
 #include "data/input_error.h"
-#include "fit/evolutionary_strategy.h"
+#include "fit/parameter_search.h"
 #include "fit/problem.h"
 #include "fit/refine.h"
 #include "fit/report_residuals.h"
 #include "fit/simulation.h"
+#include "fit/springs_on_limit.h"
 #include "fit/uncertainty.h"
+#include "model/spring_vector.h"
 #include "model/stability.h"
 
 namespace clothfit {
@@ -79,6 +82,16 @@ constexpr Effort kFinalEffort{.rounds = 6,
 /// A log-parameter less certain than this (a factor of e^0.7 = 2 either way) is undetermined.
 constexpr double kUndeterminedLogSigma = 0.7;
 
+/// Basins differ by more than this share in some parameter, and by more than so many sigmas.
+constexpr double kDifferentBasins = 0.05;
+constexpr double kDifferentSigmas = 3;
+
+/// A linear one is when its sigma is that of a uniform draw from its range, 1 / sqrt(12), about.
+constexpr double kUndeterminedRangeShare = 0.25;
+
+/// Parameters more strongly correlated than this do the same to the motion, about.
+constexpr double kAlike = 0.95;
+
 /// A cost whose local derivative is this many times that over two per cent is rough.
 constexpr double kRough = 3;
 
@@ -106,82 +119,24 @@ double search_time_step_s(const FitProblem& problem, const FitOptions& options, 
   const double stable_s = stable_time_step_s(problem.cloth, parameter_set(problem, corner));
   const double simulated_s =
       problem.frame_time_s[static_cast<size_t>(frames - 1)] - problem.frame_time_s.front();
-  const double simulations = 0.5 * options.population * (options.generations + 1);
+  const auto simulations = static_cast<double>(search_simulations(options));
   const double affordable_s = simulated_s * static_cast<double>(problem.cloth.spring_count()) *
                               simulations / kSearchSpringSteps;
   return std::max(stable_s, affordable_s);
 }
 
-struct Search {
-  std::vector<Eigen::VectorXd> best;  ///< values, best first
-  bool cancelled = false;
-};
-
-/// The evolutionary strategy over the physical parameters, the others at `start`, on a coarse mesh
-/// and a short window.
-Search search(const FitProblem& problem, const FitOptions& options, const Eigen::VectorXd& start,
-              const ProgressCallback& progress, FitReport& report) {
-  const int frames = horizon_frames(problem, kSearchShare);
-  const TrajectoryObjective objective(problem, frames,
-                                      search_time_step_s(problem, options, frames));
-
-  std::vector<SearchParameter> ranges;
-  std::vector<int> searched;
-  for (int p = 0; p < problem.space.size(); ++p) {
-    const FitParameter& parameter = problem.space.parameters[static_cast<size_t>(p)];
-    if (!is_physical(parameter.role)) continue;
-    searched.push_back(p);
-    ranges.push_back({.name = parameter.name,
-                      .lower = parameter.lower,
-                      .upper = parameter.upper,
-                      .log_scale = parameter.scale == ParameterScale::logarithmic});
-  }
-  const auto all_values = [&](const Eigen::VectorXd& individual) {
-    Eigen::VectorXd values = start;
-    for (size_t n = 0; n < searched.size(); ++n)
-      values[searched[n]] = individual[static_cast<Eigen::Index>(n)];
-    return values;
-  };
-  const GenerationCost cost = [&](const Eigen::MatrixXd& individuals) {
-    std::vector<Eigen::VectorXd> values;
-    for (Eigen::Index n = 0; n < individuals.cols(); ++n)
-      values.push_back(all_values(individuals.col(n)));
-    const std::vector<Eigen::VectorXd> residuals = objective.residuals(values);
-    Eigen::VectorXd costs(individuals.cols());
-    for (Eigen::Index n = 0; n < individuals.cols(); ++n)
-      costs[n] = objective.mean_length(residuals[static_cast<size_t>(n)]);
-    return costs;
-  };
-  const EvolutionOptions evolution{.population = options.population,
-                                   .generations = options.generations,
-                                   .gain_window = 15,
-                                   .least_gain = 1e-2,
-                                   .seed = options.seed};
-  const EvolutionResult result = evolve(ranges, evolution, cost, progress);
-
-  Search found;
-  found.cancelled = result.stop == EvolutionStop::cancelled;
-  report.search_cost = result.state.best_cost;
-  report.stages.push_back(fmt::format(
-      "evolutionary search: {} generations, {} simulations, mesh {} x {}, {} frames, time step "
-      "{:.3g} s, mean error {:.3g} sigma; {}",
-      result.state.generations(), result.state.evaluations, problem.cloth.mesh.columns,
-      problem.cloth.mesh.rows, frames, objective.time_step_s(), result.best().cost,
-      result.message));
-  if (!result.usable()) return found;
-  // The best few that differ: a population near its end holds many copies of one individual.
-  constexpr double kDifferent = 0.2;
-  for (const Individual& individual : result.state.population) {
-    if (!std::isfinite(individual.cost)) break;
-    const Eigen::VectorXd values = all_values(individual.values);
-    const bool is_new = std::ranges::all_of(found.best, [&](const Eigen::VectorXd& other) {
-      return (problem.space.coordinates(values) - problem.space.coordinates(other))
-                 .cwiseAbs()
-                 .maxCoeff() > kDifferent;
-    });
-    if (is_new) found.best.push_back(values);
-    if (static_cast<int>(found.best.size()) == options.refine_best) break;
-  }
+/// The search over the physical parameters on a coarse mesh and a short window, with its line in
+/// the report.
+SearchedParameters search(const TrajectoryObjective& objective, const FitOptions& options,
+                          const Eigen::VectorXd& start, const ProgressCallback& progress,
+                          FitReport& report) {
+  SearchedParameters found = search_parameters(objective, options, start, progress);
+  const Mesh& mesh = objective.problem().cloth.mesh;
+  report.search_cost = found.best_cost;
+  report.stages.push_back(
+      fmt::format("{}; {} simulations, mesh {} x {}, {} frames, time step {:.3g} s, cost in sigmas",
+                  found.message, found.simulations, mesh.columns, mesh.rows, objective.frames(),
+                  objective.time_step_s()));
   return found;
 }
 
@@ -254,21 +209,90 @@ RefineResult refine_on(const FitProblem& coarse_problem, const FitProblem& probl
   return best;
 }
 
-/// The one of the best few individuals that gets furthest over a short horizon on the coarse mesh.
-RefineResult pick_best(const FitProblem& coarse_problem, const FitOptions& options,
-                       const std::vector<Eigen::VectorXd>& candidates,
-                       const ProgressCallback& progress, FitReport& report) {
+/// What a search found, after refinement where there was one.
+struct Candidate {
+  Eigen::VectorXd values;
+  double cost = 0;  ///< as the search has it: Objective::mean_length
+  int runs = 0;
+  bool refined = false;
+};
+
+/// The cost of a search, at a time step that is stable for these values.
+double search_cost(const TrajectoryObjective& objective, const Eigen::VectorXd& values) {
+  const FitProblem& problem = objective.problem();
+  const double stable_s = stable_time_step_s(problem.cloth, parameter_set(problem, values));
+  const TrajectoryObjective stable(
+      problem, objective.frames(),
+      std::min(objective.time_step_s(), stable_s / RefineOptions().stability_margin));
+  return stable.mean_length(stable.residuals({values}).front());
+}
+
+/// The one of the optima of a search that gets furthest over a short horizon on the coarse mesh.
+/// `candidates` are all of them, the best few refined.
+RefineResult pick_best(const TrajectoryObjective& objective, const FitOptions& options,
+                       const std::vector<SearchOptimum>& optima, const ProgressCallback& progress,
+                       FitReport& report, std::vector<Candidate>& candidates) {
   RefineResult best;
-  best.values = candidates.front();
+  best.values = optima.front().values;
   best.cost = std::numeric_limits<double>::infinity();
-  for (const Eigen::VectorXd& candidate : candidates) {
-    RefineResult result =
-        refine_stage({.problem = coarse_problem, .share = kSearchShare, .effort = kCoarseEffort},
-                     options, candidate, progress, report);
+  for (const SearchOptimum& optimum : optima) {
+    candidates.push_back({.values = optimum.values, .cost = optimum.cost, .runs = optimum.runs});
+    if (static_cast<int>(candidates.size()) > options.refine_best) continue;
+    RefineResult result = refine_stage(
+        {.problem = objective.problem(), .share = kSearchShare, .effort = kCoarseEffort}, options,
+        optimum.values, progress, report);
     if (result.cancelled) return result;
-    if (result.usable && result.cost < best.cost) best = std::move(result);
+    if (!result.usable) continue;
+    const double cost = search_cost(objective, result.values);
+    if (std::isfinite(cost))
+      candidates.back() = {
+          .values = result.values, .cost = cost, .runs = optimum.runs, .refined = true};
+    if (result.cost < best.cost) best = std::move(result);
   }
   return best;
+}
+
+/// Candidates that ended in the same place, put together; best first.
+std::vector<Basin> basins_of(const ParameterSpace& space, std::vector<Candidate> candidates,
+                             const Eigen::VectorXd& values, const Uncertainty& uncertainty) {
+  const Eigen::VectorXd sigma =
+      uncertainty.sigma.cwiseQuotient(space.value_by_coordinate(values)).cwiseAbs();
+  const auto differ = [&](const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
+    for (int p = 0; p < space.size(); ++p) {
+      const FitParameter& parameter = space.parameters[static_cast<size_t>(p)];
+      if (!is_physical(parameter.role)) continue;
+      const bool logarithmic = parameter.scale == ParameterScale::logarithmic;
+      if (logarithmic && !(sigma[p] < kUndeterminedLogSigma)) continue;
+      const double share = logarithmic ? 1 : std::max(std::abs(a[p]), std::abs(b[p]));
+      const double least = std::max(kDifferentBasins * share, kDifferentSigmas * sigma[p]);
+      if (std::abs(a[p] - b[p]) > least) return true;
+    }
+    return false;
+  };
+  std::ranges::stable_sort(candidates, {}, &Candidate::cost);
+  std::vector<Basin> basins;
+  std::vector<Eigen::VectorXd> places;
+  for (const Candidate& candidate : candidates) {
+    const Eigen::VectorXd place = space.coordinates(candidate.values);
+    size_t n = 0;
+    while (n < basins.size() && differ(place, places[n])) ++n;
+    if (n < basins.size()) {
+      basins[n].ended += candidate.runs;
+      continue;
+    }
+    Basin basin{.cost = candidate.cost,
+                .ended = candidate.runs,
+                .refined = candidate.refined,
+                .parameters = {}};
+    for (int p = 0; p < space.size(); ++p) {
+      const FitParameter& parameter = space.parameters[static_cast<size_t>(p)];
+      if (is_physical(parameter.role))
+        basin.parameters.push_back({.name = parameter.name, .value = candidate.values[p]});
+    }
+    basins.push_back(std::move(basin));
+    places.push_back(place);
+  }
+  return basins;
 }
 
 /// Where a fit begins without a search: the values given, within their ranges.
@@ -286,8 +310,10 @@ Eigen::VectorXd given_start(const FitProblem& problem, const std::map<std::strin
 }
 
 /// The whole way from the ranges, or from a given start, to the optimum.
+/// `candidates` are what the search found on the way.
 RefineResult identify(const FitInput& input, const FitProblem& problem, const FitOptions& options,
-                      const ProgressCallback& progress, FitReport& report) {
+                      const ProgressCallback& progress, FitReport& report,
+                      std::vector<Candidate>& candidates) {
   const FitProblem coarse_problem =
       make_problem(input, options, coarse(problem, options, problem.cloth.mesh.columns),
                    coarse(problem, options, problem.cloth.mesh.rows));
@@ -307,14 +333,18 @@ RefineResult identify(const FitInput& input, const FitProblem& problem, const Fi
       if (problem.space.parameters[static_cast<size_t>(p)].role == ParameterRole::start)
         start[p] = first.values[p];
   }
-  const Search found = search(coarse_problem, options, start, progress, report);
-  if (found.best.empty()) {
+  const int frames = horizon_frames(coarse_problem, kSearchShare);
+  const TrajectoryObjective objective(coarse_problem, frames,
+                                      search_time_step_s(coarse_problem, options, frames));
+  const SearchedParameters found = search(objective, options, start, progress, report);
+  if (found.optima.empty() || found.cancelled) {
     RefineResult none;
     none.cancelled = found.cancelled;
     none.message = "no individual of the search could be simulated to the end of its window";
     return none;
   }
-  const RefineResult best = pick_best(coarse_problem, options, found.best, progress, report);
+  const RefineResult best =
+      pick_best(objective, options, found.optima, progress, report, candidates);
   if (best.cancelled) return best;
   return refine_on(coarse_problem, problem, options, best.values, kHorizonShares, progress, report);
 }
@@ -330,6 +360,12 @@ ParameterEstimate estimate(const FitParameter& parameter, const std::string& nam
     result.reason = fmt::format("the motion hardly depends on it (sigma {:.0f} % of the value)",
                                 100 * std::min(relative, 1e4));
     result.sigma = std::min(sigma, 1e4 * value);
+  } else if (!logarithmic && is_physical(parameter.role) &&
+             !(sigma < kUndeterminedRangeShare * (parameter.upper - parameter.lower))) {
+    result.state = ParameterState::undetermined;
+    result.reason = fmt::format("the motion hardly depends on it (sigma {:.0f} % of its range)",
+                                100 * std::min(sigma / (parameter.upper - parameter.lower), 1e4));
+    result.sigma = std::min(sigma, 1e4 * (parameter.upper - parameter.lower));
   } else if (roughness > kRough) {
     result.state = ParameterState::undetermined;
     result.reason = fmt::format(
@@ -358,13 +394,70 @@ ParameterEstimate constant(const std::string& name, const std::string& unit, dou
           .reason = reason};
 }
 
+/// The parameter that is hardest to tell from the p-th, and their correlation.
+std::pair<int, double> nearest_parameter(const Eigen::MatrixXd& correlation, int p) {
+  std::pair<int, double> nearest{-1, 0};
+  for (int other = 0; other < static_cast<int>(correlation.cols()); ++other)
+    if (other != p && std::abs(correlation(p, other)) > std::abs(nearest.second))
+      nearest = {other, correlation(p, other)};
+  return nearest;
+}
+
+/// Says so where a parameter is undetermined because another one does the same: where the cloth or
+/// the camera was placed, say, or the scale of gravity.
+void explain_by_correlation(const ParameterSpace& space, const Uncertainty& uncertainty, int p,
+                            ParameterEstimate& parameter) {
+  if (parameter.state != ParameterState::undetermined) return;
+  const auto [other, correlation] = nearest_parameter(uncertainty.correlation, p);
+  if (other < 0 || !(std::abs(correlation) > kAlike)) return;
+  const FitParameter& alike = space.parameters[static_cast<size_t>(other)];
+  std::string name = alike.name;
+  if (alike.role == ParameterRole::nuisance) name += " (how the scene was placed)";
+  if (alike.role == ParameterRole::start) name += " (where the cloth was at the start)";
+  parameter.reason +=
+      fmt::format("; it can hardly be told from {} (correlation {:.3f})", name, correlation);
+}
+
+/// A spring that sits on its strain limit is as long as that allows, however stiff it is.
+void explain_by_strain_limit(const FitProblem& problem, const Eigen::VectorXd& values,
+                             const SpringsOnLimit& count,
+                             std::vector<ParameterEstimate>& parameters) {
+  Eigen::VectorXd numbers(static_cast<Eigen::Index>(problem.spring_numbers.size()));
+  for (size_t n = 0; n < problem.spring_numbers.size(); ++n)
+    numbers[static_cast<Eigen::Index>(n)] = problem.spring_numbers[n].value(values);
+  const Eigen::MatrixXd springs = springs_by_numbers(problem.spring_set, numbers);
+  const std::vector<SpringNumber> names = numbers_of(problem.spring_set);
+  for (size_t n = 0; n < names.size(); ++n) {
+    if (names[n].quantity != SpringQuantity::stiffness) continue;
+    if (problem.spring_numbers[n].parameter < 0) continue;
+    long on = 0, all = 0;
+    for (size_t type = 0; type < kSpringTypes; ++type) {
+      const auto row = static_cast<Eigen::Index>(stiffness_block + type);
+      if (springs(row, static_cast<Eigen::Index>(n)) == 0) continue;
+      on += count.on[type];
+      all += count.all[type];
+    }
+    if (2 * on <= all) continue;
+    const auto found = std::ranges::find(parameters, names[n].name, &ParameterEstimate::name);
+    assert(found != parameters.end());
+    found->state = ParameterState::undetermined;
+    found->reason = fmt::format(
+        "{:.0f} % of its springs sit on their strain limit in the fitted frames, as long as that "
+        "allows however stiff they are",
+        100.0 * static_cast<double>(on) / static_cast<double>(all));
+  }
+}
+
 /// The parameter tables of the result from the fitted values.
 void fill_parameters(const FitProblem& problem, const FitOptions& options,
                      const Eigen::VectorXd& values, const Uncertainty& uncertainty,
                      FitResult& result) {
   const auto estimate_of = [&](int p, const std::string& name) {
-    return estimate(problem.space.parameters[static_cast<size_t>(p)], name, values[p],
-                    uncertainty.sigma[p], uncertainty.roughness[p]);
+    ParameterEstimate parameter =
+        estimate(problem.space.parameters[static_cast<size_t>(p)], name, values[p],
+                 uncertainty.sigma[p], uncertainty.roughness[p]);
+    explain_by_correlation(problem.space, uncertainty, p, parameter);
+    return parameter;
   };
   const double area_m2 = problem.cloth.mesh.width_m * problem.cloth.mesh.height_m;
   ParameterEstimate density =
@@ -415,6 +508,19 @@ void fill_correlation(const ParameterSpace& space, const Uncertainty& uncertaint
   report.correlation = uncertainty.correlation(shown, shown);
 }
 
+/// Columns and rows. Natural lengths that come from an earlier fit are those of its mesh.
+std::pair<int, int> mesh_of(const ClothDescription& cloth, const FitOptions& options) {
+  std::pair<int, int> suggested{cloth.mesh_columns, cloth.mesh_rows};
+  const bool of_one_mesh = options.forecast && options.spring_set != SpringSet::fabric;
+  if (of_one_mesh) suggested = {options.forecast->mesh_columns, options.forecast->mesh_rows};
+  const std::pair<int, int> mesh{options.mesh_columns > 0 ? options.mesh_columns : suggested.first,
+                                 options.mesh_rows > 0 ? options.mesh_rows : suggested.second};
+  if (of_one_mesh && mesh != suggested)
+    throw InputError("--mesh", "the natural lengths of the earlier fit are those of its own mesh",
+                     fmt::format("{}x{}", suggested.first, suggested.second), "leave --mesh out");
+  return mesh;
+}
+
 FitReport stopped(FitReport report, FitStop stop, const std::string& message) {
   report.stop = stop;
   report.message = message;
@@ -432,7 +538,12 @@ void FitOptions::validate() const {
   require(population >= 4 && population <= 100000, "population", "4 to 100000 individuals");
   require(generations >= 1, "generations", "at least 1");
   require(refine_best >= 1, "refine-best", "at least 1");
+  require(!std::isnan(stop_cost), "stop-cost", "a mean error in sigmas");
+  require(!resume || !checkpoint.empty(), "resume", "a --checkpoint to go on from");
+  require(checkpoint.empty() || (!start && !forecast), "checkpoint",
+          "a fit that searches: without --start and --forecast");
   require(substep_scale >= 1 && std::isfinite(substep_scale), "substep-scale", "1 or more");
+  require(start_nodes >= 2 && start_nodes <= 30, "start-nodes", "2 to 30 nodes a side");
   require(work > 0 && std::isfinite(work), "work", "more than 0");
   require(threads >= 0, "threads", "0 (all) or more");
 }
@@ -446,17 +557,15 @@ FitReport fit(const FitInput& input, const FitOptions& options, const ProgressCa
           ? static_cast<size_t>(options.threads)
           : tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
 
-  const ClothDescription& description = input.recording.cloth;
-  const FitProblem problem = make_problem(
-      input, options, options.mesh_columns > 0 ? options.mesh_columns : description.mesh_columns,
-      options.mesh_rows > 0 ? options.mesh_rows : description.mesh_rows);
+  const auto [columns, rows] = mesh_of(input.recording.cloth, options);
+  const FitProblem problem = make_problem(input, options, columns, rows);
   FitReport report;
   FitResult& result = report.result;
   result.recording = input.recording.name;
   result.seed = options.seed;
   result.mesh_columns = problem.cloth.mesh.columns;
   result.mesh_rows = problem.cloth.mesh.rows;
-  result.parameter_set = "fabric";
+  result.parameter_set = to_string(problem.spring_set);
   result.integrator = "euler";
   result.start = to_string(problem.start);
   result.observations_rejected = problem.rejected;
@@ -464,7 +573,8 @@ FitReport fit(const FitInput& input, const FitOptions& options, const ProgressCa
   Eigen::VectorXd values = problem.space.start();
   Uncertainty uncertainty;
   if (!options.forecast) {
-    const RefineResult refined = identify(input, problem, options, progress, report);
+    std::vector<Candidate> candidates;
+    const RefineResult refined = identify(input, problem, options, progress, report, candidates);
     if (refined.cancelled) return stopped(std::move(report), FitStop::cancelled, "cancelled");
     if (!refined.usable)
       return stopped(std::move(report), FitStop::diverged, "no fit worked out: " + refined.message);
@@ -479,6 +589,7 @@ FitReport fit(const FitInput& input, const FitOptions& options, const ProgressCa
       return stopped(std::move(report), FitStop::diverged,
                      "the derivatives at the optimum could not be computed");
     fill_correlation(problem.space, uncertainty, report);
+    result.basins = basins_of(problem.space, std::move(candidates), values, uncertainty);
     for (int p = 0; p < problem.space.size(); ++p)
       if (const FitParameter& parameter = problem.space.parameters[static_cast<size_t>(p)];
           is_physical(parameter.role))
@@ -506,6 +617,12 @@ FitReport fit(const FitInput& input, const FitOptions& options, const ProgressCa
         std::max(longest_frame_s, problem.frame_time_s[f] - problem.frame_time_s[f - 1]);
   result.substeps = static_cast<int>(std::ceil(longest_frame_s / result.time_step_s - 1e-9));
   fill_parameters(problem, options, values, uncertainty, result);
+  const std::vector<Eigen::Matrix3Xd> fitted_frames(
+      trajectories.front().begin(), trajectories.front().begin() + problem.first_held_out);
+  explain_by_strain_limit(
+      problem, values,
+      springs_on_limit(problem.cloth, parameter_set(problem, values).springs, fitted_frames),
+      result.parameters);
   report.model = describe_model(problem, input.recording, values);
   report.model.time_step_s = result.time_step_s;
   fill_residuals(problem, trajectories.front(), report);

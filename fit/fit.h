@@ -1,6 +1,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <filesystem>
+#include <limits>
 #include <map>
 #include <optional>
 #include <string>
@@ -27,6 +29,10 @@ struct FitInput {
 /// What large residuals weigh: as all others, or less (Huber).
 enum class Loss { squared, huber };
 
+/// How the parameters' ranges are searched: by the founding paper's evolutionary strategy, or by
+/// CMA-ES with restarts.
+enum class SearchMethod { paper, cma };
+
 /// Which observations a fit uses.
 enum class ObservationKind { automatic, tracks3d, tracks2d };
 
@@ -37,9 +43,14 @@ struct FitOptions {
   int mesh_columns = 0;                      ///< 0: the recording's suggestion
   int mesh_rows = 0;
   unsigned long long seed = 1;
+  SearchMethod search = SearchMethod::paper;
   int population = 100;  ///< individuals of the evolutionary search [louchet1995]
   int generations = 40;  ///< at most; the search stops earlier when it no longer gains
-  int refine_best = 3;   ///< individuals that go to refinement
+  int refine_best = 3;   ///< individuals, or optima of CMA-ES, that go to refinement
+  /// The search ends once its best cost, the mean error over its window in sigmas, is this low.
+  double stop_cost = -std::numeric_limits<double>::infinity();
+  std::filesystem::path checkpoint;  ///< the search's state after each generation; empty: not saved
+  bool resume = false;               ///< go on from `checkpoint`, to the same bits
   /// Values of parameters by name, from an earlier fit: there is no search, and what has none
   /// starts where it would.
   std::optional<std::map<std::string, double>> start;

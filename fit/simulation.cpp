@@ -4,6 +4,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 
 #include "calib/rigid3.h"
 #include "data/input_error.h"
@@ -50,6 +51,13 @@ StrainLimitMode mode_of(StrainLimitKind kind) {
   return StrainLimitMode::off;
 }
 
+SpringParameters springs_of(const ModelSprings& springs) {
+  return {.natural_length_m = springs.natural_length_m,
+          .stiffness_n_per_m = springs.stiffness_n_per_m,
+          .damping_ns_per_m = springs.damping_ns_per_m,
+          .critical_elongation = springs.critical_elongation.value_or(SpringParameters::kNoLimit)};
+}
+
 /// The pose of a flat sheet from three of its corners.
 SheetPose pose_of(const Mesh& mesh, const Eigen::Matrix3Xd& position_m) {
   const Eigen::Vector3d corner = position_m.col(mesh.vertex(0, 0));
@@ -81,6 +89,15 @@ void require_possible(const std::string& effect, const EffectParameter& paramete
 
 }  // namespace
 
+ModelSprings springs_of(const SpringParameters& springs) {
+  ModelSprings result{.natural_length_m = springs.natural_length_m,
+                      .stiffness_n_per_m = springs.stiffness_n_per_m,
+                      .damping_ns_per_m = springs.damping_ns_per_m};
+  if (std::ranges::all_of(springs.critical_elongation, [](double x) { return std::isfinite(x); }))
+    result.critical_elongation = springs.critical_elongation;
+  return result;
+}
+
 Simulation make_simulation(const ModelDescription& model) {
   Simulation simulation;
   const Mesh mesh{model.mesh_columns, model.mesh_rows, model.cloth.width_m, model.cloth.height_m};
@@ -94,10 +111,14 @@ Simulation make_simulation(const ModelDescription& model) {
   }
 
   ParameterSet& set = simulation.parameters;
-  simulation.fabric = fabric_of(model.fabric);
-  set.springs = spring_parameters(simulation.fabric, mesh);
-  if (model.strain_limit != StrainLimitKind::off)
-    set.springs.critical_elongation.fill(model.critical_elongation);
+  if (model.springs) {
+    set.springs = springs_of(*model.springs);
+  } else {
+    simulation.fabric = fabric_of(model.fabric);
+    set.springs = spring_parameters(*simulation.fabric, mesh);
+    if (model.strain_limit != StrainLimitKind::off)
+      set.springs.critical_elongation.fill(model.critical_elongation);
+  }
   set.gravity_m_per_s2 = model.gravity_m_per_s2;
   for (const DeclaredEffect& effect : model.effects) {
     const std::string where = model.where(effect.line);
@@ -112,11 +133,16 @@ Simulation make_simulation(const ModelDescription& model) {
     }
     set.effects.push_back(std::move(numbers));
   }
-  const Rigid3 world_from_sheet{model.sheet.orientation, model.sheet.position_m};
-  const Eigen::Matrix3Xd flat = flat_positions(mesh);
-  set.start_position_m.resize(3, flat.cols());
-  for (Eigen::Index v = 0; v < flat.cols(); ++v)
-    set.start_position_m.col(v) = world_from_sheet * Eigen::Vector3d(flat.col(v));
+  if (model.start_state) {
+    set.start_position_m = model.start_state->position_m;
+    set.start_velocity_m_per_s = model.start_state->velocity_m_per_s;
+  } else {
+    const Rigid3 world_from_sheet{model.sheet.orientation, model.sheet.position_m};
+    const Eigen::Matrix3Xd flat = flat_positions(mesh);
+    set.start_position_m.resize(3, flat.cols());
+    for (Eigen::Index v = 0; v < flat.cols(); ++v)
+      set.start_position_m.col(v) = world_from_sheet * Eigen::Vector3d(flat.col(v));
+  }
   simulation.start = model.start;
   simulation.frame_time_s = model.frame_time_s;
   return simulation;
@@ -132,7 +158,12 @@ ModelDescription describe_model(const FitProblem& problem, const Recording& reco
   model.cloth.mass_kg = problem.cloth_mass_kg;
   model.mesh_columns = mesh.columns;
   model.mesh_rows = mesh.rows;
-  model.fabric = named(fabric_of(problem, values));
+  if (problem.spring_set == SpringSet::fabric) {
+    model.fabric = named(fabric_of(problem, values));
+  } else {
+    model.springs = springs_of(set.springs);
+    model.strain_limit = StrainLimitKind::positions;
+  }
   model.gravity_m_per_s2 = set.gravity_m_per_s2;
   model.obstacle = recording.obstacle;
 
@@ -156,7 +187,12 @@ ModelDescription describe_model(const FitProblem& problem, const Recording& reco
     model.effects.push_back(std::move(effect));
   }
   model.start = problem.start;
-  model.sheet = pose_of(mesh, set.start_position_m);
+  if (problem.start == StartKind::unknown) {
+    model.start_state = ModelStartState{.position_m = set.start_position_m,
+                                        .velocity_m_per_s = set.start_velocity_m_per_s};
+  } else {
+    model.sheet = pose_of(mesh, set.start_position_m);
+  }
   model.frame_time_s = problem.frame_time_s;
   model.frame_rate_hz = recording.frame_rate_hz;
   return model;

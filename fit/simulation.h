@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <vector>
 
 #include "data/model_description.h"
@@ -15,11 +16,14 @@ namespace clothfit {
 /// One run of the model, made ready.
 struct Simulation {
   Cloth cloth;
-  Fabric fabric;
-  ParameterSet parameters;  ///< starts from the placed sheet
+  std::optional<Fabric> fabric;  ///< that the springs come from, unless they have their own numbers
+  ParameterSet parameters;       ///< starts from the placed sheet, or in motion
   StartKind start = StartKind::released_flat;
   std::vector<double> frame_time_s;
 };
+
+/// Springs as a model file has them.
+ModelSprings springs_of(const SpringParameters& springs);
 
 /// Throws InputError for an effect, or a parameter of one, that does not exist, and for
 /// contact_mesh without an obstacle.
@@ -27,7 +31,8 @@ Simulation make_simulation(const ModelDescription& model);
 
 /// A fitted, or given, model of a recording as a model file has it: the cloth on the problem's mesh
 /// with the parameters `values`, gravity and the sheet as they were fitted along, and the paths of
-/// held points, tracked ones as their smoothing splines have them at the frames; its obstacle.
+/// held points, tracked ones as their smoothing splines have them at the frames; its obstacle; the
+/// state that a start in motion was found to be in.
 ModelDescription describe_model(const FitProblem& problem, const Recording& recording,
                                 const Eigen::VectorXd& values);
 

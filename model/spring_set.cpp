@@ -18,6 +18,12 @@ std::string to_string(SpringSet set) {
   return "fabric";
 }
 
+std::optional<SpringSet> spring_set_named(const std::string& name) {
+  for (const SpringSet set : {SpringSet::fabric, SpringSet::louchet5, SpringSet::louchet18})
+    if (to_string(set) == name) return set;
+  return std::nullopt;
+}
+
 std::vector<SpringNumber> numbers_of(SpringSet set) {
   using enum SpringQuantity;
   switch (set) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,6 +14,9 @@ namespace clothfit {
 enum class SpringSet { fabric, louchet5, louchet18 };
 
 std::string to_string(SpringSet set);
+
+/// The set of that name; nothing where there is none.
+std::optional<SpringSet> spring_set_named(const std::string& name);
 
 /// What a number of a set is.
 enum class SpringQuantity { stiffness, retardation_time, natural_length, critical_elongation };

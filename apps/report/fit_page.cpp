@@ -90,8 +90,18 @@ std::string correlation_section(const FitReport& report) {
 }
 
 std::string search_section(const FitReport& report) {
-  std::string content = figure(search_cost_svg(report.search_cost),
-                               "Cost of the best individual of the evolutionary search.");
+  std::string content =
+      figure(search_cost_svg(report.search_cost), "Cost of the best individual of the search.");
+  const Table basins = basin_table(report.result);
+  if (!basins.rows.empty()) {
+    content += "<div class=\"wide\">" +
+               html_table(basins,
+                          "Basins: the places in which runs of the search, or refinements of its "
+                          "best individuals, ended. The cost is the mean error over the search's "
+                          "window, on its mesh. A second one as low as the first says that the "
+                          "recording can be explained in two ways.") +
+               "</div>\n";
+  }
   if (!report.stages.empty()) {
     content += "<ol class=\"stages\">\n";
     for (const std::string& stage : report.stages) {

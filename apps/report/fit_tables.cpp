@@ -75,6 +75,28 @@ Table short_parameter_table(const FitResult& result) {
   return table;
 }
 
+Table basin_table(const FitResult& result) {
+  Table table;
+  if (result.basins.empty()) return table;
+  table.header.push_back("");
+  std::vector<std::string> cost = {"cost (sigmas)"}, ended = {"ended there"}, how = {"refined"};
+  for (const Basin& basin : result.basins) {
+    table.header.push_back(std::to_string(table.header.size()));
+    cost.push_back(significant(basin.cost, 3));
+    ended.push_back(std::to_string(basin.ended));
+    how.push_back(basin.refined ? "yes" : "no");
+  }
+  table.rows = {cost, ended, how};
+  const std::vector<Basin::Number>& names = result.basins.front().parameters;
+  for (std::size_t p = 0; p < names.size(); ++p) {
+    std::vector<std::string> row = {names[p].name};
+    for (const Basin& basin : result.basins)
+      row.push_back(p < basin.parameters.size() ? significant(basin.parameters[p].value, 3) : "");
+    table.rows.push_back(std::move(row));
+  }
+  return table;
+}
+
 Table error_table(const FitResult& result) {
   Table table{
       {"kind", "unit", "fitted_rms", "fitted_rms_distance", "fitted_count", "held_out_rms",

@@ -20,6 +20,10 @@ Table parameter_table(const FitResult& result);
 /// The same rounded by sigma, for people.
 Table short_parameter_table(const FitResult& result);
 
+/// The places that searches and refinements ended in, one a column, best first; no rows where there
+/// was no search.
+Table basin_table(const FitResult& result);
+
 /// One row per kind of observation with all digits (CSV).
 Table error_table(const FitResult& result);
 /// The same for people: 3D errors in mm.

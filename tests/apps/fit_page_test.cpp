@@ -71,10 +71,20 @@ TEST_P(FitPage, NeedsNothingFromOutside) {
   EXPECT_THAT(page_, Not(HasSubstr("url(")));
 }
 
+TEST_P(FitPage, ListsTheBasinsOfTheSearch) {
+  EXPECT_THAT(page_, HasSubstr("88.7"));
+  EXPECT_THAT(page_, HasSubstr("2.93"));
+
+  FitReport without = sample_.report;
+  without.result.basins.clear();
+  EXPECT_THAT(fit_page_html(without, sample_.recording, {}), Not(HasSubstr("Basins:")));
+}
+
 TEST_P(FitPage, EscapesNamesFromTheRecording) {
   EXPECT_THAT(page_, HasSubstr("a &lt;b&gt;bold&lt;/b&gt; name &amp; more"));
   EXPECT_THAT(page_, HasSubstr("decision margin &lt; 20 &amp; blurred"));
   EXPECT_THAT(page_, HasSubstr("8&lt;8"));
+  EXPECT_THAT(page_, HasSubstr("a&lt;b"));
   EXPECT_THAT(page_, Not(HasSubstr("<b>")));
 }
 

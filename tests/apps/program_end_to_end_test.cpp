@@ -119,6 +119,133 @@ TEST(ProgramFit, GivesTheSameBytesOnOneThreadAndOnTwo) {
   }
 }
 
+TEST(ProgramFit, GoesOnFromItsCheckpointAfterCtrlCToTheSameBytes) {
+  const test::ScratchFolder here("checkpoint");
+  const auto command = [&](const std::string& out) {
+    std::vector<std::string> arguments = small_fit((kBundled / "swing_plain").string(), out);
+    arguments.insert(arguments.end(), {"--work", "0.001"});  // what follows is not at stake
+    return arguments;
+  };
+  ASSERT_EQ(run_program(command("whole.fit"), here.path()).exit_code, 0);
+  std::vector<std::string> saved = command("saved.fit");
+  saved.insert(saved.end(), {"--checkpoint", "search.txt"});
+  const auto interrupt_after_a_generation = [&](int process) {
+    const auto give_up = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+    while (!fs::exists(here.path() / "search.txt") && std::chrono::steady_clock::now() < give_up) {
+      std::this_thread::yield();
+    }
+    kill(process, SIGINT);
+  };
+
+  const ProgramRun cut = run_program(saved, here.path(), interrupt_after_a_generation);
+  EXPECT_EQ(cut.exit_code, 130) << cut.error;
+  EXPECT_THAT(cut.error, HasSubstr("the search stands in search.txt"));
+  EXPECT_THAT(cut.error, HasSubstr("--resume"));
+  EXPECT_THAT(names_in(here.path()), ElementsAre("search.txt", "whole.fit"));
+  saved.emplace_back("--resume");
+  const ProgramRun resumed = run_program(saved, here.path());
+
+  ASSERT_EQ(resumed.exit_code, 0) << resumed.error;
+  const auto without_seconds = [&](const std::string& folder) {
+    FitResult result = read_fit_result(here.path() / folder / "fit.json");
+    result.seconds = 0;
+    write_fit_result(result, here.path() / folder / "fit.json");
+    return read_text(here.path() / folder / "fit.json");
+  };
+  EXPECT_EQ(without_seconds("saved.fit"), without_seconds("whole.fit"));
+}
+
+TEST(ProgramFit, OfThePapersSpringsCanBeSimulatedForecastAndGoneOnFrom) {
+  const test::ScratchFolder here("louchet5");
+  const std::string recording = (kBundled / "swing_plain").string();
+  std::vector<std::string> command = small_fit(recording, "a.fit");
+  command.insert(command.end(), {"--springs", "louchet5", "--work", "0.01", "--search", "cma"});
+  const ProgramRun fitted = run_program(command, here.path());
+  ASSERT_EQ(fitted.exit_code, 0) << fitted.error;
+  const FitResult result = read_fit_result(here.path() / "a.fit" / "fit.json");
+  EXPECT_EQ(result.parameter_set, "louchet5");
+  EXPECT_EQ(result.parameters.size(), 6u);
+
+  const ProgramRun simulated =
+      run_program({"simulate", "--fit", "a.fit", "--format", "csv"}, here.path());
+  ASSERT_EQ(simulated.exit_code, 0) << simulated.error;
+  const ProgramRun softer = run_program(
+      {"simulate", "--fit", "a.fit", "--set", "stiffness=5", "--format", "csv", "--out", "softer"},
+      here.path());
+  ASSERT_EQ(softer.exit_code, 0) << softer.error;
+  const ProgramRun elsewhere = run_program({"simulate", (kBundled / "swing_hem").string(), "--fit",
+                                            "a.fit", "--format", "csv", "--out", "elsewhere"},
+                                           here.path());
+  ASSERT_EQ(elsewhere.exit_code, 0) << elsewhere.error;
+  const ProgramRun forecast = run_program(
+      {"fit", recording, "--forecast", "a.fit/fit.json", "--out", "b.fit"}, here.path());
+  ASSERT_EQ(forecast.exit_code, 0) << forecast.error;
+  EXPECT_EQ(read_fit_result(here.path() / "b.fit" / "fit.json").mesh_columns, 9);
+  const ProgramRun other = run_program({"fit", recording, "--forecast", "a.fit/fit.json",
+                                        "--springs", "louchet18", "--out", "c.fit"},
+                                       here.path());
+  EXPECT_EQ(other.exit_code, 3);
+  EXPECT_THAT(other.error, HasSubstr("the fit of --forecast has louchet5"));
+  const ProgramRun gone_on =
+      run_program({"fit", recording, "--start", "a.fit/fit.json", "--mesh", "9x9", "--work",
+                   "0.001", "--loss", "squared", "--out", "d.fit"},
+                  here.path());
+  ASSERT_EQ(gone_on.exit_code, 0) << gone_on.error;
+  EXPECT_THAT(read_fit_result(here.path() / "d.fit" / "fit.json").command,
+              HasSubstr("--start a.fit/fit.json --loss squared"));
+}
+
+TEST(ProgramFit, OfAClothInMotionCanBeSimulated) {
+  // Given a recording that begins in the middle of a swing: a simulation's own, cut
+  const test::ScratchFolder here("in_motion");
+  std::ofstream(here.path() / "start.csv") << [] {
+    std::string text = "row,column,x,y,z,vx,vy,vz\n";
+    for (int row = 0; row < 5; ++row)
+      for (int column = 0; column < 5; ++column)
+        text += std::to_string(row) + "," + std::to_string(column) + "," +
+                std::to_string(0.1 * column) + ",0," + std::to_string(1 - 0.1 * row) + ",0," +
+                std::to_string(0.3 * row) + ",0\n";
+    return text;
+  }();
+  std::ofstream(here.path() / "sheet.yaml")
+      << "format: clothfit-model/1\nname: sheet\n"
+         "cloth: {size: [0.4, 0.4], mass: 0.03, mesh: {columns: 5, rows: 5}}\n"
+         "fabric: {tension_warp: 50, tension_weft: 50, shear: 20, flexion_warp: 10, "
+         "flexion_weft: 10, damping_warp: 0.002, damping_weft: 0.002}\n"
+         "held: [{at: [0, 0], motion: fixed}, {at: [0.4, 0], motion: fixed}]\n"
+         "start: {kind: in_motion, file: start.csv}\ntime: {frame_rate: 60, duration: 0.3}\n";
+  ASSERT_EQ(run_program({"simulate", "sheet.yaml", "--format", "csv"}, here.path()).exit_code, 0);
+
+  const ProgramRun fitted =
+      run_program({"fit", "sheet.simulation", "--start-nodes", "3", "--population", "16",
+                   "--generations", "2", "--refine-best", "1", "--work", "0.1", "--out", "a.fit"},
+                  here.path());
+  ASSERT_EQ(fitted.exit_code, 0) << fitted.error;
+  const ProgramRun simulated =
+      run_program({"simulate", "--fit", "a.fit", "--format", "csv", "--out", "again"}, here.path());
+  ASSERT_EQ(simulated.exit_code, 0) << simulated.error;
+
+  // Then the fit's simulation is as far off as the fit says.
+  const Recording measured = read_recording(here.path() / "sheet.simulation");
+  const Recording again = read_recording(here.path() / "again");
+  const Tracks3d before = read_tracks3d(*measured.tracks3d, measured.markers);
+  const Tracks3d after = read_tracks3d(*again.tracks3d, again.markers);
+  ASSERT_EQ(before.size(), after.size());
+  double sum = 0;
+  for (std::size_t n = 0; n < before.size(); ++n)
+    sum += (before[n].position_m - after[n].position_m).squaredNorm();
+  const FitResult result = read_fit_result(here.path() / "a.fit" / "fit.json");
+  EXPECT_EQ(result.start, "unknown");
+  // Tracks have twelve digits or so.
+  EXPECT_NEAR(std::sqrt(sum / static_cast<double>(before.size())),
+              result.errors[0].fitted.rms_distance, 1e-9);
+
+  const ProgramRun forecast = run_program(
+      {"fit", "sheet.simulation", "--forecast", "a.fit/fit.json", "--out", "b.fit"}, here.path());
+  EXPECT_EQ(forecast.exit_code, 3);
+  EXPECT_THAT(forecast.error, HasSubstr("begins with the cloth in motion"));
+}
+
 TEST(ProgramFit, LeavesNothingWhenInterrupted) {
   const test::ScratchFolder here("interrupt");
   const auto interrupt_once_at_work = [&](int process) {

@@ -106,6 +106,11 @@ TEST_F(Program, AnswersWrongUsageWithTwo) {
         {"fit", "a", "--mesh", "60000x60000"},
         {"fit", "a", "--seed", "x"},
         {"fit", "a", "--observations", "sounds"},
+        {"fit", "a", "--search", "grid"},
+        {"fit", "a", "--loss", "cubic"},
+        {"fit", "a", "--springs", "louchet6"},
+        {"fit", "a", "--resume"},
+        {"fit", "a", "--start", "a.json", "--forecast", "b.json"},
         {"calibrate", "a", "--board", "chessboard:9x6"},
         {"calibrate", "a", "--board", "chessboard:2x2:0.1"},
         {"calibrate", "a", "--name", "../b"},
@@ -279,6 +284,24 @@ TEST_F(Program, RefusesStillsOfAnotherSizeThanThePictures) {
   write_grey_picture(recording_ / "stills" / "0.png", 640, 480);
 
   expect_refused("calibrate", "320 x 240 px");
+}
+
+TEST_F(Program, NeverWritesOverACheckpoint) {
+  copy_bundled("swing_plain");
+  write_text(here_ / "search.txt", "hours of searching");
+
+  const ProgramRun run =
+      run_program({"fit", recording_.string(), "--checkpoint", "search.txt"}, here_);
+
+  EXPECT_EQ(run.exit_code, 3);
+  EXPECT_THAT(run.error, HasSubstr("search.txt exists already"));
+  EXPECT_THAT(run.error, HasSubstr("--resume"));
+  EXPECT_THAT(names_in(here_), ::testing::ElementsAre("search.txt"));
+
+  const ProgramRun resumed =
+      run_program({"fit", recording_.string(), "--checkpoint", "search.txt", "--resume"}, here_);
+  EXPECT_EQ(resumed.exit_code, 3);
+  EXPECT_THAT(resumed.error, HasSubstr("search.txt:1: is no checkpoint of a search"));
 }
 
 TEST_F(Program, NeverReplacesAFolderOfTheUsers) {

@@ -126,6 +126,8 @@ SampleFit sample_fit(int coordinates) {
        "sigma exceeds the value, p < 1"},
       {"areal_density", "kg/m2", 0.203125, 0, ParameterState::fixed, "the cloth was weighed"}};
   result.effects = {{"viscous_damping", {{"c", "1/s", -0.02, 0.03, ParameterState::fitted, ""}}}};
+  result.basins = {{.cost = 1.61, .ended = 2, .parameters = {{"tension_warp", 55.1}, {"a<b", 1}}},
+                   {.cost = 2.93, .ended = 1, .parameters = {{"tension_warp", 88.7}, {"a<b", 2}}}};
   ObservationErrors errors;
   errors.kind = residuals.kind;
   errors.unit = residuals.unit;

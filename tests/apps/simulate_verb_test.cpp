@@ -117,6 +117,54 @@ TEST_F(Simulate, LeavesARecordingOfTheSameClothThatReadsBack) {
   EXPECT_LT((turning->position_m - Eigen::Vector3d(0.35, 0.05, 1)).norm(), 1e-9);
 }
 
+TEST_F(Simulate, RunsSpringsThatAreGivenTypeByType) {
+  std::string text = model_text(kCorners);
+  const std::size_t begin = text.find("fabric:"), end = text.find('\n', begin);
+  text.replace(begin, end - begin,
+               "springs: {natural_length: [0.05, 0.05, 0.07, 0.07, 0.1, 0.1], stiffness: [20, 20, "
+               "10, 10, 5, 5], damping: [0.01, 0.01, 0, 0, 0, 0], critical_elongation: [0.1, 0.1, "
+               "0.1, 0.1, 0.2, 0.2]}\nstrain_limit: {mode: consistent}");
+  write(text);
+
+  expect_refused({"sheet.yaml", "--mesh", "5x5"}, "those of one mesh");
+  expect_refused({"sheet.yaml", "--set", "shear=3"}, "type by type");
+  ASSERT_EQ(run({"sheet.yaml"}).exit_code, 0);
+
+  EXPECT_EQ(result()["parameter_set"], "springs");
+  EXPECT_TRUE(result()["continuum"].is_null());
+  EXPECT_EQ(result()["parameters"][1]["name"], "natural_length_0");
+  EXPECT_EQ(result()["strain_limit"]["elongation"][5], 0.2);
+  EXPECT_LT(result()["largest_stretch"], 1.2 + 1.1e-3);  // the limit's tolerance is 1e-3
+}
+
+TEST_F(Simulate, BeginsInMotionWhereTheModelSays) {
+  // A sheet in free flight, 1 m/s upwards
+  std::string text = model_text("[]");
+  const std::size_t begin = text.find("start:"), end = text.find('\n', begin);
+  text.replace(begin, end - begin, "start: {kind: in_motion, file: start.csv}");
+  text.replace(text.find("columns: 9, rows: 7"), 19, "columns: 2, rows: 2");
+  std::ofstream(here_.path() / "start.csv")
+      << "row,column,x,y,z,vx,vy,vz\n0,0,0,0,1,0,0,1\n0,1,0.4,0,1,0,0,1\n"
+         "1,0,0,0.3,1,0,0,1\n1,1,0.4,0.3,1,0,0,1\n";
+  write(text);
+
+  ASSERT_EQ(run({"sheet.yaml", "--format", "csv"}).exit_code, 0);
+
+  EXPECT_EQ(result()["start"], "in_motion");
+  const Recording recording = read_recording(here_.path() / "sheet.simulation");
+  EXPECT_EQ(recording.start, StartKind::unknown);
+  const double h = result()["time_step"]["used_s"];
+  for (const Position3d& row : read_tracks3d(*recording.tracks3d, recording.markers)) {
+    // As a falling sheet, with the velocity of its start
+    const double t = 0.02 * row.frame;
+    EXPECT_NEAR(row.position_m.z(), 1 + t - 9.81 * t * (t + h) / 2, 1e-12);
+  }
+  // What it leaves begins in motion too.
+  ASSERT_EQ(run({"sheet.simulation", "--format", "csv", "--out", "again"}).exit_code, 0);
+  EXPECT_EQ(result("again")["start"], "in_motion");
+  EXPECT_EQ(run({"sheet.simulation", "--mesh", "3x3"}).exit_code, 3);
+}
+
 TEST_F(Simulate, WritesTheFormatsThatAreAskedFor) {
   write(model_text(kCorners));
 

@@ -31,6 +31,9 @@ FitResult sample_result() {
   result.effects = {{"wind", {{"q_x", "Pa", 0.25, 0.01, ParameterState::fitted, ""}}}};
   result.nuisance = {{"tilt_x", "rad", 1e-4, 1e-5, ParameterState::fitted, ""}};
   result.errors = {{"front", "px", {0.3, 0.42, 1000}, {0.5, 0.7, 400}, 0.29, {21, 30, 25}}};
+  result.basins = {
+      {.cost = 1.6, .ended = 3, .parameters = {{"tension_warp", 41.1}, {"wind.q_x", 1.0 / 3}}},
+      {.cost = 4.5, .ended = 1, .refined = false, .parameters = {{"tension_warp", 90}}}};
   result.observations_used = 1400;
   result.observations_rejected = {{"blurred", 3}, {"too far", 1}};
   return result;
@@ -85,6 +88,17 @@ void expect_same(const FitResult& a, const FitResult& b) {
     EXPECT_EQ(a.errors[i].trivial.last_velocity, b.errors[i].trivial.last_velocity);
     EXPECT_EQ(a.errors[i].trivial.rigid, b.errors[i].trivial.rigid);
   }
+  ASSERT_EQ(a.basins.size(), b.basins.size());
+  for (std::size_t i = 0; i < a.basins.size(); ++i) {
+    EXPECT_EQ(a.basins[i].cost, b.basins[i].cost);
+    EXPECT_EQ(a.basins[i].ended, b.basins[i].ended);
+    EXPECT_EQ(a.basins[i].refined, b.basins[i].refined);
+    ASSERT_EQ(a.basins[i].parameters.size(), b.basins[i].parameters.size());
+    for (std::size_t p = 0; p < a.basins[i].parameters.size(); ++p) {
+      EXPECT_EQ(a.basins[i].parameters[p].name, b.basins[i].parameters[p].name);
+      EXPECT_EQ(a.basins[i].parameters[p].value, b.basins[i].parameters[p].value);
+    }
+  }
   EXPECT_EQ(a.observations_used, b.observations_used);
   EXPECT_EQ(a.observations_rejected, b.observations_rejected);
 }
@@ -115,12 +129,14 @@ TEST(FitJson, HasTheKeysOfTheFormat) {
   for (const auto& [key, value] : json.items()) keys.push_back(key);
   EXPECT_THAT(keys, testing::ElementsAre("format", "recording", "version", "command", "seed",
                                          "seconds", "model", "parameters", "effects", "nuisance",
-                                         "errors", "observations"));
+                                         "basins", "errors", "observations"));
   EXPECT_EQ(json["format"], "clothfit-fit/1");
   EXPECT_EQ(json["model"]["mesh"]["rows"], 9);
   EXPECT_EQ(json["model"]["time_step_s"], 1.0 / 480);
   EXPECT_EQ(json["parameters"][2]["state"], "undetermined");
   EXPECT_EQ(json["effects"][0]["parameters"][0]["name"], "q_x");
+  EXPECT_EQ(json["basins"][0]["parameters"]["wind.q_x"], 1.0 / 3);
+  EXPECT_EQ(json["basins"][1]["refined"], false);
   ASSERT_TRUE(json["errors"].is_object());  // one kind; several make a list
   EXPECT_EQ(json["errors"]["kind"], "front");
   EXPECT_EQ(json["errors"]["held_out"]["rms_distance"], 0.7);
@@ -136,6 +152,7 @@ TEST(FitJson, MayHoldMoreThanThisVersionKnows) {
   json["model"]["new"] = nullptr;
   json["parameters"][0].erase("reason");
   json.erase("nuisance");
+  json.erase("basins");
   json["errors"].erase("kind");
 
   const FitResult result = read_fit_result(folder.write("fit.json", json.dump()));
@@ -165,6 +182,8 @@ TEST(FitJson, IsRefusedWhereAValueIsMissingOrOfAnotherKind) {
   expect("fit.json: `/parameters/0/state` is `free`",
          [](auto& j) { j["parameters"][0]["state"] = "free"; });
   expect("fit.json: `/parameters` is not a list", [](auto& j) { j["parameters"] = 1; });
+  expect("fit.json: `/basins/1/refined` is not a truth",
+         [](auto& j) { j["basins"][1]["refined"] = 0; });
   expect("fit.json: `/model` is not an object", [](auto& j) { j["model"] = 1; });
   expect("fit.json: `/seed` is not a seed", [](auto& j) { j["seed"] = -1; });
   expect("fit.json: `/observations/used` is not a count",

@@ -161,6 +161,111 @@ TEST_F(ModelFile, ReadsBackAsWrittenToTheLastBit) {
   EXPECT_EQ(again.start, model.start);
 }
 
+/// The model with springs instead of its fabric.
+std::string with_springs(const std::string& damping = "[0, 0, 0, 0, 0, 0.001]") {
+  std::string text = kModel;
+  const std::size_t begin = text.find("fabric:"), end = text.find("gravity:");
+  return text.replace(begin, end - begin,
+                      "springs:\n"
+                      "  natural_length: [0.05, 0.05, 0.07, 0.07, 0.1, 0.1]\n"
+                      "  stiffness: [40, 41, 15, 15, 8, 0]\n"
+                      "  damping: " +
+                          damping +
+                          "\n"
+                          "  critical_elongation: [0.1, 0.1, 0.2, 0.2, 0.3, 0.3]\n"
+                          "strain_limit: {mode: positions}\n");
+}
+
+TEST_F(ModelFile, MayGiveItsSpringsTypeByType) {
+  ModelDescription model = read(with_springs());
+  ASSERT_TRUE(model.springs);
+  EXPECT_TRUE(model.fabric.empty());
+  EXPECT_EQ(model.fabric_line, 5);
+  EXPECT_EQ(model.springs->stiffness_n_per_m[1], 41);
+  model.springs->natural_length_m[3] = 1.0 / 3;
+  model.springs->critical_elongation->at(5) = 0.1 + 0.2;
+
+  std::filesystem::create_directories(folder_ / "out");
+  write_model(model, folder_ / "out");
+  const ModelDescription again = read_model(folder_ / "out" / "model.yaml");
+
+  EXPECT_EQ(again.springs, model.springs);
+  EXPECT_EQ(again.strain_limit, StrainLimitKind::positions);
+}
+
+TEST_F(ModelFile, RefusesSpringsThatCannotBe) {
+  const auto expect = [&](const std::string& from, const std::string& to,
+                          const std::string& beginning) {
+    std::string text = with_springs();
+    const std::size_t at = text.find(from);
+    ASSERT_NE(at, std::string::npos) << from;
+    text.replace(at, from.size(), to);
+    expect_refused(folder_, beginning, [&] { read(text); });
+  };
+  expect("[0.05,", "[0,", "model.yaml:6: springs.natural_length[0] = 0; ");
+  expect("[40, 41, 15, 15, 8, 0]", "[40, 41, 15]", "model.yaml:7: springs.stiffness");
+  expect("[40, 41, 15, 15, 8, 0]", "[0, 0, 0, 0, 0, 0]", "model.yaml:5: springs: every stiffness ");
+  expect("0.001]", "-1]", "model.yaml:8: springs.damping[5] = -1; ");
+  expect("{mode: positions}", "{mode: positions, elongation: 0.1}",
+         "model.yaml:10: strain_limit.elongation stands beside springs; ");
+  expect("  critical_elongation: [0.1, 0.1, 0.2, 0.2, 0.3, 0.3]\n", "",
+         "model.yaml:9: the strain is limited, and the springs have no limits; ");
+  expect("springs:\n", "fabric: {}\nsprings:\n", "model.yaml:5: the model has both ");
+}
+
+/// The model with a start in motion on a mesh of 2 x 2.
+std::string in_motion(const std::string& start = "{kind: in_motion, file: start.csv}") {
+  std::string text = kModel;
+  text.replace(text.find("{columns: 9, rows: 7}"), 21, "{columns: 2, rows: 2}");
+  const std::size_t begin = text.find("{kind: at_rest"), end = text.find("\n", begin);
+  return text.replace(begin, end - begin, start);
+}
+
+TEST_F(ModelFile, MayBeginInMotion) {
+  folder_.write("start.csv",
+                "row,column,x,y,z,vx,vy,vz\n1,1,0.3,0.4,0,0,0,1\n0,0,0,0,0,0,0,0\n"
+                "0,1,0.3,0,0,0,0,2\n1,0,0,0.4,0,0,0,3\n");
+  ModelDescription model = read(in_motion());
+  ASSERT_TRUE(model.start_state);
+  EXPECT_EQ(model.start, StartKind::unknown);
+  EXPECT_EQ(model.start_state->position_m.col(1), Eigen::Vector3d(0.3, 0, 0));
+  EXPECT_EQ(model.start_state->velocity_m_per_s.row(2), Eigen::RowVector4d(0, 2, 3, 1));
+  model.start_state->position_m(0, 2) = 1.0 / 3;
+  model.start_state->velocity_m_per_s(1, 3) = std::numeric_limits<double>::denorm_min();
+
+  std::filesystem::create_directories(folder_ / "out");
+  write_model(model, folder_ / "out");
+  const ModelDescription again = read_model(folder_ / "out" / "model.yaml");
+
+  ASSERT_TRUE(again.start_state);
+  EXPECT_EQ(again.start_state->position_m, model.start_state->position_m);
+  EXPECT_EQ(again.start_state->velocity_m_per_s, model.start_state->velocity_m_per_s);
+}
+
+TEST_F(ModelFile, RefusesAStartInMotionThatIsNotWhole) {
+  const std::string three =
+      "row,column,x,y,z,vx,vy,vz\n0,0,0,0,0,0,0,0\n0,1,1,0,0,0,0,0\n"
+      "1,0,0,1,0,0,0,0\n";
+  const auto expect = [&](const std::string& table, const std::string& beginning) {
+    folder_.write("start.csv", table);
+    expect_refused(folder_, beginning, [&] { read(in_motion()); });
+  };
+  expect(three, "start.csv: has 3 rows; ");
+  expect(three + "1,0,1,1,0,0,0,0\n", "start.csv:5: vertex [1, 0] comes twice; ");
+  expect(three + "1,2,1,1,0,0,0,0\n", "start.csv:5: there is no vertex [1, 2]; ");
+  expect(three + "1,1,1,1,nan,0,0,0\n", "start.csv:5: ");
+  folder_.write("start.csv", three + "1,1,1,1,0,0,0,0\n");
+  const auto expect_start = [&](const std::string& start, const std::string& beginning) {
+    expect_refused(folder_, beginning, [&] { read(in_motion(start)); });
+  };
+  expect_start("{kind: in_motion}", "model.yaml:");
+  expect_start("{kind: in_motion, file: none.csv}", "model.yaml:21: start.file = none.csv: ");
+  expect_start("{kind: in_motion, file: start.csv, position: [0, 0, 0]}",
+               "model.yaml:21: start.position stands beside in_motion; ");
+  expect_start("{kind: at_rest, file: start.csv}",
+               "model.yaml:21: start.file stands beside at_rest; ");
+}
+
 TEST_F(ModelFile, NamesEveryModeOfTheStrainLimit) {
   std::filesystem::create_directories(folder_ / "out");
   for (const auto& [word, kind] : {std::pair{"off", StrainLimitKind::off},

@@ -249,6 +249,14 @@ TEST(CmaEs, StartsWhereItIsToldTo) {
   EXPECT_EQ(start.population, 7);  // 4 + floor(3 ln 3)
 }
 
+TEST(CmaEs, MeasuresHowFarItsIndividualsDiffer) {
+  CmaState state = start_cma(ranges(2, 0, 1), {.initial_step = 0.3});
+  EXPECT_NEAR(diversity(state), 0.3, 1e-15);  // the first covariance is the identity
+
+  state.covariance << 10, 8, 8, 6;  // eigenvalues 8 +- sqrt(68): their mean is 8
+  EXPECT_NEAR(diversity(state), 0.3 * std::sqrt(8.0), 1e-15);
+}
+
 TEST(CmaEs, RefusesOptionsAndRangesThatMakeNoSense) {
   const auto parameters = ranges(2, 0, 1);
   EXPECT_THROW(start_cma({}, {}), InputError);

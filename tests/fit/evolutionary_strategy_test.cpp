@@ -390,6 +390,24 @@ TEST(EvolutionaryStrategy, StopsWhenTheBestCostNoLongerFalls) {
   EXPECT_LT(result.best().cost, 1.01);
 }
 
+TEST(EvolutionaryStrategy, MeasuresHowFarItsIndividualsDiffer) {
+  const std::vector<SearchParameter> parameters = {
+      {.name = "a", .lower = 0, .upper = 2},
+      {.name = "b", .lower = 1, .upper = 100, .log_scale = true}};
+  EvolutionState state;
+  for (const double share : {0.0, 1.0})
+    state.population.push_back({.values = Eigen::Vector2d(1, share == 0 ? 1 : 100), .cost = 1});
+
+  // The first parameter does not vary; the second lies at both ends of its range.
+  EXPECT_NEAR(diversity(parameters, state), 0.5 * (0 + 0.5), 1e-15);
+
+  // A uniform draw: 1 / sqrt(12); off by a few per cent for a thousand individuals
+  EvolutionOptions options = all_generations(1, 3);
+  options.population = 1000;
+  const EvolutionState drawn = first_generation(unit_ranges(3), options, sphere);
+  EXPECT_NEAR(diversity(unit_ranges(3), drawn), 1 / std::sqrt(12.0), 0.01);
+}
+
 TEST(EvolutionaryStrategy, RefusesOptionsAndRangesThatMakeNoSense) {
   const auto refused = [](const std::vector<SearchParameter>& parameters,
                           const std::function<void(EvolutionOptions&)>& change) {

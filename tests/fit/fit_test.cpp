@@ -6,9 +6,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
+#include <fstream>
 
 #include "data/input_error.h"
 #include "synthetic_cloth.h"
+#include "tests/data/temporary_folder.h"
 
 namespace clothfit {
 namespace {
@@ -134,12 +137,241 @@ TEST(Fit, EndsWhenItIsCancelled) {
   }
 }
 
+/// A cloth whose fit takes a moment.
+FitInput tiny_input(unsigned seed = 1) {
+  return synthetic_input(
+      {.mesh = 5, .markers = 5, .frames = 16, .held_out_from = 12, .seed = seed});
+}
+
+FitOptions tiny_fit(SearchMethod search) {
+  FitOptions options = quick();
+  options.search = search;
+  options.population = 24;
+  options.generations = 8;
+  return options;
+}
+
+/// fit.json's bytes, but for the seconds that it took.
+std::string fit_json(FitReport report, const TemporaryFolder& folder) {
+  report.result.seconds = 0;
+  const std::filesystem::path file = folder.path() / "fit.json";
+  write_fit_result(report.result, file);
+  std::ifstream in(file);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+TEST(Fit, FindsTheFabricByCmaToo) {
+  const SyntheticCloth truth;
+  FitOptions options = quick();
+  options.search = SearchMethod::cma;
+
+  const FitReport report = fit(synthetic_input(truth), options, {});
+
+  ASSERT_TRUE(report.usable()) << report.message;
+  EXPECT_THAT(report.stages.front(), ::testing::HasSubstr("CMA-ES"));
+  expect_within(report.result, "tension_warp", truth.fabric.tension_warp_n_per_m, 0.05);
+  expect_within(report.result, "shear", truth.fabric.shear_n_per_m, 0.03);
+  expect_within(report.result, "damping_warp", truth.fabric.damping_warp_s, 0.2);
+}
+
+TEST(Fit, TellsTheBasinsThatItCameAcrossBestFirst) {
+  for (const SearchMethod search : {SearchMethod::paper, SearchMethod::cma}) {
+    FitOptions options = tiny_fit(search);
+    options.refine_best = 3;
+    const FitReport report = fit(tiny_input(), options, {});
+
+    ASSERT_TRUE(report.usable()) << report.message;
+    const std::vector<Basin>& basins = report.result.basins;
+    ASSERT_FALSE(basins.empty());
+    EXPECT_TRUE(basins.front().refined);
+    for (size_t n = 0; n < basins.size(); ++n) {
+      ASSERT_EQ(basins[n].parameters.size(), 7u);
+      EXPECT_EQ(basins[n].parameters[2].name, "shear");
+      EXPECT_GE(basins[n].ended, 1);
+      EXPECT_GE(basins[n].cost, basins[n > 0 ? n - 1 : 0].cost);
+    }
+    // The noise of a 3D point, sqrt(8 / pi) sigmas long on average, and what the mesh misses
+    EXPECT_GT(basins.front().cost, 1.4);
+    EXPECT_LT(basins.front().cost, 3);
+  }
+}
+
+TEST(Fit, GoesOnFromACheckpointToTheSameBytes) {
+  const TemporaryFolder folder;
+  for (const SearchMethod search : {SearchMethod::paper, SearchMethod::cma}) {
+    const FitInput input = tiny_input();
+    const FitReport whole = fit(input, tiny_fit(search), {});
+    ASSERT_TRUE(whole.usable()) << whole.message;
+    const std::string expected = fit_json(whole, folder);
+    for (const int generation : {1, 3, 5}) {
+      SCOPED_TRACE(generation);
+      FitOptions options = tiny_fit(search);
+      options.checkpoint =
+          folder.path() / (std::to_string(static_cast<int>(search)) + std::to_string(generation));
+      int calls = 0;
+      const FitReport cut = fit(input, options, [&](const Progress& progress) {
+        return progress.stage != "search" || ++calls < generation;
+      });
+      EXPECT_EQ(cut.stop, FitStop::cancelled);
+      EXPECT_EQ(cut.search_cost.size(), static_cast<size_t>(generation));
+
+      options.resume = true;
+      const FitReport resumed = fit(input, options, {});
+
+      EXPECT_EQ(resumed.search_cost, whole.search_cost);
+      EXPECT_TRUE(fit_json(resumed, folder) == expected);
+    }
+  }
+}
+
+TEST(Fit, GoesOnAfterASearchThatHadEnded) {
+  const TemporaryFolder folder;
+  FitOptions options = tiny_fit(SearchMethod::paper);
+  const std::string expected = fit_json(fit(tiny_input(), options, {}), folder);
+  options.checkpoint = folder.path() / "checkpoint";
+  const FitReport cut = fit(tiny_input(), options,
+                            [&](const Progress& progress) { return progress.stage == "search"; });
+  ASSERT_EQ(cut.stop, FitStop::cancelled);
+
+  options.resume = true;
+  EXPECT_TRUE(fit_json(fit(tiny_input(), options, {}), folder) == expected);
+}
+
+TEST(Fit, RefusesTheCheckpointOfAnotherFit) {
+  const TemporaryFolder folder;
+  FitOptions options = tiny_fit(SearchMethod::paper);
+  options.checkpoint = folder.path() / "checkpoint";
+  fit(tiny_input(), options, [](const Progress&) { return false; });
+  ASSERT_TRUE(std::filesystem::exists(options.checkpoint));
+  options.resume = true;
+
+  EXPECT_THROW(fit(tiny_input(2), options, {}), InputError);  // other noise
+  FitInput heavier = tiny_input();
+  heavier.recording.cloth.mass_kg = 0.031;
+  EXPECT_THROW(fit(heavier, options, {}), InputError);
+  FitOptions other = options;
+  other.seed = 2;
+  EXPECT_THROW(fit(tiny_input(), other, {}), InputError);
+  other = options;
+  other.search = SearchMethod::cma;
+  EXPECT_THROW(fit(tiny_input(), other, {}), InputError);
+}
+
+TEST(Fit, EndsItsSearchAtTheCostThatItIsAskedFor) {
+  for (const SearchMethod search : {SearchMethod::paper, SearchMethod::cma}) {
+    FitOptions options = tiny_fit(search);
+    options.stop_cost = 1e6;
+    EXPECT_EQ(fit(tiny_input(), options, {}).search_cost.size(), 1u);
+  }
+}
+
+/// A cloth with one stiffness for all springs, and air that damps it.
+SyntheticCloth uniform_springs(double stiffness_n_per_m) {
+  return {.fabric = {.tension_warp_n_per_m = stiffness_n_per_m,
+                     .tension_weft_n_per_m = stiffness_n_per_m,
+                     .shear_n_per_m = stiffness_n_per_m,
+                     .flexion_warp_n_per_m = stiffness_n_per_m,
+                     .flexion_weft_n_per_m = stiffness_n_per_m},
+          .drag_rate_per_s = 3,
+          .mesh = 5,
+          .markers = 5,
+          .frames = 24,
+          .held_out_from = 18};
+}
+
+TEST(Fit, FindsThePapersFiveNumbersAndForecastsWithThem) {
+  // The limit makes the cost piecewise: a smaller search ends in another basin.
+  const SyntheticCloth truth = uniform_springs(20);
+  FitOptions options = quick();
+  options.population = 200;
+  options.generations = 60;
+  options.spring_set = SpringSet::louchet5;
+  options.effects = {"viscous_damping"};
+
+  const FitReport fitted = fit(synthetic_input(truth), options, {});
+
+  ASSERT_TRUE(fitted.usable()) << fitted.message;
+  EXPECT_EQ(fitted.result.parameter_set, "louchet5");
+  expect_within(fitted.result, "stiffness", 20, 0.05);
+  expect_within(fitted.result, "natural_length_01", 0.1, 0.01);
+  expect_within(fitted.result, "natural_length_23", 0.1 * std::sqrt(2.0), 0.01);
+  // No spring of the truth has a limit.
+  EXPECT_EQ(find(fitted.result, "critical_elongation").state, ParameterState::undetermined);
+
+  // The same cloth once more, with noise of its own
+  SyntheticCloth again = truth;
+  again.seed = 77;
+  FitOptions forecast{.spring_set = SpringSet::louchet5, .forecast = fitted.result};
+  const FitReport report = fit(synthetic_input(again), forecast, {});
+
+  ASSERT_TRUE(report.usable()) << report.message;
+  EXPECT_EQ(report.result.parameter_set, "louchet5");
+  EXPECT_EQ(find(report.result, "stiffness").state, ParameterState::fixed);
+  EXPECT_LT(report.result.errors.at(0).held_out.rms, 1.5 * truth.noise_m);
+  forecast.mesh_columns = 6;
+  EXPECT_THROW(fit(synthetic_input(again), forecast, {}), InputError);
+}
+
+TEST(Fit, SaysThatSpringsOnTheirStrainLimitTellNothingOfTheirStiffness) {
+  // Given springs so soft that the limit carries the cloth, at the step of the truth: one sweep a
+  // step limits strain the more, the more steps there are. The fit begins with the truth and is let
+  // do little.
+  SyntheticCloth truth = uniform_springs(0.1);
+  truth.critical_elongation = 0.02;
+  FitOptions options;
+  options.spring_set = SpringSet::louchet18;
+  options.effects = {"viscous_damping"};
+  options.work = 1e-3;
+  options.substep_scale = 80;
+  options.start = {{"viscous_damping.rate", truth.drag_rate_per_s}};
+  const double flat_m[] = {0.1, 0.1, 0.1 * std::sqrt(2.0), 0.1 * std::sqrt(2.0), 0.2, 0.2};
+  for (int type = 0; type < 6; ++type) {
+    const std::string of_type = "_" + std::to_string(type);
+    (*options.start)["stiffness" + of_type] = 0.1;
+    (*options.start)["natural_length" + of_type] = flat_m[type];
+    (*options.start)["critical_elongation" + of_type] = truth.critical_elongation;
+  }
+
+  const FitReport report = fit(synthetic_input(truth), options, {});
+
+  ASSERT_TRUE(report.usable()) << report.message;
+  const ParameterEstimate& stiffness = find(report.result, "stiffness_0");  // along the fall
+  EXPECT_EQ(stiffness.state, ParameterState::undetermined);
+  EXPECT_THAT(stiffness.reason, ::testing::HasSubstr("sit on their strain limit"));
+  // What such a spring shows is its longest length: the product of two parameters.
+  EXPECT_THAT(find(report.result, "critical_elongation_0").reason,
+              ::testing::HasSubstr("it can hardly be told from natural_length_0"));
+}
+
+TEST(Fit, BeginsWithTheParametersOfAnEarlierFitWithoutASearch) {
+  const FitReport searched = fit(tiny_input(), tiny_fit(SearchMethod::paper), {});
+  ASSERT_TRUE(searched.usable());
+  FitOptions options;
+  options.start.emplace();
+  for (const ParameterEstimate& parameter : searched.result.parameters)
+    if (parameter.name != "areal_density") (*options.start)[parameter.name] = 1.2 * parameter.value;
+
+  const FitReport report = fit(tiny_input(), options, {});
+
+  ASSERT_TRUE(report.usable()) << report.message;
+  EXPECT_TRUE(report.search_cost.empty());
+  EXPECT_TRUE(report.result.basins.empty());
+  for (const char* name : {"tension_warp", "shear"}) {
+    const ParameterEstimate& before = find(searched.result, name);
+    EXPECT_NEAR(find(report.result, name).value, before.value, 0.2 * before.sigma) << name;
+  }
+  (*options.start)["sheer"] = 1;
+  EXPECT_THROW(fit(tiny_input(), options, {}), InputError);
+}
+
 TEST(Fit, RefusesOptionsOutOfRange) {
   const FitInput input = synthetic_input({.mesh = 5, .markers = 5});
   EXPECT_THROW(fit(input, {.mesh_columns = 1}, {}), InputError);
   EXPECT_THROW(fit(input, {.population = 1}, {}), InputError);
   EXPECT_THROW(fit(input, {.work = 0}, {}), InputError);
   EXPECT_THROW(fit(input, {.substep_scale = 0}, {}), InputError);
+  EXPECT_THROW(fit(input, {.resume = true}, {}), InputError);
+  EXPECT_THROW(fit(input, {.checkpoint = "a", .start = {{}}}, {}), InputError);
 }
 
 }  // namespace

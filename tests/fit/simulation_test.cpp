@@ -8,6 +8,7 @@
 
 #include "data/input_error.h"
 #include "model/simulate.h"
+#include "model/spring_vector.h"
 #include "model/stability.h"
 #include "tests/data/temporary_folder.h"
 #include "tests/fit/synthetic_cloth.h"
@@ -240,6 +241,65 @@ TEST(Simulation, OfADescribedFitTouchesTheRecordingsObstacle) {
 
   EXPECT_LT(rearmost_m(0), kWall_m - 0.05);
   EXPECT_GT(rearmost_m(2e4), kWall_m - 0.01);
+}
+
+/// Through model.yaml and back.
+ModelDescription on_disk(const ModelDescription& model) {
+  const TemporaryFolder folder;
+  write_model(model, folder.path());
+  return read_model(folder.path() / "model.yaml");
+}
+
+TEST(Simulation, OfAFitOfThePapersSpringsIsTheFitsOwnFromItsFileToo) {
+  for (const SpringSet set : {SpringSet::louchet5, SpringSet::louchet18}) {
+    SCOPED_TRACE(to_string(set));
+    const FitInput input = synthetic_input({});
+    const FitProblem problem = make_problem(input, {.spring_set = set}, 9, 9);
+    Eigen::VectorXd values = problem.space.start();
+    for (int p = 0; p < problem.space.size(); ++p) {
+      const FitParameter& parameter = problem.space.parameters[static_cast<size_t>(p)];
+      if (parameter.role == ParameterRole::springs) values[p] *= 1 + 0.01 * (p % 7) / 3.0;
+      if (parameter.name.starts_with("critical_elongation")) values[p] = 0.05;
+    }
+    const double time_step_s =
+        0.5 * stable_time_step_s(problem.cloth, parameter_set(problem, values));
+
+    const ModelDescription model = describe_model(problem, input.recording, values);
+    const Simulation simulation = make_simulation(on_disk(model));
+
+    // Every number of the springs to the last bit; the sheet's pose is rounded, and the limit,
+    // which acts or does not, multiplies that.
+    const SpringParameters springs = parameter_set(problem, values).springs;
+    EXPECT_EQ(to_vector(simulation.parameters.springs), to_vector(springs));
+    EXPECT_EQ(simulation.cloth.strain_limit.mode, StrainLimitMode::positions);
+    const SimulateResult result = run(simulation, time_step_s);
+    const auto own = run_model(problem, {values}, problem.frames(), time_step_s).front();
+    ASSERT_FALSE(own.empty());
+    EXPECT_LT(largest_difference_m(result.position_m, own), 1e-6);
+    EXPECT_GT((own.back() - own.front()).norm(), 0.1);
+  }
+}
+
+TEST(Simulation, OfAFitThatBeginsInMotionIsTheFitsOwnToTheLastBit) {
+  FitInput input = synthetic_input({});
+  input.recording.start = StartKind::unknown;
+  const FitProblem problem = make_problem(input, {.start_nodes = 3}, 9, 9);
+  Eigen::VectorXd values = problem.space.start();
+  values[problem.space.index("start_position_4_y")] = 0.01;
+  values[problem.space.index("start_velocity_4_y")] = 1;
+  const double time_step_s =
+      0.5 * stable_time_step_s(problem.cloth, parameter_set(problem, values));
+
+  const Simulation simulation =
+      make_simulation(on_disk(describe_model(problem, input.recording, values)));
+
+  EXPECT_EQ(simulation.start, StartKind::unknown);
+  const SimulateResult result = run(simulation, time_step_s);
+  const auto own = run_model(problem, {values}, problem.frames(), time_step_s).front();
+  ASSERT_FALSE(own.empty());
+  EXPECT_EQ(largest_difference_m(result.position_m, own), 0);
+  // It moves at once: 1 m/s in the middle, for a sixtieth of a second.
+  EXPECT_GT((own[1] - own[0]).colwise().norm().maxCoeff(), 0.01);
 }
 
 TEST(Simulation, StartsAtRestWhereTheModelSays) {

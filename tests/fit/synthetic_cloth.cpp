@@ -60,6 +60,10 @@ FitInput synthetic_input(const SyntheticCloth& truth) {
   cloth.add_effect("viscous_damping", "test");
   ParameterSet parameters{.springs = spring_parameters(truth.fabric, mesh),
                           .effects = {{truth.drag_rate_per_s}}};
+  if (truth.critical_elongation > 0) {
+    cloth.strain_limit.mode = StrainLimitMode::positions;
+    parameters.springs.critical_elongation.fill(truth.critical_elongation);
+  }
   // The flat sheet: s to the right, t down and, turned, away from the camera.
   const double tilt = 25.0 / 180.0 * std::numbers::pi;
   const Eigen::Vector3d along_t(0, std::sin(tilt), -std::cos(tilt));

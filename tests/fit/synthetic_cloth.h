@@ -14,9 +14,10 @@ struct SyntheticCloth {
                 .flexion_weft_n_per_m = 7,
                 .damping_warp_s = 2.5e-3,
                 .damping_weft_s = 2e-3};
-  double drag_rate_per_s = 0;  ///< viscous_damping of the air
-  int mesh = 9;                ///< columns and rows
-  int markers = 7;             ///< columns and rows, evenly spread, corners included
+  double drag_rate_per_s = 0;      ///< viscous_damping of the air
+  double critical_elongation = 0;  ///< of every spring, mode `positions`; 0: no strain limit
+  int mesh = 9;                    ///< columns and rows
+  int markers = 7;                 ///< columns and rows, evenly spread, corners included
   int frames = 36;
   int held_out_from = 26;
   double noise_m = 5e-4;
