@@ -12,6 +12,7 @@
 #include "model/effects/registry.h"
 #include "model/stability.h"
 #include "tests/model/curtain.h"
+#include "tests/model/hung_cloth.h"
 #include "tests/model/mechanics.h"
 #include "tests/model/random_cloth.h"
 #include "tests/model/scalar_reference.h"
@@ -23,24 +24,6 @@ Schedule frames(int count, double rate_hz, double time_step_s) {
   Schedule schedule{.time_step_s = time_step_s};
   for (int n = 0; n < count; ++n) schedule.frame_time_s.push_back(n / rate_hz);
   return schedule;
-}
-
-/// A cloth held by its two upper corners.
-Cloth hung_cloth(int vertices_per_side) {
-  Cloth cloth = square_cloth(vertices_per_side);
-  cloth.held = {held_at(cloth.mesh, 0, 0), held_at(cloth.mesh, 0.4, 0)};
-  return cloth;
-}
-
-std::vector<ParameterSet> random_sets(const Cloth& cloth, int count, unsigned seed) {
-  Uniform uniform(seed);
-  std::vector<ParameterSet> sets;
-  for (int n = 0; n < count; ++n) {
-    sets.push_back({.springs = spring_parameters(random_fabric(uniform), cloth.mesh),
-                    .effects = {{uniform(0, 2)}},
-                    .start_position_m = crumpled(cloth.mesh, 0.1, uniform)});
-  }
-  return sets;
 }
 
 bool same_bits(const SimulateResult& a, const SimulateResult& b) {
