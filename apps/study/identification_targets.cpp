@@ -61,7 +61,7 @@ void judge_tracks3d(const TargetsResult& result, std::vector<TargetRow>& rows) {
   cover.target = "the same: 95 % intervals cover 93 to 97 %, per parameter";
   if (const RecoverResult* found = result_of(result, "tracks3d")) {
     const auto trials = static_cast<int>(found->trials.size());
-    const int good = trials - found->failures - std::max(found->wrong, found->unconverged);
+    const int good = found->good;
     converged.measured =
         fmt::format("{} of {} ({} without a fit, {} not converged, {} beyond 10 bounds)", good,
                     trials, found->failures, found->unconverged, found->wrong);

@@ -270,9 +270,10 @@ void summarise_trials(RecoverResult& result) {
     bool wrong = false;
     for (const RecoveredParameter& p : trial.parameters) {
       if (std::ranges::find(names, p.name) == names.end()) names.push_back(p.name);
-      wrong = wrong || std::abs(p.estimate - p.truth) > kWrongBounds * p.bound_sigma;
+      wrong = wrong || !(std::abs(p.estimate - p.truth) <= kWrongBounds * p.bound_sigma);
     }
     if (wrong) ++result.wrong;
+    if (!wrong && trial.stop == FitStop::converged) ++result.good;
   }
   for (const std::string& name : names)
     result.parameters.push_back(summary_of(name, result.trials));

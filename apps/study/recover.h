@@ -72,6 +72,7 @@ struct RecoverResult {
   std::string message;
   std::vector<RecoverTrial> trials;
   std::vector<RecoverySummary> parameters;
+  int good = 0;         ///< fits that converged, all parameters within 10 bounds of the truth
   int failures = 0;     ///< trials without a fit
   int unconverged = 0;  ///< fits that say so of themselves
   int wrong = 0;        ///< fits that converged beyond 10 bounds from the truth in any parameter

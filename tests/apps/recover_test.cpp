@@ -42,6 +42,7 @@ TEST(Recover, ScattersAsTheBoundAllowsAndKnowsIt) {
   ASSERT_EQ(result.stop, ExecuteStop::finished);
   EXPECT_EQ(result.failures, 0);
   EXPECT_EQ(result.wrong, 0);
+  EXPECT_EQ(result.good + result.unconverged, 20);
   ASSERT_EQ(result.parameters.size(), 7u);
   double squared_by_bound = 0, squared_by_sigma = 0;
   int covered = 0, count = 0;

@@ -192,7 +192,7 @@ TEST(Recording, KeepsTheNamesOfLinkedFiles) {
   std::filesystem::rename(folder / "tracks2d/front.csv.gz", folder / "store");
   std::filesystem::create_symlink("../store", folder / "tracks2d/front.csv.gz");
   folder.write("recording.yaml",
-               replaced(kFullRecording, "frames/front}", "frames/../frames/front/}"));
+               replaced(kFullRecording, "images: frames/front", "images: frames/../frames/front/"));
 
   const Recording recording = read_recording(folder.path());
 
