@@ -124,7 +124,7 @@ std::string command_text(const FitVerbOptions& options, const FitFlags& flags) {
   add("--population", options.fit.population, defaults.population);
   add("--generations", options.fit.generations, defaults.generations);
   add("--refine-best", options.fit.refine_best, defaults.refine_best);
-  add("--stop-cost", options.fit.stop_cost, defaults.stop_cost);
+  if (options.fit.stop_cost) text += fmt::format(" --stop-cost {}", *options.fit.stop_cost);
   add("--start-nodes", options.fit.start_nodes, defaults.start_nodes);
   add("--work", options.fit.work, defaults.work);
   add("--substep-scale", options.fit.substep_scale, defaults.substep_scale);
@@ -216,7 +216,7 @@ void add_fit_verb(CLI::App& program, VerbAction& action) {
                    "its own first frame")
       ->type_name("FIT.json");
   verb->add_option("--start", flags->start,
-                   "Begin with the parameters of this fit.json instead of a search")
+                   "Begin with the parameters of this fit.json; search only if they lead nowhere")
       ->type_name("FIT.json")
       ->excludes("--forecast");
   verb->add_option("--springs", flags->springs,

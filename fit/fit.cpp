@@ -11,6 +11,7 @@
 #include <span>
 
 #include "data/input_error.h"
+#include "fit/observed_motion.h"
 #include "fit/parameter_search.h"
 #include "fit/problem.h"
 #include "fit/refine.h"
@@ -36,6 +37,8 @@ constexpr double kHorizonShares[] = {0.4, 0.7};
 constexpr double kFineShares[] = {kSearchShare, 0.7};
 /// A given start may be far off, and nothing has been simulated yet.
 constexpr double kGivenShares[] = {0.1, 0.2, 0.4};
+/// Closer than this factor to an end of its range a logarithmic parameter is at that end.
+constexpr double kEnd = 1.5;
 constexpr int kFewestFrames = 8;
 
 /// Spring-steps that a search may cost; its time step is cut no finer than that.
@@ -51,9 +54,10 @@ struct Effort {
   Derivatives derivatives = Derivatives::tangents;
   double difference_step = 0;
   double trust_region_radius = RefineOptions().trust_region_radius;
+  bool exact_in_the_end = false;
   double most_spring_steps = 0;  ///< a stage stops there: a wrong model may lead it on for hours
 };
-constexpr Effort kCoarseEffort{.rounds = 1,
+constexpr Effort kCoarseEffort{.rounds = 3,
                                .least_gain = 1e-3,
                                .derivatives = Derivatives::forward,
                                .difference_step = 2e-2,
@@ -77,6 +81,7 @@ constexpr Effort kFinalEffort{.rounds = 6,
                               .least_gain = 1e-7,
                               .derivatives = Derivatives::tangents,
                               .trust_region_radius = 1e6,
+                              .exact_in_the_end = true,
                               .most_spring_steps = 2e10};
 
 /// A log-parameter less certain than this (a factor of e^0.7 = 2 either way) is undetermined.
@@ -109,20 +114,21 @@ int coarse(const FitProblem& problem, const FitOptions& options, int count) {
   return std::max(std::min(count, smallest), (count - 1) / kCoarsening + 1);
 }
 
-/// The time step of a search: stable at the upper corner of the ranges if the budget allows; else
+/// The time steps of a search: stable at the upper corner of the ranges if the budget allows; else
 /// as fine as the budget allows, and individuals that would need a finer one rank last.
-double search_time_step_s(const FitProblem& problem, const FitOptions& options, int frames) {
+TimeSteps search_time_steps(const FitProblem& problem, const FitOptions& options, int frames) {
   Eigen::VectorXd corner = problem.space.start();
   for (int p = 0; p < problem.space.size(); ++p)
     if (is_physical(problem.space.parameters[static_cast<size_t>(p)].role))
       corner[p] = problem.space.parameters[static_cast<size_t>(p)].upper;
-  const double stable_s = stable_time_step_s(problem.cloth, parameter_set(problem, corner));
+  const TimeSteps stable = stable_time_steps(problem.cloth, parameter_set(problem, corner));
   const double simulated_s =
       problem.frame_time_s[static_cast<size_t>(frames - 1)] - problem.frame_time_s.front();
   const auto simulations = static_cast<double>(search_simulations(options));
   const double affordable_s = simulated_s * static_cast<double>(problem.cloth.spring_count()) *
                               simulations / kSearchSpringSteps;
-  return std::max(stable_s, affordable_s);
+  const double run_s = std::max(stable.run_s, affordable_s);
+  return {run_s, std::max(run_s, stable.rest_s)};
 }
 
 /// The search over the physical parameters on a coarse mesh and a short window, with its line in
@@ -159,19 +165,20 @@ RefineResult refine_stage(const Stage& stage, const FitOptions& options,
       .least_gain = stage.effort.least_gain,
       .derivatives = stage.effort.derivatives,
       .difference_step = stage.effort.difference_step,
+      .exact_in_the_end = stage.effort.exact_in_the_end,
       .loss = options.loss,
       .trust_region_radius = stage.effort.trust_region_radius,
       .most_spring_steps = options.work * stage.effort.most_spring_steps,
       .substep_scale = options.substep_scale};
   const int frames = horizon_frames(problem, stage.share);
-  const auto make_objective = [&](double time_step_s) -> std::unique_ptr<Objective> {
+  const auto make_objective = [&](const TimeSteps& steps) -> std::unique_ptr<Objective> {
     if (stage.derivatives_of == nullptr)
-      return std::make_unique<TrajectoryObjective>(problem, frames, time_step_s);
+      return std::make_unique<TrajectoryObjective>(problem, frames, steps);
     // What is stable for the fine mesh is far more so for the coarse one.
     const double coarser =
         problem.cloth.mesh.spacing_s_m() / stage.derivatives_of->cloth.mesh.spacing_s_m();
-    return std::make_unique<CoarselyDifferentiated>(problem, *stage.derivatives_of, frames,
-                                                    time_step_s, time_step_s / coarser);
+    return std::make_unique<CoarselyDifferentiated>(problem, *stage.derivatives_of, frames, steps,
+                                                    steps.times(1 / coarser));
   };
   RefineResult result = refine(problem, make_objective, start, refine_options, progress);
   report.stages.push_back(fmt::format(
@@ -184,28 +191,68 @@ RefineResult refine_stage(const Stage& stage, const FitOptions& options,
   return result;
 }
 
+/// The cost of a search (Objective::mean_length), at time steps that are stable for these values.
+double search_cost(const TrajectoryObjective& objective, const Eigen::VectorXd& values) {
+  const FitProblem& problem = objective.problem();
+  const TimeSteps stable = stable_time_steps(problem.cloth, parameter_set(problem, values))
+                               .times(1 / RefineOptions().stability_margin);
+  const TimeSteps& searched = objective.steps();
+  const TrajectoryObjective safe(
+      problem, objective.frames(),
+      {std::min(searched.run_s, stable.run_s), std::min(searched.rest_s, stable.rest_s)});
+  return safe.mean_length(safe.residuals({values}).front());
+}
+
+/// Whether the model follows the cloth over the window of a search (fit/observed_motion.h).
+bool follows(const FitProblem& problem, const Eigen::VectorXd& values) {
+  const double any_step_s = std::numeric_limits<double>::infinity();
+  const TrajectoryObjective window(problem, horizon_frames(problem, kSearchShare), any_step_s);
+  return search_cost(window, values) < cost_of_following(window);
+}
+
+/// Logarithmic parameters that a coarse mesh has driven to an end of their range go back to where a
+/// fit begins: there the residuals hardly change with the logarithm, and a first step on the finer
+/// mesh would leap across the range.
+Eigen::VectorXd away_from_ends(const ParameterSpace& space, const Eigen::VectorXd& values) {
+  const Eigen::VectorXd start = space.start();
+  Eigen::VectorXd result = values;
+  for (int p = 0; p < space.size(); ++p) {
+    const FitParameter& parameter = space.parameters[static_cast<size_t>(p)];
+    if (parameter.scale != ParameterScale::logarithmic) continue;
+    const bool at_end = values[p] < kEnd * parameter.lower || values[p] > parameter.upper / kEnd;
+    if (at_end) result[p] = start[p];
+  }
+  return result;
+}
+
 /// Refinement, stage after stage: on the coarse mesh over growing horizons, then on the fit's own
 /// mesh, first with the coarse one's derivatives.
 RefineResult refine_on(const FitProblem& coarse_problem, const FitProblem& problem,
                        const FitOptions& options, const Eigen::VectorXd& start,
                        std::span<const double> coarse_shares, const ProgressCallback& progress,
                        FitReport& report) {
-  std::vector<Stage> stages;
-  for (const double share : coarse_shares)
-    stages.push_back({.problem = coarse_problem, .share = share, .effort = kTrendEffort});
-  stages.push_back({.problem = problem,
-                    .derivatives_of = &coarse_problem,
-                    .share = kSearchShare,
-                    .effort = kApproachEffort});
-  for (const double share : kFineShares)
-    stages.push_back({.problem = problem, .share = share, .effort = kRoughEffort});
-  stages.push_back({.problem = problem, .effort = kFinalEffort});
   RefineResult best;
   best.values = start;
-  for (const Stage& stage : stages) {
+  const auto improve = [&](const Stage& stage) {
     best = refine_stage(stage, options, best.values, progress, report);
-    if (best.cancelled || !best.usable) return best;
+    return !best.cancelled && best.usable;
+  };
+  // Where the model follows the cloth already the coarse mesh has nothing more to teach.
+  if (!follows(problem, start) && !follows(coarse_problem, start)) {
+    for (const double share : coarse_shares)
+      if (!improve({.problem = coarse_problem, .share = share, .effort = kTrendEffort}))
+        return best;
+    best.values = away_from_ends(problem.space, best.values);
+    if (!improve({.problem = problem,
+                  .derivatives_of = &coarse_problem,
+                  .share = kSearchShare,
+                  .effort = kApproachEffort}))
+      return best;
   }
+  best.values = away_from_ends(problem.space, best.values);
+  for (const double share : kFineShares)
+    if (!improve({.problem = problem, .share = share, .effort = kRoughEffort})) return best;
+  improve({.problem = problem, .effort = kFinalEffort});
   return best;
 }
 
@@ -217,27 +264,18 @@ struct Candidate {
   bool refined = false;
 };
 
-/// The cost of a search, at a time step that is stable for these values.
-double search_cost(const TrajectoryObjective& objective, const Eigen::VectorXd& values) {
-  const FitProblem& problem = objective.problem();
-  const double stable_s = stable_time_step_s(problem.cloth, parameter_set(problem, values));
-  const TrajectoryObjective stable(
-      problem, objective.frames(),
-      std::min(objective.time_step_s(), stable_s / RefineOptions().stability_margin));
-  return stable.mean_length(stable.residuals({values}).front());
-}
-
 /// The one of the optima of a search that gets furthest over a short horizon on the coarse mesh.
-/// `candidates` are all of them, the best few refined.
+/// `candidates` are all of them, the best few refined, up to the first that follows the cloth.
 RefineResult pick_best(const TrajectoryObjective& objective, const FitOptions& options,
                        const std::vector<SearchOptimum>& optima, const ProgressCallback& progress,
                        FitReport& report, std::vector<Candidate>& candidates) {
   RefineResult best;
   best.values = optima.front().values;
   best.cost = std::numeric_limits<double>::infinity();
+  bool enough = false;
   for (const SearchOptimum& optimum : optima) {
     candidates.push_back({.values = optimum.values, .cost = optimum.cost, .runs = optimum.runs});
-    if (static_cast<int>(candidates.size()) > options.refine_best) continue;
+    if (enough || static_cast<int>(candidates.size()) > options.refine_best) continue;
     RefineResult result = refine_stage(
         {.problem = objective.problem(), .share = kSearchShare, .effort = kCoarseEffort}, options,
         optimum.values, progress, report);
@@ -248,6 +286,7 @@ RefineResult pick_best(const TrajectoryObjective& objective, const FitOptions& o
       candidates.back() = {
           .values = result.values, .cost = cost, .runs = optimum.runs, .refined = true};
     if (result.cost < best.cost) best = std::move(result);
+    enough = candidates.back().cost < cost_of_following(objective);
   }
   return best;
 }
@@ -309,19 +348,11 @@ Eigen::VectorXd given_start(const FitProblem& problem, const std::map<std::strin
   return values;
 }
 
-/// The whole way from the ranges, or from a given start, to the optimum.
-/// `candidates` are what the search found on the way.
-RefineResult identify(const FitInput& input, const FitProblem& problem, const FitOptions& options,
-                      const ProgressCallback& progress, FitReport& report,
-                      std::vector<Candidate>& candidates) {
-  const FitProblem coarse_problem =
-      make_problem(input, options, coarse(problem, options, problem.cloth.mesh.columns),
-                   coarse(problem, options, problem.cloth.mesh.rows));
+/// From the ranges to the optimum. `candidates` are what the search found on the way.
+RefineResult search_and_refine(const FitProblem& coarse_problem, const FitProblem& problem,
+                               const FitOptions& options, const ProgressCallback& progress,
+                               FitReport& report, std::vector<Candidate>& candidates) {
   Eigen::VectorXd start = problem.space.start();
-  if (options.start) {
-    start = given_start(problem, *options.start);
-    return refine_on(coarse_problem, problem, options, start, kGivenShares, progress, report);
-  }
   if (problem.start == StartKind::unknown) {
     // A search needs to know where the cloth begins: from the middle of the ranges, over the first
     // frames, which say more of the start than of the fabric.
@@ -335,7 +366,7 @@ RefineResult identify(const FitInput& input, const FitProblem& problem, const Fi
   }
   const int frames = horizon_frames(coarse_problem, kSearchShare);
   const TrajectoryObjective objective(coarse_problem, frames,
-                                      search_time_step_s(coarse_problem, options, frames));
+                                      search_time_steps(coarse_problem, options, frames));
   const SearchedParameters found = search(objective, options, start, progress, report);
   if (found.optima.empty() || found.cancelled) {
     RefineResult none;
@@ -347,6 +378,28 @@ RefineResult identify(const FitInput& input, const FitProblem& problem, const Fi
       pick_best(objective, options, found.optima, progress, report, candidates);
   if (best.cancelled) return best;
   return refine_on(coarse_problem, problem, options, best.values, kHorizonShares, progress, report);
+}
+
+/// The whole way to the optimum: from a given start, and from the ranges where there is none or
+/// where it does not lead to an optimum.
+RefineResult identify(const FitInput& input, const FitProblem& problem, const FitOptions& options,
+                      const ProgressCallback& progress, FitReport& report,
+                      std::vector<Candidate>& candidates) {
+  const FitProblem coarse_problem =
+      make_problem(input, options, coarse(problem, options, problem.cloth.mesh.columns),
+                   coarse(problem, options, problem.cloth.mesh.rows));
+  RefineResult from_start;
+  if (options.start) {
+    const Eigen::VectorXd start = given_start(problem, *options.start);
+    from_start = refine_on(coarse_problem, problem, options, start, kGivenShares, progress, report);
+    if (from_start.cancelled || (from_start.usable && from_start.converged)) return from_start;
+    report.stages.push_back("the given start leads to no optimum");
+  }
+  RefineResult found =
+      search_and_refine(coarse_problem, problem, options, progress, report, candidates);
+  const bool better =
+      found.cancelled || !from_start.usable || (found.usable && found.cost < from_start.cost);
+  return better ? found : from_start;
 }
 
 ParameterEstimate estimate(const FitParameter& parameter, const std::string& name, double value,
@@ -538,7 +591,7 @@ void FitOptions::validate() const {
   require(population >= 4 && population <= 100000, "population", "4 to 100000 individuals");
   require(generations >= 1, "generations", "at least 1");
   require(refine_best >= 1, "refine-best", "at least 1");
-  require(!std::isnan(stop_cost), "stop-cost", "a mean error in sigmas");
+  require(!stop_cost || !std::isnan(*stop_cost), "stop-cost", "a mean error in sigmas");
   require(!resume || !checkpoint.empty(), "resume", "a --checkpoint to go on from");
   require(checkpoint.empty() || (!start && !forecast), "checkpoint",
           "a fit that searches: without --start and --forecast");
@@ -571,6 +624,9 @@ FitReport fit(const FitInput& input, const FitOptions& options, const ProgressCa
   result.observations_rejected = problem.rejected;
 
   Eigen::VectorXd values = problem.space.start();
+  const auto steps_at = [&](const Eigen::VectorXd& at) {
+    return time_steps_of_run(problem.cloth, parameter_set(problem, at), result.time_step_s);
+  };
   Uncertainty uncertainty;
   if (!options.forecast) {
     std::vector<Candidate> candidates;
@@ -582,7 +638,7 @@ FitReport fit(const FitInput& input, const FitOptions& options, const ProgressCa
     result.time_step_s = refined.time_step_s;
     report.stop = refined.converged ? FitStop::converged : FitStop::reached_limit;
     report.message = refined.message;
-    const TrajectoryObjective objective(problem, problem.first_held_out, result.time_step_s);
+    const TrajectoryObjective objective(problem, problem.first_held_out, steps_at(values));
     uncertainty =
         estimate_uncertainty(objective, values, options.loss, refined.residual_by_coordinate);
     if (!uncertainty.usable)
@@ -607,7 +663,7 @@ FitReport fit(const FitInput& input, const FitOptions& options, const ProgressCa
     report.stages.push_back("forecast: nothing fitted");
   }
 
-  const auto trajectories = run_model(problem, {values}, problem.frames(), result.time_step_s);
+  const auto trajectories = run_model(problem, {values}, problem.frames(), steps_at(values));
   if (trajectories.front().empty())
     return stopped(std::move(report), FitStop::diverged,
                    "the model diverged when it was run on through all frames");

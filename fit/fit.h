@@ -2,7 +2,6 @@
 
 #include <Eigen/Core>
 #include <filesystem>
-#include <limits>
 #include <map>
 #include <optional>
 #include <string>
@@ -47,12 +46,13 @@ struct FitOptions {
   int population = 100;  ///< individuals of the evolutionary search [louchet1995]
   int generations = 40;  ///< at most; the search stops earlier when it no longer gains
   int refine_best = 3;   ///< individuals, or optima of CMA-ES, that go to refinement
-  /// The search ends once its best cost, the mean error over its window in sigmas, is this low.
-  double stop_cost = -std::numeric_limits<double>::infinity();
+  /// The search ends once its best cost, the mean error over its window in sigmas, is this low; not
+  /// given: once the model follows the cloth (fit/observed_motion.h).
+  std::optional<double> stop_cost;
   std::filesystem::path checkpoint;  ///< the search's state after each generation; empty: not saved
   bool resume = false;               ///< go on from `checkpoint`, to the same bits
-  /// Values of parameters by name, from an earlier fit: there is no search, and what has none
-  /// starts where it would.
+  /// Values of parameters by name, from an earlier fit: there is a search only if they lead to no
+  /// optimum, and what has none starts where it would.
   std::optional<std::map<std::string, double>> start;
   Loss loss = Loss::huber;
   int start_nodes = 6;       ///< per side, of the corrections of a start that is unknown

@@ -31,7 +31,7 @@ Recovery recover(const FitProblem& problem, const RecordedStates& states,
   const StateObjective objective(problem, states, transitions, time_step_s);
   const std::vector<SearchParameter> ranges = search_ranges(problem);
   const GenerationCost cost = sum_of_squares(objective);
-  const auto in_small_units = [&](double) {
+  const auto in_small_units = [&](const TimeSteps&) {
     return std::make_unique<StateObjective>(problem, states, transitions, time_step_s,
                                             kRefinementUnit_m);
   };

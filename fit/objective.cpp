@@ -19,7 +19,7 @@ void Objective::add_block(Block block) {
 
 bool Objective::is_stable(const Eigen::VectorXd& values) const {
   return !needs_stable_step() ||
-         stable_time_step_s(problem_.cloth, parameter_set(problem_, values)) >= time_step_s_;
+         clothfit::is_stable(problem_, parameter_set(problem_, values), steps_);
 }
 
 Linearisation Objective::linearise(const Eigen::VectorXd& values, Derivatives derivatives,
@@ -66,8 +66,9 @@ double Objective::mean_length(const Eigen::VectorXd& residual) const {
   return sum / static_cast<double>(blocks_.size());
 }
 
-TrajectoryObjective::TrajectoryObjective(const FitProblem& problem, int frames, double time_step_s)
-    : Objective(problem, time_step_s), frames_(frames) {
+TrajectoryObjective::TrajectoryObjective(const FitProblem& problem, int frames,
+                                         const TimeSteps& steps)
+    : Objective(problem, steps), frames_(frames) {
   assert(frames >= 1 && frames <= problem.frames());
   for (size_t s = 0; s < problem.observations.size(); ++s) {
     const ObservationSet& set = problem.observations[s];
@@ -95,7 +96,7 @@ double TrajectoryObjective::spring_steps_per_run() const {
 
 std::vector<Eigen::VectorXd> TrajectoryObjective::residuals(
     const std::vector<Eigen::VectorXd>& values) const {
-  const auto trajectories = run_model(problem(), values, frames_, time_step_s());
+  const auto trajectories = run_model(problem(), values, frames_, steps());
   std::vector<Eigen::VectorXd> results(values.size());
   for (size_t n = 0; n < values.size(); ++n) {
     if (trajectories[n].empty()) continue;
@@ -126,7 +127,7 @@ Linearisation TrajectoryObjective::linearise(const Eigen::VectorXd& values) cons
   std::vector<Direction> along = directions(of, values);
   if (of.start == StartKind::at_rest)
     start_at_rest_with_tangents(of.cloth, set, along, of.gravity_m_per_s2.norm(),
-                                of.frame_time_s.front(), time_step_s());
+                                of.frame_time_s.front(), steps().rest_s);
   const Schedule schedule{
       .frame_time_s = {of.frame_time_s.begin(), of.frame_time_s.begin() + frames_},
       .time_step_s = time_step_s()};
@@ -162,10 +163,11 @@ Linearisation TrajectoryObjective::linearise(const Eigen::VectorXd& values) cons
 
 CoarselyDifferentiated::CoarselyDifferentiated(const FitProblem& problem,
                                                const FitProblem& coarse_problem, int frames,
-                                               double time_step_s, double coarse_time_step_s)
-    : Objective(problem, time_step_s),
-      fine_(problem, frames, time_step_s),
-      coarse_(coarse_problem, frames, coarse_time_step_s) {
+                                               const TimeSteps& steps,
+                                               const TimeSteps& coarse_steps)
+    : Objective(problem, steps),
+      fine_(problem, frames, steps),
+      coarse_(coarse_problem, frames, coarse_steps) {
   assert(problem.space.size() == coarse_problem.space.size());
   assert(fine_.residual_count() == coarse_.residual_count());
   for (const Block& block : fine_.blocks()) add_block(block);

@@ -27,8 +27,8 @@ enum class Derivatives {
 /// A cost of a fit: half the sum of squares (or a robust sum) of whitened residuals, which are a
 /// function of the parameters. Its parts are blocks, one for each thing observed.
 ///
-/// Every cost has one time step for all parameter vectors: a cost that cut time anew for each of
-/// them would jump.
+/// Every cost has the same time steps for all parameter vectors: a cost that cut time anew for each
+/// of them would jump.
 class Objective {
  public:
   virtual ~Objective() = default;
@@ -44,7 +44,8 @@ class Objective {
   };
   const std::vector<Block>& blocks() const { return blocks_; }
   int residual_count() const { return residual_count_; }
-  double time_step_s() const { return time_step_s_; }
+  const TimeSteps& steps() const { return steps_; }
+  double time_step_s() const { return steps_.run_s; }
   const FitProblem& problem() const { return problem_; }
   virtual std::string name() const = 0;  ///< for a person
 
@@ -82,18 +83,17 @@ class Objective {
 
  protected:
   /// `problem` must outlive the objective.
-  Objective(const FitProblem& problem, double time_step_s)
-      : problem_(problem), time_step_s_(time_step_s) {}
+  Objective(const FitProblem& problem, const TimeSteps& steps) : problem_(problem), steps_(steps) {}
   Objective(const Objective&) = default;
 
   /// Adds a block behind those there are; its offset is filled in.
   void add_block(Block block);
-  /// Whether the scheme is stable for these values at the objective's time step.
+  /// Whether the scheme is stable for these values at the objective's time steps.
   bool is_stable(const Eigen::VectorXd& values) const;
 
  private:
   const FitProblem& problem_;
-  double time_step_s_;
+  TimeSteps steps_;
   std::vector<Block> blocks_;
   int residual_count_ = 0;
 };
@@ -102,7 +102,7 @@ class Objective {
 /// `frames` frames, each coordinate divided by its sigma.
 class TrajectoryObjective final : public Objective {
  public:
-  TrajectoryObjective(const FitProblem& problem, int frames, double time_step_s);
+  TrajectoryObjective(const FitProblem& problem, int frames, const TimeSteps& steps);
 
   int frames() const { return frames_; }
   std::string name() const override;
@@ -123,7 +123,7 @@ class CoarselyDifferentiated final : public Objective {
  public:
   /// Both problems have the same parameters and observations. Each takes a time step of its own.
   CoarselyDifferentiated(const FitProblem& problem, const FitProblem& coarse_problem, int frames,
-                         double time_step_s, double coarse_time_step_s);
+                         const TimeSteps& steps, const TimeSteps& coarse_steps);
 
   std::string name() const override { return fine_.name(); }
   bool has_cheap_derivatives() const override { return true; }

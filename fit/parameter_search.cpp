@@ -9,6 +9,7 @@
 #include "fit/checksum.h"
 #include "fit/cma_es.h"
 #include "fit/evolutionary_strategy.h"
+#include "fit/observed_motion.h"
 #include "fit/search_checkpoint.h"
 
 namespace clothfit {
@@ -94,11 +95,11 @@ class Distinct {
 
 SearchedParameters search_by_strategy(const SearchSpace& space, const FitOptions& options,
                                       const std::string& problem, const ParameterSpace& parameters,
-                                      const GenerationCost& cost,
+                                      const GenerationCost& cost, double stop_cost,
                                       const ProgressCallback& progress) {
   const EvolutionOptions evolution{.population = options.population,
                                    .generations = options.generations,
-                                   .cost_below = options.stop_cost,
+                                   .cost_below = stop_cost,
                                    .gain_window = 15,
                                    .least_gain = 1e-2,
                                    .seed = options.seed};
@@ -133,12 +134,12 @@ SearchedParameters search_by_strategy(const SearchSpace& space, const FitOptions
 
 SearchedParameters search_by_restarts(const SearchSpace& space, const FitOptions& options,
                                       const std::string& problem, const ParameterSpace& parameters,
-                                      const GenerationCost& cost,
+                                      const GenerationCost& cost, double stop_cost,
                                       const ProgressCallback& progress) {
   // A generation fills the lanes; a run need not end closer than refinement takes over.
   const CmaOptions cma{.population = 16,
                        .most_evaluations = search_simulations(options),
-                       .cost_below = options.stop_cost,
+                       .cost_below = stop_cost,
                        .cost_tolerance = 1e-3,
                        .step_tolerance = 1e-2,
                        .seed = options.seed};
@@ -193,9 +194,10 @@ SearchedParameters search_parameters(const Objective& objective, const FitOption
   };
   const std::string problem =
       options.checkpoint.empty() ? std::string() : problem_line(objective, start);
+  const double stop_cost = options.stop_cost.value_or(cost_of_following(objective));
   return options.search == SearchMethod::cma
-             ? search_by_restarts(space, options, problem, parameters, cost, progress)
-             : search_by_strategy(space, options, problem, parameters, cost, progress);
+             ? search_by_restarts(space, options, problem, parameters, cost, stop_cost, progress)
+             : search_by_strategy(space, options, problem, parameters, cost, stop_cost, progress);
 }
 
 }  // namespace clothfit

@@ -491,14 +491,20 @@ std::vector<Direction> directions(const FitProblem& problem, const Eigen::Vector
   return result;
 }
 
+bool is_stable(const FitProblem& problem, const ParameterSet& set, const TimeSteps& steps) {
+  const bool rests = problem.start == StartKind::at_rest;
+  return stable_time_step_s(problem.cloth, set) >= steps.run_s &&
+         (!rests || stable_rest_step_s(problem.cloth, set) >= steps.rest_s);
+}
+
 std::vector<std::vector<Eigen::Matrix3Xd>> run_model(const FitProblem& problem,
                                                      const std::vector<Eigen::VectorXd>& values,
-                                                     int frames, double time_step_s) {
+                                                     int frames, const TimeSteps& steps) {
   std::vector<ParameterSet> sets;
   std::vector<size_t> owner;
   for (size_t n = 0; n < values.size(); ++n) {
     ParameterSet set = parameter_set(problem, values[n]);
-    if (stable_time_step_s(problem.cloth, set) < time_step_s) continue;
+    if (!is_stable(problem, set, steps)) continue;
     sets.push_back(std::move(set));
     owner.push_back(n);
   }
@@ -506,10 +512,10 @@ std::vector<std::vector<Eigen::Matrix3Xd>> run_model(const FitProblem& problem,
   if (sets.empty()) return trajectories;
   if (problem.start == StartKind::at_rest)
     start_at_rest(problem.cloth, sets, problem.gravity_m_per_s2.norm(),
-                  problem.frame_time_s.front(), time_step_s);
+                  problem.frame_time_s.front(), steps.rest_s);
   const Schedule schedule{
       .frame_time_s = {problem.frame_time_s.begin(), problem.frame_time_s.begin() + frames},
-      .time_step_s = time_step_s};
+      .time_step_s = steps.run_s};
   std::vector<SimulateResult> results = simulate(problem.cloth, sets, schedule);
   for (size_t n = 0; n < results.size(); ++n)
     if (results[n].usable()) trajectories[owner[n]] = std::move(results[n].position_m);

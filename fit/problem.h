@@ -11,6 +11,7 @@
 #include "fit/start_state.h"
 #include "model/cloth.h"
 #include "model/fabric.h"
+#include "model/relax.h"
 #include "model/spring_set.h"
 #include "model/surface.h"
 #include "model/tangent_step.h"
@@ -61,10 +62,13 @@ ParameterSet parameter_set(const FitProblem& problem, const Eigen::VectorXd& val
 /// derivatives of what parameter_set() returns.
 std::vector<Direction> directions(const FitProblem& problem, const Eigen::VectorXd& values);
 
+/// Whether a run of the model, and the relaxation of a start at rest, are stable at these steps.
+bool is_stable(const FitProblem& problem, const ParameterSet& set, const TimeSteps& steps);
+
 /// Simulated mesh positions in frames [0, frames) for each parameter vector; empty where the run
-/// diverged or the time step would not be stable. A start at rest is relaxed first.
+/// diverged or the time steps would not be stable. A start at rest is relaxed first.
 std::vector<std::vector<Eigen::Matrix3Xd>> run_model(const FitProblem& problem,
                                                      const std::vector<Eigen::VectorXd>& values,
-                                                     int frames, double time_step_s);
+                                                     int frames, const TimeSteps& steps);
 
 }  // namespace clothfit

@@ -12,6 +12,9 @@
 namespace clothfit {
 namespace {
 
+/// An optimum whose stable time step is not this much above the one taken leans on it.
+constexpr double kRoom = 1.05;
+
 constexpr const char* kOutOfWork = "not converged at the limit of work";
 
 /// The ranges in coordinates.
@@ -37,10 +40,13 @@ struct Box {
 /// simulated once for all blocks.
 class SharedEvaluation final : public ceres::EvaluationCallback {
  public:
-  SharedEvaluation(const Objective& objective, const RefineOptions& options, const Box& box,
-                   double huber_threshold, const Eigen::VectorXd& coordinates)
-      : problem_(objective.problem()),
+  SharedEvaluation(const ObjectiveMaker& make_objective, std::unique_ptr<Objective>& objective,
+                   const RefineOptions& options, const Box& box, double huber_threshold,
+                   const Eigen::VectorXd& coordinates)
+      : problem_(objective->problem()),
+        make_objective_(make_objective),
         objective_(objective),
+        coarsest_(objective->steps()),
         options_(options),
         box_(box),
         huber_threshold_(huber_threshold),
@@ -55,32 +61,90 @@ class SharedEvaluation final : public ceres::EvaluationCallback {
     if (!is_new && (has_jacobian_ || !evaluate_jacobians)) return;
     evaluated_ = coordinates_;
     const Eigen::VectorXd values = problem_.space.values(coordinates_);
+    cut_time_for(values);
     has_jacobian_ = evaluate_jacobians || options_.derivatives != Derivatives::tangents ||
-                    objective_.has_cheap_derivatives();
-    if (has_jacobian_) {
-      now_ = objective_.linearise(values, options_.derivatives, options_.difference_step);
-      if (now_.usable) hold_at_bounds();
-      linearised_at_ = coordinates_;
-    } else {
-      now_.runs = 1;
-      now_.residual = objective_.residuals({values}).front();
-      now_.usable = now_.residual.size() == objective_.residual_count();
+                    objective_->has_cheap_derivatives();
+    if (has_jacobian_ && serves_on(values)) {
+      has_derivatives_for_ = coordinates_;
+      hold_at_bounds();
+      return;
     }
-    simulations_ += now_.runs;
+    if (has_jacobian_) {
+      now_ = objective_->linearise(values, options_.derivatives, options_.difference_step);
+      linearised_at_ = has_derivatives_for_ = coordinates_;
+      residual_there_ = now_.residual;
+      updates_ = 0;
+      if (now_.usable) hold_at_bounds();
+    } else {
+      run(values);
+    }
+    if (has_jacobian_) simulations_ += now_.runs;
   }
 
   const Linearisation& now() const { return now_; }
   /// Coordinates that are held at a bound.
   bool is_held(int p) const { return held_[static_cast<size_t>(p)]; }
   int simulations() const { return simulations_; }
-  /// The last derivatives, where they belong to `coordinates`.
+  /// Whether the last derivatives were updated.
+  bool are_updated() const { return updates_ > 0; }
+  /// Whether the last derivatives are those that belong to `coordinates`, or were kept for them.
   bool is_linearised_at(const Eigen::VectorXd& coordinates) const {
-    return now_.usable && linearised_at_.size() == coordinates.size() &&
-           linearised_at_ == coordinates;
+    return now_.usable && has_derivatives_for_.size() == coordinates.size() &&
+           has_derivatives_for_ == coordinates;
   }
-  double spring_steps() const { return simulations_ * objective_.spring_steps_per_run(); }
+  double spring_steps() const { return simulations_ * objective_->spring_steps_per_run(); }
 
  private:
+  /// Makes the objective anew with finer time steps where a trial asks for them: the jump of the
+  /// cost is small beside what such a trial changes, and to refuse it would hold back all other
+  /// coordinates for many steps. A trial that asks for far finer ones is refused.
+  void cut_time_for(const Eigen::VectorXd& values) {
+    constexpr double kFinest = 1.0 / 2;
+    if (!objective_->needs_stable_step()) return;
+    const ParameterSet set = parameter_set(problem_, values);
+    const TimeSteps now = objective_->steps();
+    if (is_stable(problem_, set, now)) return;
+    const TimeSteps safe =
+        stable_time_steps(problem_.cloth, set).times(1 / options_.stability_margin);
+    const TimeSteps finer{std::min(now.run_s, safe.run_s), std::min(now.rest_s, safe.rest_s)};
+    if (finer.run_s < kFinest * coarsest_.run_s || finer.rest_s < kFinest * coarsest_.rest_s)
+      return;
+    objective_ = make_objective_(finer);
+  }
+
+  void run(const Eigen::VectorXd& values) {
+    now_.residual = objective_->residuals({values}).front();
+    now_.usable = now_.residual.size() == objective_->residual_count();
+    ++simulations_;
+    ran_at_ = coordinates_;
+  }
+
+  /// Whether derivatives that were had elsewhere, as they are or updated, do for this point (see
+  /// RefineOptions::kept_within). The residuals are this point's then.
+  bool serves_on(const Eigen::VectorXd& values) {
+    constexpr int kMostUpdates = 8;
+    const bool dear =
+        options_.derivatives == Derivatives::tangents && !objective_->has_cheap_derivatives();
+    if (!dear || !now_.usable || linearised_at_.size() != coordinates_.size()) return false;
+    if (ran_at_.size() != coordinates_.size() || ran_at_ != coordinates_) run(values);
+    if (!now_.usable) return false;
+    Eigen::MatrixXd& jacobian = now_.residual_by_coordinate;
+    const Eigen::VectorXd way = coordinates_ - linearised_at_;
+    const Eigen::VectorXd change = jacobian * way;
+    const Eigen::VectorXd missed = now_.residual - residual_there_ - change;
+    if (missed.norm() <= options_.kept_within * change.norm()) return true;
+    if (updates_ == kMostUpdates || missed.norm() > options_.updated_within * change.norm())
+      return false;
+    // The smallest change of the Jacobian that would have foretold it, coordinates weighed by what
+    // they change.
+    const Eigen::VectorXd weighed = jacobian.colwise().squaredNorm().transpose().cwiseProduct(way);
+    jacobian += missed * weighed.transpose() / way.dot(weighed);
+    linearised_at_ = coordinates_;
+    residual_there_ = now_.residual;
+    ++updates_;
+    return true;
+  }
+
   /// Ceres clips its steps to the bounds, but computes them as if there were none: where one
   /// coordinate is clipped the others get what would have gone with its full step. So a coordinate
   /// at a bound that blocks it takes no part.
@@ -88,7 +152,7 @@ class SharedEvaluation final : public ceres::EvaluationCallback {
     const Eigen::VectorXd values = problem_.space.values(coordinates_);
     const Eigen::VectorXd slope = problem_.space.value_by_coordinate(values);
     Eigen::VectorXd gradient = Eigen::VectorXd::Zero(coordinates_.size());
-    for (const Objective::Block& block : objective_.blocks()) {
+    for (const Objective::Block& block : objective_->blocks()) {
       const auto r = now_.residual.segment(block.offset, block.dimension);
       const double weight = std::min(1.0, huber_threshold_ / std::max(r.norm(), 1e-300));
       gradient +=
@@ -108,12 +172,16 @@ class SharedEvaluation final : public ceres::EvaluationCallback {
   }
 
   const FitProblem& problem_;
-  const Objective& objective_;
+  const ObjectiveMaker& make_objective_;
+  std::unique_ptr<Objective>& objective_;
+  TimeSteps coarsest_;  ///< that the round began with
   const RefineOptions& options_;
   const Box& box_;
   double huber_threshold_;
   const Eigen::VectorXd& coordinates_;
-  Eigen::VectorXd evaluated_, linearised_at_;
+  Eigen::VectorXd evaluated_, ran_at_, linearised_at_, has_derivatives_for_;
+  Eigen::VectorXd residual_there_;  ///< where it was linearised
+  int updates_ = 0;                 ///< of the Jacobian since then
   Linearisation now_;
   bool has_jacobian_ = false;
   std::vector<bool> held_;
@@ -229,18 +297,22 @@ struct Round {
   ceres::Solver::Summary summary;
   Eigen::VectorXd values;
   Eigen::MatrixXd residual_by_coordinate;  ///< there; empty where it was not had exactly
+  bool derivatives_updated = false;
   int simulations = 0;
 };
 
-Round solve(const Objective& objective, const Eigen::VectorXd& start, double huber_threshold,
+/// `objective` may be cut finer in time on the way.
+Round solve(const ObjectiveMaker& make_objective, std::unique_ptr<Objective>& objective,
+            const Eigen::VectorXd& start, double huber_threshold,
             const RefineOptions& refine_options, double most_spring_steps,
             const ProgressCallback& progress) {
-  const FitProblem& problem = objective.problem();
+  const FitProblem& problem = objective->problem();
   const ParameterSpace& space = problem.space;
   Eigen::VectorXd coordinates = space.coordinates(start);
   const Box box(space);
   coordinates = coordinates.cwiseMax(box.lower).cwiseMin(box.upper);
-  SharedEvaluation shared(objective, refine_options, box, huber_threshold, coordinates);
+  SharedEvaluation shared(make_objective, objective, refine_options, box, huber_threshold,
+                          coordinates);
 
   ceres::Problem::Options problem_options;
   problem_options.evaluation_callback = &shared;
@@ -250,7 +322,7 @@ Round solve(const Objective& objective, const Eigen::VectorXd& start, double hub
   ceres::LossFunction* const loss = refine_options.loss == Loss::huber ? &huber : nullptr;
   double* const block = coordinates.data();
   least_squares.AddParameterBlock(block, space.size());
-  for (const Objective::Block& rows : objective.blocks())
+  for (const Objective::Block& rows : objective->blocks())
     least_squares.AddResidualBlock(new ObservationCost(shared, rows, space.size()), loss, block);
   for (const GaussianPrior& prior : problem.priors)
     least_squares.AddResidualBlock(new PriorCost(shared, space, prior), nullptr, block);
@@ -270,7 +342,7 @@ Round solve(const Objective& objective, const Eigen::VectorXd& start, double hub
   // along the bounds would first try the old one up to twenty times, a linearisation each.
   options.max_num_line_search_step_size_iterations = 0;
   Reporter reporter(progress,
-                    {.stage = "refining " + objective.name(),
+                    {.stage = "refining " + objective->name(),
                      .done = 0,
                      .total = static_cast<double>(refine_options.iterations),
                      .unit = "iterations",
@@ -282,8 +354,9 @@ Round solve(const Objective& objective, const Eigen::VectorXd& start, double hub
   round.values = space.values(coordinates);
   round.simulations = shared.simulations();
   const bool exact =
-      refine_options.derivatives == Derivatives::tangents && !objective.has_cheap_derivatives();
-  if (exact && shared.is_linearised_at(coordinates))
+      refine_options.derivatives == Derivatives::tangents && !objective->has_cheap_derivatives();
+  round.derivatives_updated = exact && shared.are_updated();
+  if (exact && !round.derivatives_updated && shared.is_linearised_at(coordinates))
     round.residual_by_coordinate = shared.now().residual_by_coordinate;
   return round;
 }
@@ -304,13 +377,13 @@ RefineResult refine(const FitProblem& problem, const ObjectiveMaker& make_object
   RefineResult result;
   result.values = start;
   double spring_steps_left = options.most_spring_steps;
-  const auto stable_s = [&] {
-    return stable_time_step_s(problem.cloth, parameter_set(problem, result.values));
+  const auto stable = [&] {
+    return stable_time_steps(problem.cloth, parameter_set(problem, result.values));
   };
   for (int n = 0; n < options.rounds; ++n) {
     result.converged = false;
-    const std::unique_ptr<Objective> objective =
-        make_objective(stable_s() / (options.stability_margin * options.substep_scale));
+    std::unique_ptr<Objective> objective =
+        make_objective(stable().times(1 / (options.stability_margin * options.substep_scale)));
     result.time_step_s = objective->time_step_s();
     const Eigen::VectorXd before = objective->residuals({result.values}).front();
     ++result.simulations;
@@ -322,9 +395,10 @@ RefineResult refine(const FitProblem& problem, const ObjectiveMaker& make_object
     const double huber_threshold = options.loss == Loss::huber
                                        ? kHuberScales * result.robust_scale
                                        : std::numeric_limits<double>::infinity();
-    Round round =
-        solve(*objective, result.values, huber_threshold, options, spring_steps_left, progress);
+    Round round = solve(make_objective, objective, result.values, huber_threshold, options,
+                        spring_steps_left, progress);
     result.simulations += round.simulations;
+    result.time_step_s = objective->time_step_s();
     spring_steps_left -= round.simulations * objective->spring_steps_per_run();
     result.solver_iterations += static_cast<int>(round.summary.iterations.size());
     result.message = ending(round.summary);
@@ -343,14 +417,20 @@ RefineResult refine(const FitProblem& problem, const ObjectiveMaker& make_object
     result.cost = round.summary.final_cost / objective->residual_count();
     const bool settled = round.summary.termination_type == ceres::CONVERGENCE;
     // Done when neither the step limit nor the loss's scale had a say in where the round ended.
-    const bool has_room = !objective->needs_stable_step() || stable_s() > 1.05 * result.time_step_s;
+    const TimeSteps largest = stable(), taken = objective->steps();
+    const bool rests = problem.start == StartKind::at_rest;
+    const bool has_room =
+        !objective->needs_stable_step() ||
+        (largest.run_s > kRoom * taken.run_s && (!rests || largest.rest_s > kRoom * taken.rest_s));
     bool same_scale = true;
     if (options.loss == Loss::huber) {
       const Eigen::VectorXd after = objective->residuals({result.values}).front();
       const double scale_now = after.size() > 0 ? robust_scale(after) : result.robust_scale;
       same_scale = scale_now > 0.8 * result.robust_scale;
     }
-    result.converged = has_room && settled && (same_scale || moved < 1e-3);
+    result.converged = has_room && settled &&
+                       !(options.exact_in_the_end && round.derivatives_updated) &&
+                       (same_scale || moved < 1e-3);
     if (result.converged) break;
     if (spring_steps_left <= 0) {
       result.message = kOutOfWork;
@@ -365,8 +445,8 @@ RefineResult refine(const FitProblem& problem, int frames, const Eigen::VectorXd
                     const RefineOptions& options, const ProgressCallback& progress) {
   return refine(
       problem,
-      [&](double time_step_s) {
-        return std::make_unique<TrajectoryObjective>(problem, frames, time_step_s);
+      [&](const TimeSteps& steps) {
+        return std::make_unique<TrajectoryObjective>(problem, frames, steps);
       },
       start, options, progress);
 }

@@ -208,7 +208,8 @@ ParameterSet started(const Simulation& simulation, double time_step_s) {
   ParameterSet set = simulation.parameters;
   if (simulation.start == StartKind::at_rest)
     start_at_rest(simulation.cloth, {&set, 1}, set.gravity_m_per_s2.norm(),
-                  simulation.frame_time_s.front(), time_step_s);
+                  simulation.frame_time_s.front(),
+                  time_steps_of_run(simulation.cloth, set, time_step_s).rest_s);
   return set;
 }
 

@@ -79,7 +79,7 @@ Uncertainty estimate_uncertainty(const TrajectoryObjective& objective,
                                                : std::numeric_limits<double>::infinity();
   Eigen::MatrixXd information = Eigen::MatrixXd::Zero(parameters, parameters);
   std::map<std::pair<int, int>, Eigen::VectorXd> gradient_of_marker;
-  const TrajectoryObjective half(problem, objective.frames(), 0.5 * objective.time_step_s());
+  const TrajectoryObjective half(problem, objective.frames(), objective.steps().times(0.5));
   const Eigen::VectorXd half_step_residual = half.residuals({values}).front();
   if (half_step_residual.size() != residual.size()) return result;
   Eigen::VectorXd step_gradient = Eigen::VectorXd::Zero(parameters);

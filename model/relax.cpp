@@ -3,21 +3,36 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
-#include "model/effects/viscous_damping.h"
 #include "model/lane_groups.h"
+#include "model/stability.h"
 #include "model/step.h"
 
 namespace clothfit {
 namespace {
 
-/// A cloth in heavy air: that of `cloth`, its own effects but those that shift supports (they shift
-/// in time, and time stands still here), and a viscous damping on top.
+/// The retardation time of springs while they relax, as a share of the time step: it calms motions
+/// that are as fast as the step can follow, and costs a tenth of the step. Slower ones the air
+/// calms.
+constexpr double kRetardationShare = 0.125;
+
+std::array<double, kSpringTypes> calm(const std::array<double, kSpringTypes>& stiffness_n_per_m,
+                                      double time_step_s) {
+  std::array<double, kSpringTypes> damping_ns_per_m{};
+  for (size_t type = 0; type < kSpringTypes; ++type)
+    damping_ns_per_m[type] = kRetardationShare * time_step_s * stiffness_n_per_m[type];
+  return damping_ns_per_m;
+}
+
+/// A cloth with calm springs in heavy air: that of `cloth`, its own effects but those that shift
+/// supports (they shift in time, and time stands still here). The air takes a share of all
+/// velocities before each step.
 struct HeavyAir {
   Cloth cloth;
   std::vector<size_t> kept;  ///< effects of the cloth, in the order they have here
-  double damping_per_s = 0;
+  double slowing = 1;        ///< what the air leaves of a velocity in a step
   double time_step_s = 0;
   int steps = 0;
 
@@ -26,10 +41,10 @@ struct HeavyAir {
     constexpr double kPendulumTimes = 7;  // (1 + 7) exp(-7) is left of the distance: 0.7 %
     const double pendulum_rate =
         std::sqrt(std::max(pendulum_gravity_m_per_s2, 1e-3) / light.mesh.height_m);
-    damping_per_s = 2 * pendulum_rate;
     const double duration_s = kPendulumTimes / pendulum_rate;
     steps = std::max(1, static_cast<int>(std::ceil(duration_s / longest_step_s)));
     time_step_s = duration_s / steps;
+    slowing = std::exp(-2 * pendulum_rate * time_step_s);
 
     cloth.effects.clear();
     cloth.effect_descriptions.clear();
@@ -39,14 +54,12 @@ struct HeavyAir {
       cloth.effects.push_back(light.effects[e]);
       cloth.effect_descriptions.push_back(light.effect_descriptions[e]);
     }
-    cloth.effect_descriptions.push_back(viscous_damping::describe());
-    cloth.effects.push_back(viscous_damping::make());
   }
 
   ParameterSet in_it(ParameterSet set) const {
+    set.springs.damping_ns_per_m = calm(set.springs.stiffness_n_per_m, time_step_s);
     std::vector<std::vector<double>> effects;
     for (const size_t e : kept) effects.push_back(std::move(set.effects[e]));
-    effects.push_back({damping_per_s});
     set.effects = std::move(effects);
     set.start_effect_memory.clear();
     set.start_velocity_m_per_s.resize(3, 0);
@@ -54,10 +67,10 @@ struct HeavyAir {
   }
 
   Direction in_it(Direction direction) const {
+    direction.damping_ns_per_m = calm(direction.stiffness_n_per_m, time_step_s);
     if (!direction.effects.empty()) {
       std::vector<std::vector<double>> effects;
       for (const size_t e : kept) effects.push_back(std::move(direction.effects[e]));
-      effects.push_back({0});
       direction.effects = std::move(effects);
     }
     direction.start_effect_memory.clear();
@@ -88,6 +101,14 @@ std::vector<Eigen::VectorXd> memory_of(const Cloth& cloth, const HeavyAir& heavy
 }
 
 template <class L>
+void slow(double share, LaneVectors<L>& velocity_m_per_s) {
+  const auto factor = static_cast<typename L::Number>(share);
+  velocity_m_per_s.x *= factor;
+  velocity_m_per_s.y *= factor;
+  velocity_m_per_s.z *= factor;
+}
+
+template <class L>
 void settle(const HeavyAir& heavy, double time_s, std::span<const ParameterSet> group,
             LaneState<L>& state) {
   for (int l = 0; l < L::kCount; ++l)
@@ -111,6 +132,7 @@ void settle(const HeavyAir& heavy, double time_s, std::span<const ParameterSet> 
         place(target_m.z, from_m.z, there.z());
       }
     }
+    slow(heavy.slowing, state.velocity_m_per_s);
     stepper.step(parameters, target_m, time_s, heavy.time_step_s, state);
   }
 }
@@ -144,11 +166,30 @@ void settle(const HeavyAir& heavy, double time_s, const ParameterSet& set,
         place(target_m.tangent.z, from_m.tangent.z, lane, change.z());
       }
     }
+    slow(heavy.slowing, state.velocity_m_per_s.value);
+    slow(heavy.slowing, state.velocity_m_per_s.tangent);
     stepper.step(parameters, target_m, time_s, heavy.time_step_s, state);
   }
 }
 
 }  // namespace
+
+double stable_rest_step_s(const Cloth& cloth, const ParameterSet& parameters) {
+  ParameterSet set = parameters;
+  set.springs.damping_ns_per_m.fill(0);
+  const double undamped_s = stable_time_step_s(cloth, set);
+  set.springs.damping_ns_per_m = calm(set.springs.stiffness_n_per_m, undamped_s);
+  return stable_time_step_s(cloth, set);
+}
+
+TimeSteps stable_time_steps(const Cloth& cloth, const ParameterSet& parameters) {
+  return {stable_time_step_s(cloth, parameters), stable_rest_step_s(cloth, parameters)};
+}
+
+TimeSteps time_steps_of_run(const Cloth& cloth, const ParameterSet& parameters, double run_s) {
+  const TimeSteps stable = stable_time_steps(cloth, parameters);
+  return std::isfinite(stable.rest_s) ? stable.times(run_s / stable.run_s) : TimeSteps(run_s);
+}
 
 std::vector<RelaxedCloth> relax(const Cloth& cloth, std::span<const ParameterSet> parameters,
                                 double pendulum_gravity_m_per_s2, double time_s,

@@ -15,6 +15,27 @@ struct RelaxedCloth {
   std::vector<Eigen::VectorXd> effect_memory;  ///< as ParameterSet::start_effect_memory
 };
 
+/// The largest step at which relax() is stable. Springs are damped there for its own step alone, so
+/// that it is often ten times that of a run, whose dampers bound it: dampers do no work at rest.
+double stable_rest_step_s(const Cloth& cloth, const ParameterSet& parameters);
+
+/// Steps of a run that begins at rest: its own, and that of the relaxation before it.
+struct TimeSteps {
+  double run_s = 0;
+  double rest_s = 0;
+
+  /// The same for both.
+  TimeSteps(double both_s) : run_s(both_s), rest_s(both_s) {}
+  TimeSteps(double of_run_s, double of_rest_s) : run_s(of_run_s), rest_s(of_rest_s) {}
+  TimeSteps times(double factor) const { return {factor * run_s, factor * rest_s}; }
+};
+
+/// The largest at which both are stable.
+TimeSteps stable_time_steps(const Cloth& cloth, const ParameterSet& parameters);
+
+/// A run's step, and a relaxation's that is the same share of the largest stable one.
+TimeSteps time_steps_of_run(const Cloth& cloth, const ParameterSet& parameters, double run_s);
+
 /// The start positions relaxed under gravity with heavy viscous damping, from rest and without
 /// memory, held points where `motion` has them at `time_s`, and what the effects have come to
 /// remember on the way. The damping, critical for a pendulum of the cloth's height, and the fixed
