@@ -7,6 +7,7 @@
 
 #include <Eigen/QR>
 #include <cmath>
+#include <map>
 #include <random>
 
 #include "data/input_error.h"
@@ -147,52 +148,47 @@ TEST(MarkerOffsets, AreEstimatedFromTheFittedFramesAlone) {
   EXPECT_LT(narrow.norm(), 1e-2 * offset_m.norm());
 }
 
-/// Stiffness and drag of the fit from a start that is off, beside the truth.
-RefineResult refined(const FitProblem& problem) {
-  Eigen::VectorXd start = problem.space.start();
+std::map<std::string, double> true_values() {
   const Fabric truth = SyntheticCloth{}.fabric;
-  const std::pair<const char*, double> known[] = {{"tension_warp", truth.tension_warp_n_per_m},
-                                                  {"tension_weft", truth.tension_weft_n_per_m},
-                                                  {"shear", truth.shear_n_per_m},
-                                                  {"flexion_warp", truth.flexion_warp_n_per_m},
-                                                  {"flexion_weft", truth.flexion_weft_n_per_m},
-                                                  {"damping_warp", truth.damping_warp_s},
-                                                  {"damping_weft", truth.damping_weft_s}};
-  for (const auto& [name, value] : known) start[problem.space.index(name)] = 1.2 * value;
-  return refine(problem, problem.first_held_out, start, {.loss = Loss::squared}, {});
+  return {{"tension_warp", truth.tension_warp_n_per_m},
+          {"tension_weft", truth.tension_weft_n_per_m},
+          {"shear", truth.shear_n_per_m},
+          {"flexion_warp", truth.flexion_warp_n_per_m},
+          {"flexion_weft", truth.flexion_weft_n_per_m},
+          {"damping_warp", truth.damping_warp_s},
+          {"damping_weft", truth.damping_weft_s}};
 }
 
-TEST(MarkerOffsets, LeaveTheStiffnessUnbiasedThatIsBiasedWithoutThem) {
+/// How far the worst of the five stiffnesses ends from the truth, as a logarithm, from a start that
+/// is off by a fifth.
+double worst_stiffness_error(const FitProblem& problem) {
+  Eigen::VectorXd start = problem.space.start();
+  for (const auto& [name, value] : true_values()) start[problem.space.index(name)] = 1.2 * value;
+  const RefineResult result =
+      refine(problem, problem.first_held_out, start, {.loss = Loss::squared}, {});
+  EXPECT_TRUE(result.converged) << result.message;
+  double worst = 0;
+  for (const auto& [name, value] : true_values())
+    if (!name.starts_with("damping"))
+      worst = std::max(worst, std::abs(std::log(result.values[problem.space.index(name)] / value)));
+  return worst;
+}
+
+TEST(MarkerOffsets, LeaveStiffnessUnbiasedThatIsBiasedWithoutThem) {
   Eigen::Matrix3Xd offset_m;
   const FitInput input = offset_input(offset_m, 30);
-  const double true_shear = SyntheticCloth{}.fabric.shear_n_per_m;
-  const auto shear = [&](double tau_m) {
-    const FitProblem problem = make_problem(input, with_offsets(tau_m), 9, 9);
-    const RefineResult result = refined(problem);
-    EXPECT_TRUE(result.usable) << result.message;
-    return result.values[problem.space.index("shear")];
-  };
 
-  const double with = shear(0.01), without = shear(0);
-
-  // Over five seeds of noise and offsets the former scattered by 1 %; the latter is off by 10 to
-  // 40 %.
-  EXPECT_NEAR(with, true_shear, 0.04 * true_shear);
-  EXPECT_GT(std::abs(without - true_shear), 0.06 * true_shear);
+  // Over six seeds of noise and offsets the worst stiffness ended 4 to 10 % off with offsets, which
+  // is its noise, and 51 to 570 % (as a logarithm) off without.
+  EXPECT_LT(worst_stiffness_error(make_problem(input, with_offsets(0.01), 9, 9)), 0.2);
+  EXPECT_GT(worst_stiffness_error(make_problem(input, with_offsets(0), 9, 9)), 0.4);
 }
 
 TEST(MarkerOffsets, AreFoundAgainAndForeseeHeldOutFramesAndForecasts) {
   Eigen::Matrix3Xd offset_m;
   const FitInput input = offset_input(offset_m, 30);
   FitOptions options = with_offsets(0.02);
-  const Fabric truth = SyntheticCloth{}.fabric;
-  options.start = {{"tension_warp", truth.tension_warp_n_per_m},
-                   {"tension_weft", truth.tension_weft_n_per_m},
-                   {"shear", truth.shear_n_per_m},
-                   {"flexion_warp", truth.flexion_warp_n_per_m},
-                   {"flexion_weft", truth.flexion_weft_n_per_m},
-                   {"damping_warp", truth.damping_warp_s},
-                   {"damping_weft", truth.damping_weft_s}};
+  options.start = true_values();
   options.mesh_columns = options.mesh_rows = 9;
   options.work = 0.02;
 
@@ -200,7 +196,7 @@ TEST(MarkerOffsets, AreFoundAgainAndForeseeHeldOutFramesAndForecasts) {
 
   ASSERT_TRUE(report.usable()) << report.message;
   // The held-out frames, whose noise is 0.3 mm, are met to about that although the offsets are
-  // seventeen times as large.
+  // seventeen times as large per coordinate.
   EXPECT_LT(report.result.errors.front().held_out.rms, 6e-4);
   // All markers together can move with the sheet, which is placed on them.
   Eigen::Matrix3Xd found(3, offset_m.cols());
