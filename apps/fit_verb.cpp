@@ -125,6 +125,8 @@ std::string command_text(const FitVerbOptions& options, const FitFlags& flags) {
   add("--generations", options.fit.generations, defaults.generations);
   add("--refine-best", options.fit.refine_best, defaults.refine_best);
   if (options.fit.stop_cost) text += fmt::format(" --stop-cost {}", *options.fit.stop_cost);
+  add("--search-share", options.fit.search_share, defaults.search_share);
+  add("--marker-offsets", options.fit.marker_offset_sigma_m, defaults.marker_offset_sigma_m);
   add("--start-nodes", options.fit.start_nodes, defaults.start_nodes);
   add("--work", options.fit.work, defaults.work);
   add("--substep-scale", options.fit.substep_scale, defaults.substep_scale);
@@ -230,6 +232,10 @@ void add_fit_verb(CLI::App& program, VerbAction& action) {
                    "What large residuals weigh: less than others, or as much")
       ->check(CLI::IsMember({"huber", "squared"}))
       ->capture_default_str();
+  verb->add_option("--marker-offsets", options->fit.marker_offset_sigma_m,
+                   "Let every marker be seen beside its place by a constant, with this standard "
+                   "deviation: 0.01 or 10mm; 0 for none")
+      ->transform(length_in_metres());
   verb->add_option("--search", flags->search,
                    "The founding paper's evolutionary strategy, or CMA-ES with restarts and as "
                    "many simulations")
@@ -238,6 +244,9 @@ void add_fit_verb(CLI::App& program, VerbAction& action) {
   verb->add_option("--population", options->fit.population, "Individuals of the search")
       ->capture_default_str();
   verb->add_option("--generations", options->fit.generations, "Generations of the search, at most")
+      ->capture_default_str();
+  verb->add_option("--search-share", options->fit.search_share,
+                   "Share of the fitted frames that the search looks at")
       ->capture_default_str();
   verb->add_option("--refine-best", options->fit.refine_best, "Individuals that go to refinement")
       ->capture_default_str();

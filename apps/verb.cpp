@@ -9,6 +9,11 @@ void add_out_option(CLI::App& verb, std::filesystem::path& out, const std::strin
       ->type_name("DIR");
 }
 
+CLI::AsNumberWithUnit length_in_metres() {
+  return CLI::AsNumberWithUnit(
+      std::map<std::string, double>{{"m", 1.0}, {"cm", 1e-2}, {"mm", 1e-3}});
+}
+
 std::filesystem::path out_folder(const std::filesystem::path& asked,
                                  const std::string& default_name) {
   return asked.empty() ? fs::path(default_name) : asked;

@@ -24,6 +24,9 @@ void add_study_verb(CLI::App& program, VerbAction& action);
 /// Binds --out, whose default is `default_name` in the current directory.
 void add_out_option(CLI::App& verb, std::filesystem::path& out, const std::string& default_name);
 
+/// Turns a length such as 10mm, 1cm, 0.01m or 0.01 into metres.
+CLI::AsNumberWithUnit length_in_metres();
+
 /// The folder that was asked for, or `default_name` in the current directory.
 std::filesystem::path out_folder(const std::filesystem::path& asked,
                                  const std::string& default_name);

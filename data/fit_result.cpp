@@ -176,6 +176,12 @@ ObservationErrors read_errors(const JsonValue& json) {
   return errors;
 }
 
+Eigen::Vector3d read_vector(const JsonValue& json) {
+  const std::vector<JsonValue> numbers = json.items();
+  if (numbers.size() != 3) json.refuse("is no vector", "three numbers");
+  return {numbers[0].number(), numbers[1].number(), numbers[2].number()};
+}
+
 Basin read_basin(const JsonValue& json) {
   Basin basin;
   basin.cost = json.at("cost").number();
@@ -225,29 +231,35 @@ void write_fit_result(const FitResult& result, const std::filesystem::path& file
   if (errors.size() == 1) errors = Json(errors.front());
   Json basins = Json::array();
   for (const Basin& basin : result.basins) basins.push_back(to_json(basin));
+  Json offsets = Json::object();
+  for (const MarkerOffset& offset : result.marker_offsets)
+    offsets[offset.marker] = {finite(offset.offset_m.x()), finite(offset.offset_m.y()),
+                              finite(offset.offset_m.z())};
   Json rejected = Json::object();
   for (const auto& [reason, count] : result.observations_rejected) rejected[reason] = count;
 
-  const Json json = {
-      {"format", kFormat},
-      {"recording", result.recording},
-      {"version", result.version},
-      {"command", result.command},
-      {"seed", result.seed},
-      {"seconds", finite(result.seconds)},
-      {"model",
-       {{"mesh", {{"columns", result.mesh_columns}, {"rows", result.mesh_rows}}},
-        {"parameter_set", result.parameter_set},
-        {"integrator", result.integrator},
-        {"substeps", result.substeps},
-        {"time_step_s", finite(result.time_step_s)},
-        {"start", result.start}}},
-      {"parameters", to_json(result.parameters)},
-      {"effects", effects},
-      {"nuisance", to_json(result.nuisance)},
-      {"basins", basins},
-      {"errors", errors},
-      {"observations", {{"used", result.observations_used}, {"rejected", rejected}}}};
+  Json json = {{"format", kFormat},
+               {"recording", result.recording},
+               {"version", result.version},
+               {"command", result.command},
+               {"seed", result.seed},
+               {"seconds", finite(result.seconds)},
+               {"model",
+                {{"mesh", {{"columns", result.mesh_columns}, {"rows", result.mesh_rows}}},
+                 {"parameter_set", result.parameter_set},
+                 {"integrator", result.integrator},
+                 {"substeps", result.substeps},
+                 {"time_step_s", finite(result.time_step_s)},
+                 {"start", result.start}}},
+               {"parameters", to_json(result.parameters)},
+               {"effects", effects},
+               {"nuisance", to_json(result.nuisance)},
+               {"basins", basins},
+               {"errors", errors},
+               {"observations", {{"used", result.observations_used}, {"rejected", rejected}}}};
+  if (!result.marker_offsets.empty())
+    json["marker_offsets"] = {{"sigma_m", finite(result.marker_offset_sigma_m)},
+                              {"offset_m", offsets}};
   // A recording's name may hold bytes that are no UTF-8; JSON may not.
   write_text(json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n", file);
 }
@@ -280,6 +292,13 @@ FitResult read_fit_result(const std::filesystem::path& file) {
     result.effects.push_back({effect.at("name").text(), read_parameters(effect.at("parameters"))});
   }
   if (json.has("nuisance")) result.nuisance = read_parameters(json.at("nuisance"));
+  if (json.has("marker_offsets")) {
+    const JsonValue offsets = json.at("marker_offsets");
+    result.marker_offset_sigma_m = offsets.at("sigma_m").number();
+    const JsonValue by_marker = offsets.at("offset_m");
+    for (const std::string& marker : by_marker.keys())
+      result.marker_offsets.push_back({marker, read_vector(by_marker.at(marker))});
+  }
   if (json.has("basins")) {
     for (const JsonValue& basin : json.at("basins").items())
       result.basins.push_back(read_basin(basin));

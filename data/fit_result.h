@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <filesystem>
 #include <map>
 #include <string>
@@ -62,6 +63,12 @@ struct ObservationErrors {
   TrivialErrors trivial;
 };
 
+/// A constant by which a marker was seen beside the place that the model gives it.
+struct MarkerOffset {
+  std::string marker;
+  Eigen::Vector3d offset_m;  ///< observed - predicted; world
+};
+
 /// What fit.json holds (format clothfit-fit/1).
 struct FitResult {
   std::string recording;
@@ -79,7 +86,9 @@ struct FitResult {
   std::vector<ParameterEstimate> parameters;
   std::vector<EffectEstimate> effects;
   std::vector<ParameterEstimate> nuisance;  ///< measurement unknowns fitted along
-  std::vector<Basin> basins;                ///< best first; empty without a search
+  double marker_offset_sigma_m = 0;         ///< of their prior; 0 for those of an earlier fit
+  std::vector<MarkerOffset> marker_offsets;
+  std::vector<Basin> basins;  ///< best first; empty without a search
   std::vector<ObservationErrors> errors;
   int observations_used = 0;
   std::map<std::string, int> observations_rejected;  ///< reason -> count

@@ -11,6 +11,7 @@
 #include <span>
 
 #include "data/input_error.h"
+#include "fit/marker_offsets.h"
 #include "fit/observed_motion.h"
 #include "fit/parameter_search.h"
 #include "fit/problem.h"
@@ -30,8 +31,9 @@ namespace {
 constexpr int kCoarsening = 2;
 constexpr int kSmallestMesh = 7;
 
-/// Share of the fitted frames that the search looks at, and those of the refinement's stages:
-/// whole trajectories of folding cloth diverge from a start that is only roughly right.
+/// Shares of the fitted frames that the refinement's stages look at: whole trajectories of folding
+/// cloth diverge from a start that is only roughly right. Those shorter than the search's window
+/// are left out.
 constexpr double kSearchShare = 0.4;
 constexpr double kHorizonShares[] = {0.4, 0.7};
 constexpr double kFineShares[] = {kSearchShare, 0.7};
@@ -41,7 +43,8 @@ constexpr double kGivenShares[] = {0.1, 0.2, 0.4};
 constexpr double kEnd = 1.5;
 constexpr int kFewestFrames = 8;
 
-/// Spring-steps that a search may cost; its time step is cut no finer than that.
+/// Spring-steps that a search over the usual share may cost; its time step is cut no finer than
+/// that. A longer window is allowed as much more.
 constexpr double kSearchSpringSteps = 1.2e9;
 
 /// How finely a stage is solved. The last one goes to the rounding of the reported digits; those
@@ -126,8 +129,12 @@ TimeSteps search_time_steps(const FitProblem& problem, const FitOptions& options
       problem.frame_time_s[static_cast<size_t>(frames - 1)] - problem.frame_time_s.front();
   const auto simulations = static_cast<double>(search_simulations(options));
   const double affordable_s = simulated_s * static_cast<double>(problem.cloth.spring_count()) *
-                              simulations / kSearchSpringSteps;
-  const double run_s = std::max(stable.run_s, affordable_s);
+                              simulations /
+                              (kSearchSpringSteps * options.search_share / kSearchShare);
+  // Long recordings would otherwise leave steps at which hardly any individual is stable.
+  const TimeSteps of_middle =
+      stable_time_steps(problem.cloth, parameter_set(problem, problem.space.start()));
+  const double run_s = std::max(stable.run_s, std::min(affordable_s, of_middle.run_s));
   return {run_s, std::max(run_s, stable.rest_s)};
 }
 
@@ -231,6 +238,7 @@ RefineResult refine_on(const FitProblem& coarse_problem, const FitProblem& probl
                        const FitOptions& options, const Eigen::VectorXd& start,
                        std::span<const double> coarse_shares, const ProgressCallback& progress,
                        FitReport& report) {
+  const double least_share = options.start ? 0 : options.search_share;
   RefineResult best;
   best.values = start;
   const auto improve = [&](const Stage& stage) {
@@ -240,18 +248,21 @@ RefineResult refine_on(const FitProblem& coarse_problem, const FitProblem& probl
   // Where the model follows the cloth already the coarse mesh has nothing more to teach.
   if (!follows(problem, start) && !follows(coarse_problem, start)) {
     for (const double share : coarse_shares)
-      if (!improve({.problem = coarse_problem, .share = share, .effort = kTrendEffort}))
+      if (share >= least_share &&
+          !improve({.problem = coarse_problem, .share = share, .effort = kTrendEffort}))
         return best;
     best.values = away_from_ends(problem.space, best.values);
     if (!improve({.problem = problem,
                   .derivatives_of = &coarse_problem,
-                  .share = kSearchShare,
+                  .share = std::max(kSearchShare, least_share),
                   .effort = kApproachEffort}))
       return best;
   }
   best.values = away_from_ends(problem.space, best.values);
   for (const double share : kFineShares)
-    if (!improve({.problem = problem, .share = share, .effort = kRoughEffort})) return best;
+    if (share >= least_share &&
+        !improve({.problem = problem, .share = share, .effort = kRoughEffort}))
+      return best;
   improve({.problem = problem, .effort = kFinalEffort});
   return best;
 }
@@ -277,8 +288,8 @@ RefineResult pick_best(const TrajectoryObjective& objective, const FitOptions& o
     candidates.push_back({.values = optimum.values, .cost = optimum.cost, .runs = optimum.runs});
     if (enough || static_cast<int>(candidates.size()) > options.refine_best) continue;
     RefineResult result = refine_stage(
-        {.problem = objective.problem(), .share = kSearchShare, .effort = kCoarseEffort}, options,
-        optimum.values, progress, report);
+        {.problem = objective.problem(), .share = options.search_share, .effort = kCoarseEffort},
+        options, optimum.values, progress, report);
     if (result.cancelled) return result;
     if (!result.usable) continue;
     const double cost = search_cost(objective, result.values);
@@ -364,7 +375,7 @@ RefineResult search_and_refine(const FitProblem& coarse_problem, const FitProble
       if (problem.space.parameters[static_cast<size_t>(p)].role == ParameterRole::start)
         start[p] = first.values[p];
   }
-  const int frames = horizon_frames(coarse_problem, kSearchShare);
+  const int frames = horizon_frames(coarse_problem, options.search_share);
   const TrajectoryObjective objective(coarse_problem, frames,
                                       search_time_steps(coarse_problem, options, frames));
   const SearchedParameters found = search(objective, options, start, progress, report);
@@ -574,6 +585,44 @@ std::pair<int, int> mesh_of(const ClothDescription& cloth, const FitOptions& opt
   return mesh;
 }
 
+/// Constants that predictions of the markers get, 3 x markers, with their part of the report: what
+/// the fitted frames ask for, or what the earlier fit of a forecast found for markers of such
+/// names. None where there are none.
+Eigen::Matrix3Xd marker_offsets(const FitProblem& problem, const MarkerSet& markers,
+                                const FitOptions& options,
+                                const std::vector<Eigen::Matrix3Xd>& mesh_positions,
+                                FitReport& report) {
+  const std::vector<MarkerOffset> known =
+      options.forecast ? options.forecast->marker_offsets : std::vector<MarkerOffset>();
+  const auto count = static_cast<Eigen::Index>(markers.markers.size());
+  Eigen::Matrix3Xd offset_m;
+  if (problem.marker_offset_sigma_m > 0) {
+    offset_m = estimate_offsets(problem.observations.front(),
+                                marker_positions(problem.vertex_weights, mesh_positions),
+                                problem.first_held_out, problem.marker_offset_sigma_m);
+  } else if (!known.empty()) {
+    offset_m = Eigen::Matrix3Xd::Zero(3, count);
+    for (const MarkerOffset& offset : known)
+      if (const auto found = markers.index.find(offset.marker); found != markers.index.end())
+        offset_m.col(found->second) = offset.offset_m;
+  } else {
+    return {};
+  }
+  Eigen::Index furthest = 0;
+  const double most_m = offset_m.colwise().norm().maxCoeff(&furthest);
+  report.stages.push_back(
+      fmt::format("offsets of markers{}: {:.2g} mm rms, at most {:.2g} mm (marker {})",
+                  options.forecast ? " of the earlier fit" : "",
+                  1e3 * std::sqrt(offset_m.squaredNorm() / static_cast<double>(count)),
+                  1e3 * most_m, markers.markers[static_cast<size_t>(furthest)].name));
+  report.result.marker_offset_sigma_m = problem.marker_offset_sigma_m;
+  for (Eigen::Index m = 0; m < count; ++m)
+    if (!offset_m.col(m).isZero(0))
+      report.result.marker_offsets.push_back(
+          {.marker = markers.markers[static_cast<size_t>(m)].name, .offset_m = offset_m.col(m)});
+  return offset_m;
+}
+
 FitReport stopped(FitReport report, FitStop stop, const std::string& message) {
   report.stop = stop;
   report.message = message;
@@ -590,6 +639,7 @@ void FitOptions::validate() const {
   require(mesh_rows == 0 || mesh_rows >= 2, "mesh", "at least 2 rows");
   require(population >= 4 && population <= 100000, "population", "4 to 100000 individuals");
   require(generations >= 1, "generations", "at least 1");
+  require(search_share > 0 && search_share <= 1, "search-share", "more than 0, at most 1");
   require(refine_best >= 1, "refine-best", "at least 1");
   require(!stop_cost || !std::isnan(*stop_cost), "stop-cost", "a mean error in sigmas");
   require(!resume || !checkpoint.empty(), "resume", "a --checkpoint to go on from");
@@ -597,6 +647,10 @@ void FitOptions::validate() const {
           "a fit that searches: without --start and --forecast");
   require(substep_scale >= 1 && std::isfinite(substep_scale), "substep-scale", "1 or more");
   require(start_nodes >= 2 && start_nodes <= 30, "start-nodes", "2 to 30 nodes a side");
+  require(marker_offset_sigma_m >= 0 && std::isfinite(marker_offset_sigma_m), "marker-offsets",
+          "a length in metres, 0 (none) or more");
+  require(marker_offset_sigma_m == 0 || !forecast, "marker-offsets",
+          "a fit: a forecast takes those of the earlier one");
   require(work > 0 && std::isfinite(work), "work", "more than 0");
   require(threads >= 0, "threads", "0 (all) or more");
 }
@@ -681,7 +735,10 @@ FitReport fit(const FitInput& input, const FitOptions& options, const ProgressCa
       result.parameters);
   report.model = describe_model(problem, input.recording, values);
   report.model.time_step_s = result.time_step_s;
-  fill_residuals(problem, trajectories.front(), report);
+  fill_residuals(
+      problem, trajectories.front(),
+      marker_offsets(problem, input.recording.markers, options, trajectories.front(), report),
+      report);
   for (const ObservationSet& set : problem.observations)
     result.observations_used += static_cast<int>(set.rows.size());
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();

@@ -43,9 +43,10 @@ struct FitOptions {
   int mesh_rows = 0;
   unsigned long long seed = 1;
   SearchMethod search = SearchMethod::paper;
-  int population = 100;  ///< individuals of the evolutionary search [louchet1995]
-  int generations = 40;  ///< at most; the search stops earlier when it no longer gains
-  int refine_best = 3;   ///< individuals, or optima of CMA-ES, that go to refinement
+  int population = 100;       ///< individuals of the evolutionary search [louchet1995]
+  int generations = 40;       ///< at most; the search stops earlier when it no longer gains
+  double search_share = 0.4;  ///< of the fitted frames, that the search looks at; 0 < share <= 1
+  int refine_best = 3;        ///< individuals, or optima of CMA-ES, that go to refinement
   /// The search ends once its best cost, the mean error over its window in sigmas, is this low; not
   /// given: once the model follows the cloth (fit/observed_motion.h).
   std::optional<double> stop_cost;
@@ -55,7 +56,9 @@ struct FitOptions {
   /// optimum, and what has none starts where it would.
   std::optional<std::map<std::string, double>> start;
   Loss loss = Loss::huber;
-  int start_nodes = 6;       ///< per side, of the corrections of a start that is unknown
+  int start_nodes = 6;  ///< per side, of the corrections of a start that is unknown
+  /// Standard deviation of constant offsets of the markers (fit/marker_offsets.h); 0: none.
+  double marker_offset_sigma_m = 0;
   double work = 1;           ///< > 0; times the limits of work of the refinement's stages
   double substep_scale = 1;  ///< >= 1; more cuts time finer than stability asks
   int threads = 0;           ///< 0: as many as the machine has

@@ -3,6 +3,7 @@
 #include <cassert>
 #include <cmath>
 #include <limits>
+#include <map>
 
 #include "model/relax.h"
 #include "model/simulate.h"
@@ -81,6 +82,21 @@ TrajectoryObjective::TrajectoryObjective(const FitProblem& problem, int frames,
                  .dimension = set.dimension});
     }
   }
+  if (problem.marker_offset_sigma_m == 0) return;
+  std::map<int, MarkerResiduals> by_marker;
+  for (const Block& block : blocks()) {
+    const ObservationSet& set = problem.observations[static_cast<size_t>(block.set)];
+    MarkerResiduals& marker = by_marker[block.marker];
+    marker.marker = block.marker;
+    marker.rows.push_back(
+        {.first = block.offset, .sigma_m = set.rows[static_cast<size_t>(block.row)].sigma});
+  }
+  for (auto& [index, marker] : by_marker) with_offset_.push_back(std::move(marker));
+}
+
+void TrajectoryObjective::take_offsets_out(Eigen::Ref<Eigen::MatrixXd> columns) const {
+  if (!with_offset_.empty())
+    profile_out_offsets(with_offset_, problem().marker_offset_sigma_m, columns);
 }
 
 std::string TrajectoryObjective::name() const {
@@ -114,7 +130,9 @@ std::vector<Eigen::VectorXd> TrajectoryObjective::residuals(
       residual.segment(block.offset, block.dimension) =
           (*predicted - row.observed).head(block.dimension) / row.sigma;
     }
-    if (visible && residual.allFinite()) results[n] = std::move(residual);
+    if (!visible || !residual.allFinite()) continue;
+    take_offsets_out(residual);
+    results[n] = std::move(residual);
   }
   return results;
 }
@@ -157,6 +175,8 @@ Linearisation TrajectoryObjective::linearise(const Eigen::VectorXd& values) cons
           .segment(block.offset, block.dimension) = change.head(block.dimension) / row.sigma;
     }
   }
+  take_offsets_out(result.residual);
+  take_offsets_out(result.residual_by_coordinate);
   result.usable = result.residual.allFinite() && result.residual_by_coordinate.allFinite();
   return result;
 }

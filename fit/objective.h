@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "fit/marker_offsets.h"
 #include "fit/problem.h"
 
 namespace clothfit {
@@ -99,7 +100,8 @@ class Objective {
 };
 
 /// The trajectory cost: what a free run from the start leaves of the observations in the first
-/// `frames` frames, each coordinate divided by its sigma.
+/// `frames` frames, each coordinate divided by its sigma. Where the problem says that markers have
+/// constant offsets, these are taken out (fit/marker_offsets.h), as those frames determine them.
 class TrajectoryObjective final : public Objective {
  public:
   TrajectoryObjective(const FitProblem& problem, int frames, const TimeSteps& steps);
@@ -112,7 +114,10 @@ class TrajectoryObjective final : public Objective {
   Linearisation linearise(const Eigen::VectorXd& values) const override;
 
  private:
+  void take_offsets_out(Eigen::Ref<Eigen::MatrixXd> columns) const;
+
   int frames_;
+  std::vector<MarkerResiduals> with_offset_;  ///< markers that have one
 };
 
 /// The same cost with the derivatives of a coarser mesh: half the vertices a side cost a

@@ -87,6 +87,15 @@ void add_observations(const FitInput& input, const FitOptions& options, FitProbl
                      "look at the status column of the tracks");
 }
 
+void add_marker_offsets(const FitOptions& options, FitProblem& problem) {
+  if (options.marker_offset_sigma_m == 0) return;
+  if (problem.observations.front().dimension != 3)
+    throw InputError("--marker-offsets", "the fit looks at pixels",
+                     "3D tracks: an offset is a constant in space",
+                     "leave it out, or fit 3D tracks (--observations tracks3d)");
+  problem.marker_offset_sigma_m = options.marker_offset_sigma_m;
+}
+
 void add_masses(const Recording& recording, const Mesh& mesh, FitProblem& problem) {
   const ClothDescription& cloth = recording.cloth;
   problem.mass_assumed = !cloth.mass_kg.has_value();
@@ -367,6 +376,7 @@ FitProblem make_problem(const FitInput& input, const FitOptions& options, int me
   problem.cloth.held = std::move(drive.held);
   problem.driving_markers = std::move(drive.driving_markers);
   add_observations(input, options, problem);
+  add_marker_offsets(options, problem);
   problem.vertex_weights = vertex_weights(make_surface(
       mesh.columns, mesh.rows, mesh.width_m, mesh.height_m, marker_places(recording.markers)));
   const Rigid3 world_from_sheet = place_sheet_of(recording, problem);

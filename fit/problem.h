@@ -43,6 +43,7 @@ struct FitProblem {
   Eigen::Matrix<double, 3, 2> level_axes;
   std::vector<Binding> sheet_motion;  ///< of the placed sheet: turn (rad) and shift (m); or none
   std::vector<GaussianPrior> priors;
+  double marker_offset_sigma_m = 0;  ///< prior of fit/marker_offsets.h; 0: markers have none
 
   int frames() const { return static_cast<int>(frame_time_s.size()); }
 };

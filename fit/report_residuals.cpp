@@ -78,8 +78,10 @@ void add_trivial_predictors(const FitProblem& problem, const ObservationSet& set
 }  // namespace
 
 void fill_residuals(const FitProblem& problem, const std::vector<Eigen::Matrix3Xd>& mesh_positions,
-                    FitReport& report) {
-  const auto markers = marker_positions(problem.vertex_weights, mesh_positions);
+                    const Eigen::Matrix3Xd& marker_offset_m, FitReport& report) {
+  std::vector<Eigen::Matrix3Xd> markers = marker_positions(problem.vertex_weights, mesh_positions);
+  if (marker_offset_m.cols() > 0)
+    for (Eigen::Matrix3Xd& positions : markers) positions += marker_offset_m;
   const auto frames = static_cast<size_t>(problem.frames());
   for (const ObservationSet& set : problem.observations) {
     FitReport::Residuals residuals{.kind = set.kind, .unit = set.unit};

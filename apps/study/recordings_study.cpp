@@ -6,7 +6,6 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
-#include <memory>
 #include <nlohmann/json.hpp>
 #include <set>
 
@@ -21,7 +20,6 @@
 #include "fit/checksum.h"
 #include "fit/drive.h"
 #include "fit/executor.h"
-#include "fit/journal.h"
 #include "fit/marker_error.h"
 #include "fit/trivial_predictors.h"
 
@@ -165,6 +163,8 @@ std::vector<StudyRow> rows_of(const FitInput& input, const FitReport& report,
     one.last_velocity_rms = judged ? points * errors.trivial.last_velocity : kNan;
     one.rigid_rms = judged ? points * errors.trivial.rigid : kNan;
     one.noise = points * errors.noise;
+    const auto published = options.published.find(row.recording);
+    one.published_rms = published == options.published.end() ? kNan : published->second;
     one.whole_rigid_rms = one.weighted_rms = one.weighted_rigid_rms = kNan;
     one.centred_held_out_rms = one.centred_rigid_rms = one.centred_weighted_rms = kNan;
     judge_whole(input, report.residuals[k], options.weights, one);
@@ -186,6 +186,7 @@ std::vector<StudyRow> fit_one(const fs::path& folder, const StudiedModel& model,
     if (options.weights) weights_of(recording.markers, *options.weights);
     FitOptions fit_options = options.fit;
     fit_options.effects = model.effects;
+    if (!model.marker_offsets) fit_options.marker_offset_sigma_m = 0;
     fit_options.threads = 0;  // a limit of one fit would be one of all that are at work
     const FitReport report =
         fit(input, fit_options, [](const Progress&) { return !interrupted(); });
@@ -199,40 +200,6 @@ std::vector<StudyRow> fit_one(const fs::path& folder, const StudiedModel& model,
     row.reason = error.what();
   }
   return {row};
-}
-
-/// One line that names all that a row depends on, so that a journal of another study is refused.
-/// Of the recordings it holds the descriptions, and names and sizes of the files beside them.
-std::string journal_key(const RecordingsStudyOptions& options) {
-  std::uint64_t sum = kEmptyChecksum;
-  const auto add = [&](const std::string& text) {
-    sum = checksum(text, sum);
-    sum = checksum(std::string_view("\0", 1), sum);
-  };
-  for (const fs::path& folder : options.recordings) {
-    add(folder.generic_string());
-    std::set<fs::path> files;
-    for (const auto& entry : fs::recursive_directory_iterator(folder))
-      if (entry.is_regular_file()) files.insert(entry.path());
-    for (const fs::path& file : files) {
-      add(file.lexically_relative(folder).generic_string());
-      add(std::to_string(fs::file_size(file)));
-    }
-    add(read_text(folder / kRecordingFile));
-  }
-  for (const StudiedModel& model : options.models) {
-    add(model.name);
-    for (const std::string& effect : model.effects) add(effect);
-  }
-  if (options.weights)
-    for (const auto& [name, weight] : *options.weights) add(fmt::format("{} {}", name, weight));
-  const FitOptions& fit = options.fit;
-  return fmt::format(
-      "study recordings, clothfit {}, seed {}, mesh {}x{}, observations {}, population {}, "
-      "generations {}, refine best {}, work {}, substep scale {}, recordings and models {:016x}",
-      program_version(), fit.seed, fit.mesh_columns, fit.mesh_rows,
-      static_cast<int>(fit.observations), fit.population, fit.generations, fit.refine_best,
-      fit.work, fit.substep_scale, sum);
 }
 
 }  // namespace
@@ -252,23 +219,64 @@ std::vector<fs::path> find_recordings(const std::vector<fs::path>& folders) {
   return {found.begin(), found.end()};
 }
 
-std::vector<StudyRow> study_recordings(const RecordingsStudyOptions& options,
+void RecordingsStudyOptions::validate() const {
+  fit.validate();
+  const bool offsets = std::ranges::any_of(models, &StudiedModel::marker_offsets);
+  if (offsets && fit.marker_offset_sigma_m == 0)
+    throw InputError("--marker-offsets", "is 0, and a model has offsets of markers",
+                     "their standard deviation, such as 10mm");
+  if (!published.empty() && !weights)
+    throw InputError("--published", "is given without --weights",
+                     "the weights that the published errors were computed with");
+}
+
+std::string RecordingsStudyOptions::key() const {
+  std::uint64_t sum = kEmptyChecksum;
+  const auto add = [&](const std::string& text) {
+    sum = checksum(text, sum);
+    sum = checksum(std::string_view("\0", 1), sum);
+  };
+  for (const fs::path& folder : recordings) {
+    add(folder.generic_string());
+    std::set<fs::path> files;
+    for (const auto& entry : fs::recursive_directory_iterator(folder))
+      if (entry.is_regular_file()) files.insert(entry.path());
+    for (const fs::path& file : files) {
+      add(file.lexically_relative(folder).generic_string());
+      add(std::to_string(fs::file_size(file)));
+    }
+    add(read_text(folder / kRecordingFile));
+  }
+  for (const StudiedModel& model : models) {
+    add(model.name);
+    for (const std::string& effect : model.effects) add(effect);
+    if (model.marker_offsets) add("with offsets of markers");
+  }
+  for (const auto& [name, error_m] : published) add(fmt::format("{} {}", name, error_m));
+  if (weights)
+    for (const auto& [name, weight] : *weights) add(fmt::format("{} {}", name, weight));
+  return fmt::format(
+      "study recordings, clothfit {}, seed {}, mesh {}x{}, observations {}, search {} over {}, "
+      "population {}, generations {}, refine best {}, work {}, substep scale {}, marker offsets {} "
+      "m, recordings and models {:016x}",
+      program_version(), fit.seed, fit.mesh_columns, fit.mesh_rows,
+      static_cast<int>(fit.observations), static_cast<int>(fit.search), fit.search_share,
+      fit.population, fit.generations, fit.refine_best, fit.work, fit.substep_scale,
+      fit.marker_offset_sigma_m, sum);
+}
+
+std::vector<StudyRow> study_recordings(const RecordingsStudyOptions& options, Journal* journal,
                                        const ProgressCallback& progress) {
-  options.fit.validate();
+  options.validate();
   const auto models = static_cast<int>(options.models.size());
   const Work work = [&](int index, std::uint64_t) {
     const fs::path& folder = options.recordings[static_cast<std::size_t>(index / models)];
     const StudiedModel& model = options.models[static_cast<std::size_t>(index % models)];
     return rows_to_text(fit_one(folder, model, options));
   };
-  std::unique_ptr<Journal> journal;
-  if (!options.journal.empty())
-    journal =
-        std::make_unique<Journal>(options.journal, journal_key(options), JournalStart::resume);
-  const ExecuteResult result =
-      execute(models * static_cast<int>(options.recordings.size()), work,
-              {.threads = options.threads, .seed = options.fit.seed, .unit = "fits"}, journal.get(),
-              progress);
+  const ExecuteResult result = execute(
+      models * static_cast<int>(options.recordings.size()), work,
+      {.threads = options.threads, .seed = options.fit.seed, .unit = "fits"}, journal, progress);
   if (!result.usable()) throw Cancelled();
   std::vector<StudyRow> rows;
   for (const std::string& payload : result.payloads)

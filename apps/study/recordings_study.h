@@ -7,8 +7,10 @@
 #include <vector>
 
 #include "apps/study/marker_weights.h"
+#include "apps/study/published_errors.h"
 #include "data/progress.h"
 #include "fit/fit.h"
+#include "fit/journal.h"
 
 namespace clothfit {
 
@@ -17,15 +19,23 @@ namespace clothfit {
 struct StudiedModel {
   std::string name;
   std::vector<std::string> effects;
+  bool marker_offsets = false;  ///< constants beside the markers' places (fit/marker_offsets.h)
 };
 
 struct RecordingsStudyOptions {
   std::vector<std::filesystem::path> recordings;  ///< folders with a recording.yaml each
   std::vector<StudiedModel> models;
-  FitOptions fit;  ///< of every fit; `effects` and `threads` are the study's own
+  /// Of every fit; `effects` and `threads` are the study's own, and `marker_offset_sigma_m` goes to
+  /// the models that ask for offsets.
+  FitOptions fit;
   std::optional<MarkerWeights> weights;
-  int threads = 0;                ///< fits at work side by side; 0: as many as the machine has
-  std::filesystem::path journal;  ///< keeps finished fits; empty: none
+  PublishedErrors published;  ///< of some of the recordings; with weights
+  int threads = 0;            ///< fits at work side by side; 0: as many as the machine has
+
+  void validate() const;  ///< throws InputError
+  /// One line that names all that a row depends on, so that a journal of another study is refused.
+  /// Of the recordings it holds the descriptions, and names and sizes of the files beside them.
+  std::string key() const;
 };
 
 /// What one fit has to say about one kind of observation. Errors are root mean squares of the
@@ -51,6 +61,7 @@ struct StudyRow {
   /// All frames, markers weighed as the study has it, those that drive held points included: of the
   /// model and of the rigid guess. NaN without weights.
   double weighted_rms = 0, weighted_rigid_rms = 0;
+  double published_rms = 0;  ///< what others have stated for the recording's weighted error, or NaN
 
   /// With each marker's mean error on the fitted frames taken off the predictions: held out, of the
   /// model and of the rigid guess; all frames, weighed, of the model.
@@ -68,9 +79,10 @@ std::vector<std::filesystem::path> find_recordings(
 /// Fits every recording with every model, by fit/executor.h, and judges the fits. A recording that
 /// cannot be read or fitted has its reason in its rows and stops no other. The rows are sorted by
 /// recording, model and kind; their numbers but `seconds` are the same bits for any number of
-/// threads, and whether or not the journal held some of them. Throws InputError for options and a
-/// journal that make no sense, Cancelled when `progress` or an interrupt asks to stop.
-std::vector<StudyRow> study_recordings(const RecordingsStudyOptions& options,
+/// threads, and whether or not the journal, where given (its key that of the options), held some of
+/// them. Throws InputError for options that make no sense, Cancelled when `progress` or an
+/// interrupt asks to stop.
+std::vector<StudyRow> study_recordings(const RecordingsStudyOptions& options, Journal* journal,
                                        const ProgressCallback& progress);
 
 }  // namespace clothfit

@@ -30,6 +30,7 @@ constexpr ErrorColumn kErrors[] = {
     {"noise", "noise", &StudyRow::noise},
     {"weighted_rms", "weighted", &StudyRow::weighted_rms},
     {"weighted_rigid_rms", "rigidly, weighted", &StudyRow::weighted_rigid_rms},
+    {"published_rms", "published, weighted", &StudyRow::published_rms},
     {"centred_held_out_rms", "held out, centred", &StudyRow::centred_held_out_rms},
     {"centred_rigid_rms", "rigidly, centred", &StudyRow::centred_rigid_rms},
     {"centred_weighted_rms", "weighted, centred", &StudyRow::centred_weighted_rms},
@@ -106,6 +107,35 @@ Table study_summary(const std::vector<StudyRow>& rows) {
   return table;
 }
 
+Table study_contest(const std::vector<StudyRow>& rows) {
+  Table table{{"model", "below rigidly", "below published", "below the lower of both", "target"},
+              {}};
+  std::vector<std::string> models;  // as they come
+  for (const StudyRow& row : rows)
+    if (row.fitted && std::isfinite(row.weighted_rms) &&
+        std::ranges::find(models, row.model) == models.end())
+      models.push_back(row.model);
+  for (const std::string& model : models) {
+    int all = 0, stated = 0, below_rigid = 0, below_published = 0, below_both = 0;
+    for (const StudyRow& row : rows) {
+      if (row.model != model || !std::isfinite(row.weighted_rms)) continue;
+      ++all;
+      below_rigid += row.weighted_rms < row.weighted_rigid_rms;
+      if (!std::isfinite(row.published_rms)) continue;
+      ++stated;
+      below_published += row.weighted_rms < row.published_rms;
+      below_both += row.weighted_rms < std::min(row.published_rms, row.weighted_rigid_rms);
+    }
+    const auto share = [](int count, int of) {
+      return of > 0 ? fmt::format("{} of {}", count, of) : std::string("-");
+    };
+    table.rows.push_back({model, share(below_rigid, all), share(below_published, stated),
+                          share(below_both, stated),
+                          stated > 0 ? fmt::format("{} of {}", (stated + 1) / 2, stated) : "-"});
+  }
+  return table;
+}
+
 std::string study_page_html(const std::vector<StudyRow>& rows, const std::string& command) {
   std::string body =
       fmt::format("<h1>Study of recordings</h1>\n<p class=\"meta\">clothfit {}</p>\n",
@@ -115,6 +145,11 @@ std::string study_page_html(const std::vector<StudyRow>& rows, const std::string
                      "predicted and observed markers. The last column counts recordings whose "
                      "held-out frames the model predicts better than moving rigidly with the held "
                      "points does.");
+  if (const Table contest = study_contest(rows); !contest.rows.empty())
+    body += html_table(contest,
+                       "Recordings whose weighted error over all frames is below that of moving "
+                       "rigidly with the held points, below the published one, and below the "
+                       "lower of both.");
   body += "<div class=\"wide\">\n" +
           html_table(short_study_table(rows),
                      "Root mean square of the distance: on fitted frames; on held-out ones; over "

@@ -27,6 +27,7 @@ void for_each_member(Row& row, const VisitText& text, const VisitNumber& number)
   number("noise", row.noise);
   number("weighted_rms", row.weighted_rms);
   number("weighted_rigid_rms", row.weighted_rigid_rms);
+  number("published_rms", row.published_rms);
   number("centred_held_out_rms", row.centred_held_out_rms);
   number("centred_rigid_rms", row.centred_rigid_rms);
   number("centred_weighted_rms", row.centred_weighted_rms);

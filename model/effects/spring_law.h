@@ -73,9 +73,10 @@ class SpringLawEffect final : public LawEffect<SpringLawEffect<Law>, Law> {
     return Law::kMemory * static_cast<int>(cloth.spring_count());
   }
 
+  // Left to itself GCC calls a function for each vector, and lanes pass through memory.
   template <class L>
-  static void add(const EffectScene<L>& scene, const EffectValues<L>& parameters,
-                  EffectMemory<L>& memory, LaneVectors<L>& force_n) {
+  [[gnu::flatten]] static void add(const EffectScene<L>& scene, const EffectValues<L>& parameters,
+                                   EffectMemory<L>& memory, LaneVectors<L>& force_n) {
     using Real = RealOf<L>;
     const auto p = reals_of<L, Law::kParameters>(parameters);
     for_springs<L>(scene, [&](int number, const Spring& spring, const Vector3<Real>&,

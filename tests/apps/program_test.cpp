@@ -304,6 +304,35 @@ TEST_F(Program, NeverWritesOverACheckpoint) {
   EXPECT_THAT(resumed.error, HasSubstr("search.txt:1: is no checkpoint of a search"));
 }
 
+TEST_F(Program, NeverWritesOverTheJournalOfAStudy) {
+  copy_bundled("swing_plain");
+  write_text(here_ / "hours", "of fits");
+
+  const ProgramRun run =
+      run_program({"study", "recordings", recording_.string(), "--journal", "hours"}, here_);
+
+  EXPECT_EQ(run.exit_code, 3);
+  EXPECT_THAT(run.error, HasSubstr("hours"));
+  EXPECT_THAT(run.error, HasSubstr("--resume"));
+  EXPECT_THAT(names_in(here_), ::testing::ElementsAre("hours"));
+}
+
+TEST_F(Program, KnowsLengthsByTheirUnit) {
+  copy_bundled("swing_plain");
+  const auto fit_with_offsets = [&](const char* length) {
+    return run_program(
+        {"fit", recording_.string(), "--observations", "tracks2d", "--marker-offsets", length},
+        here_);
+  };
+
+  EXPECT_EQ(fit_with_offsets("10feet").exit_code, 2);
+  EXPECT_EQ(fit_with_offsets("-3mm").exit_code, 3);
+  EXPECT_THAT(fit_with_offsets("-3mm").error, HasSubstr("--marker-offsets"));
+  const ProgramRun of_pixels = fit_with_offsets("10mm");
+  EXPECT_EQ(of_pixels.exit_code, 3);
+  EXPECT_THAT(of_pixels.error, HasSubstr("the fit looks at pixels"));
+}
+
 TEST_F(Program, NeverReplacesAFolderOfTheUsers) {
   copy_bundled("swing_plain");
   write_text(here_ / "mine" / "thesis.txt", "years of work");

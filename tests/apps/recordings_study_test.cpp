@@ -8,6 +8,7 @@
 
 #include <cmath>
 #include <fstream>
+#include <set>
 
 #include "apps/exit_code.h"
 #include "apps/steps.h"
@@ -22,6 +23,7 @@ namespace {
 namespace fs = std::filesystem;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::Pair;
 using ::testing::ThrowsMessage;
 
 const fs::path kBundled = fs::path(CLOTHFIT_SOURCE_DIR) / "data" / "recordings";
@@ -91,7 +93,7 @@ TEST_F(RecordingsStudy, SaysWhatTheSingleFitSays) {
   RecordingsStudyOptions options = quick();
   options.models.push_back({.name = "damped", .effects = {"viscous_damping"}});
 
-  const std::vector<StudyRow> rows = study_recordings(options, {});
+  const std::vector<StudyRow> rows = study_recordings(options, nullptr, {});
 
   ASSERT_EQ(rows.size(), 2u);
   const FitInput input =
@@ -121,7 +123,7 @@ TEST_F(RecordingsStudy, ABrokenRecordingHasItsReasonAndStopsNoOther) {
   add_broken("broken");
   copy("swing_plain", "plain");
 
-  const std::vector<StudyRow> rows = study_recordings(quick(), {});
+  const std::vector<StudyRow> rows = study_recordings(quick(), nullptr, {});
 
   ASSERT_EQ(rows.size(), 2u);
   EXPECT_FALSE(rows[0].fitted);
@@ -136,45 +138,55 @@ TEST_F(RecordingsStudy, TheSameBytesOnOneThreadAndOnThree) {
   copy("swing_plain", "a");
   copy("swing_breeze", "b");
   RecordingsStudyOptions options = quick();
-  const std::string one = text_of(study_recordings(options, {}));
+  const std::string one = text_of(study_recordings(options, nullptr, {}));
 
   options.threads = 3;
 
-  EXPECT_EQ(text_of(study_recordings(options, {})), one);
+  EXPECT_EQ(text_of(study_recordings(options, nullptr, {})), one);
 }
 
 TEST_F(RecordingsStudy, GoesOnWhereItWasCancelled) {
   copy("swing_plain", "a");
   copy("swing_breeze", "b");
   RecordingsStudyOptions options = quick();
-  const std::string whole = text_of(study_recordings(options, {}));
-  options.journal = scratch_.path() / "journal";
-  const auto one_fit = [](const Progress& progress) { return progress.done < 1; };
-  EXPECT_THROW(study_recordings(options, one_fit), Cancelled);
+  const std::string whole = text_of(study_recordings(options, nullptr, {}));
+  const fs::path file = scratch_.path() / "journal";
+  {
+    Journal journal(file, options.key(), JournalStart::anew);
+    const auto one_fit = [](const Progress& progress) { return progress.done < 1; };
+    EXPECT_THROW(study_recordings(options, &journal, one_fit), Cancelled);
+  }
 
-  double first_seen = -1;
-  const std::vector<StudyRow> resumed = study_recordings(options, [&](const Progress& progress) {
-    if (first_seen < 0) first_seen = progress.done;
-    return true;
-  });
+  Journal journal(file, options.key(), JournalStart::resume);
+  EXPECT_EQ(journal.finished().size(), 1u);  // of the two fits
+  const std::vector<StudyRow> resumed = study_recordings(options, &journal, {});
 
-  EXPECT_EQ(first_seen, 1);  // one of the two fits was there
   EXPECT_EQ(text_of(resumed), whole);
   // Nothing is left to do: even the seconds are those of the journal.
-  EXPECT_EQ(rows_to_text(study_recordings(options, {})), rows_to_text(resumed));
+  EXPECT_EQ(rows_to_text(study_recordings(options, &journal, {})), rows_to_text(resumed));
 }
 
-TEST_F(RecordingsStudy, RefusesTheJournalOfAnotherStudy) {
+TEST_F(RecordingsStudy, HasAKeyThatNamesWhatItsRowsDependOn) {
   add_broken("broken");
-  RecordingsStudyOptions options = quick();
-  options.journal = scratch_.path() / "journal";
-  study_recordings(options, {});
+  const RecordingsStudyOptions options = quick();
+  std::set<std::string> keys{options.key()};
+  const auto add_key_of = [&](auto change) {
+    RecordingsStudyOptions other = options;
+    change(other);
+    keys.insert(other.key());
+  };
 
-  options.fit.seed = 2;
-  EXPECT_THROW(study_recordings(options, {}), InputError);
-  options.fit.seed = 1;
+  add_key_of([](RecordingsStudyOptions& other) { other.fit.seed = 2; });
+  add_key_of([](RecordingsStudyOptions& other) { other.fit.search = SearchMethod::cma; });
+  add_key_of([](RecordingsStudyOptions& other) { other.fit.search_share = 1; });
+  add_key_of([](RecordingsStudyOptions& other) { other.fit.marker_offset_sigma_m = 0.01; });
+  add_key_of([](RecordingsStudyOptions& other) { other.models[0].marker_offsets = true; });
+  add_key_of([](RecordingsStudyOptions& other) { other.published["broken"] = 0.01; });
   std::ofstream(folder_ / "broken" / "recording.yaml", std::ios::app) << "# changed\n";
-  EXPECT_THROW(study_recordings(options, {}), InputError);
+  add_key_of([](RecordingsStudyOptions&) {});
+
+  EXPECT_EQ(keys.size(), 8u);
+  EXPECT_EQ(options.key(), RecordingsStudyOptions(options).key());
 }
 
 TEST_F(RecordingsStudy, WeightsOfOneForEveryMarkerLeaveTheErrorOfTheWholeRecording) {
@@ -184,7 +196,7 @@ TEST_F(RecordingsStudy, WeightsOfOneForEveryMarkerLeaveTheErrorOfTheWholeRecordi
   for (const Marker& marker : read_recording(folder_ / "plain").markers.markers)
     (*options.weights)[marker.name] = 1;
 
-  const StudyRow row = study_recordings(options, {}).front();
+  const StudyRow row = study_recordings(options, nullptr, {}).front();
 
   // No marker drives the cloth here, and hardly one is missed in any frame: means over markers of
   // means over frames are the mean over all to a few thousandths.
@@ -204,7 +216,7 @@ TEST_F(RecordingsStudy, AMarkerThatDrivesTheClothIsOffByWhatSmoothingItsTrackToo
       (*options.weights)[marker.name] = 1;
   ASSERT_EQ(options.weights->size(), 1u);
 
-  const StudyRow row = study_recordings(options, {}).front();
+  const StudyRow row = study_recordings(options, nullptr, {}).front();
 
   // The corner stands still, so what is left is its noise, 0.5 mm in each coordinate.
   ASSERT_TRUE(row.fitted) << row.reason;
@@ -216,10 +228,57 @@ TEST_F(RecordingsStudy, WeightsForAnotherSetOfMarkersAreAReasonInTheTable) {
   RecordingsStudyOptions options = quick();
   options.weights = MarkerWeights{{"nobody", 1.0}};
 
-  const StudyRow row = study_recordings(options, {}).front();
+  const StudyRow row = study_recordings(options, nullptr, {}).front();
 
   EXPECT_FALSE(row.fitted);
   EXPECT_THAT(row.reason, HasSubstr("nobody"));
+}
+
+TEST_F(RecordingsStudy, CountsWhatIsBelowTheRigidGuessAndThePublishedError) {
+  copy("swing_plain", "plain");
+  RecordingsStudyOptions options = quick();
+  options.fit.marker_offset_sigma_m = 0.01;
+  options.models.push_back({.name = "offset", .effects = {}, .marker_offsets = true});
+  options.weights.emplace();
+  for (const Marker& marker : read_recording(folder_ / "plain").markers.markers)
+    (*options.weights)[marker.name] = 1;
+  options.published["swing_plain"] = 1e-9;  // nothing is as good
+
+  const std::vector<StudyRow> rows = study_recordings(options, nullptr, {});
+
+  ASSERT_EQ(rows.size(), 2u);
+  EXPECT_EQ(rows[0].published_rms, 1e-9);
+  // The offsets take what is constant out of the held-out frames' error as well.
+  EXPECT_NE(rows[1].weighted_rms, rows[0].weighted_rms);
+  const std::string rigid = rows[0].weighted_rms < rows[0].weighted_rigid_rms ? "1 of 1" : "0 of 1";
+  EXPECT_THAT(study_contest(rows).rows.front(),
+              ElementsAre("base", rigid, "0 of 1", "0 of 1", "1 of 1"));
+  EXPECT_THAT(study_page_html(rows, "command"), HasSubstr("below the lower of both"));
+}
+
+TEST_F(RecordingsStudy, RefusesOffsetsWithoutADeviationAndPublishedErrorsWithoutWeights) {
+  RecordingsStudyOptions options;
+  options.models = {{.name = "offset", .effects = {}, .marker_offsets = true}};
+  EXPECT_THAT([&] { options.validate(); },
+              ThrowsMessage<InputError>(HasSubstr("--marker-offsets: is 0")));
+  options.fit.marker_offset_sigma_m = 0.01;
+  options.published["any"] = 0.01;
+  EXPECT_THAT([&] { options.validate(); },
+              ThrowsMessage<InputError>(HasSubstr("without --weights")));
+}
+
+TEST(PublishedErrorsFile, IsRefusedWhereItMakesNoSense) {
+  const test::ScratchFolder scratch("published_errors");
+  const fs::path file = scratch.path() / "published.csv";
+  const auto read = [&](const std::string& rows) {
+    std::ofstream(file) << "recording,weighted_rms_m\n" << rows;
+    return read_published_errors(file);
+  };
+
+  EXPECT_THAT(read("a,0.012\nb,0.03\n"), ElementsAre(Pair("a", 0.012), Pair("b", 0.03)));
+  EXPECT_THROW(read("a,0\n"), InputError);
+  EXPECT_THROW(read("a,0.01\na,0.02\n"), InputError);
+  EXPECT_THROW(read(""), InputError);
 }
 
 TEST(MarkerWeightsFile, IsRefusedWhereItMakesNoSense) {

@@ -31,6 +31,8 @@ FitResult sample_result() {
   result.effects = {{"wind", {{"q_x", "Pa", 0.25, 0.01, ParameterState::fitted, ""}}}};
   result.nuisance = {{"tilt_x", "rad", 1e-4, 1e-5, ParameterState::fitted, ""}};
   result.errors = {{"front", "px", {0.3, 0.42, 1000}, {0.5, 0.7, 400}, 0.29, {21, 30, 25}}};
+  result.marker_offset_sigma_m = 0.01;
+  result.marker_offsets = {{"m7", {1e-3, -2e-3, 1.0 / 3}}, {"m2", {0, 0, 0.1}}};
   result.basins = {
       {.cost = 1.6, .ended = 3, .parameters = {{"tension_warp", 41.1}, {"wind.q_x", 1.0 / 3}}},
       {.cost = 4.5, .ended = 1, .refined = false, .parameters = {{"tension_warp", 90}}}};
@@ -88,6 +90,12 @@ void expect_same(const FitResult& a, const FitResult& b) {
     EXPECT_EQ(a.errors[i].trivial.last_velocity, b.errors[i].trivial.last_velocity);
     EXPECT_EQ(a.errors[i].trivial.rigid, b.errors[i].trivial.rigid);
   }
+  EXPECT_EQ(a.marker_offset_sigma_m, b.marker_offset_sigma_m);
+  ASSERT_EQ(a.marker_offsets.size(), b.marker_offsets.size());
+  for (std::size_t i = 0; i < a.marker_offsets.size(); ++i) {
+    EXPECT_EQ(a.marker_offsets[i].marker, b.marker_offsets[i].marker);
+    EXPECT_EQ(a.marker_offsets[i].offset_m, b.marker_offsets[i].offset_m);
+  }
   ASSERT_EQ(a.basins.size(), b.basins.size());
   for (std::size_t i = 0; i < a.basins.size(); ++i) {
     EXPECT_EQ(a.basins[i].cost, b.basins[i].cost);
@@ -129,7 +137,7 @@ TEST(FitJson, HasTheKeysOfTheFormat) {
   for (const auto& [key, value] : json.items()) keys.push_back(key);
   EXPECT_THAT(keys, testing::ElementsAre("format", "recording", "version", "command", "seed",
                                          "seconds", "model", "parameters", "effects", "nuisance",
-                                         "basins", "errors", "observations"));
+                                         "basins", "errors", "observations", "marker_offsets"));
   EXPECT_EQ(json["format"], "clothfit-fit/1");
   EXPECT_EQ(json["model"]["mesh"]["rows"], 9);
   EXPECT_EQ(json["model"]["time_step_s"], 1.0 / 480);
@@ -142,6 +150,7 @@ TEST(FitJson, HasTheKeysOfTheFormat) {
   EXPECT_EQ(json["errors"]["held_out"]["rms_distance"], 0.7);
   EXPECT_EQ(json["errors"]["trivial"]["last_velocity"], 30);
   EXPECT_EQ(json["observations"]["rejected"]["too far"], 1);
+  EXPECT_EQ(json["marker_offsets"]["offset_m"]["m7"][1], -2e-3);
 }
 
 TEST(FitJson, MayHoldMoreThanThisVersionKnows) {
@@ -174,6 +183,9 @@ TEST(FitJson, IsRefusedWhereAValueIsMissingOrOfAnotherKind) {
 
   expect("fit.json: `/format` is `clothfit-fit/2`",
          [](auto& j) { j["format"] = "clothfit-fit/2"; });
+  expect("fit.json: `/marker_offsets/offset_m/m2` is no vector", [](auto& j) {
+    j["marker_offsets"]["offset_m"]["m2"] = {1, 2};
+  });
   expect("fit.json: `/model/mesh` is missing", [](auto& j) { j["model"].erase("mesh"); });
   expect("fit.json: `/parameters/1/value` is missing",
          [](auto& j) { j["parameters"][1].erase("value"); });

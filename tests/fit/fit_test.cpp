@@ -174,6 +174,22 @@ TEST(Fit, FindsTheFabricByCmaToo) {
   expect_within(report.result, "damping_warp", truth.fabric.damping_warp_s, 0.2);
 }
 
+TEST(Fit, LooksAtNoFewerFramesThanItSearchedOver) {
+  const SyntheticCloth truth{.seed = 7};  // 26 frames are fitted
+  FitOptions options = quick();
+  options.search = SearchMethod::cma;
+  options.search_share = 1;
+
+  const FitReport report = fit(synthetic_input(truth), options, {});
+
+  ASSERT_TRUE(report.usable()) << report.message;
+  for (const std::string& stage : report.stages)
+    if (stage.find("frames") != std::string::npos) {
+      EXPECT_THAT(stage, ::testing::HasSubstr("26 frames"));
+    }
+  expect_within(report.result, "shear", truth.fabric.shear_n_per_m, 0.03);
+}
+
 TEST(Fit, TellsTheBasinsThatItCameAcrossBestFirst) {
   for (const SearchMethod search : {SearchMethod::paper, SearchMethod::cma}) {
     FitOptions options = tiny_fit(search);
@@ -368,6 +384,8 @@ TEST(Fit, RefusesOptionsOutOfRange) {
   const FitInput input = synthetic_input({.mesh = 5, .markers = 5});
   EXPECT_THROW(fit(input, {.mesh_columns = 1}, {}), InputError);
   EXPECT_THROW(fit(input, {.population = 1}, {}), InputError);
+  EXPECT_THROW(fit(input, {.search_share = 0}, {}), InputError);
+  EXPECT_THROW(fit(input, {.search_share = 1.1}, {}), InputError);
   EXPECT_THROW(fit(input, {.work = 0}, {}), InputError);
   EXPECT_THROW(fit(input, {.substep_scale = 0}, {}), InputError);
   EXPECT_THROW(fit(input, {.resume = true}, {}), InputError);
