@@ -26,12 +26,15 @@ double finite(double value) {
 }
 
 Json to_json(const ParameterEstimate& parameter) {
-  return {{"name", parameter.name},
-          {"unit", parameter.unit},
-          {"value", finite(parameter.value)},
-          {"sigma", finite(parameter.sigma)},
-          {"state", to_string(parameter.state)},
-          {"reason", parameter.reason}};
+  Json json = {{"name", parameter.name},
+               {"unit", parameter.unit},
+               {"value", finite(parameter.value)},
+               {"sigma", finite(parameter.sigma)},
+               {"state", to_string(parameter.state)},
+               {"reason", parameter.reason}};
+  if (const auto& interval = parameter.interval_90)
+    json["interval_90"] = {finite(interval->lower), finite(interval->upper)};
+  return json;
 }
 
 Json to_json(const std::vector<ParameterEstimate>& parameters) {
@@ -149,6 +152,11 @@ ParameterEstimate read_parameter(const JsonValue& json) {
   }
   parameter.state = *found;
   parameter.reason = json.text_or_empty("reason");
+  if (json.has("interval_90")) {
+    const std::vector<JsonValue> ends = json.at("interval_90").items();
+    if (ends.size() != 2) json.at("interval_90").refuse("is no interval", "two numbers");
+    parameter.interval_90 = {.lower = ends[0].number(), .upper = ends[1].number()};
+  }
   return parameter;
 }
 

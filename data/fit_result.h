@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -10,6 +11,11 @@ namespace clothfit {
 enum class ParameterState { fitted, fixed, undetermined };
 std::string to_string(ParameterState state);
 
+/// Ends of an interval, in a parameter's unit.
+struct Interval {
+  double lower = 0, upper = 0;
+};
+
 struct ParameterEstimate {
   std::string name;
   std::string unit;
@@ -17,6 +23,7 @@ struct ParameterEstimate {
   double sigma = 0;  ///< one standard deviation; 0 when fixed
   ParameterState state = ParameterState::fitted;
   std::string reason;  ///< why it is undetermined or fixed; empty when fitted
+  std::optional<Interval> interval_90 = std::nullopt;  ///< of 90 %; where it was fitted
 };
 
 struct EffectEstimate {

@@ -441,6 +441,7 @@ void explain_by_strain_limit(const FitProblem& problem, const Eigen::VectorXd& v
     const auto found = std::ranges::find(parameters, names[n].name, &ParameterEstimate::name);
     assert(found != parameters.end());
     found->state = ParameterState::undetermined;
+    found->interval_90.reset();
     found->reason = fmt::format(
         "{:.0f} % of its springs sit on their strain limit in the fitted frames, as long as that "
         "allows however stiff they are",
@@ -457,6 +458,8 @@ void fill_parameters(const FitProblem& problem, const FitOptions& options,
         estimate(problem.space.parameters[static_cast<size_t>(p)], name, values[p],
                  uncertainty.sigma[p], uncertainty.roughness[p]);
     explain_by_correlation(problem.space, uncertainty, p, parameter);
+    if (parameter.state == ParameterState::fitted)
+      parameter.interval_90 = {.lower = uncertainty.lower[p], .upper = uncertainty.upper[p]};
     return parameter;
   };
   const double area_m2 = problem.cloth.mesh.width_m * problem.cloth.mesh.height_m;
@@ -506,6 +509,31 @@ void fill_correlation(const ParameterSpace& space, const Uncertainty& uncertaint
     report.correlation_names.push_back(space.parameters[static_cast<size_t>(p)].name);
   }
   report.correlation = uncertainty.correlation(shown, shown);
+}
+
+/// Of the physics, what sigma is made of; of all, what residuals it was made from.
+void add_uncertainty(const FitProblem& problem, const Eigen::VectorXd& values,
+                     const Uncertainty& uncertainty, FitReport& report) {
+  for (int p = 0; p < problem.space.size(); ++p) {
+    const FitParameter& parameter = problem.space.parameters[static_cast<size_t>(p)];
+    if (!is_physical(parameter.role)) continue;
+    report.sigma_parts.push_back(
+        {.name = parameter.name,
+         .value = values[p],
+         .noise = uncertainty.noise_sigma[p],
+         .robust = uncertainty.robust_sigma[p],
+         .step_shift = uncertainty.step_shift[p],
+         .degrees_of_freedom = uncertainty.degrees_of_freedom[p],
+         .interval_90 = {.lower = uncertainty.lower[p], .upper = uncertainty.upper[p]}});
+  }
+  const BlockCounts& counts = uncertainty.block_counts;
+  const std::string blocks =
+      uncertainty.blocks > 0
+          ? fmt::format("sigma over {} blocks ({} along s, {} along t, {} in time)",
+                        uncertainty.blocks, counts.along_s, counts.along_t, counts.in_time)
+          : "sigma of independent residuals alone: " + uncertainty.why_no_blocks;
+  report.stages.push_back(fmt::format("chi-square per degree of freedom {:.3g}; {}",
+                                      uncertainty.chi_square_per_dof, blocks));
 }
 
 /// Columns and rows. Natural lengths that come from an earlier fit are those of its mesh.
@@ -590,16 +618,7 @@ FitReport fit(const FitInput& input, const FitOptions& options, const ProgressCa
                      "the derivatives at the optimum could not be computed");
     fill_correlation(problem.space, uncertainty, report);
     result.basins = basins_of(problem.space, std::move(candidates), values, uncertainty);
-    for (int p = 0; p < problem.space.size(); ++p)
-      if (const FitParameter& parameter = problem.space.parameters[static_cast<size_t>(p)];
-          is_physical(parameter.role))
-        report.sigma_parts.push_back({.name = parameter.name,
-                                      .value = values[p],
-                                      .noise = uncertainty.noise_sigma[p],
-                                      .robust = uncertainty.robust_sigma[p],
-                                      .step_shift = uncertainty.step_shift[p]});
-    report.stages.push_back(
-        fmt::format("chi-square per degree of freedom {:.3g}", uncertainty.chi_square_per_dof));
+    add_uncertainty(problem, values, uncertainty, report);
   } else {
     const RefineOptions defaults;
     result.time_step_s = stable_time_step_s(problem.cloth, parameter_set(problem, values)) /

@@ -26,6 +26,12 @@ std::string relative_text(const ParameterEstimate& parameter) {
   return significant(100 * parameter.sigma / std::abs(parameter.value), 2) + "%";
 }
 
+std::string interval_text(const ParameterEstimate& parameter) {
+  if (!parameter.interval_90) return "";
+  return value_text(parameter.interval_90->lower, parameter.sigma) + " to " +
+         value_text(parameter.interval_90->upper, parameter.sigma);
+}
+
 }  // namespace
 
 std::string to_string(FitStop stop) {
@@ -52,17 +58,20 @@ std::string kind_title(const std::string& kind, const std::string& unit) {
 }
 
 Table parameter_table(const FitResult& result) {
-  Table table{{"group", "name", "unit", "value", "sigma", "state", "reason"}, {}};
+  Table table{
+      {"group", "name", "unit", "value", "sigma", "state", "reason", "lower_90", "upper_90"}, {}};
   for_each_parameter(result, [&](const std::string& group, const ParameterEstimate& parameter) {
+    const auto& interval = parameter.interval_90;
     table.rows.push_back({group, parameter.name, parameter.unit, exact_text(parameter.value),
-                          exact_text(parameter.sigma), to_string(parameter.state),
-                          parameter.reason});
+                          exact_text(parameter.sigma), to_string(parameter.state), parameter.reason,
+                          interval ? exact_text(interval->lower) : "",
+                          interval ? exact_text(interval->upper) : ""});
   });
   return table;
 }
 
 Table short_parameter_table(const FitResult& result) {
-  Table table{{"parameter", "value", "sigma", "relative", "unit", "state"}, {}};
+  Table table{{"parameter", "value", "sigma", "relative", "90 %", "unit", "state"}, {}};
   for_each_parameter(result, [&](const std::string& group, const ParameterEstimate& parameter) {
     const std::string name = group == "base" ? parameter.name : group + ": " + parameter.name;
     const bool fixed = parameter.state == ParameterState::fixed;
@@ -70,7 +79,7 @@ Table short_parameter_table(const FitResult& result) {
     if (!parameter.reason.empty()) state += ": " + parameter.reason;
     table.rows.push_back({name, value_text(parameter.value, parameter.sigma),
                           fixed ? "" : significant(parameter.sigma, 2), relative_text(parameter),
-                          parameter.unit, state});
+                          interval_text(parameter), parameter.unit, state});
   });
   return table;
 }

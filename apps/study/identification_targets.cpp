@@ -136,8 +136,8 @@ void judge_drag(const TargetsResult& result, std::vector<TargetRow>& rows) {
     double low = 1, high = 0;
     for (const RecoverySummary& p : found.parameters) {
       if (p.name.starts_with("damping") || p.name.find('.') != std::string::npos) continue;
-      low = std::min(low, p.robust_coverage_90);
-      high = std::max(high, p.robust_coverage_90);
+      low = std::min(low, p.holds_truth.robust);
+      high = std::max(high, p.holds_truth.robust);
     }
     return std::pair(low, high);
   };

@@ -11,6 +11,7 @@
 
 #include "data/input_error.h"
 #include "data/median.h"
+#include "fit/cluster_covariance.h"
 #include "fit/draws.h"
 #include "fit/objective.h"
 #include "fit/problem.h"
@@ -77,7 +78,8 @@ std::string payload_of(const RecoverTrial& trial) {
   for (const RecoveredParameter& p : trial.parameters)
     parameters.push_back({p.name, number(p.truth), number(p.estimate), number(p.sigma),
                           number(p.noise_sigma), number(p.robust_sigma), number(p.bound_sigma),
-                          p.undetermined});
+                          p.undetermined, number(p.degrees_of_freedom), number(p.interval_90.lower),
+                          number(p.interval_90.upper)});
   return json.dump();
 }
 
@@ -95,6 +97,10 @@ RecoverTrial trial_of(const std::string& payload) {
                                 .sigma = number_of(p[3]),
                                 .noise_sigma = number_of(p[4]),
                                 .robust_sigma = number_of(p[5]),
+                                .degrees_of_freedom = p[8].is_null()
+                                                          ? std::numeric_limits<double>::infinity()
+                                                          : p[8].get<double>(),
+                                .interval_90 = {number_of(p[9]), number_of(p[10])},
                                 .bound_sigma = number_of(p[6]),
                                 .undetermined = p[7]});
   return trial;
@@ -125,9 +131,9 @@ double share_within(const std::vector<double>& pulls, double limit) {
 }
 
 RecoverySummary summary_of(const std::string& name, const std::vector<RecoverTrial>& trials) {
-  constexpr double kNormal95 = 1.959964, kNormal90 = 1.644854;
+  constexpr double kNormal95 = 1.959964;
   RecoverySummary summary{.name = name};
-  std::vector<double> relative, by_bound, by_noise, by_robust;
+  std::vector<double> relative, by_bound, by_noise;
   for (const RecoverTrial& trial : trials) {
     const auto p = std::ranges::find(trial.parameters, name, &RecoveredParameter::name);
     if (p == trial.parameters.end()) continue;
@@ -141,7 +147,6 @@ RecoverySummary summary_of(const std::string& name, const std::vector<RecoverTri
     relative.push_back(error / p->truth);
     if (std::isfinite(p->bound_sigma)) by_bound.push_back(error / p->bound_sigma);
     by_noise.push_back(error / p->noise_sigma);
-    by_robust.push_back(error / p->robust_sigma);
   }
   if (relative.empty()) return summary;
   summary.bias = mean_of(relative);
@@ -158,7 +163,7 @@ RecoverySummary summary_of(const std::string& name, const std::vector<RecoverTri
   summary.spread_over_bound = deviation_of(by_bound);
   summary.bias_over_bound = mean_of(by_bound);
   summary.coverage_95 = share_within(by_noise, kNormal95);
-  summary.robust_coverage_90 = share_within(by_robust, kNormal90);
+  summary.holds_truth = coverage_90(trials, name, summary.truth);
   return summary;
 }
 
@@ -178,7 +183,7 @@ std::string RecoverOptions::key() const {
   std::string effects;
   for (const std::string& effect : fit.effects) effects += effect + " ";
   return fmt::format(
-      "recover 1 seed {} scene {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} fit "
+      "recover 2 seed {} scene {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} fit "
       "{} "
       "{} {} {} {} {} {} {} {} start {} effects {}",
       seed, scene.size_m, scene.mass_kg, f.tension_warp_n_per_m, f.tension_weft_n_per_m,
@@ -189,6 +194,25 @@ std::string RecoverOptions::key() const {
       static_cast<int>(fit.observations), fit.mesh_columns, fit.mesh_rows, fit.population,
       fit.generations, fit.refine_best, static_cast<int>(fit.loss), fit.start_nodes,
       fit.substep_scale, start_factor, effects);
+}
+
+Coverage90 coverage_90(const std::vector<RecoverTrial>& trials, const std::string& parameter,
+                       double value) {
+  const double normal = student_factor(0.9, std::numeric_limits<double>::infinity());
+  int plain = 0, robust = 0, stated = 0, count = 0;
+  for (const RecoverTrial& trial : trials) {
+    const auto p = std::ranges::find(trial.parameters, parameter, &RecoveredParameter::name);
+    if (p == trial.parameters.end() || p->undetermined) continue;
+    ++count;
+    const double error = std::abs(p->estimate - value);
+    if (error <= normal * p->noise_sigma) ++plain;
+    if (error <= student_factor(0.9, p->degrees_of_freedom) * p->robust_sigma) ++robust;
+    if (p->interval_90.lower <= value && value <= p->interval_90.upper) ++stated;
+  }
+  const auto share = [&](int held) {
+    return count > 0 ? held / static_cast<double>(count) : kNone;
+  };
+  return {.plain = share(plain), .robust = share(robust), .stated = share(stated)};
 }
 
 RecoverTrial recover_once(const RecoverOptions& options, int, std::uint64_t seed) {
@@ -221,6 +245,8 @@ RecoverTrial recover_once(const RecoverOptions& options, int, std::uint64_t seed
                                    .estimate = parts.value,
                                    .noise_sigma = parts.noise,
                                    .robust_sigma = parts.robust,
+                                   .degrees_of_freedom = parts.degrees_of_freedom,
+                                   .interval_90 = parts.interval_90,
                                    .bound_sigma = kNone};
       if (const auto sigma = bound.find(parts.name); sigma != bound.end())
         parameter.bound_sigma = sigma->second;
