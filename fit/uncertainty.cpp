@@ -8,6 +8,7 @@
 
 #include "fit/cluster_covariance.h"
 #include "fit/observed_blocks.h"
+#include "fit/prior_cost.h"
 
 namespace clothfit {
 
@@ -21,27 +22,6 @@ Eigen::MatrixXd invert(const Eigen::MatrixXd& information) {
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(information);
   const Eigen::VectorXd variance = eigen.eigenvalues().cwiseMax(kLeastInformation).cwiseInverse();
   return eigen.eigenvectors() * variance.asDiagonal() * eigen.eigenvectors().transpose();
-}
-
-/// Half the sum of squares of the priors' residuals, to second order in the coordinates.
-struct PriorCost {
-  Eigen::MatrixXd information;
-  Eigen::VectorXd gradient;
-};
-
-PriorCost prior_cost(const FitProblem& problem, const Eigen::VectorXd& values,
-                     const Eigen::VectorXd& slope) {
-  PriorCost cost{.information = Eigen::MatrixXd::Zero(slope.size(), slope.size()),
-                 .gradient = Eigen::VectorXd::Zero(slope.size())};
-  for (const GaussianPrior& prior : problem.priors) {
-    Eigen::MatrixXd j = Eigen::MatrixXd::Zero(prior.mean.size(), slope.size());
-    for (size_t n = 0; n < prior.indices.size(); ++n)
-      j.col(prior.indices[n]) =
-          prior.sqrt_information.col(static_cast<Eigen::Index>(n)) * slope[prior.indices[n]];
-    cost.information += j.transpose() * j;
-    cost.gradient += j.transpose() * prior.residual(values);
-  }
-  return cost;
 }
 
 /// Huber's, of each residual.
@@ -153,7 +133,7 @@ Uncertainty estimate_uncertainty(const TrajectoryObjective& objective,
       chi_square / std::max(1.0, fit.weight.sum() - static_cast<double>(fit.coordinates()));
 
   const Eigen::VectorXd slope = problem.space.value_by_coordinate(values);
-  const PriorCost prior = prior_cost(problem, values, slope);
+  const PriorCost prior = prior_cost(problem, values);
   fit.prior_information = prior.information;
   const Eigen::MatrixXd covariance =
       invert(information / std::max(1.0, result.chi_square_per_dof) + prior.information);

@@ -14,6 +14,7 @@
 #include "fit/cluster_covariance.h"
 #include "fit/draws.h"
 #include "fit/objective.h"
+#include "fit/prior_cost.h"
 #include "fit/problem.h"
 #include "model/stability.h"
 
@@ -24,42 +25,6 @@ using Json = nlohmann::ordered_json;
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 enum Series : int { kStart = 100 };
-
-/// Standard deviations of the fit's parameters from the information at the truth, by name.
-std::map<std::string, double> bounds(const SyntheticRecording& recording,
-                                     const FitOptions& options) {
-  const ClothDescription& cloth = recording.input.recording.cloth;
-  const FitProblem problem =
-      make_problem(recording.input, options,
-                   options.mesh_columns > 0 ? options.mesh_columns : cloth.mesh_columns,
-                   options.mesh_rows > 0 ? options.mesh_rows : cloth.mesh_rows);
-  Eigen::VectorXd values = problem.space.start();
-  for (int p = 0; p < problem.space.size(); ++p) {
-    const auto known = recording.truth.find(problem.space.parameters[static_cast<size_t>(p)].name);
-    if (known != recording.truth.end()) values[p] = known->second;
-  }
-  const double stable_s = stable_time_step_s(problem.cloth, parameter_set(problem, values));
-  const TrajectoryObjective objective(problem, problem.first_held_out, stable_s / 1.5);
-  const Linearisation linear = objective.linearise(values);
-  std::map<std::string, double> result;
-  if (!linear.usable) return result;
-  const Eigen::VectorXd slope = problem.space.value_by_coordinate(values);
-  Eigen::MatrixXd information =
-      linear.residual_by_coordinate.transpose() * linear.residual_by_coordinate;
-  for (const GaussianPrior& prior : problem.priors) {
-    Eigen::MatrixXd j = Eigen::MatrixXd::Zero(prior.mean.size(), slope.size());
-    for (size_t n = 0; n < prior.indices.size(); ++n)
-      j.col(prior.indices[n]) =
-          prior.sqrt_information.col(static_cast<Eigen::Index>(n)) * slope[prior.indices[n]];
-    information += j.transpose() * j;
-  }
-  const Eigen::MatrixXd covariance =
-      information.ldlt().solve(Eigen::MatrixXd::Identity(slope.size(), slope.size()));
-  for (int p = 0; p < problem.space.size(); ++p)
-    result[problem.space.parameters[static_cast<size_t>(p)].name] =
-        std::sqrt(covariance(p, p)) * slope[p];
-  return result;
-}
 
 Json number(double value) {
   return std::isfinite(value) ? Json(value) : Json(nullptr);
@@ -190,10 +155,43 @@ std::string RecoverOptions::key() const {
       f.shear_n_per_m, f.flexion_warp_n_per_m, f.flexion_weft_n_per_m, f.damping_warp_s,
       f.damping_weft_s, scene.drag_per_s, scene.truth_mesh, scene.truth_steps, scene.markers,
       scene.frames, scene.frame_rate_hz, scene.before_s, scene.cameras, scene.noise_m,
-      scene.noise_px, scene.missing, fmt::format("{} {}", scene.hand, scene.outliers),
+      scene.noise_px, scene.missing,
+      fmt::format("{} {} {}", scene.hand, scene.outliers, scene.noisy),
       static_cast<int>(fit.observations), fit.mesh_columns, fit.mesh_rows, fit.population,
       fit.generations, fit.refine_best, static_cast<int>(fit.loss), fit.start_nodes,
       fit.substep_scale, start_factor, effects);
+}
+
+FitProblem problem_of(const SyntheticRecording& recording, const FitOptions& options) {
+  const ClothDescription& cloth = recording.input.recording.cloth;
+  return make_problem(recording.input, options,
+                      options.mesh_columns > 0 ? options.mesh_columns : cloth.mesh_columns,
+                      options.mesh_rows > 0 ? options.mesh_rows : cloth.mesh_rows);
+}
+
+std::map<std::string, double> bound_sigmas(const SyntheticRecording& recording,
+                                           const FitOptions& options) {
+  const FitProblem problem = problem_of(recording, options);
+  Eigen::VectorXd values = problem.space.start();
+  for (int p = 0; p < problem.space.size(); ++p) {
+    const auto known = recording.truth.find(problem.space.parameters[static_cast<size_t>(p)].name);
+    if (known != recording.truth.end()) values[p] = known->second;
+  }
+  const double stable_s = stable_time_step_s(problem.cloth, parameter_set(problem, values));
+  const TrajectoryObjective objective(problem, problem.first_held_out, stable_s / 1.5);
+  const Linearisation linear = objective.linearise(values);
+  std::map<std::string, double> result;
+  if (!linear.usable) return result;
+  const Eigen::VectorXd slope = problem.space.value_by_coordinate(values);
+  const Eigen::MatrixXd information =
+      linear.residual_by_coordinate.transpose() * linear.residual_by_coordinate +
+      prior_cost(problem, values).information;
+  const Eigen::MatrixXd covariance =
+      information.ldlt().solve(Eigen::MatrixXd::Identity(slope.size(), slope.size()));
+  for (int p = 0; p < problem.space.size(); ++p)
+    result[problem.space.parameters[static_cast<size_t>(p)].name] =
+        std::sqrt(covariance(p, p)) * slope[p];
+  return result;
 }
 
 Coverage90 coverage_90(const std::vector<RecoverTrial>& trials, const std::string& parameter,
@@ -236,7 +234,7 @@ RecoverTrial recover_once(const RecoverOptions& options, int, std::uint64_t seed
   RecoverTrial trial{.stop = report.stop, .message = report.message};
   for (const auto& [reason, count] : report.result.observations_rejected) trial.rejected += count;
   if (report.usable()) {
-    const std::map<std::string, double> bound = bounds(recording, fit_options);
+    const std::map<std::string, double> bound = bound_sigmas(recording, fit_options);
     for (const FitReport::SigmaParts& parts : report.sigma_parts) {
       const auto known = recording.truth.find(parts.name);
       if (known == recording.truth.end()) continue;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -8,6 +9,7 @@
 #include "apps/study/synthetic_recording.h"
 #include "data/progress.h"
 #include "fit/executor.h"
+#include "fit/problem.h"
 
 namespace clothfit {
 
@@ -41,6 +43,14 @@ struct RecoveredParameter {
   double bound_sigma = 0;
   bool undetermined = false;
 };
+
+/// A synthetic recording as these options fit it, on their mesh.
+FitProblem problem_of(const SyntheticRecording& recording, const FitOptions& options);
+
+/// Standard deviations of the fit's parameters by Cramer and Rao's bound, from the information of
+/// the recording at the truth, by name; none where that cannot be simulated.
+std::map<std::string, double> bound_sigmas(const SyntheticRecording& recording,
+                                           const FitOptions& options);
 
 struct RecoverTrial {
   FitStop stop = FitStop::diverged;
