@@ -34,6 +34,10 @@ Json to_json(const ParameterEstimate& parameter) {
                {"reason", parameter.reason}};
   if (const auto& interval = parameter.interval_90)
     json["interval_90"] = {finite(interval->lower), finite(interval->upper)};
+  if (parameter.interval_by_profile) json["interval_by_profile"] = true;
+  if (const auto& interval = parameter.bootstrap_90)
+    json["bootstrap_90"] = {finite(interval->lower), finite(interval->upper)};
+  if (parameter.mesh_shift) json["mesh_shift"] = finite(*parameter.mesh_shift);
   return json;
 }
 
@@ -135,6 +139,15 @@ class JsonValue {
   std::string place_;
 };
 
+/// Nothing where there is no such key.
+std::optional<Interval> read_interval(const JsonValue& json, const std::string& key) {
+  if (!json.has(key)) return std::nullopt;
+  const JsonValue list = json.at(key);
+  const std::vector<JsonValue> ends = list.items();
+  if (ends.size() != 2) list.refuse("is no interval", "two numbers");
+  return Interval{.lower = ends[0].number(), .upper = ends[1].number()};
+}
+
 ParameterEstimate read_parameter(const JsonValue& json) {
   ParameterEstimate parameter;
   parameter.name = json.at("name").text();
@@ -152,11 +165,11 @@ ParameterEstimate read_parameter(const JsonValue& json) {
   }
   parameter.state = *found;
   parameter.reason = json.text_or_empty("reason");
-  if (json.has("interval_90")) {
-    const std::vector<JsonValue> ends = json.at("interval_90").items();
-    if (ends.size() != 2) json.at("interval_90").refuse("is no interval", "two numbers");
-    parameter.interval_90 = {.lower = ends[0].number(), .upper = ends[1].number()};
-  }
+  parameter.interval_90 = read_interval(json, "interval_90");
+  parameter.interval_by_profile =
+      json.has("interval_by_profile") && json.at("interval_by_profile").truth();
+  parameter.bootstrap_90 = read_interval(json, "bootstrap_90");
+  if (json.has("mesh_shift")) parameter.mesh_shift = json.at("mesh_shift").number();
   return parameter;
 }
 

@@ -58,6 +58,9 @@ struct FitOptions {
   int start_nodes = 6;       ///< per side, of the corrections of a start that is unknown
   double work = 1;           ///< > 0; times the limits of work of the refinement's stages
   double substep_scale = 1;  ///< >= 1; more cuts time finer than stability asks
+  bool profile = false;      ///< intervals from the profiled cost where it is no parabola
+  int bootstrap = 0;         ///< replicates of a bootstrap over blocks; 0: none, else 19 or more
+  bool two_meshes = false;   ///< fit again on a mesh of other resolution, from the optimum
   int threads = 0;           ///< 0: as many as the machine has
   /// Parameters taken from an earlier fit: nothing is fitted, the recording is forecast from its
   /// own first frame.

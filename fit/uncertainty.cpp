@@ -6,6 +6,7 @@
 #include <limits>
 #include <utility>
 
+#include "fit/block_bootstrap.h"
 #include "fit/cluster_covariance.h"
 #include "fit/observed_blocks.h"
 #include "fit/prior_cost.h"
@@ -24,40 +25,53 @@ Eigen::MatrixXd invert(const Eigen::MatrixXd& information) {
   return eigen.eigenvectors() * variance.asDiagonal() * eigen.eigenvectors().transpose();
 }
 
-/// Huber's, of each residual.
-Eigen::VectorXd weights(const Objective& objective, const Eigen::VectorXd& residual, Loss loss) {
-  Eigen::VectorXd weight = Eigen::VectorXd::Ones(residual.size());
-  if (loss != Loss::huber) return weight;
-  const double threshold = kHuberScales * robust_scale(residual);
-  for (const Objective::Block& block : objective.blocks()) {
-    const double length = residual.segment(block.offset, block.dimension).norm();
-    weight.segment(block.offset, block.dimension)
-        .setConstant(std::min(1.0, threshold / std::max(length, 1e-300)));
-  }
-  return weight;
-}
-
 /// The sandwich's variance of each coordinate and its degrees of freedom; where there is none, 0
-/// and why. The fit's residuals are those that `objective` leaves.
-void add_robust_part(const TrajectoryObjective& objective, const LinearisedFit& fit,
-                     Uncertainty& result, Eigen::VectorXd& variance) {
+/// and why. The blocks, for others.
+Eigen::VectorXi add_robust_part(const TrajectoryObjective& objective, const LinearisedFit& fit,
+                                Uncertainty& result, Eigen::VectorXd& variance) {
   variance = Eigen::VectorXd::Zero(fit.coordinates());
   result.degrees_of_freedom =
       Eigen::VectorXd::Constant(fit.coordinates(), std::numeric_limits<double>::infinity());
   const ObservedBlocks cut = observed_blocks(objective, fit.residual);
   if (cut.blocks.count < 2) {
     result.why_no_blocks = "all observations lie in one place";
-    return;
+    return {};
   }
   const ClusterCovariance robust = cluster_covariance(fit, cut.blocks.block);
   if (!robust.usable) {
     result.why_no_blocks = robust.reason;
-    return;
+    return {};
   }
   result.blocks = cut.blocks.count;
   result.block_counts = cut.counts;
   variance = robust.covariance.diagonal().cwiseMin(1 / kLeastInformation);
   result.degrees_of_freedom = robust.degrees_of_freedom;
+  return cut.blocks.block;
+}
+
+/// Ends in coordinates, within the ranges.
+void set_ends(const ParameterSpace& space, const Eigen::VectorXd& lower_coordinates,
+              const Eigen::VectorXd& upper_coordinates, Eigen::VectorXd& lower,
+              Eigen::VectorXd& upper) {
+  lower = space.values(lower_coordinates);
+  upper = space.values(upper_coordinates);
+  for (int p = 0; p < space.size(); ++p) {
+    const FitParameter& parameter = space.parameters[static_cast<size_t>(p)];
+    lower[p] = std::max(lower[p], parameter.lower);
+    upper[p] = std::min(upper[p], parameter.upper);
+  }
+}
+
+void add_bootstrap(const ParameterSpace& space, const Eigen::VectorXd& values,
+                   const LinearisedFit& fit, const Eigen::VectorXi& block,
+                   const UncertaintyOptions& options, Uncertainty& result) {
+  const Bootstrap bootstrap =
+      bootstrap_linearised(fit, block, {.replicates = options.bootstrap, .seed = options.seed});
+  const ChangeIntervals change = studentised_intervals(bootstrap, kIntervalLevel);
+  const Eigen::VectorXd here = space.coordinates(values);
+  if (change.lower.allFinite() && change.upper.allFinite())
+    set_ends(space, here + change.lower, here + change.upper, result.bootstrap_lower,
+             result.bootstrap_upper);
 }
 
 /// See Uncertainty::roughness. Only physics makes folds.
@@ -89,25 +103,31 @@ void add_interval(const ParameterSpace& space, const Eigen::VectorXd& values,
                   const Eigen::VectorXd& noise, const Eigen::VectorXd& robust,
                   const Eigen::VectorXd& shift, Uncertainty& result) {
   const double normal = student_factor(kIntervalLevel, std::numeric_limits<double>::infinity());
-  Eigen::VectorXd half_width(values.size());
+  Eigen::VectorXd& half_width = result.half_width;
+  half_width.resize(values.size());
   for (Eigen::Index p = 0; p < values.size(); ++p) {
     const double student = student_factor(kIntervalLevel, result.degrees_of_freedom[p]);
     half_width[p] = std::hypot(std::max(normal * noise[p], student * robust[p]), normal * shift[p]);
   }
-  const Eigen::VectorXd coordinates = space.coordinates(values);
-  result.lower = space.values(coordinates - half_width);
-  result.upper = space.values(coordinates + half_width);
-  for (int p = 0; p < space.size(); ++p) {
-    const FitParameter& parameter = space.parameters[static_cast<size_t>(p)];
-    result.lower[p] = std::max(result.lower[p], parameter.lower);
-    result.upper[p] = std::min(result.upper[p], parameter.upper);
-  }
+  const Eigen::VectorXd here = space.coordinates(values);
+  set_ends(space, here - half_width, here + half_width, result.lower, result.upper);
 }
 
 }  // namespace
 
+Eigen::VectorXd huber_weights(const Objective& objective, const Eigen::VectorXd& residual,
+                              double threshold) {
+  Eigen::VectorXd weight(residual.size());
+  for (const Objective::Block& block : objective.blocks()) {
+    const double length = residual.segment(block.offset, block.dimension).norm();
+    weight.segment(block.offset, block.dimension)
+        .setConstant(std::min(1.0, threshold / std::max(length, 1e-300)));
+  }
+  return weight;
+}
+
 Uncertainty estimate_uncertainty(const TrajectoryObjective& objective,
-                                 const Eigen::VectorXd& values, Loss loss,
+                                 const Eigen::VectorXd& values, const UncertaintyOptions& options,
                                  Eigen::MatrixXd residual_by_coordinate) {
   Uncertainty result;
   const FitProblem& problem = objective.problem();
@@ -125,7 +145,9 @@ Uncertainty estimate_uncertainty(const TrajectoryObjective& objective,
   if (half_step_residual.size() != fit.residual.size()) return result;
   result.roughness = roughness(objective, values, fit);
 
-  fit.weight = weights(objective, fit.residual, loss);
+  const double threshold = options.loss == Loss::huber ? kHuberScales * robust_scale(fit.residual)
+                                                       : std::numeric_limits<double>::infinity();
+  fit.weight = huber_weights(objective, fit.residual, threshold);
   const Eigen::MatrixXd weighted = fit.weight.asDiagonal() * fit.jacobian;
   const Eigen::MatrixXd information = weighted.transpose() * fit.jacobian;
   const double chi_square = fit.residual.cwiseAbs2().dot(fit.weight);
@@ -142,11 +164,14 @@ Uncertainty estimate_uncertainty(const TrajectoryObjective& objective,
       sigma.cwiseInverse().asDiagonal() * covariance * sigma.cwiseInverse().asDiagonal();
 
   const Eigen::MatrixXd inverse = invert(information + prior.information);
+  result.inverse_hessian = inverse;
   const Eigen::VectorXd shift =
       -inverse * (weighted.transpose() * (2 * (half_step_residual - fit.residual)));
   fit.residual -= fit.jacobian * (inverse * (weighted.transpose() * fit.residual + prior.gradient));
   Eigen::VectorXd robust_variance;
-  add_robust_part(objective, fit, result, robust_variance);
+  const Eigen::VectorXi block = add_robust_part(objective, fit, result, robust_variance);
+  if (options.bootstrap > 0 && block.size() > 0)
+    add_bootstrap(problem.space, values, fit, block, options, result);
 
   result.step_shift = shift.cwiseProduct(slope);
   result.noise_sigma = sigma.cwiseProduct(slope);

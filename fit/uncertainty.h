@@ -10,6 +10,12 @@ namespace clothfit {
 /// The level of the intervals that a fit states.
 inline constexpr double kIntervalLevel = 0.9;
 
+struct UncertaintyOptions {
+  Loss loss = Loss::huber;
+  int bootstrap = 0;  ///< replicates, 0 or at least 19
+  unsigned long long seed = 1;
+};
+
 struct Uncertainty {
   bool usable = false;
   Eigen::VectorXd sigma;        ///< of each parameter, in its unit: all below together
@@ -25,6 +31,11 @@ struct Uncertainty {
   /// range: the wider of the normal one of independent residuals and Student's of the blocks; the
   /// time step's share added in square.
   Eigen::VectorXd lower, upper;
+  Eigen::VectorXd half_width;       ///< of it in coordinates, before the range cuts it
+  Eigen::MatrixXd inverse_hessian;  ///< of the cost by coordinates, (J' W J + P)^-1
+  /// Studentised intervals of a bootstrap over the blocks (fit/block_bootstrap.h), within the
+  /// ranges; empty unless asked for, and without blocks.
+  Eigen::VectorXd bootstrap_lower, bootstrap_upper;
   Eigen::MatrixXd correlation;  ///< of the coordinates
   double chi_square_per_dof = 0;
   /// How far each parameter would move (in its unit) if the time step went to zero: the
@@ -55,7 +66,12 @@ struct Uncertainty {
 ///
 /// `residual_by_coordinate`: exact derivatives at `values` that are known already, or empty.
 Uncertainty estimate_uncertainty(const TrajectoryObjective& objective,
-                                 const Eigen::VectorXd& values, Loss loss = Loss::huber,
+                                 const Eigen::VectorXd& values,
+                                 const UncertaintyOptions& options = {},
                                  Eigen::MatrixXd residual_by_coordinate = {});
+
+/// Huber's weights of residuals beyond `threshold`, by the length of their observation's.
+Eigen::VectorXd huber_weights(const Objective& objective, const Eigen::VectorXd& residual,
+                              double threshold);
 
 }  // namespace clothfit
