@@ -30,7 +30,7 @@ TEST(PlantedDrag, IntervalsOverBlocksHoldThePseudoTruthWherePlainOnesDoNot) {
   const RecoverOptions study = small_study(80 * sigma_per_s);
 
   const RecoverResult result = recover(study, nullptr, {});
-  const PseudoTruth pseudo = pseudo_truth(study, 6, {});
+  const PseudoTruth pseudo = pseudo_truth(study, 10, {});
 
   SCOPED_TRACE("seed 7");
   ASSERT_EQ(result.failures, 0);
