@@ -130,6 +130,9 @@ std::string command_text(const FitVerbOptions& options, const FitFlags& flags) {
   add("--start-nodes", options.fit.start_nodes, defaults.start_nodes);
   add("--work", options.fit.work, defaults.work);
   add("--substep-scale", options.fit.substep_scale, defaults.substep_scale);
+  add("--bootstrap", options.fit.bootstrap, defaults.bootstrap);
+  if (options.fit.profile) text += " --profile";
+  if (options.fit.two_meshes) text += " --two-meshes";
   return text;
 }
 
@@ -263,6 +266,14 @@ void add_fit_verb(CLI::App& program, VerbAction& action) {
   verb->add_option("--substep-scale", options->fit.substep_scale,
                    "Above 1: smaller time steps than stability asks for")
       ->capture_default_str();
+  verb->add_flag("--profile", options->fit.profile,
+                 "Intervals from the profiled cost where it is no parabola");
+  verb->add_option("--bootstrap", options->fit.bootstrap,
+                   "Intervals from so many replicates of a bootstrap over blocks of the cloth, "
+                   "beside the others")
+      ->type_name("N");
+  verb->add_flag("--two-meshes", options->fit.two_meshes,
+                 "Fit again on a mesh of other resolution, and show the difference");
   verb->add_option("--threads", options->fit.threads, "Threads; 0 for as many as the machine has")
       ->capture_default_str();
   add_out_option(*verb, options->out, "NAME.fit");

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <cmath>
 #include <memory>
 
 #include "apps/csv_table.h"
@@ -10,6 +11,7 @@
 #include "apps/interrupt.h"
 #include "apps/progress_line.h"
 #include "apps/report/html.h"
+#include "apps/report/number_text.h"
 #include "apps/report/recover_tables.h"
 #include "apps/text_table.h"
 #include "data/output_folder.h"
@@ -41,6 +43,26 @@ Table targets_table(const std::vector<TargetRow>& rows) {
   return table;
 }
 
+/// A line for each parameter and size of the planted drag.
+Table planted_drag_table(const std::vector<PlantedDrag>& drags) {
+  Table table{
+      .header = {"drag (sigmas)", "parameter", "trials", "undetermined", "truth", "pseudo-truth",
+                 "robust 90 %", "stated 90 %", "plain 90 %", "truth: robust", "stated", "plain"},
+      .rows = {}};
+  const auto percent = [](double share) {
+    return std::isfinite(share) ? fmt::format("{:.1f} %", 100 * share) : "-";
+  };
+  for (const PlantedDrag& drag : drags)
+    for (const PlantedDragRow& p : drag.rows)
+      table.rows.push_back({fmt::format("{:g}", drag.sigmas), p.parameter, std::to_string(p.trials),
+                            std::to_string(p.undetermined), significant(p.truth, 4),
+                            significant(p.pseudo_truth, 4), percent(p.holds_pseudo_truth.robust),
+                            percent(p.holds_pseudo_truth.stated),
+                            percent(p.holds_pseudo_truth.plain), percent(p.holds_truth.robust),
+                            percent(p.holds_truth.stated), percent(p.holds_truth.plain)});
+  return table;
+}
+
 std::string page_html(const Table& targets, const TargetsResult& result) {
   std::string body = "<h1>What identification reaches</h1>\n";
   body += html_table(targets, "Targets, what was measured, and how to measure it again.");
@@ -49,6 +71,11 @@ std::string page_html(const Table& targets, const TargetsResult& result) {
                                     html_table(recovery_counts(found), "Counts.") +
                                     html_table(recovery_table(found), "Errors and intervals."));
   }
+  if (!result.planted_drag.empty())
+    body += section("planted drag",
+                    html_table(planted_drag_table(result.planted_drag),
+                               "How often intervals hold the pseudo-true value, where fits without "
+                               "the drag of many releases would agree, and the true one."));
   return html_page("What identification reaches", body);
 }
 
@@ -81,12 +108,18 @@ int run_identification(const IdentificationOptions& options) {
     write_csv_table(parameters.header, parameters.rows, out.path() / (study.name + ".csv"));
     write_csv_table(trials.header, trials.rows, out.path() / (study.name + "_trials.csv"));
   }
+  const Table planted = planted_drag_table(result.planted_drag);
+  if (!planted.rows.empty())
+    write_csv_table(planted.header, planted.rows, out.path() / "planted_drag.csv");
   write_text(page_html(targets, result), out.path() / "report.html");
   out.publish();
   if (own_journals) fs::remove_all(journals);
   for (const TargetRow& row : result.rows)
     fmt::print("{}\n    {}: {}\n    {}\n", row.target, state_text(row.state), row.measured,
                row.command);
+  if (!planted.rows.empty())
+    fmt::print("\nIntervals that hold the pseudo-true value, and the true one:\n\n{}\n",
+               text_table(planted.header, planted.rows));
   fmt::print("Report: {}\n", shown_path(out.final_path() / "report.html"));
   return kExitGood;
 }
@@ -100,7 +133,8 @@ void add_identification_experiment(CLI::App& experiment, VerbAction& action) {
       ->capture_default_str();
   verb->add_option(
           "--only", options->targets.only,
-          "Studies to do: tracks3d, one_camera, spoiled, clean, drag, drag_fitted, seconds")
+          "Studies to do: tracks3d, one_camera, spoiled, clean, drag (or drag_1, drag_5, drag_20), "
+          "drag_fitted, seconds")
       ->type_name("NAME");
   verb->add_option("--seed", options->targets.seed, "Seed of all studies")->capture_default_str();
   verb->add_option("--threads", options->targets.threads,

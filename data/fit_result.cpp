@@ -26,12 +26,19 @@ double finite(double value) {
 }
 
 Json to_json(const ParameterEstimate& parameter) {
-  return {{"name", parameter.name},
-          {"unit", parameter.unit},
-          {"value", finite(parameter.value)},
-          {"sigma", finite(parameter.sigma)},
-          {"state", to_string(parameter.state)},
-          {"reason", parameter.reason}};
+  Json json = {{"name", parameter.name},
+               {"unit", parameter.unit},
+               {"value", finite(parameter.value)},
+               {"sigma", finite(parameter.sigma)},
+               {"state", to_string(parameter.state)},
+               {"reason", parameter.reason}};
+  if (const auto& interval = parameter.interval_90)
+    json["interval_90"] = {finite(interval->lower), finite(interval->upper)};
+  if (parameter.interval_by_profile) json["interval_by_profile"] = true;
+  if (const auto& interval = parameter.bootstrap_90)
+    json["bootstrap_90"] = {finite(interval->lower), finite(interval->upper)};
+  if (parameter.mesh_shift) json["mesh_shift"] = finite(*parameter.mesh_shift);
+  return json;
 }
 
 Json to_json(const std::vector<ParameterEstimate>& parameters) {
@@ -132,6 +139,15 @@ class JsonValue {
   std::string place_;
 };
 
+/// Nothing where there is no such key.
+std::optional<Interval> read_interval(const JsonValue& json, const std::string& key) {
+  if (!json.has(key)) return std::nullopt;
+  const JsonValue list = json.at(key);
+  const std::vector<JsonValue> ends = list.items();
+  if (ends.size() != 2) list.refuse("is no interval", "two numbers");
+  return Interval{.lower = ends[0].number(), .upper = ends[1].number()};
+}
+
 ParameterEstimate read_parameter(const JsonValue& json) {
   ParameterEstimate parameter;
   parameter.name = json.at("name").text();
@@ -149,6 +165,11 @@ ParameterEstimate read_parameter(const JsonValue& json) {
   }
   parameter.state = *found;
   parameter.reason = json.text_or_empty("reason");
+  parameter.interval_90 = read_interval(json, "interval_90");
+  parameter.interval_by_profile =
+      json.has("interval_by_profile") && json.at("interval_by_profile").truth();
+  parameter.bootstrap_90 = read_interval(json, "bootstrap_90");
+  if (json.has("mesh_shift")) parameter.mesh_shift = json.at("mesh_shift").number();
   return parameter;
 }
 

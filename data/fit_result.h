@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,6 +12,11 @@ namespace clothfit {
 enum class ParameterState { fitted, fixed, undetermined };
 std::string to_string(ParameterState state);
 
+/// Ends of an interval, in a parameter's unit.
+struct Interval {
+  double lower = 0, upper = 0;
+};
+
 struct ParameterEstimate {
   std::string name;
   std::string unit;
@@ -18,6 +24,11 @@ struct ParameterEstimate {
   double sigma = 0;  ///< one standard deviation; 0 when fixed
   ParameterState state = ParameterState::fitted;
   std::string reason;  ///< why it is undetermined or fixed; empty when fitted
+  std::optional<Interval> interval_90 = std::nullopt;   ///< of 90 %; where it was fitted
+  bool interval_by_profile = false;                     ///< its ends are those of the profiled cost
+  std::optional<Interval> bootstrap_90 = std::nullopt;  ///< where it was asked for
+  /// Its value on a mesh of another resolution less this one, where that was asked for.
+  std::optional<double> mesh_shift = std::nullopt;
 };
 
 struct EffectEstimate {

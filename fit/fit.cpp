@@ -13,6 +13,8 @@
 #include "data/input_error.h"
 #include "fit/marker_offsets.h"
 #include "fit/observed_motion.h"
+#include "fit/other_mesh.h"
+#include "fit/parameter_profiles.h"
 #include "fit/parameter_search.h"
 #include "fit/problem.h"
 #include "fit/refine.h"
@@ -505,6 +507,9 @@ void explain_by_strain_limit(const FitProblem& problem, const Eigen::VectorXd& v
     const auto found = std::ranges::find(parameters, names[n].name, &ParameterEstimate::name);
     assert(found != parameters.end());
     found->state = ParameterState::undetermined;
+    found->interval_90.reset();
+    found->bootstrap_90.reset();
+    found->interval_by_profile = false;
     found->reason = fmt::format(
         "{:.0f} % of its springs sit on their strain limit in the fitted frames, as long as that "
         "allows however stiff they are",
@@ -512,15 +517,82 @@ void explain_by_strain_limit(const FitProblem& problem, const Eigen::VectorXd& v
   }
 }
 
+/// What is asked for beside sigma.
+struct FurtherLooks {
+  std::vector<ParameterProfile> profiles;
+  OtherMesh other_mesh;
+};
+
+/// Profiles and the fit on another mesh, where the options ask for them, each with its line in the
+/// report.
+FurtherLooks look_further(const FitInput& input, const TrajectoryObjective& objective,
+                          const FitOptions& options, const Eigen::VectorXd& values,
+                          const Uncertainty& uncertainty, const ProgressCallback& progress,
+                          FitReport& report) {
+  const FitProblem& problem = objective.problem();
+  FurtherLooks looks;
+  if (options.profile) {
+    looks.profiles = parameter_profiles(objective, values, uncertainty, options.loss, progress);
+    for (const ParameterProfile& profile : looks.profiles) {
+      const std::string& name =
+          problem.space.parameters[static_cast<size_t>(profile.parameter)].name;
+      const std::string ends =
+          profile.profiled
+              ? fmt::format("profiled: {:.4g} to {:.4g}{}", profile.lower, profile.upper,
+                            profile.profile.optimum_was_none
+                                ? "; lower costs than the optimum's were met"
+                                : "")
+              : "a parabola";
+      report.stages.push_back(fmt::format(
+          "{}: at the ends of its interval the cost rises {:.2f} and {:.2f} times as far as a "
+          "parabola; {}",
+          name, profile.rise_below, profile.rise_above, ends));
+    }
+  }
+  if (options.two_meshes) {
+    const Mesh& mesh = problem.cloth.mesh;
+    const int least = std::max(kSmallestMesh, options.start_nodes + 1);
+    const FitProblem other = make_problem(input, options, other_mesh_count(mesh.columns, least),
+                                          other_mesh_count(mesh.rows, least));
+    const RefineOptions refine_options{
+        .loss = options.loss,
+        .trust_region_radius = kFinalEffort.trust_region_radius,
+        .most_spring_steps = options.work * kFinalEffort.most_spring_steps,
+        .substep_scale = options.substep_scale};
+    looks.other_mesh = fit_on_other_mesh(other, values, refine_options, progress);
+    report.stages.push_back(fmt::format("the fit again on {} x {}, for the mesh's share: {}",
+                                        looks.other_mesh.columns, looks.other_mesh.rows,
+                                        looks.other_mesh.message));
+  }
+  return looks;
+}
+
+/// The intervals of the p-th parameter.
+void add_intervals(int p, const Uncertainty& uncertainty, const FurtherLooks& looks,
+                   ParameterEstimate& parameter) {
+  if (looks.other_mesh.usable) parameter.mesh_shift = looks.other_mesh.shift[p];
+  if (parameter.state != ParameterState::fitted) return;
+  parameter.interval_90 = {.lower = uncertainty.lower[p], .upper = uncertainty.upper[p]};
+  if (uncertainty.bootstrap_lower.size() > 0)
+    parameter.bootstrap_90 = {.lower = uncertainty.bootstrap_lower[p],
+                              .upper = uncertainty.bootstrap_upper[p]};
+  const auto profile = std::ranges::find(looks.profiles, p, &ParameterProfile::parameter);
+  if (profile == looks.profiles.end() || !profile->profiled || !profile->profile.preferable())
+    return;
+  parameter.interval_90 = {.lower = profile->lower, .upper = profile->upper};
+  parameter.interval_by_profile = true;
+}
+
 /// The parameter tables of the result from the fitted values.
 void fill_parameters(const FitProblem& problem, const FitOptions& options,
                      const Eigen::VectorXd& values, const Uncertainty& uncertainty,
-                     FitResult& result) {
+                     const FurtherLooks& looks, FitResult& result) {
   const auto estimate_of = [&](int p, const std::string& name) {
     ParameterEstimate parameter =
         estimate(problem.space.parameters[static_cast<size_t>(p)], name, values[p],
                  uncertainty.sigma[p], uncertainty.roughness[p]);
     explain_by_correlation(problem.space, uncertainty, p, parameter);
+    add_intervals(p, uncertainty, looks, parameter);
     return parameter;
   };
   const double area_m2 = problem.cloth.mesh.width_m * problem.cloth.mesh.height_m;
@@ -570,6 +642,31 @@ void fill_correlation(const ParameterSpace& space, const Uncertainty& uncertaint
     report.correlation_names.push_back(space.parameters[static_cast<size_t>(p)].name);
   }
   report.correlation = uncertainty.correlation(shown, shown);
+}
+
+/// Of the physics, what sigma is made of; of all, what residuals it was made from.
+void add_uncertainty(const FitProblem& problem, const Eigen::VectorXd& values,
+                     const Uncertainty& uncertainty, FitReport& report) {
+  for (int p = 0; p < problem.space.size(); ++p) {
+    const FitParameter& parameter = problem.space.parameters[static_cast<size_t>(p)];
+    if (!is_physical(parameter.role)) continue;
+    report.sigma_parts.push_back(
+        {.name = parameter.name,
+         .value = values[p],
+         .noise = uncertainty.noise_sigma[p],
+         .robust = uncertainty.robust_sigma[p],
+         .step_shift = uncertainty.step_shift[p],
+         .degrees_of_freedom = uncertainty.degrees_of_freedom[p],
+         .interval_90 = {.lower = uncertainty.lower[p], .upper = uncertainty.upper[p]}});
+  }
+  const BlockCounts& counts = uncertainty.block_counts;
+  const std::string blocks =
+      uncertainty.blocks > 0
+          ? fmt::format("sigma over {} blocks ({} along s, {} along t, {} in time)",
+                        uncertainty.blocks, counts.along_s, counts.along_t, counts.in_time)
+          : "sigma of independent residuals alone: " + uncertainty.why_no_blocks;
+  report.stages.push_back(fmt::format("chi-square per degree of freedom {:.3g}; {}",
+                                      uncertainty.chi_square_per_dof, blocks));
 }
 
 /// Columns and rows. Natural lengths that come from an earlier fit are those of its mesh.
@@ -652,6 +749,16 @@ void FitOptions::validate() const {
   require(marker_offset_sigma_m == 0 || !forecast, "marker-offsets",
           "a fit: a forecast takes those of the earlier one");
   require(work > 0 && std::isfinite(work), "work", "more than 0");
+  require(bootstrap == 0 || (bootstrap >= 19 && bootstrap <= 100000), "bootstrap",
+          "19 to 100000 replicates");
+  const auto need_a_fit = [&](bool asked, const std::string& name) {
+    require(!asked || !forecast, name, "a fit: without --forecast");
+  };
+  need_a_fit(profile, "profile");
+  need_a_fit(bootstrap > 0, "bootstrap");
+  need_a_fit(two_meshes, "two-meshes");
+  require(!two_meshes || spring_set == SpringSet::fabric, "two-meshes",
+          "--springs fabric: natural lengths are those of one mesh");
   require(threads >= 0, "threads", "0 (all) or more");
 }
 
@@ -682,6 +789,7 @@ FitReport fit(const FitInput& input, const FitOptions& options, const ProgressCa
     return time_steps_of_run(problem.cloth, parameter_set(problem, at), result.time_step_s);
   };
   Uncertainty uncertainty;
+  FurtherLooks looks;
   if (!options.forecast) {
     std::vector<Candidate> candidates;
     const RefineResult refined = identify(input, problem, options, progress, report, candidates);
@@ -693,23 +801,23 @@ FitReport fit(const FitInput& input, const FitOptions& options, const ProgressCa
     report.stop = refined.converged ? FitStop::converged : FitStop::reached_limit;
     report.message = refined.message;
     const TrajectoryObjective objective(problem, problem.first_held_out, steps_at(values));
-    uncertainty =
-        estimate_uncertainty(objective, values, options.loss, refined.residual_by_coordinate);
+    uncertainty = estimate_uncertainty(
+        objective, values,
+        {.loss = options.loss, .bootstrap = options.bootstrap, .seed = options.seed},
+        refined.residual_by_coordinate);
     if (!uncertainty.usable)
       return stopped(std::move(report), FitStop::diverged,
                      "the derivatives at the optimum could not be computed");
     fill_correlation(problem.space, uncertainty, report);
     result.basins = basins_of(problem.space, std::move(candidates), values, uncertainty);
-    for (int p = 0; p < problem.space.size(); ++p)
-      if (const FitParameter& parameter = problem.space.parameters[static_cast<size_t>(p)];
-          is_physical(parameter.role))
-        report.sigma_parts.push_back({.name = parameter.name,
-                                      .value = values[p],
-                                      .noise = uncertainty.noise_sigma[p],
-                                      .robust = uncertainty.robust_sigma[p],
-                                      .step_shift = uncertainty.step_shift[p]});
-    report.stages.push_back(
-        fmt::format("chi-square per degree of freedom {:.3g}", uncertainty.chi_square_per_dof));
+    add_uncertainty(problem, values, uncertainty, report);
+    bool cancelled = false;
+    const ProgressCallback watched = [&](const Progress& now) {
+      cancelled = cancelled || (progress && !progress(now));
+      return !cancelled;
+    };
+    looks = look_further(input, objective, options, values, uncertainty, watched, report);
+    if (cancelled) return stopped(std::move(report), FitStop::cancelled, "cancelled");
   } else {
     const RefineOptions defaults;
     result.time_step_s = stable_time_step_s(problem.cloth, parameter_set(problem, values)) /
@@ -726,7 +834,7 @@ FitReport fit(const FitInput& input, const FitOptions& options, const ProgressCa
     longest_frame_s =
         std::max(longest_frame_s, problem.frame_time_s[f] - problem.frame_time_s[f - 1]);
   result.substeps = static_cast<int>(std::ceil(longest_frame_s / result.time_step_s - 1e-9));
-  fill_parameters(problem, options, values, uncertainty, result);
+  fill_parameters(problem, options, values, uncertainty, looks, result);
   const std::vector<Eigen::Matrix3Xd> fitted_frames(
       trajectories.front().begin(), trajectories.front().begin() + problem.first_held_out);
   explain_by_strain_limit(

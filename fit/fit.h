@@ -61,6 +61,9 @@ struct FitOptions {
   double marker_offset_sigma_m = 0;
   double work = 1;           ///< > 0; times the limits of work of the refinement's stages
   double substep_scale = 1;  ///< >= 1; more cuts time finer than stability asks
+  bool profile = false;      ///< intervals from the profiled cost where it is no parabola
+  int bootstrap = 0;         ///< replicates of a bootstrap over blocks; 0: none, else 19 or more
+  bool two_meshes = false;   ///< fit again on a mesh of other resolution, from the optimum
   int threads = 0;           ///< 0: as many as the machine has
   /// Parameters taken from an earlier fit: nothing is fitted, the recording is forecast from its
   /// own first frame.
@@ -83,6 +86,8 @@ struct FitReport {
     std::string name;
     double value = 0;
     double noise = 0, robust = 0, step_shift = 0;  ///< in the parameter's unit
+    double degrees_of_freedom = 0;                 ///< of robust; infinite without blocks
+    Interval interval_90;                          ///< with all of these
   };
   std::vector<SigmaParts> sigma_parts;
 

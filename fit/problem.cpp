@@ -337,7 +337,7 @@ Turned turned(const Eigen::Vector3d& turn, const Eigen::Vector3d& vector) {
 }
 
 Rigid3 place_sheet_of(const Recording& recording, FitProblem& problem) {
-  const Eigen::Matrix2Xd places = marker_places(recording.markers);
+  const Eigen::Matrix2Xd& places = problem.marker_place_m;
   const int frames = recording.start == StartKind::at_rest ? kRestFrames : 1;
   const auto world_from_sheet = place_flat_sheet(problem.observations, places, frames);
   if (!world_from_sheet)
@@ -377,8 +377,9 @@ FitProblem make_problem(const FitInput& input, const FitOptions& options, int me
   problem.driving_markers = std::move(drive.driving_markers);
   add_observations(input, options, problem);
   add_marker_offsets(options, problem);
-  problem.vertex_weights = vertex_weights(make_surface(
-      mesh.columns, mesh.rows, mesh.width_m, mesh.height_m, marker_places(recording.markers)));
+  problem.marker_place_m = marker_places(recording.markers);
+  problem.vertex_weights = vertex_weights(
+      make_surface(mesh.columns, mesh.rows, mesh.width_m, mesh.height_m, problem.marker_place_m));
   const Rigid3 world_from_sheet = place_sheet_of(recording, problem);
   add_springs(recording, options, problem);
   add_effects(recording, options, problem);
@@ -391,10 +392,9 @@ FitProblem make_problem(const FitInput& input, const FitOptions& options, int me
       throw InputError("--forecast", "the recording begins with the cloth in motion",
                        "a start that is known without a fit",
                        "fit the recording, or cut it so that it begins with the cloth at rest");
-    problem.start_state =
-        make_start_state(problem.observations, marker_places(recording.markers),
-                         problem.frame_time_s, problem.first_held_out, mesh, world_from_sheet,
-                         {.nodes = options.start_nodes}, problem.space, problem.priors);
+    problem.start_state = make_start_state(
+        problem.observations, problem.marker_place_m, problem.frame_time_s, problem.first_held_out,
+        mesh, world_from_sheet, {.nodes = options.start_nodes}, problem.space, problem.priors);
   }
   return problem;
 }

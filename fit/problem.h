@@ -32,6 +32,7 @@ struct FitProblem {
   int first_held_out = 0;            ///< = number of frames when nothing is held out
   std::vector<ObservationSet> observations;
   std::map<std::string, int> rejected;  ///< observations left out, by reason
+  Eigen::Matrix2Xd marker_place_m;      ///< s, t of each marker, 2 x markers
   Surface::Weights vertex_weights;      ///< markers x vertices
   std::vector<int> driving_markers;
 

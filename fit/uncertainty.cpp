@@ -4,36 +4,79 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <map>
+#include <utility>
+
+#include "fit/block_bootstrap.h"
+#include "fit/cluster_covariance.h"
+#include "fit/observed_blocks.h"
+#include "fit/prior_cost.h"
 
 namespace clothfit {
 
 namespace {
 
+constexpr double kLeastInformation = 1e-12;
+
 /// Inverse of an information matrix. Directions that the data say nothing about get a standard
 /// deviation of a million instead of spoiling the inverse for all.
 Eigen::MatrixXd invert(const Eigen::MatrixXd& information) {
-  constexpr double kLeastInformation = 1e-12;
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(information);
   const Eigen::VectorXd variance = eigen.eigenvalues().cwiseMax(kLeastInformation).cwiseInverse();
   return eigen.eigenvectors() * variance.asDiagonal() * eigen.eigenvectors().transpose();
 }
 
-Eigen::MatrixXd prior_information(const FitProblem& problem, const Eigen::VectorXd& slope) {
-  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(slope.size(), slope.size());
-  for (const GaussianPrior& prior : problem.priors) {
-    Eigen::MatrixXd j = Eigen::MatrixXd::Zero(prior.mean.size(), slope.size());
-    for (size_t n = 0; n < prior.indices.size(); ++n)
-      j.col(prior.indices[n]) =
-          prior.sqrt_information.col(static_cast<Eigen::Index>(n)) * slope[prior.indices[n]];
-    information += j.transpose() * j;
+/// The sandwich's variance of each coordinate and its degrees of freedom; where there is none, 0
+/// and why. The blocks, for others.
+Eigen::VectorXi add_robust_part(const TrajectoryObjective& objective, const LinearisedFit& fit,
+                                Uncertainty& result, Eigen::VectorXd& variance) {
+  variance = Eigen::VectorXd::Zero(fit.coordinates());
+  result.degrees_of_freedom =
+      Eigen::VectorXd::Constant(fit.coordinates(), std::numeric_limits<double>::infinity());
+  const ObservedBlocks cut = observed_blocks(objective, fit.residual);
+  if (cut.blocks.count < 2) {
+    result.why_no_blocks = "all observations lie in one place";
+    return {};
   }
-  return information;
+  const ClusterCovariance robust = cluster_covariance(fit, cut.blocks.block);
+  if (!robust.usable) {
+    result.why_no_blocks = robust.reason;
+    return {};
+  }
+  result.blocks = cut.blocks.count;
+  result.block_counts = cut.counts;
+  variance = robust.covariance.diagonal().cwiseMin(1 / kLeastInformation);
+  result.degrees_of_freedom = robust.degrees_of_freedom;
+  return cut.blocks.block;
+}
+
+/// Ends in coordinates, within the ranges.
+void set_ends(const ParameterSpace& space, const Eigen::VectorXd& lower_coordinates,
+              const Eigen::VectorXd& upper_coordinates, Eigen::VectorXd& lower,
+              Eigen::VectorXd& upper) {
+  lower = space.values(lower_coordinates);
+  upper = space.values(upper_coordinates);
+  for (int p = 0; p < space.size(); ++p) {
+    const FitParameter& parameter = space.parameters[static_cast<size_t>(p)];
+    lower[p] = std::max(lower[p], parameter.lower);
+    upper[p] = std::min(upper[p], parameter.upper);
+  }
+}
+
+void add_bootstrap(const ParameterSpace& space, const Eigen::VectorXd& values,
+                   const LinearisedFit& fit, const Eigen::VectorXi& block,
+                   const UncertaintyOptions& options, Uncertainty& result) {
+  const Bootstrap bootstrap =
+      bootstrap_linearised(fit, block, {.replicates = options.bootstrap, .seed = options.seed});
+  const ChangeIntervals change = studentised_intervals(bootstrap, kIntervalLevel);
+  const Eigen::VectorXd here = space.coordinates(values);
+  if (change.lower.allFinite() && change.upper.allFinite())
+    set_ends(space, here + change.lower, here + change.upper, result.bootstrap_lower,
+             result.bootstrap_upper);
 }
 
 /// See Uncertainty::roughness. Only physics makes folds.
 Eigen::VectorXd roughness(const Objective& objective, const Eigen::VectorXd& values,
-                          const Linearisation& linear) {
+                          const LinearisedFit& linear) {
   constexpr double kWideStep = 0.02;
   const ParameterSpace& space = objective.problem().space;
   Eigen::VectorXd result = Eigen::VectorXd::Ones(space.size());
@@ -50,78 +93,93 @@ Eigen::VectorXd roughness(const Objective& objective, const Eigen::VectorXd& val
   for (size_t n = 0; n < moved.size(); ++n) {
     if (residuals[n].size() != linear.residual.size()) continue;
     const double wide = (residuals[n] - linear.residual).norm() / kWideStep;
-    result[moved[n]] = linear.residual_by_coordinate.col(moved[n]).norm() / std::max(wide, 1e-300);
+    result[moved[n]] = linear.jacobian.col(moved[n]).norm() / std::max(wide, 1e-300);
   }
   return result;
 }
 
+/// From standard deviations and the shift of coordinates.
+void add_interval(const ParameterSpace& space, const Eigen::VectorXd& values,
+                  const Eigen::VectorXd& noise, const Eigen::VectorXd& robust,
+                  const Eigen::VectorXd& shift, Uncertainty& result) {
+  const double normal = student_factor(kIntervalLevel, std::numeric_limits<double>::infinity());
+  Eigen::VectorXd& half_width = result.half_width;
+  half_width.resize(values.size());
+  for (Eigen::Index p = 0; p < values.size(); ++p) {
+    const double student = student_factor(kIntervalLevel, result.degrees_of_freedom[p]);
+    half_width[p] = std::hypot(std::max(normal * noise[p], student * robust[p]), normal * shift[p]);
+  }
+  const Eigen::VectorXd here = space.coordinates(values);
+  set_ends(space, here - half_width, here + half_width, result.lower, result.upper);
+}
+
 }  // namespace
 
+Eigen::VectorXd huber_weights(const Objective& objective, const Eigen::VectorXd& residual,
+                              double threshold) {
+  Eigen::VectorXd weight(residual.size());
+  for (const Objective::Block& block : objective.blocks()) {
+    const double length = residual.segment(block.offset, block.dimension).norm();
+    weight.segment(block.offset, block.dimension)
+        .setConstant(std::min(1.0, threshold / std::max(length, 1e-300)));
+  }
+  return weight;
+}
+
 Uncertainty estimate_uncertainty(const TrajectoryObjective& objective,
-                                 const Eigen::VectorXd& values, Loss loss,
-                                 const Eigen::MatrixXd& residual_by_coordinate) {
+                                 const Eigen::VectorXd& values, const UncertaintyOptions& options,
+                                 Eigen::MatrixXd residual_by_coordinate) {
   Uncertainty result;
   const FitProblem& problem = objective.problem();
-  const int parameters = problem.space.size();
-  Linearisation linear;
+  LinearisedFit fit;
   if (residual_by_coordinate.rows() == objective.residual_count()) {
-    linear.residual = objective.residuals({values}).front();
-    linear.residual_by_coordinate = residual_by_coordinate;
-    linear.usable = linear.residual.size() == objective.residual_count();
-  } else {
-    linear = objective.linearise(values);
+    fit.residual = objective.residuals({values}).front();
+    fit.jacobian = std::move(residual_by_coordinate);
+  } else if (Linearisation linear = objective.linearise(values); linear.usable) {
+    fit.residual = std::move(linear.residual);
+    fit.jacobian = std::move(linear.residual_by_coordinate);
   }
-  if (!linear.usable) return result;
-  const Eigen::VectorXd& residual = linear.residual;
-  const Eigen::MatrixXd& jacobian = linear.residual_by_coordinate;
-
-  const double threshold = loss == Loss::huber ? kHuberScales * robust_scale(residual)
-                                               : std::numeric_limits<double>::infinity();
-  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(parameters, parameters);
-  std::map<std::pair<int, int>, Eigen::VectorXd> gradient_of_marker;
+  if (fit.residual.size() != objective.residual_count()) return result;
   const TrajectoryObjective half(problem, objective.frames(), objective.steps().times(0.5));
   const Eigen::VectorXd half_step_residual = half.residuals({values}).front();
-  if (half_step_residual.size() != residual.size()) return result;
-  Eigen::VectorXd step_gradient = Eigen::VectorXd::Zero(parameters);
-  double chi_square = 0;
-  double weight_sum = 0;
-  for (const Objective::Block& block : objective.blocks()) {
-    const auto r = residual.segment(block.offset, block.dimension);
-    const auto j = jacobian.middleRows(block.offset, block.dimension);
-    const double weight = std::min(1.0, threshold / std::max(r.norm(), 1e-300));
-    information += weight * j.transpose() * j;
-    auto [gradient, is_new] = gradient_of_marker.try_emplace({block.set, block.marker},
-                                                             Eigen::VectorXd::Zero(parameters));
-    gradient->second += weight * j.transpose() * r;
-    step_gradient += weight * j.transpose() * 2 *
-                     (half_step_residual.segment(block.offset, block.dimension) - r);
-    chi_square += weight * r.squaredNorm();
-    weight_sum += weight * block.dimension;
-  }
-  result.chi_square_per_dof = chi_square / std::max(1.0, weight_sum - parameters);
+  if (half_step_residual.size() != fit.residual.size()) return result;
+  result.roughness = roughness(objective, values, fit);
+
+  const double threshold = options.loss == Loss::huber ? kHuberScales * robust_scale(fit.residual)
+                                                       : std::numeric_limits<double>::infinity();
+  fit.weight = huber_weights(objective, fit.residual, threshold);
+  const Eigen::MatrixXd weighted = fit.weight.asDiagonal() * fit.jacobian;
+  const Eigen::MatrixXd information = weighted.transpose() * fit.jacobian;
+  const double chi_square = fit.residual.cwiseAbs2().dot(fit.weight);
+  result.chi_square_per_dof =
+      chi_square / std::max(1.0, fit.weight.sum() - static_cast<double>(fit.coordinates()));
 
   const Eigen::VectorXd slope = problem.space.value_by_coordinate(values);
-  const Eigen::MatrixXd prior = prior_information(problem, slope);
+  const PriorCost prior = prior_cost(problem, values);
+  fit.prior_information = prior.information;
   const Eigen::MatrixXd covariance =
-      invert(information / std::max(1.0, result.chi_square_per_dof) + prior);
-  Eigen::MatrixXd scatter = Eigen::MatrixXd::Zero(parameters, parameters);
-  for (const auto& [marker, gradient] : gradient_of_marker)
-    scatter += gradient * gradient.transpose();
-  const Eigen::MatrixXd bread = invert(information + prior);
-  const Eigen::VectorXd robust_variance = (bread * scatter * bread).diagonal();
-
+      invert(information / std::max(1.0, result.chi_square_per_dof) + prior.information);
   const Eigen::VectorXd sigma = covariance.diagonal().cwiseSqrt();
   result.correlation =
       sigma.cwiseInverse().asDiagonal() * covariance * sigma.cwiseInverse().asDiagonal();
-  const Eigen::VectorXd shift = -bread * step_gradient;
+
+  const Eigen::MatrixXd inverse = invert(information + prior.information);
+  result.inverse_hessian = inverse;
+  const Eigen::VectorXd shift =
+      -inverse * (weighted.transpose() * (2 * (half_step_residual - fit.residual)));
+  fit.residual -= fit.jacobian * (inverse * (weighted.transpose() * fit.residual + prior.gradient));
+  Eigen::VectorXd robust_variance;
+  const Eigen::VectorXi block = add_robust_part(objective, fit, result, robust_variance);
+  if (options.bootstrap > 0 && block.size() > 0)
+    add_bootstrap(problem.space, values, fit, block, options, result);
+
   result.step_shift = shift.cwiseProduct(slope);
   result.noise_sigma = sigma.cwiseProduct(slope);
   result.robust_sigma = robust_variance.cwiseSqrt().cwiseProduct(slope);
   result.sigma = (covariance.diagonal().cwiseMax(robust_variance) + shift.cwiseAbs2())
                      .cwiseSqrt()
                      .cwiseProduct(slope);
-
-  result.roughness = roughness(objective, values, linear);
+  add_interval(problem.space, values, sigma, robust_variance.cwiseSqrt(), shift, result);
   result.usable = true;
   return result;
 }

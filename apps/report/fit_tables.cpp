@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cmath>
+#include <optional>
 
 #include "apps/report/number_text.h"
 
@@ -24,6 +25,12 @@ std::string relative_text(const ParameterEstimate& parameter) {
   const bool meaningful = parameter.state != ParameterState::fixed && parameter.value != 0;
   if (!meaningful) return "";
   return significant(100 * parameter.sigma / std::abs(parameter.value), 2) + "%";
+}
+
+/// With as many digits as sigma asks for.
+std::string interval_text(const std::optional<Interval>& interval, double sigma) {
+  if (!interval) return "";
+  return value_text(interval->lower, sigma) + " to " + value_text(interval->upper, sigma);
 }
 
 }  // namespace
@@ -52,25 +59,49 @@ std::string kind_title(const std::string& kind, const std::string& unit) {
 }
 
 Table parameter_table(const FitResult& result) {
-  Table table{{"group", "name", "unit", "value", "sigma", "state", "reason"}, {}};
+  Table table{{"group", "name", "unit", "value", "sigma", "state", "reason", "lower_90", "upper_90",
+               "bootstrap_lower_90", "bootstrap_upper_90", "mesh_shift"},
+              {}};
   for_each_parameter(result, [&](const std::string& group, const ParameterEstimate& parameter) {
+    const auto& interval = parameter.interval_90;
+    const auto& bootstrap = parameter.bootstrap_90;
     table.rows.push_back({group, parameter.name, parameter.unit, exact_text(parameter.value),
-                          exact_text(parameter.sigma), to_string(parameter.state),
-                          parameter.reason});
+                          exact_text(parameter.sigma), to_string(parameter.state), parameter.reason,
+                          interval ? exact_text(interval->lower) : "",
+                          interval ? exact_text(interval->upper) : "",
+                          bootstrap ? exact_text(bootstrap->lower) : "",
+                          bootstrap ? exact_text(bootstrap->upper) : "",
+                          parameter.mesh_shift ? exact_text(*parameter.mesh_shift) : ""});
   });
   return table;
 }
 
 Table short_parameter_table(const FitResult& result) {
-  Table table{{"parameter", "value", "sigma", "relative", "unit", "state"}, {}};
+  Table table{{"parameter", "value", "sigma", "relative", "90 %", "unit", "state"}, {}};
+  bool bootstrapped = false, on_two_meshes = false;
+  for_each_parameter(result, [&](const std::string&, const ParameterEstimate& parameter) {
+    bootstrapped = bootstrapped || parameter.bootstrap_90;
+    on_two_meshes = on_two_meshes || parameter.mesh_shift;
+  });
+  if (bootstrapped) table.header.insert(table.header.end() - 2, "90 % by bootstrap");
+  if (on_two_meshes) table.header.insert(table.header.end() - 2, "other mesh");
   for_each_parameter(result, [&](const std::string& group, const ParameterEstimate& parameter) {
     const std::string name = group == "base" ? parameter.name : group + ": " + parameter.name;
     const bool fixed = parameter.state == ParameterState::fixed;
     std::string state = to_string(parameter.state);
     if (!parameter.reason.empty()) state += ": " + parameter.reason;
-    table.rows.push_back({name, value_text(parameter.value, parameter.sigma),
-                          fixed ? "" : significant(parameter.sigma, 2), relative_text(parameter),
-                          parameter.unit, state});
+    std::vector<std::string> row = {name, value_text(parameter.value, parameter.sigma),
+                                    fixed ? "" : significant(parameter.sigma, 2),
+                                    relative_text(parameter),
+                                    interval_text(parameter.interval_90, parameter.sigma) +
+                                        (parameter.interval_by_profile ? " (profile)" : "")};
+    if (bootstrapped) row.push_back(interval_text(parameter.bootstrap_90, parameter.sigma));
+    if (on_two_meshes)
+      row.push_back(parameter.mesh_shift ? fmt::format("{}{}", *parameter.mesh_shift < 0 ? "" : "+",
+                                                       significant(*parameter.mesh_shift, 2))
+                                         : "");
+    row.insert(row.end(), {parameter.unit, state});
+    table.rows.push_back(std::move(row));
   });
   return table;
 }

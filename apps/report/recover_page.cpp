@@ -75,10 +75,11 @@ std::string recover_page_html(const RecoverOptions& options, const RecoverResult
       html_table(recovery_counts(result),
                  "Counts. A fit counts as beyond 10 bounds when any of its parameters lies that "
                  "far from the truth.");
-  body += html_table(recovery_table(result),
-                     "Errors relative to the truth. The 95 % interval is the estimate ± 1.96 "
-                     "sigma of independent noise; the robust 90 % interval bears residuals that "
-                     "are correlated in time.");
+  body +=
+      html_table(recovery_table(result),
+                 "Errors relative to the truth. The 95 % interval is the estimate ± 1.96 "
+                 "sigma of independent noise; the robust 90 % interval bears residuals that "
+                 "depend on each other within blocks of the cloth; the stated one is fit.json's.");
   const std::string pulls = pulls_svg(result);
   if (!pulls.empty())
     body += fmt::format(

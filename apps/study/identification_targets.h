@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "apps/study/planted_drag.h"
 #include "apps/study/recover.h"
 
 namespace clothfit {
@@ -15,7 +16,7 @@ struct TargetsOptions {
       1;  ///< of the trials that a target asks for, in (0, 1]; each study keeps 5 at least
   unsigned long long seed = 1;
   int threads = 0;
-  std::vector<std::string> only;  ///< names of studies; empty: all
+  std::vector<std::string> only;  ///< names of studies, `drag` for all of its levels; empty: all
   void validate() const;          ///< throws InputError
 };
 
@@ -23,8 +24,9 @@ struct TargetsOptions {
 struct TargetStudy {
   std::string name, what;
   RecoverOptions options;
+  double drag_sigmas = 0;  ///< planted in the truth and not in the fit; 0: none
 };
-/// tracks3d, one_camera, spoiled, clean, drag, drag_fitted.
+/// tracks3d, one_camera, spoiled, clean, drag_1, drag_5, drag_20, drag_fitted.
 std::vector<TargetStudy> target_studies(const TargetsOptions& options);
 
 enum class TargetState { met, missed, not_measured };
@@ -41,9 +43,17 @@ struct FitSeconds {
 };
 FitSeconds measure_fits(unsigned long long seed);
 
+/// Planted drag of one size that the fit lacks.
+struct PlantedDrag {
+  double sigmas = 0;
+  PseudoTruth pseudo;
+  std::vector<PlantedDragRow> rows;
+};
+
 struct TargetsResult {
   bool cancelled = false;
   std::vector<std::pair<TargetStudy, RecoverResult>> studies;
+  std::vector<PlantedDrag> planted_drag;
   FitSeconds seconds;
   std::vector<TargetRow> rows;
 };

@@ -11,8 +11,10 @@
 
 #include "data/input_error.h"
 #include "data/median.h"
+#include "fit/cluster_covariance.h"
 #include "fit/draws.h"
 #include "fit/objective.h"
+#include "fit/prior_cost.h"
 #include "fit/problem.h"
 #include "model/stability.h"
 
@@ -23,42 +25,6 @@ using Json = nlohmann::ordered_json;
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 enum Series : int { kStart = 100 };
-
-/// Standard deviations of the fit's parameters from the information at the truth, by name.
-std::map<std::string, double> bounds(const SyntheticRecording& recording,
-                                     const FitOptions& options) {
-  const ClothDescription& cloth = recording.input.recording.cloth;
-  const FitProblem problem =
-      make_problem(recording.input, options,
-                   options.mesh_columns > 0 ? options.mesh_columns : cloth.mesh_columns,
-                   options.mesh_rows > 0 ? options.mesh_rows : cloth.mesh_rows);
-  Eigen::VectorXd values = problem.space.start();
-  for (int p = 0; p < problem.space.size(); ++p) {
-    const auto known = recording.truth.find(problem.space.parameters[static_cast<size_t>(p)].name);
-    if (known != recording.truth.end()) values[p] = known->second;
-  }
-  const double stable_s = stable_time_step_s(problem.cloth, parameter_set(problem, values));
-  const TrajectoryObjective objective(problem, problem.first_held_out, stable_s / 1.5);
-  const Linearisation linear = objective.linearise(values);
-  std::map<std::string, double> result;
-  if (!linear.usable) return result;
-  const Eigen::VectorXd slope = problem.space.value_by_coordinate(values);
-  Eigen::MatrixXd information =
-      linear.residual_by_coordinate.transpose() * linear.residual_by_coordinate;
-  for (const GaussianPrior& prior : problem.priors) {
-    Eigen::MatrixXd j = Eigen::MatrixXd::Zero(prior.mean.size(), slope.size());
-    for (size_t n = 0; n < prior.indices.size(); ++n)
-      j.col(prior.indices[n]) =
-          prior.sqrt_information.col(static_cast<Eigen::Index>(n)) * slope[prior.indices[n]];
-    information += j.transpose() * j;
-  }
-  const Eigen::MatrixXd covariance =
-      information.ldlt().solve(Eigen::MatrixXd::Identity(slope.size(), slope.size()));
-  for (int p = 0; p < problem.space.size(); ++p)
-    result[problem.space.parameters[static_cast<size_t>(p)].name] =
-        std::sqrt(covariance(p, p)) * slope[p];
-  return result;
-}
 
 Json number(double value) {
   return std::isfinite(value) ? Json(value) : Json(nullptr);
@@ -77,7 +43,8 @@ std::string payload_of(const RecoverTrial& trial) {
   for (const RecoveredParameter& p : trial.parameters)
     parameters.push_back({p.name, number(p.truth), number(p.estimate), number(p.sigma),
                           number(p.noise_sigma), number(p.robust_sigma), number(p.bound_sigma),
-                          p.undetermined});
+                          p.undetermined, number(p.degrees_of_freedom), number(p.interval_90.lower),
+                          number(p.interval_90.upper)});
   return json.dump();
 }
 
@@ -95,6 +62,10 @@ RecoverTrial trial_of(const std::string& payload) {
                                 .sigma = number_of(p[3]),
                                 .noise_sigma = number_of(p[4]),
                                 .robust_sigma = number_of(p[5]),
+                                .degrees_of_freedom = p[8].is_null()
+                                                          ? std::numeric_limits<double>::infinity()
+                                                          : p[8].get<double>(),
+                                .interval_90 = {number_of(p[9]), number_of(p[10])},
                                 .bound_sigma = number_of(p[6]),
                                 .undetermined = p[7]});
   return trial;
@@ -125,9 +96,9 @@ double share_within(const std::vector<double>& pulls, double limit) {
 }
 
 RecoverySummary summary_of(const std::string& name, const std::vector<RecoverTrial>& trials) {
-  constexpr double kNormal95 = 1.959964, kNormal90 = 1.644854;
+  constexpr double kNormal95 = 1.959964;
   RecoverySummary summary{.name = name};
-  std::vector<double> relative, by_bound, by_noise, by_robust;
+  std::vector<double> relative, by_bound, by_noise;
   for (const RecoverTrial& trial : trials) {
     const auto p = std::ranges::find(trial.parameters, name, &RecoveredParameter::name);
     if (p == trial.parameters.end()) continue;
@@ -141,7 +112,6 @@ RecoverySummary summary_of(const std::string& name, const std::vector<RecoverTri
     relative.push_back(error / p->truth);
     if (std::isfinite(p->bound_sigma)) by_bound.push_back(error / p->bound_sigma);
     by_noise.push_back(error / p->noise_sigma);
-    by_robust.push_back(error / p->robust_sigma);
   }
   if (relative.empty()) return summary;
   summary.bias = mean_of(relative);
@@ -158,7 +128,7 @@ RecoverySummary summary_of(const std::string& name, const std::vector<RecoverTri
   summary.spread_over_bound = deviation_of(by_bound);
   summary.bias_over_bound = mean_of(by_bound);
   summary.coverage_95 = share_within(by_noise, kNormal95);
-  summary.robust_coverage_90 = share_within(by_robust, kNormal90);
+  summary.holds_truth = coverage_90(trials, name, summary.truth);
   return summary;
 }
 
@@ -178,17 +148,69 @@ std::string RecoverOptions::key() const {
   std::string effects;
   for (const std::string& effect : fit.effects) effects += effect + " ";
   return fmt::format(
-      "recover 1 seed {} scene {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} fit "
+      "recover 2 seed {} scene {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} fit "
       "{} "
       "{} {} {} {} {} {} {} {} start {} effects {}",
       seed, scene.size_m, scene.mass_kg, f.tension_warp_n_per_m, f.tension_weft_n_per_m,
       f.shear_n_per_m, f.flexion_warp_n_per_m, f.flexion_weft_n_per_m, f.damping_warp_s,
       f.damping_weft_s, scene.drag_per_s, scene.truth_mesh, scene.truth_steps, scene.markers,
       scene.frames, scene.frame_rate_hz, scene.before_s, scene.cameras, scene.noise_m,
-      scene.noise_px, scene.missing, fmt::format("{} {}", scene.hand, scene.outliers),
+      scene.noise_px, scene.missing,
+      fmt::format("{} {} {}", scene.hand, scene.outliers, scene.noisy),
       static_cast<int>(fit.observations), fit.mesh_columns, fit.mesh_rows, fit.population,
       fit.generations, fit.refine_best, static_cast<int>(fit.loss), fit.start_nodes,
       fit.substep_scale, start_factor, effects);
+}
+
+FitProblem problem_of(const SyntheticRecording& recording, const FitOptions& options) {
+  const ClothDescription& cloth = recording.input.recording.cloth;
+  return make_problem(recording.input, options,
+                      options.mesh_columns > 0 ? options.mesh_columns : cloth.mesh_columns,
+                      options.mesh_rows > 0 ? options.mesh_rows : cloth.mesh_rows);
+}
+
+std::map<std::string, double> bound_sigmas(const SyntheticRecording& recording,
+                                           const FitOptions& options) {
+  const FitProblem problem = problem_of(recording, options);
+  Eigen::VectorXd values = problem.space.start();
+  for (int p = 0; p < problem.space.size(); ++p) {
+    const auto known = recording.truth.find(problem.space.parameters[static_cast<size_t>(p)].name);
+    if (known != recording.truth.end()) values[p] = known->second;
+  }
+  const double stable_s = stable_time_step_s(problem.cloth, parameter_set(problem, values));
+  const TrajectoryObjective objective(problem, problem.first_held_out, stable_s / 1.5);
+  const Linearisation linear = objective.linearise(values);
+  std::map<std::string, double> result;
+  if (!linear.usable) return result;
+  const Eigen::VectorXd slope = problem.space.value_by_coordinate(values);
+  const Eigen::MatrixXd information =
+      linear.residual_by_coordinate.transpose() * linear.residual_by_coordinate +
+      prior_cost(problem, values).information;
+  const Eigen::MatrixXd covariance =
+      information.ldlt().solve(Eigen::MatrixXd::Identity(slope.size(), slope.size()));
+  for (int p = 0; p < problem.space.size(); ++p)
+    result[problem.space.parameters[static_cast<size_t>(p)].name] =
+        std::sqrt(covariance(p, p)) * slope[p];
+  return result;
+}
+
+Coverage90 coverage_90(const std::vector<RecoverTrial>& trials, const std::string& parameter,
+                       double value) {
+  const double normal = student_factor(0.9, std::numeric_limits<double>::infinity());
+  int plain = 0, robust = 0, stated = 0, count = 0;
+  for (const RecoverTrial& trial : trials) {
+    const auto p = std::ranges::find(trial.parameters, parameter, &RecoveredParameter::name);
+    if (p == trial.parameters.end() || p->undetermined) continue;
+    ++count;
+    const double error = std::abs(p->estimate - value);
+    if (error <= normal * p->noise_sigma) ++plain;
+    if (error <= student_factor(0.9, p->degrees_of_freedom) * p->robust_sigma) ++robust;
+    if (p->interval_90.lower <= value && value <= p->interval_90.upper) ++stated;
+  }
+  const auto share = [&](int held) {
+    return count > 0 ? held / static_cast<double>(count) : kNone;
+  };
+  return {.plain = share(plain), .robust = share(robust), .stated = share(stated)};
 }
 
 RecoverTrial recover_once(const RecoverOptions& options, int, std::uint64_t seed) {
@@ -212,7 +234,7 @@ RecoverTrial recover_once(const RecoverOptions& options, int, std::uint64_t seed
   RecoverTrial trial{.stop = report.stop, .message = report.message};
   for (const auto& [reason, count] : report.result.observations_rejected) trial.rejected += count;
   if (report.usable()) {
-    const std::map<std::string, double> bound = bounds(recording, fit_options);
+    const std::map<std::string, double> bound = bound_sigmas(recording, fit_options);
     for (const FitReport::SigmaParts& parts : report.sigma_parts) {
       const auto known = recording.truth.find(parts.name);
       if (known == recording.truth.end()) continue;
@@ -221,6 +243,8 @@ RecoverTrial recover_once(const RecoverOptions& options, int, std::uint64_t seed
                                    .estimate = parts.value,
                                    .noise_sigma = parts.noise,
                                    .robust_sigma = parts.robust,
+                                   .degrees_of_freedom = parts.degrees_of_freedom,
+                                   .interval_90 = parts.interval_90,
                                    .bound_sigma = kNone};
       if (const auto sigma = bound.find(parts.name); sigma != bound.end())
         parameter.bound_sigma = sigma->second;

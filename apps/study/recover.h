@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -8,6 +9,7 @@
 #include "apps/study/synthetic_recording.h"
 #include "data/progress.h"
 #include "fit/executor.h"
+#include "fit/problem.h"
 
 namespace clothfit {
 
@@ -34,11 +36,21 @@ struct RecoveredParameter {
   double truth = 0, estimate = 0;
   double sigma = 0;                          ///< as fit.json has it
   double noise_sigma = 0, robust_sigma = 0;  ///< FitReport::SigmaParts
+  double degrees_of_freedom = 0;             ///< of robust_sigma; infinite without blocks
+  Interval interval_90;                      ///< as fit.json has it
   /// The Cramer-Rao bound: of the information of the recording at the truth, all that is fitted
   /// along included. NaN where the model is not the truth's.
   double bound_sigma = 0;
   bool undetermined = false;
 };
+
+/// A synthetic recording as these options fit it, on their mesh.
+FitProblem problem_of(const SyntheticRecording& recording, const FitOptions& options);
+
+/// Standard deviations of the fit's parameters by Cramer and Rao's bound, from the information of
+/// the recording at the truth, by name; none where that cannot be simulated.
+std::map<std::string, double> bound_sigmas(const SyntheticRecording& recording,
+                                           const FitOptions& options);
 
 struct RecoverTrial {
   FitStop stop = FitStop::diverged;
@@ -51,20 +63,30 @@ struct RecoverTrial {
 /// Trial `index` of the study. Pure but for `seconds`.
 RecoverTrial recover_once(const RecoverOptions& options, int index, std::uint64_t seed);
 
+/// Shares of trials whose 90 % intervals of a parameter hold some value; NaN without trials.
+struct Coverage90 {
+  double plain = 0;   ///< estimate +- 1.645 noise sigma
+  double robust = 0;  ///< estimate +- Student's factor times robust sigma
+  double stated = 0;  ///< as fit.json has it
+};
+/// Trials where it is undetermined are left out.
+Coverage90 coverage_90(const std::vector<RecoverTrial>& trials, const std::string& parameter,
+                       double value);
+
 /// One parameter over all trials.
 struct RecoverySummary {
   std::string name;
   double truth = 0;
-  int trials = 0;                 ///< that ended with an estimate of it
-  int undetermined = 0;           ///< of these, left out of all below
-  double bias = 0;                ///< mean relative error
-  double spread = 0;              ///< standard deviation of relative errors
-  double rms = 0;                 ///< of relative errors
-  double percentile_95 = 0;       ///< of absolute relative errors
-  double spread_over_bound = 0;   ///< standard deviation of error / bound
-  double bias_over_bound = 0;     ///< mean of error / bound
-  double coverage_95 = 0;         ///< of estimate +- 1.96 noise sigma
-  double robust_coverage_90 = 0;  ///< of estimate +- 1.645 robust sigma
+  int trials = 0;                ///< that ended with an estimate of it
+  int undetermined = 0;          ///< of these, left out of all below
+  double bias = 0;               ///< mean relative error
+  double spread = 0;             ///< standard deviation of relative errors
+  double rms = 0;                ///< of relative errors
+  double percentile_95 = 0;      ///< of absolute relative errors
+  double spread_over_bound = 0;  ///< standard deviation of error / bound
+  double bias_over_bound = 0;    ///< mean of error / bound
+  double coverage_95 = 0;        ///< of estimate +- 1.96 noise sigma
+  Coverage90 holds_truth;
 };
 
 struct RecoverResult {

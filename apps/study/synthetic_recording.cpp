@@ -182,6 +182,7 @@ void SyntheticScene::validate() const {
 
 SyntheticRecording make_synthetic_recording(const SyntheticScene& scene, std::uint64_t seed) {
   constexpr double kOutlierM = 0.1, kOutlierPx = 60;
+  const double noise_share = scene.noisy ? 1 : 0;
   SyntheticRecording result;
   FitInput& input = result.input;
   input.recording = recording_of(scene);
@@ -196,7 +197,7 @@ SyntheticRecording make_synthetic_recording(const SyntheticScene& scene, std::ui
       spoiled.draw();
       Eigen::Vector3d place = markers[static_cast<size_t>(f)].col(m);
       for (double& coordinate : place)
-        coordinate += scene.noise_m * noise.normal() + spoiled.error(kOutlierM);
+        coordinate += noise_share * scene.noise_m * noise.normal() + spoiled.error(kOutlierM);
       if (spoiled.is_lost(f, places[static_cast<size_t>(m)])) continue;
       input.tracks3d.push_back(
           {.frame = f, .marker = m, .position_m = place, .sigma_m = scene.noise_m});
@@ -214,7 +215,7 @@ SyntheticRecording make_synthetic_recording(const SyntheticScene& scene, std::ui
         lost.draw();
         Eigen::Vector2d error;
         for (double& coordinate : error)
-          coordinate = scene.noise_px * pixels.normal() + lost.error(kOutlierPx);
+          coordinate = noise_share * scene.noise_px * pixels.normal() + lost.error(kOutlierPx);
         const auto pixel =
             project(camera, camera_from_world(camera) *
                                 Eigen::Vector3d(markers[static_cast<size_t>(f)].col(m)));

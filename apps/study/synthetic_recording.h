@@ -32,6 +32,7 @@ struct SyntheticScene {
   int cameras = 1;            ///< 1 to 4, 1 m away around the cloth's front
   double noise_m = 1e-3;      ///< of 3D tracks, per coordinate, > 0
   double noise_px = 0.3;      ///< > 0
+  bool noisy = true;          ///< false: observations state that noise and have none
   double missing = 0;         ///< share of observations dropped at random, 0 to 0.9
   bool hand = false;          ///< a hand hides a quarter of the cloth for a third of the time
   double outliers = 0;        ///< share of observations off by up to 0.1 m or 60 px, 0 to 0.5

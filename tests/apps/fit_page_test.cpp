@@ -181,13 +181,19 @@ TEST(FitSummary, SaysMillimetresForPositionsInSpace) {
 }
 
 TEST(FitTables, CarryAllDigitsToCsv) {
-  const test::SampleFit sample = test::sample_fit(3);
+  test::SampleFit sample = test::sample_fit(3);
+  ParameterEstimate& tension = sample.report.result.parameters[0];
+  tension.interval_90 = {.lower = 54.1, .upper = 56 + 1.0 / 8};
+  tension.bootstrap_90 = {.lower = 54.2, .upper = 56};
+  tension.mesh_shift = -0.25;
 
   const Table parameters = parameter_table(sample.report.result);
   const Table residuals = residual_table(sample.report, sample.recording);
 
-  EXPECT_EQ(parameters.rows[0], (std::vector<std::string>{"base", "tension_warp", "N/m", "55.1234",
-                                                          "0.61", "fitted", ""}));
+  EXPECT_EQ(parameters.rows[0],
+            (std::vector<std::string>{"base", "tension_warp", "N/m", "55.1234", "0.61", "fitted",
+                                      "", "54.1", "56.125", "54.2", "56", "-0.25"}));
+  EXPECT_EQ(parameters.rows[1].size(), parameters.header.size());
   EXPECT_EQ(residuals.rows.size(), sample.report.residuals[0].rows.size());
   EXPECT_EQ(residuals.rows[0].size(), residuals.header.size());
 }

@@ -30,7 +30,8 @@ std::vector<double> found(const RecoverTrial& trial) {
   std::vector<double> numbers{static_cast<double>(trial.stop)};
   for (const RecoveredParameter& p : trial.parameters)
     for (const double number : {p.truth, p.estimate, p.sigma, p.noise_sigma, p.robust_sigma,
-                                p.bound_sigma, p.undetermined ? 1.0 : 0.0})
+                                p.bound_sigma, p.undetermined ? 1.0 : 0.0, p.degrees_of_freedom,
+                                p.interval_90.lower, p.interval_90.upper})
       numbers.push_back(number);
   return numbers;
 }

@@ -28,6 +28,10 @@ FitResult sample_result() {
       {"tension_warp", "N/m", 41.2, 0.6, ParameterState::fitted, ""},
       {"areal_density", "kg/m2", 0.2, 0, ParameterState::fixed, "weighed"},
       {"flexion_weft", "N/m", 0.1 + 0.2, 5, ParameterState::undetermined, "hidden by \"noise\""}};
+  result.parameters.front().interval_90 = {.lower = 40.1, .upper = 42 + 1.0 / 3};
+  result.parameters.front().interval_by_profile = true;
+  result.parameters.front().bootstrap_90 = {.lower = 40.3, .upper = 42.4};
+  result.parameters.front().mesh_shift = -0.7;
   result.effects = {{"wind", {{"q_x", "Pa", 0.25, 0.01, ParameterState::fitted, ""}}}};
   result.nuisance = {{"tilt_x", "rad", 1e-4, 1e-5, ParameterState::fitted, ""}};
   result.errors = {{"front", "px", {0.3, 0.42, 1000}, {0.5, 0.7, 400}, 0.29, {21, 30, 25}}};
@@ -41,6 +45,13 @@ FitResult sample_result() {
   return result;
 }
 
+void expect_same(const std::optional<Interval>& a, const std::optional<Interval>& b) {
+  ASSERT_EQ(a.has_value(), b.has_value());
+  if (!a) return;
+  EXPECT_EQ(a->lower, b->lower);
+  EXPECT_EQ(a->upper, b->upper);
+}
+
 void expect_same(const std::vector<ParameterEstimate>& a, const std::vector<ParameterEstimate>& b) {
   ASSERT_EQ(a.size(), b.size());
   for (std::size_t i = 0; i < a.size(); ++i) {
@@ -50,6 +61,10 @@ void expect_same(const std::vector<ParameterEstimate>& a, const std::vector<Para
     EXPECT_EQ(a[i].sigma, b[i].sigma);
     EXPECT_EQ(a[i].state, b[i].state);
     EXPECT_EQ(a[i].reason, b[i].reason);
+    expect_same(a[i].interval_90, b[i].interval_90);
+    EXPECT_EQ(a[i].interval_by_profile, b[i].interval_by_profile);
+    expect_same(a[i].bootstrap_90, b[i].bootstrap_90);
+    EXPECT_EQ(a[i].mesh_shift, b[i].mesh_shift);
   }
 }
 
@@ -142,6 +157,8 @@ TEST(FitJson, HasTheKeysOfTheFormat) {
   EXPECT_EQ(json["model"]["mesh"]["rows"], 9);
   EXPECT_EQ(json["model"]["time_step_s"], 1.0 / 480);
   EXPECT_EQ(json["parameters"][2]["state"], "undetermined");
+  EXPECT_EQ(json["parameters"][0]["interval_90"][0], 40.1);
+  EXPECT_FALSE(json["parameters"][1].contains("interval_90"));
   EXPECT_EQ(json["effects"][0]["parameters"][0]["name"], "q_x");
   EXPECT_EQ(json["basins"][0]["parameters"]["wind.q_x"], 1.0 / 3);
   EXPECT_EQ(json["basins"][1]["refined"], false);
@@ -189,6 +206,8 @@ TEST(FitJson, IsRefusedWhereAValueIsMissingOrOfAnotherKind) {
   expect("fit.json: `/model/mesh` is missing", [](auto& j) { j["model"].erase("mesh"); });
   expect("fit.json: `/parameters/1/value` is missing",
          [](auto& j) { j["parameters"][1].erase("value"); });
+  expect("fit.json: `/parameters/0/interval_90` is no interval",
+         [](auto& j) { j["parameters"][0]["interval_90"] = {1.0}; });
   expect("fit.json: `/parameters/1/value` is not a number",
          [](auto& j) { j["parameters"][1]["value"] = nullptr; });
   expect("fit.json: `/parameters/0/state` is `free`",

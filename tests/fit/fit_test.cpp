@@ -380,6 +380,42 @@ TEST(Fit, BeginsWithTheParametersOfAnEarlierFitWithoutASearch) {
   EXPECT_THROW(fit(tiny_input(), options, {}), InputError);
 }
 
+TEST(Fit, LooksFurtherWhereItIsAskedTo) {
+  FitOptions options;
+  options.start.emplace();
+  for (const auto& [name, value] : std::map<std::string, double>{{"tension_warp", 40},
+                                                                 {"tension_weft", 50},
+                                                                 {"shear", 18},
+                                                                 {"flexion_warp", 9},
+                                                                 {"flexion_weft", 7},
+                                                                 {"damping_warp", 2.5e-3},
+                                                                 {"damping_weft", 2e-3}})
+    (*options.start)[name] = value;
+  const FitReport plain = fit(tiny_input(), options, {});
+  ASSERT_TRUE(plain.usable()) << plain.message;
+  EXPECT_FALSE(find(plain.result, "shear").bootstrap_90);
+  EXPECT_FALSE(find(plain.result, "shear").mesh_shift);
+  options.profile = options.two_meshes = true;
+  options.bootstrap = 99;
+
+  const FitReport report = fit(tiny_input(), options, {});
+
+  ASSERT_TRUE(report.usable()) << report.message;
+  const ParameterEstimate& shear = find(report.result, "shear");
+  EXPECT_EQ(shear.value, find(plain.result, "shear").value);
+  ASSERT_TRUE(shear.interval_90 && shear.bootstrap_90 && shear.mesh_shift);
+  EXPECT_LT(shear.interval_90->lower, shear.value);
+  EXPECT_GT(shear.interval_90->upper, shear.value);
+  EXPECT_NE(*shear.mesh_shift, 0);
+  EXPECT_EQ(report.stages.size(), plain.stages.size() + 7 + 1);  // a line for each parameter
+  options.two_meshes = false;
+  int calls = 0;
+  const FitReport cancelled = fit(tiny_input(), options, [&](const Progress& now) {
+    return now.stage != "profiles" || ++calls > 1;
+  });
+  EXPECT_TRUE(calls == 0 || cancelled.stop == FitStop::cancelled);
+}
+
 TEST(Fit, RefusesOptionsOutOfRange) {
   const FitInput input = synthetic_input({.mesh = 5, .markers = 5});
   EXPECT_THROW(fit(input, {.mesh_columns = 1}, {}), InputError);
@@ -389,6 +425,9 @@ TEST(Fit, RefusesOptionsOutOfRange) {
   EXPECT_THROW(fit(input, {.work = 0}, {}), InputError);
   EXPECT_THROW(fit(input, {.substep_scale = 0}, {}), InputError);
   EXPECT_THROW(fit(input, {.resume = true}, {}), InputError);
+  EXPECT_THROW(fit(input, {.bootstrap = 5}, {}), InputError);
+  EXPECT_THROW(fit(input, {.two_meshes = true, .forecast = FitResult()}, {}), InputError);
+  EXPECT_THROW(fit(input, {.spring_set = SpringSet::louchet5, .two_meshes = true}, {}), InputError);
   EXPECT_THROW(fit(input, {.checkpoint = "a", .start = {{}}}, {}), InputError);
 }
 

@@ -1,0 +1,25 @@
+#pragma once
+
+#include "fit/refine.h"
+
+namespace clothfit {
+
+/// Where a fit ends on a mesh of another resolution: the mesh's share of what is not known.
+struct OtherMesh {
+  bool usable = false;
+  std::string message;  ///< one line for a person
+  int columns = 0, rows = 0;
+  /// Value there less value here of each parameter, in its unit.
+  Eigen::VectorXd shift;
+};
+
+/// The number of vertices a side of the other mesh: half the cells where at least `least` vertices
+/// are left, else twice as many.
+int other_mesh_count(int count, int least);
+
+/// Refines from `values`, the optimum on the fit's own mesh, on that of `other`, whose parameters
+/// and observations are the same.
+OtherMesh fit_on_other_mesh(const FitProblem& other, const Eigen::VectorXd& values,
+                            const RefineOptions& options, const ProgressCallback& progress);
+
+}  // namespace clothfit
