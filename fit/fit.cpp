@@ -62,6 +62,8 @@ struct Effort {
   bool exact_in_the_end = false;
   double most_spring_steps = 0;  ///< a stage stops there: a wrong model may lead it on for hours
 };
+/// Coordinates of a fit for which the limits of work below are meant.
+constexpr double kUsualCoordinates = 20;
 constexpr Effort kCoarseEffort{.rounds = 3,
                                .least_gain = 1e-3,
                                .derivatives = Derivatives::forward,
@@ -168,6 +170,8 @@ RefineResult refine_stage(const Stage& stage, const FitOptions& options,
                           const Eigen::VectorXd& start, const ProgressCallback& progress,
                           FitReport& report) {
   const FitProblem& problem = stage.problem;
+  // An unknown start has hundreds of coordinates, each with its derivatives.
+  const double coordinates_share = std::max(1.0, problem.space.size() / kUsualCoordinates);
   const RefineOptions refine_options{
       .iterations = stage.effort.iterations,
       .rounds = stage.effort.rounds,
@@ -177,7 +181,7 @@ RefineResult refine_stage(const Stage& stage, const FitOptions& options,
       .exact_in_the_end = stage.effort.exact_in_the_end,
       .loss = options.loss,
       .trust_region_radius = stage.effort.trust_region_radius,
-      .most_spring_steps = options.work * stage.effort.most_spring_steps,
+      .most_spring_steps = options.work * coordinates_share * stage.effort.most_spring_steps,
       .substep_scale = options.substep_scale};
   const int frames = horizon_frames(problem, stage.share);
   const auto make_objective = [&](const TimeSteps& steps) -> std::unique_ptr<Objective> {
