@@ -13,7 +13,6 @@
 #include "apps/study/recover.h"
 #include "apps/text_table.h"
 #include "apps/verb.h"
-#include "data/input_error.h"
 #include "data/output_folder.h"
 #include "data/text_file.h"
 #include "fit/draws.h"
@@ -36,6 +35,11 @@ struct RecoverFlags {
   fs::path out, journal;
   bool resume = false;
 };
+
+std::string check_picture_size(const std::string& text) {
+  if (parse_grid_size(text)) return "";
+  return fmt::format("'{}' is no size of pictures, such as 1280x960", text);
+}
 
 /// The options given that shape the result.
 std::string command_text(const CLI::App& verb) {
@@ -63,13 +67,10 @@ RecoverOptions options_of(const RecoverFlags& flags) {
   options.fit.observations = of_pixels ? ObservationKind::tracks2d : ObservationKind::tracks3d;
   options.fit.loss = flags.loss == "huber" ? Loss::huber : Loss::squared;
   if (flags.render) {
-    const std::optional<GridSize> size = parse_grid_size(flags.picture_size);
-    if (!size)
-      throw InputError("--picture", fmt::format("'{}' is no size", flags.picture_size),
-                       "WIDTHxHEIGHT in pixels, such as 1280x960");
+    const GridSize size = parse_grid_size(flags.picture_size).value();  // checked when it was read
     options.pictures = flags.pictures;
-    options.pictures->width_px = size->columns;
-    options.pictures->height_px = size->rows;
+    options.pictures->width_px = size.columns;
+    options.pictures->height_px = size.rows;
     options.pictures->exposure_s = 1e-3 * flags.exposure_ms;
   }
   return options;
@@ -153,7 +154,9 @@ void add_recover_verb(CLI::App& program, VerbAction& action) {
     return add(name, value, what)->needs(render);
   };
   add_of_pictures("--tags", flags->pictures.tags, "Tags a side");
-  add_of_pictures("--picture", flags->picture_size, "Size of pictures")->type_name("WIDTHxHEIGHT");
+  add_of_pictures("--picture", flags->picture_size, "Size of pictures")
+      ->type_name("WIDTHxHEIGHT")
+      ->check(check_picture_size);
   add_of_pictures("--exposure-ms", flags->exposure_ms, "Exposure, milliseconds");
   add_of_pictures("--instants", flags->pictures.instants,
                   "Instants that an exposure is averaged over, odd");

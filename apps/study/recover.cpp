@@ -262,6 +262,11 @@ RecoverTrial recover_once(const RecoverOptions& options, int, std::uint64_t seed
     tracker = rendered.tracker;
     return std::move(rendered.recording);
   }();
+  if (tracker && tracker->accepted == 0)
+    return {.stop = FitStop::diverged,
+            .message = "the tracker stands by no marker",
+            .parameters = {},
+            .tracker = tracker};
   FitOptions fit_options = options.fit;
   fit_options.seed = seed;
   fit_options.threads = 1;  // trials run side by side

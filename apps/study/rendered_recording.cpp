@@ -55,11 +55,11 @@ Eigen::Matrix2Xd places_m(const std::vector<Marker>& markers) {
   return places;
 }
 
-/// Vertices a side of the mesh that is drawn: one of the truth's cells is cut into equal parts
-/// until there are 128 and more across. Its triangles lie a hundredth of a millimetre beside the
-/// surface where that bends with a radius of 0.1 m.
+/// Vertices a side of the mesh that is drawn: the truth's cells are cut into equal parts until
+/// there are 256 and more across. Its triangles then lie 3 um beside a surface of 0.4 m that bends
+/// with a radius of 0.1 m.
 int drawn_vertices(int truth_mesh) {
-  constexpr int kCells = 128;
+  constexpr int kCells = 256;
   const int cells = truth_mesh - 1;
   return 1 + cells * ((kCells + cells - 1) / cells);
 }
