@@ -55,13 +55,22 @@ Eigen::Matrix2Xd places_m(const std::vector<Marker>& markers) {
   return places;
 }
 
-/// Vertices a side of the mesh that is drawn: the truth's cells are cut into equal parts until
-/// there are 256 and more across. Its triangles then lie 3 um beside a surface of 0.4 m that bends
-/// with a radius of 0.1 m.
-int drawn_vertices(int truth_mesh) {
-  constexpr int kCells = 256;
-  const int cells = truth_mesh - 1;
-  return 1 + cells * ((kCells + cells - 1) / cells);
+/// Pixels that a length at the distance of the cloth's middle takes in the first camera.
+double pixels_of(double length_m, const SyntheticScene& scene, const PictureOptions& options) {
+  const CameraParameters camera = scene_camera(scene, 0, options.width_px, options.height_px);
+  const Eigen::Vector3d middle_m(0.5 * scene.size_m, 0, -0.5 * scene.size_m);
+  const double distance_m = (camera_from_world(camera) * middle_m).z();
+  return length_m * camera.focal_px.x() / distance_m;
+}
+
+/// Vertices a side of the mesh that is drawn: the truth's cells are cut into equal parts of two
+/// pixels at most. Where the surface bends with a radius of 50 pixels, the triangles then lie a
+/// hundredth of a pixel beside it, along its normal.
+int drawn_vertices(const SyntheticScene& scene, const PictureOptions& options) {
+  constexpr double kLargestPx = 2;
+  const int cells = scene.truth_mesh - 1;
+  const double parts = pixels_of(scene.size_m, scene, options) / (cells * kLargestPx);
+  return 1 + cells * std::max(1, static_cast<int>(std::ceil(parts)));
 }
 
 Eigen::Matrix2Xd grid_m(int vertices, double size_m) {
@@ -126,7 +135,7 @@ class Stage {
         seed_(seed),
         markers_(tag_corners(options.tags, scene.size_m)),
         print_(markers_, scene.size_m, scene.size_m),
-        drawn_(drawn_vertices(scene.truth_mesh)),
+        drawn_(drawn_vertices(scene, options)),
         drawn_surface_(surface(grid_m(drawn_, scene.size_m))),
         marker_surface_(surface(places_m(markers_.markers))),
         shapes_(exposed_shapes(scene, options, seed)) {}
@@ -268,10 +277,7 @@ void PictureOptions::validate(const SyntheticScene& scene) const {
   refuse(scene.outliers > 0, "--outliers");
   refuse(!scene.noisy, "noisy");
 
-  const CameraParameters camera = scene_camera(scene, 0, width_px, height_px);
-  const Eigen::Vector3d middle_m(0.5 * scene.size_m, 0, -0.5 * scene.size_m);
-  const double distance_m = (camera_from_world(camera) * middle_m).z();
-  const double tag_px = kTagShare * scene.size_m / tags * camera.focal_px.x() / distance_m;
+  const double tag_px = pixels_of(kTagShare * scene.size_m / tags, scene, *this);
   if (tag_px < kSmallestTagPx) {
     throw InputError("--tags", fmt::format("tags would be {:.1f} px wide", tag_px),
                      fmt::format("{} px or more", kSmallestTagPx),

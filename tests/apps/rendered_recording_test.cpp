@@ -109,7 +109,9 @@ TEST(RenderedRecording, IsTheSameForAnyNumberOfThreads) {
   SyntheticScene scene = small_scene();
   scene.cameras = 2;
   PictureOptions pictures = small_pictures();
-  pictures.samples = 1;
+  pictures.tags = 2;
+  pictures.width_px = 200;
+  pictures.height_px = 150;
   pictures.instants = 3;
   const auto with_threads = [&](std::size_t threads) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
