@@ -15,6 +15,7 @@
 #include "apps/verb.h"
 #include "data/output_folder.h"
 #include "data/text_file.h"
+#include "fit/draws.h"
 
 namespace clothfit {
 namespace {
@@ -23,12 +24,22 @@ namespace fs = std::filesystem;
 
 struct RecoverFlags {
   RecoverOptions study;
-  std::string observations = "tracks3d", loss = "squared";
+  bool render = false;
+  PictureOptions pictures;
+  std::string picture_size = "1280x960";
+  double exposure_ms = 2;
+  std::string observations;  ///< empty: 3D tracks, or 2D ones of pictures
+  std::string loss = "squared";
   double seconds = 1, noise_mm = 1;
   int mesh = 17;
   fs::path out, journal;
   bool resume = false;
 };
+
+std::string check_picture_size(const std::string& text) {
+  if (parse_grid_size(text)) return "";
+  return fmt::format("'{}' is no size of pictures, such as 1280x960", text);
+}
 
 /// The options given that shape the result.
 std::string command_text(const CLI::App& verb) {
@@ -51,9 +62,17 @@ RecoverOptions options_of(const RecoverFlags& flags) {
       1 + static_cast<int>(std::lround(flags.seconds * options.scene.frame_rate_hz));
   options.scene.noise_m = 1e-3 * flags.noise_mm;
   options.fit.mesh_columns = options.fit.mesh_rows = flags.mesh;
-  options.fit.observations =
-      flags.observations == "tracks2d" ? ObservationKind::tracks2d : ObservationKind::tracks3d;
+  const bool of_pixels =
+      flags.observations.empty() ? flags.render : flags.observations == "tracks2d";
+  options.fit.observations = of_pixels ? ObservationKind::tracks2d : ObservationKind::tracks3d;
   options.fit.loss = flags.loss == "huber" ? Loss::huber : Loss::squared;
+  if (flags.render) {
+    const GridSize size = parse_grid_size(flags.picture_size).value();  // checked when it was read
+    options.pictures = flags.pictures;
+    options.pictures->width_px = size.columns;
+    options.pictures->height_px = size.rows;
+    options.pictures->exposure_s = 1e-3 * flags.exposure_ms;
+  }
   return options;
 }
 
@@ -80,12 +99,27 @@ int run_recover(const RecoverFlags& flags, const std::string& command) {
   const Table trials = recovery_trials_table(result);
   write_csv_table(parameters.header, parameters.rows, out.path() / "parameters.csv");
   write_csv_table(trials.header, trials.rows, out.path() / "trials.csv");
-  write_text(recover_page_html(options, result, command), out.path() / "report.html");
+  std::string picture_png;
+  if (options.pictures) {
+    const Table tracker = tracker_trials_table(result);
+    write_csv_table(tracker.header, tracker.rows, out.path() / "tracker.csv");
+    picture_png = rendered_picture_png(options.scene, *options.pictures,
+                                       derived_seed(options.seed, 0), 0, options.scene.frames / 2);
+    write_text(picture_png, out.path() / "picture.png");
+  }
+  write_text(recover_page_html(options, result, command, picture_png), out.path() / "report.html");
   out.publish();
   if (flags.journal.empty()) fs::remove(journal_file);
-  fmt::print("{}\n{}\nReport: {}\n", text_table(counts.header, counts.rows),
-             text_table(parameters.header, parameters.rows),
-             shown_path(out.final_path() / "report.html"));
+  fmt::print("{}\n{}\n", text_table(counts.header, counts.rows),
+             text_table(parameters.header, parameters.rows));
+  if (result.tracker) {
+    const Table tracker = tracker_table(*result.tracker);
+    const Table rejections = tracker_rejections(*result.tracker);
+    fmt::print("{}\n", text_table(tracker.header, tracker.rows));
+    if (!rejections.rows.empty())
+      fmt::print("{}\n", text_table(rejections.header, rejections.rows));
+  }
+  fmt::print("Report: {}\n", shown_path(out.final_path() / "report.html"));
   return kExitGood;
 }
 
@@ -100,17 +134,38 @@ void add_recover_verb(CLI::App& program, VerbAction& action) {
     return verb->add_option(name, value, what)->capture_default_str();
   };
   add("--trials", flags->study.trials, "Recordings, each released another way");
-  add("--observations", flags->observations, "What to fit to")
+  verb->add_option("--observations", flags->observations,
+                   "What to fit to (default: tracks3d; tracks2d with --render)")
       ->check(CLI::IsMember({"tracks3d", "tracks2d"}));
-  add("--noise-mm", flags->noise_mm, "Noise of 3D tracks, standard deviation per coordinate");
-  add("--noise-px", scene.noise_px, "Noise of pixels");
+  CLI::Option* render = verb->add_flag("--render", flags->render,
+                                       "Find the markers in rendered pictures of a printed cloth");
+  CLI::Option* noise_mm =
+      add("--noise-mm", flags->noise_mm, "Noise of 3D tracks, standard deviation per coordinate");
+  CLI::Option* noise_px = add("--noise-px", scene.noise_px, "Noise of pixels");
   add("--cameras", scene.cameras, "Cameras, 1 to 4");
   add("--rate", scene.frame_rate_hz, "Frames per second");
   add("--seconds", flags->seconds, "Length of a recording");
   add("--before", scene.before_s,
       "Seconds that the cloth has been swinging when the recording begins: its start is then "
       "unknown to the fit");
-  add("--markers", scene.markers, "Markers a side");
+  CLI::Option* markers = add("--markers", scene.markers, "Markers a side");
+  for (CLI::Option* option : {noise_mm, noise_px, markers}) option->excludes(render);
+  const auto add_of_pictures = [&](const char* name, auto& value, const char* what) {
+    return add(name, value, what)->needs(render);
+  };
+  add_of_pictures("--tags", flags->pictures.tags, "Tags a side");
+  add_of_pictures("--picture", flags->picture_size, "Size of pictures")
+      ->type_name("WIDTHxHEIGHT")
+      ->check(check_picture_size);
+  add_of_pictures("--exposure-ms", flags->exposure_ms, "Exposure, milliseconds");
+  add_of_pictures("--instants", flags->pictures.instants,
+                  "Instants that an exposure is averaged over, odd");
+  add_of_pictures("--samples", flags->pictures.samples, "Lines of sight across a pixel");
+  add_of_pictures("--blur-px", flags->pictures.blur_px, "Blur of the lens, standard deviation");
+  add_of_pictures("--grey-noise", flags->pictures.noise_levels,
+                  "Noise of the sensor, standard deviation of grey levels");
+  add_of_pictures("--shot-noise", flags->pictures.shot_levels,
+                  "Variance of shot noise per grey level");
   add("--mesh", flags->mesh, "Vertices a side of the fit");
   add("--truth-mesh", scene.truth_mesh, "Vertices a side of the truth");
   add("--truth-steps", scene.truth_steps, "As many times more time steps in the truth");
@@ -139,7 +194,8 @@ void add_recover_verb(CLI::App& program, VerbAction& action) {
       "Examples:\n"
       "  clothfit recover --trials 100 --start-factor 5\n"
       "  clothfit recover --observations tracks2d --before 0.25 --trials 20\n"
-      "  clothfit recover --drag 0.5 --trials 50");
+      "  clothfit recover --drag 0.5 --trials 50\n"
+      "  clothfit recover --render --rate 30 --trials 4");
   verb->callback([flags, verb, &action] {
     action = [flags, command = command_text(*verb)] { return run_recover(*flags, command); };
   });

@@ -252,6 +252,13 @@ TrackResult track(const Recording& recording, const CameraEntry& camera,
     throw InputError(yaml, fmt::format("camera '{}' has no images", camera.name),
                      "`images` with a folder or a video to track in");
   }
+  const std::unique_ptr<ImageSource> images = open_images(*camera.images);
+  return track(recording, *images, camera.images->string(), options, progress);
+}
+
+TrackResult track(const Recording& recording, ImageSource& pictures, const std::string& where,
+                  const TrackOptions& options, const ProgressCallback& progress) {
+  options.validate();
   const PointsByTag markers =
       points_by_tag(recording.markers.markers, recording.markers_file.string());
   if (markers.empty()) {
@@ -261,8 +268,7 @@ TrackResult track(const Recording& recording, const CameraEntry& camera,
   const PointsByTag reference =
       points_by_tag(recording.reference, recording.reference_file.value_or("reference").string());
 
-  const std::unique_ptr<ImageSource> images = open_images(*camera.images);
-  Readings readings = read_all(*images, recording.markers.family, markers, reference, progress);
+  Readings readings = read_all(pictures, recording.markers.family, markers, reference, progress);
 
   TrackResult result;
   result.frames = readings.frames;
@@ -279,7 +285,7 @@ TrackResult track(const Recording& recording, const CameraEntry& camera,
   if (result.tracks.empty()) {
     std::set<int> ids;
     for (const auto& [id, points] : markers) ids.insert(id);
-    throw InputError(camera.images->string(),
+    throw InputError(where,
                      fmt::format("no tag of the cloth appears in {} pictures", readings.frames),
                      fmt::format("tags {} of {}", list_ids(ids), recording.markers.family),
                      what_appears_instead(readings, recording.markers.family));

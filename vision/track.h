@@ -9,6 +9,7 @@
 #include "data/progress.h"
 #include "data/recording.h"
 #include "data/tracks.h"
+#include "vision/image_source.h"
 
 namespace clothfit {
 
@@ -57,6 +58,10 @@ struct TrackResult {
 /// at a time but not always the same. Throws InputError for pictures that cannot be read, are none,
 /// or differ in size, for markers without tags, and when no tag of the cloth ever appears.
 TrackResult track(const Recording& recording, const CameraEntry& camera,
+                  const TrackOptions& options, const ProgressCallback& progress);
+
+/// The same in pictures that come from elsewhere; refusals call them `where`.
+TrackResult track(const Recording& recording, ImageSource& pictures, const std::string& where,
                   const TrackOptions& options, const ProgressCallback& progress);
 
 }  // namespace clothfit

@@ -61,10 +61,30 @@ std::string pulls_svg(const RecoverResult& result) {
   return line_plot(plot);
 }
 
+/// What the tracker made of the pictures, and one of them.
+std::string tracker_html(const TrackerErrors& tracker, const std::string& picture_png) {
+  std::string body =
+      html_table(tracker_table(tracker),
+                 "The tracker against the truth, over all trials: root mean squares of a "
+                 "coordinate's error and of the sigma stated for it, and chi-squared per number, "
+                 "which is 1 where sigma is right. Above 1, intervals that believe the sigma are "
+                 "too narrow.");
+  const Table rejections = tracker_rejections(tracker);
+  if (!rejections.rows.empty())
+    body += html_table(rejections, "Corners of tags that were read but rejected, by reason.");
+  if (!picture_png.empty())
+    body += fmt::format(
+        "<figure>\n<img src=\"{}\" alt=\"A cloth with printed tags\" style=\"max-width: 100%\">\n"
+        "<figcaption>The first camera's picture in the middle of the first "
+        "trial.</figcaption>\n</figure>\n",
+        data_uri("image/png", picture_png));
+  return body;
+}
+
 }  // namespace
 
 std::string recover_page_html(const RecoverOptions& options, const RecoverResult& result,
-                              const std::string& command) {
+                              const std::string& command, const std::string& picture_png) {
   std::string body = fmt::format(
       "<h1>Simulate and recover</h1>\n<p class=\"meta\"><code>{}</code></p>\n"
       "<p>{} recordings of a cloth whose every number is known, each released another way, each "
@@ -80,6 +100,7 @@ std::string recover_page_html(const RecoverOptions& options, const RecoverResult
                  "Errors relative to the truth. The 95 % interval is the estimate ± 1.96 "
                  "sigma of independent noise; the robust 90 % interval bears residuals that "
                  "depend on each other within blocks of the cloth; the stated one is fit.json's.");
+  if (result.tracker) body += tracker_html(*result.tracker, picture_png);
   const std::string pulls = pulls_svg(result);
   if (!pulls.empty())
     body += fmt::format(

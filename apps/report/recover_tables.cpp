@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "apps/report/number_text.h"
+#include "vision/rejection.h"
 
 namespace clothfit {
 namespace {
@@ -57,6 +58,50 @@ Table recovery_trials_table(const RecoverResult& result) {
                             exact_text(p.robust_sigma), exact_text(p.bound_sigma),
                             p.undetermined ? "yes" : "no", exact_text(p.degrees_of_freedom),
                             exact_text(p.interval_90.lower), exact_text(p.interval_90.upper)});
+  }
+  return table;
+}
+
+Table tracker_table(const TrackerErrors& tracker) {
+  const double found = tracker.accepted + tracker.rejections();
+  return {.header = {"pictures", "markers shown", "accepted", "rejected", "rms error px",
+                     "stated sigma px", "chi2 / number", "beyond 5 sigma"},
+          .rows = {{std::to_string(tracker.pictures), std::to_string(tracker.shown),
+                    std::to_string(tracker.accepted), percent(tracker.rejections() / found, 2),
+                    significant(tracker.rms_error_px(), 3), significant(tracker.rms_sigma_px(), 3),
+                    significant(tracker.chi_squared_per_number(), 3),
+                    std::to_string(tracker.beyond_5_sigma)}}};
+}
+
+Table tracker_rejections(const TrackerErrors& tracker) {
+  const double found = tracker.accepted + tracker.rejections();
+  Table table{.header = {"rejected", "markers", "share", "because"}, .rows = {}};
+  for (const RejectionReason& reason : rejection_reasons()) {
+    const auto rows = tracker.rejected.find(reason.code);
+    if (rows == tracker.rejected.end()) continue;
+    table.rows.push_back({reason.code, std::to_string(rows->second),
+                          percent(rows->second / found, 2), reason.meaning});
+  }
+  return table;
+}
+
+Table tracker_trials_table(const RecoverResult& result) {
+  Table table{.header = {"trial", "pictures", "shown", "accepted", "rms_error_px", "rms_sigma_px",
+                         "chi_squared_per_number", "beyond_5_sigma"},
+              .rows = {}};
+  for (const RejectionReason& reason : rejection_reasons()) table.header.push_back(reason.code);
+  for (size_t n = 0; n < result.trials.size(); ++n) {
+    if (!result.trials[n].tracker) continue;
+    const TrackerErrors& tracker = *result.trials[n].tracker;
+    std::vector<std::string>& row = table.rows.emplace_back(std::vector<std::string>{
+        std::to_string(n), std::to_string(tracker.pictures), std::to_string(tracker.shown),
+        std::to_string(tracker.accepted), exact_text(tracker.rms_error_px()),
+        exact_text(tracker.rms_sigma_px()), exact_text(tracker.chi_squared_per_number()),
+        std::to_string(tracker.beyond_5_sigma)});
+    for (const RejectionReason& reason : rejection_reasons()) {
+      const auto rows = tracker.rejected.find(reason.code);
+      row.push_back(std::to_string(rows == tracker.rejected.end() ? 0 : rows->second));
+    }
   }
   return table;
 }

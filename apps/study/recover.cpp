@@ -34,6 +34,28 @@ double number_of(const Json& json) {
   return json.is_null() ? kNone : json.get<double>();
 }
 
+Json json_of(const TrackerErrors& tracker) {
+  return {{"pictures", tracker.pictures},
+          {"shown", tracker.shown},
+          {"accepted", tracker.accepted},
+          {"rejected", tracker.rejected},
+          {"squared_error_px2", tracker.squared_error_px2},
+          {"stated_variance_px2", tracker.stated_variance_px2},
+          {"chi_squared", tracker.chi_squared},
+          {"beyond_5_sigma", tracker.beyond_5_sigma}};
+}
+
+TrackerErrors tracker_errors_of(const Json& json) {
+  return {.pictures = json.at("pictures"),
+          .shown = json.at("shown"),
+          .accepted = json.at("accepted"),
+          .rejected = json.at("rejected").get<std::map<std::string, int>>(),
+          .squared_error_px2 = json.at("squared_error_px2"),
+          .stated_variance_px2 = json.at("stated_variance_px2"),
+          .chi_squared = json.at("chi_squared"),
+          .beyond_5_sigma = json.at("beyond_5_sigma")};
+}
+
 std::string payload_of(const RecoverTrial& trial) {
   Json json{{"stop", static_cast<int>(trial.stop)},
             {"message", trial.message},
@@ -45,6 +67,7 @@ std::string payload_of(const RecoverTrial& trial) {
                           number(p.noise_sigma), number(p.robust_sigma), number(p.bound_sigma),
                           p.undetermined, number(p.degrees_of_freedom), number(p.interval_90.lower),
                           number(p.interval_90.upper)});
+  if (trial.tracker) json["tracker"] = json_of(*trial.tracker);
   return json.dump();
 }
 
@@ -54,7 +77,9 @@ RecoverTrial trial_of(const std::string& payload) {
                      .message = json.at("message"),
                      .parameters = {},
                      .rejected = json.at("rejected"),
+                     .tracker = std::nullopt,
                      .seconds = json.at("seconds")};
+  if (json.contains("tracker")) trial.tracker = tracker_errors_of(json.at("tracker"));
   for (const Json& p : json.at("parameters"))
     trial.parameters.push_back({.name = p[0],
                                 .truth = number_of(p[1]),
@@ -137,6 +162,12 @@ RecoverySummary summary_of(const std::string& name, const std::vector<RecoverTri
 void RecoverOptions::validate() const {
   scene.validate();
   fit.validate();
+  if (pictures) {
+    pictures->validate(scene);
+    if (fit.observations == ObservationKind::tracks3d)
+      throw InputError("--observations", "tracks3d cannot be had from pictures", "tracks2d",
+                       "leave it out beside --render");
+  }
   if (trials < 1) throw InputError("--trials", "is out of range", "at least 1");
   if (start_factor != 0 && !(start_factor >= 1))
     throw InputError("--start-factor", "is out of range", "1 or more, or 0 for a search");
@@ -147,19 +178,28 @@ std::string RecoverOptions::key() const {
   const Fabric& f = scene.fabric;
   std::string effects;
   for (const std::string& effect : fit.effects) effects += effect + " ";
+  std::string rendered;
+  if (pictures) {
+    rendered = fmt::format(" pictures {} {} {} {} {} {} {} {} {}", pictures->tags,
+                           pictures->width_px, pictures->height_px, pictures->exposure_s,
+                           pictures->instants, pictures->samples, pictures->blur_px,
+                           pictures->noise_levels, pictures->shot_levels);
+  }
   return fmt::format(
-      "recover 2 seed {} scene {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} fit "
-      "{} "
-      "{} {} {} {} {} {} {} {} start {} effects {}",
-      seed, scene.size_m, scene.mass_kg, f.tension_warp_n_per_m, f.tension_weft_n_per_m,
-      f.shear_n_per_m, f.flexion_warp_n_per_m, f.flexion_weft_n_per_m, f.damping_warp_s,
-      f.damping_weft_s, scene.drag_per_s, scene.truth_mesh, scene.truth_steps, scene.markers,
-      scene.frames, scene.frame_rate_hz, scene.before_s, scene.cameras, scene.noise_m,
-      scene.noise_px, scene.missing,
-      fmt::format("{} {} {}", scene.hand, scene.outliers, scene.noisy),
-      static_cast<int>(fit.observations), fit.mesh_columns, fit.mesh_rows, fit.population,
-      fit.generations, fit.refine_best, static_cast<int>(fit.loss), fit.start_nodes,
-      fit.substep_scale, start_factor, effects);
+             "recover 2 seed {} scene {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} "
+             "{} fit "
+             "{} "
+             "{} {} {} {} {} {} {} {} start {} effects {}",
+             seed, scene.size_m, scene.mass_kg, f.tension_warp_n_per_m, f.tension_weft_n_per_m,
+             f.shear_n_per_m, f.flexion_warp_n_per_m, f.flexion_weft_n_per_m, f.damping_warp_s,
+             f.damping_weft_s, scene.drag_per_s, scene.truth_mesh, scene.truth_steps, scene.markers,
+             scene.frames, scene.frame_rate_hz, scene.before_s, scene.cameras, scene.noise_m,
+             scene.noise_px, scene.missing,
+             fmt::format("{} {} {}", scene.hand, scene.outliers, scene.noisy),
+             static_cast<int>(fit.observations), fit.mesh_columns, fit.mesh_rows, fit.population,
+             fit.generations, fit.refine_best, static_cast<int>(fit.loss), fit.start_nodes,
+             fit.substep_scale, start_factor, effects) +
+         rendered;
 }
 
 FitProblem problem_of(const SyntheticRecording& recording, const FitOptions& options) {
@@ -215,7 +255,18 @@ Coverage90 coverage_90(const std::vector<RecoverTrial>& trials, const std::strin
 
 RecoverTrial recover_once(const RecoverOptions& options, int, std::uint64_t seed) {
   const auto began = std::chrono::steady_clock::now();
-  const SyntheticRecording recording = make_synthetic_recording(options.scene, seed);
+  std::optional<TrackerErrors> tracker;
+  const SyntheticRecording recording = [&] {
+    if (!options.pictures) return make_synthetic_recording(options.scene, seed);
+    RenderedRecording rendered = make_rendered_recording(options.scene, *options.pictures, seed);
+    tracker = rendered.tracker;
+    return std::move(rendered.recording);
+  }();
+  if (tracker && tracker->accepted == 0)
+    return {.stop = FitStop::diverged,
+            .message = "the tracker stands by no marker",
+            .parameters = {},
+            .tracker = tracker};
   FitOptions fit_options = options.fit;
   fit_options.seed = seed;
   fit_options.threads = 1;  // trials run side by side
@@ -231,7 +282,7 @@ RecoverTrial recover_once(const RecoverOptions& options, int, std::uint64_t seed
     }
   }
   const FitReport report = fit(recording.input, fit_options, {});
-  RecoverTrial trial{.stop = report.stop, .message = report.message};
+  RecoverTrial trial{.stop = report.stop, .message = report.message, .tracker = tracker};
   for (const auto& [reason, count] : report.result.observations_rejected) trial.rejected += count;
   if (report.usable()) {
     const std::map<std::string, double> bound = bound_sigmas(recording, fit_options);
@@ -286,6 +337,10 @@ void summarise_trials(RecoverResult& result) {
   std::vector<double> seconds;
   for (const RecoverTrial& trial : result.trials) {
     seconds.push_back(trial.seconds);
+    if (trial.tracker) {
+      if (!result.tracker) result.tracker.emplace();
+      result.tracker->add(*trial.tracker);
+    }
     if (!has_fit(trial)) {
       ++result.failures;
       continue;

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "apps/study/rendered_recording.h"
 #include "apps/study/synthetic_recording.h"
 #include "data/progress.h"
 #include "fit/executor.h"
@@ -14,9 +15,12 @@
 namespace clothfit {
 
 /// Simulate and recover: recordings whose every number is known are fitted, again and again, and
-/// what the fits say of themselves is held against the truth.
+/// what the fits say of themselves is held against the truth. With pictures it is render and
+/// recover: the tracker finds the markers in what cameras see of the scene.
 struct RecoverOptions {
   SyntheticScene scene;
+  /// Rendered instead of projected; the fit is then of 2D tracks.
+  std::optional<PictureOptions> pictures;
   FitOptions fit;  ///< its seed is each trial's own
   int trials = 20;
   /// Fits begin at the truth times or divided by this, drawn for each parameter; 0: from scratch,
@@ -57,6 +61,7 @@ struct RecoverTrial {
   std::string message;
   std::vector<RecoveredParameter> parameters;  ///< empty where there was no fit
   int rejected = 0;                            ///< observations that the fit left out
+  std::optional<TrackerErrors> tracker;        ///< of rendered recordings
   double seconds = 0;                          ///< the only number that differs from run to run
 };
 
@@ -99,6 +104,7 @@ struct RecoverResult {
   int unconverged = 0;  ///< fits that say so of themselves
   int wrong = 0;        ///< fits that converged beyond 10 bounds from the truth in any parameter
   double median_seconds = 0, longest_seconds = 0;
+  std::optional<TrackerErrors> tracker;  ///< of all trials together, where they were rendered
 };
 
 RecoverResult recover(const RecoverOptions& options, Journal* journal,
