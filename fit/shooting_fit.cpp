@@ -1,0 +1,230 @@
+#include "fit/shooting_fit.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "fit/prior_cost.h"
+#include "fit/refine.h"
+#include "fit/track_states.h"
+#include "model/stability.h"
+
+namespace clothfit {
+namespace {
+
+/// Ends of the ranges, in coordinates.
+struct Ranges {
+  Eigen::VectorXd lower, upper;
+
+  explicit Ranges(const ParameterSpace& space) : lower(space.size()), upper(space.size()) {
+    for (int p = 0; p < space.size(); ++p) {
+      lower[p] = space.parameters[static_cast<size_t>(p)].lower;
+      upper[p] = space.parameters[static_cast<size_t>(p)].upper;
+    }
+    lower = space.coordinates(lower);
+    upper = space.coordinates(upper);
+  }
+  /// Coordinates at an end that keeps them from a lower cost.
+  std::vector<bool> blocked(const Eigen::VectorXd& x, const Eigen::VectorXd& downhill) const {
+    std::vector<bool> held(static_cast<size_t>(x.size()));
+    for (Eigen::Index p = 0; p < x.size(); ++p) {
+      const double edge = 1e-12 * (upper[p] - lower[p]);
+      held[static_cast<size_t>(p)] =
+          downhill[p] < 0 ? x[p] - lower[p] <= edge : upper[p] - x[p] <= edge;
+    }
+    return held;
+  }
+};
+
+/// First frames of windows of about equal length.
+std::vector<int> first_frames(int frames, int window_frames) {
+  const int count = std::max(1, (frames - 1) / std::max(1, window_frames));
+  std::vector<int> first;
+  for (int w = 0; w < count; ++w) first.push_back(w * (frames - 1) / count);
+  return first;
+}
+
+TimeSteps steps_at(const FitProblem& problem, const Eigen::VectorXd& values, double margin) {
+  return stable_time_steps(problem.cloth, parameter_set(problem, values)).times(1 / margin);
+}
+
+bool has_tracks3d(const FitProblem& problem) {
+  return !problem.observations.empty() && !problem.observations.front().camera;
+}
+
+}  // namespace
+
+std::optional<ShootingWindows> make_windows(const FitProblem& problem, int frames,
+                                            const Eigen::VectorXd& values,
+                                            const ShootingOptions& options) {
+  ShootingWindows windows{
+      .first_frame = {0}, .position_m = {{}}, .velocity_m_per_s = {{}}, .nodes = options.nodes};
+  const std::vector<int> wanted = first_frames(frames, options.window_frames);
+  const auto add = [&](int frame, const Eigen::Matrix3Xd& position_m,
+                       const Eigen::Matrix3Xd& velocity_m_per_s) {
+    windows.first_frame.push_back(frame);
+    windows.position_m.push_back(position_m);
+    windows.velocity_m_per_s.push_back(velocity_m_per_s);
+  };
+  if (has_tracks3d(problem)) {
+    const TrackStates tracks = recorded_states_of_tracks(problem);
+    for (size_t w = 1; w < wanted.size(); ++w) {
+      const auto next = std::ranges::lower_bound(tracks.frame, wanted[w]);
+      if (next == tracks.frame.end() || *next >= frames) break;
+      if (*next <= windows.first_frame.back()) continue;
+      const auto n = static_cast<size_t>(next - tracks.frame.begin());
+      add(*next, tracks.states.position_m[n], tracks.states.velocity_m_per_s[n]);
+    }
+    return windows;
+  }
+  ParameterSet set = parameter_set(problem, values);
+  const TimeSteps steps = steps_at(problem, values, options.stability_margin);
+  if (problem.start == StartKind::at_rest)
+    start_at_rest(problem.cloth, {&set, 1}, problem.gravity_m_per_s2.norm(),
+                  problem.frame_time_s.front(), steps.rest_s);
+  const SimulateResult run =
+      simulate(
+          problem.cloth, {&set, 1},
+          {.frame_time_s = {problem.frame_time_s.begin(), problem.frame_time_s.begin() + frames},
+           .time_step_s = steps.run_s,
+           .velocities = true})
+          .front();
+  if (!run.usable()) return std::nullopt;
+  for (size_t w = 1; w < wanted.size(); ++w) {
+    const auto frame = static_cast<size_t>(wanted[w]);
+    add(wanted[w], run.position_m[frame], run.velocity_m_per_s[frame]);
+  }
+  return windows;
+}
+
+BorderedChainSolution damped_step(const BorderedChain& equations, double damping,
+                                  const std::vector<bool>& held) {
+  BorderedChain damped = equations;
+  // What nothing depends on keeps a unit of its own.
+  const auto damp = [&](Eigen::MatrixXd& diagonal) {
+    for (Eigen::Index n = 0; n < diagonal.rows(); ++n)
+      diagonal(n, n) = diagonal(n, n) > 0 ? (1 + damping) * diagonal(n, n) : 1;
+  };
+  for (Eigen::MatrixXd& diagonal : damped.diagonal) damp(diagonal);
+  damp(damped.border);
+  for (Eigen::Index p = 0; p < damped.border.rows(); ++p) {
+    if (!held[static_cast<size_t>(p)]) continue;
+    for (Eigen::MatrixXd& to_border : damped.to_border) to_border.col(p).setZero();
+    damped.border.row(p).setZero();
+    damped.border.col(p).setZero();
+    damped.border(p, p) = 1;
+    damped.border_right[p] = 0;
+  }
+  return solve(std::move(damped));
+}
+
+ShootingFit fit_by_shooting(const FitProblem& problem, int frames, const Eigen::VectorXd& start,
+                            const ShootingOptions& options, const ProgressCallback& progress) {
+  constexpr double kLeastDamping = 1e-9, kMostDamping = 1e8;
+  constexpr double kStill = 1e-6;  // of a coordinate: a step that is not worth a linearisation
+  ShootingFit result;
+  const ParameterSpace& space = problem.space;
+  const Ranges ranges(space);
+  Eigen::VectorXd x = space.coordinates(start).cwiseMax(ranges.lower).cwiseMin(ranges.upper);
+  result.values = space.values(x);
+  std::optional<ShootingWindows> windows = make_windows(problem, frames, result.values, options);
+  if (!windows) {
+    result.message = "the simulation that was to guess the windows' states diverged";
+    return result;
+  }
+  const double window_s =
+      (problem.frame_time_s[static_cast<size_t>(frames - 1)] - problem.frame_time_s.front()) /
+      windows->count();
+  double spring_steps = 0;
+  bool out_of_work = false;
+  for (int round = 0; round < options.rounds && !out_of_work; ++round) {
+    const double share = options.rounds > 1 ? round / (options.rounds - 1.0) : 1;
+    const double gap_m =
+        options.first_gap_m * std::pow(options.last_gap_m / options.first_gap_m, share);
+    ShootingObjective objective(problem, frames,
+                                steps_at(problem, result.values, options.stability_margin),
+                                *windows, {gap_m, gap_m / window_s});
+    result.time_step_s = objective.time_step_s();
+    const Eigen::VectorXd before = objective.residuals({result.values}).front();
+    ++result.runs;
+    if (before.size() == 0) {
+      result.message = "a window cannot be simulated from the starting values";
+      return result;
+    }
+    const double huber = options.loss == Loss::huber ? kHuberScales * robust_scale(before)
+                                                     : std::numeric_limits<double>::infinity();
+    ShootingObjective::Equations here = objective.equations(result.values, huber);
+    result.runs += here.runs;
+    if (!here.usable) {
+      result.message = "the derivatives at the starting values could not be computed";
+      return result;
+    }
+    double damping = 1e-3;
+    bool settled = false;
+    for (int n = 0; n < options.iterations && !settled && !out_of_work; ++n) {
+      if (progress && !progress({.stage = "shooting " + objective.name(),
+                                 .done = static_cast<double>(result.iterations),
+                                 .total = static_cast<double>(options.rounds * options.iterations),
+                                 .unit = "iterations",
+                                 .note = "cost " + std::to_string(here.cost)})) {
+        result.cancelled = true;
+        result.message = "cancelled";
+        return result;
+      }
+      ++result.iterations;
+      const std::vector<bool> held = ranges.blocked(x, here.chain.border_right);
+      // Shorter steps until one lowers the cost; a trial is a plain run.
+      for (;;) {
+        const BorderedChainSolution step = damped_step(here.chain, damping, held);
+        const Eigen::VectorXd next =
+            (x + step.border).cwiseMax(ranges.lower).cwiseMin(ranges.upper);
+        ShootingObjective::Corrections corrections = objective.corrections();
+        for (size_t w = 0; w < corrections.size(); ++w) corrections[w] += step.blocks[w];
+        const Eigen::VectorXd values = space.values(next);
+        double cost = std::numeric_limits<double>::infinity();
+        if (next.allFinite()) {
+          cost = objective.cost(objective.residual(values, corrections), huber) +
+                 prior_cost(problem, values).cost;
+          ++result.runs;
+        }
+        if (cost <= here.cost) {
+          const double gain = here.cost - cost;
+          const double moved = (next - x).cwiseAbs().maxCoeff();
+          settled = gain <= options.least_gain * here.cost || moved < kStill;
+          x = next;
+          result.values = values;
+          objective.set_corrections(std::move(corrections));
+          here.cost = cost;
+          damping = std::max(kLeastDamping, 0.1 * damping);
+          break;
+        }
+        damping *= 10;
+        if (damping > kMostDamping) {
+          settled = true;
+          break;
+        }
+      }
+      spring_steps = result.runs * objective.spring_steps_per_run();
+      out_of_work = spring_steps > options.most_spring_steps;
+      if (settled || out_of_work || n + 1 == options.iterations) break;
+      ShootingObjective::Equations there = objective.equations(result.values, huber);
+      result.runs += there.runs;
+      if (!there.usable) break;
+      here = std::move(there);
+    }
+    result.cost = here.cost;
+    result.corrections = objective.corrections();
+    result.windows = objective.windows();
+    result.usable = true;
+    result.message = out_of_work ? "not converged at the limit of work"
+                     : settled   ? "converged"
+                                 : "still falling";
+    if (round + 1 < options.rounds) {
+      windows = objective.recentred(result.values);
+      if (!windows) break;
+    }
+  }
+  return result;
+}
+
+}  // namespace clothfit
