@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 
 #include "fit/prior_cost.h"
 #include "fit/refine.h"
@@ -121,7 +122,8 @@ BorderedChainSolution damped_step(const BorderedChain& equations, double damping
 ShootingFit fit_by_shooting(const FitProblem& problem, int frames, const Eigen::VectorXd& start,
                             const ShootingOptions& options, const ProgressCallback& progress) {
   constexpr double kLeastDamping = 1e-9, kMostDamping = 1e8;
-  constexpr double kStill = 1e-6;  // of a coordinate: a step that is not worth a linearisation
+  constexpr double kFinest = 1.0 / 2;  // as refine() has it
+  constexpr double kStill = 1e-6;      // of a coordinate: a step that is not worth a linearisation
   ShootingFit result;
   const ParameterSpace& space = problem.space;
   const Ranges ranges(space);
@@ -141,11 +143,17 @@ ShootingFit fit_by_shooting(const FitProblem& problem, int frames, const Eigen::
     const double share = options.rounds > 1 ? round / (options.rounds - 1.0) : 1;
     const double gap_m =
         options.first_gap_m * std::pow(options.last_gap_m / options.first_gap_m, share);
-    ShootingObjective objective(problem, frames,
-                                steps_at(problem, result.values, options.stability_margin),
-                                *windows, {gap_m, gap_m / window_s});
-    result.time_step_s = objective.time_step_s();
-    const Eigen::VectorXd before = objective.residuals({result.values}).front();
+    const Continuity continuity{gap_m, gap_m / window_s};
+    const auto objective_at = [&](const TimeSteps& steps,
+                                  const ShootingObjective::Corrections& corrections) {
+      auto made = std::make_unique<ShootingObjective>(problem, frames, steps, *windows, continuity);
+      made->set_corrections(corrections);
+      return made;
+    };
+    std::unique_ptr<ShootingObjective> objective = std::make_unique<ShootingObjective>(
+        problem, frames, steps_at(problem, result.values, options.stability_margin), *windows,
+        continuity);
+    const Eigen::VectorXd before = objective->residuals({result.values}).front();
     ++result.runs;
     if (before.size() == 0) {
       result.message = "a window cannot be simulated from the starting values";
@@ -153,7 +161,7 @@ ShootingFit fit_by_shooting(const FitProblem& problem, int frames, const Eigen::
     }
     const double huber = options.loss == Loss::huber ? kHuberScales * robust_scale(before)
                                                      : std::numeric_limits<double>::infinity();
-    ShootingObjective::Equations here = objective.equations(result.values, huber);
+    ShootingObjective::Equations here = objective->equations(result.values, huber);
     result.runs += here.runs;
     if (!here.usable) {
       result.message = "the derivatives at the starting values could not be computed";
@@ -162,7 +170,7 @@ ShootingFit fit_by_shooting(const FitProblem& problem, int frames, const Eigen::
     double damping = 1e-3;
     bool settled = false;
     for (int n = 0; n < options.iterations && !settled && !out_of_work; ++n) {
-      if (progress && !progress({.stage = "shooting " + objective.name(),
+      if (progress && !progress({.stage = "shooting " + objective->name(),
                                  .done = static_cast<double>(result.iterations),
                                  .total = static_cast<double>(options.rounds * options.iterations),
                                  .unit = "iterations",
@@ -178,12 +186,24 @@ ShootingFit fit_by_shooting(const FitProblem& problem, int frames, const Eigen::
         const BorderedChainSolution step = damped_step(here.chain, damping, held);
         const Eigen::VectorXd next =
             (x + step.border).cwiseMax(ranges.lower).cwiseMin(ranges.upper);
-        ShootingObjective::Corrections corrections = objective.corrections();
+        ShootingObjective::Corrections corrections = objective->corrections();
         for (size_t w = 0; w < corrections.size(); ++w) corrections[w] += step.blocks[w];
         const Eigen::VectorXd values = space.values(next);
+        // A trial that asks for finer time steps is judged with them: the jump of the cost is small
+        // beside what it changes. One that asks for far finer ones is refused.
+        std::unique_ptr<ShootingObjective> finer;
         double cost = std::numeric_limits<double>::infinity();
         if (next.allFinite()) {
-          cost = objective.cost(objective.residual(values, corrections), huber) +
+          const TimeSteps now = objective->steps();
+          if (!is_stable(problem, parameter_set(problem, values), now)) {
+            const TimeSteps safe = steps_at(problem, values, options.stability_margin);
+            const TimeSteps both{std::min(now.run_s, safe.run_s),
+                                 std::min(now.rest_s, safe.rest_s)};
+            if (both.run_s >= kFinest * now.run_s && both.rest_s >= kFinest * now.rest_s)
+              finer = objective_at(both, objective->corrections());
+          }
+          const ShootingObjective& judge = finer ? *finer : *objective;
+          cost = judge.cost(judge.residual(values, corrections), huber) +
                  prior_cost(problem, values).cost;
           ++result.runs;
         }
@@ -193,7 +213,7 @@ ShootingFit fit_by_shooting(const FitProblem& problem, int frames, const Eigen::
           settled = gain <= options.least_gain * here.cost || moved < kStill;
           x = next;
           result.values = values;
-          objective.set_corrections(std::move(corrections));
+          objective->set_corrections(std::move(corrections));
           here.cost = cost;
           damping = std::max(kLeastDamping, 0.1 * damping);
           break;
@@ -204,23 +224,27 @@ ShootingFit fit_by_shooting(const FitProblem& problem, int frames, const Eigen::
           break;
         }
       }
-      spring_steps = result.runs * objective.spring_steps_per_run();
+      spring_steps = result.runs * objective->spring_steps_per_run();
       out_of_work = spring_steps > options.most_spring_steps;
       if (settled || out_of_work || n + 1 == options.iterations) break;
-      ShootingObjective::Equations there = objective.equations(result.values, huber);
+      // Time steps follow the parameters; all trials of one iteration have the same.
+      objective = objective_at(steps_at(problem, result.values, options.stability_margin),
+                               objective->corrections());
+      ShootingObjective::Equations there = objective->equations(result.values, huber);
       result.runs += there.runs;
       if (!there.usable) break;
       here = std::move(there);
     }
     result.cost = here.cost;
-    result.corrections = objective.corrections();
-    result.windows = objective.windows();
+    result.time_step_s = objective->time_step_s();
+    result.corrections = objective->corrections();
+    result.windows = objective->windows();
     result.usable = true;
     result.message = out_of_work ? "not converged at the limit of work"
                      : settled   ? "converged"
                                  : "still falling";
     if (round + 1 < options.rounds) {
-      windows = objective.recentred(result.values);
+      windows = objective->recentred(result.values);
       if (!windows) break;
     }
   }

@@ -10,14 +10,14 @@ namespace clothfit {
 
 struct ShootingOptions {
   int window_frames =
-      6;          ///< of a window, 1 or more; longer ones know more and lose the cloth sooner
-  int nodes = 4;  ///< per side, of the corrections of a window's state; costs grow sixfold
+      15;         ///< of a window, 1 or more; longer ones tell more and lose the cloth sooner
+  int nodes = 3;  ///< per side, of the corrections of a window's state: 6 runs for each node
   /// Standard deviation of a gap's positions (m), of the first round and of the last; that of
   /// velocities is this over a window's duration. It falls by equal factors between.
-  double first_gap_m = 1e-2, last_gap_m = 1e-4;
-  int rounds = 4;            ///< each with a continuity, a loss, a time step and guesses of its own
-  int iterations = 15;       ///< of a round, at most
-  double least_gain = 1e-3;  ///< a round ends when the cost falls by less than this share
+  double first_gap_m = 1e-2, last_gap_m = 1e-3;
+  int rounds = 3;                   ///< each with a continuity, a loss and guesses of its own
+  int iterations = 15;              ///< of a round, at most
+  double least_gain = 1e-2;         ///< a round ends when the cost falls by less than this share
   double most_spring_steps = 1e18;  ///< springs times time steps; looked at after each iteration
   Loss loss = Loss::huber;
   double stability_margin = 1.5;

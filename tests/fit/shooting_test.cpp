@@ -276,6 +276,97 @@ TEST(ShootingFit, StepsAsTheDenseEquationsSay) {
   EXPECT_EQ(step.border[2], 0);
 }
 
+TEST(ShootingFit, ConvergesFromAfarWhereTheTrajectoryIsLost) {
+  // Given two seconds of swinging, and every parameter off by a factor of five
+  constexpr unsigned kSeed = 1;
+  constexpr int kFrames = 120;
+  const FitProblem problem = make_problem(synthetic_input(tiny(kSeed, kFrames)), {}, 5, 5);
+  const Eigen::VectorXd truth = true_values(problem);
+  Eigen::VectorXd start = truth;
+  std::mt19937_64 generator(82);
+  for (int p = 0; p < 7; ++p) start[p] *= (generator() & 1) != 0 ? 5 : 0.2;
+
+  const RefineResult lost = refine(problem, kFrames, start, {.rounds = 3}, {});
+  const ShootingFit led = fit_by_shooting(problem, kFrames, start, {}, {});
+  ASSERT_TRUE(led.usable) << led.message;
+  const RefineResult found = refine(problem, kFrames, led.values, {.trust_region_radius = 1e4}, {});
+
+  SCOPED_TRACE("seed " + std::to_string(kSeed));
+  EXPECT_GT(lost.cost, 5);  // half a squared sigma is the noise
+  EXPECT_TRUE(found.converged) << found.message;
+  EXPECT_LT(found.robust_scale, 1.1);
+  for (int p = 0; p < 7; ++p) {
+    SCOPED_TRACE(p);
+    // What a round's last gap of 1 mm and its three nodes leave open.
+    EXPECT_NEAR(led.values[p] / truth[p], 1, 0.15);
+    // Half a millimetre of noise over two seconds, and long time steps.
+    EXPECT_NEAR(found.values[p] / truth[p], 1, 0.02);
+  }
+}
+
+TEST(ShootingFit, ConvergesFromPixelsToo) {
+  // The windows' states are guessed from the run at the start, which is another motion by then.
+  constexpr unsigned kSeed = 2;
+  constexpr int kFrames = 60;
+  const FitProblem problem = make_problem(synthetic_input(tiny(kSeed, kFrames)),
+                                          {.observations = ObservationKind::tracks2d}, 5, 5);
+  const Eigen::VectorXd truth = true_values(problem);
+  Eigen::VectorXd start = truth;
+  for (int p = 0; p < 7; ++p) start[p] *= p % 2 == 0 ? 5 : 0.2;
+
+  const ShootingFit led = fit_by_shooting(problem, kFrames, start, {}, {});
+
+  ASSERT_TRUE(led.usable) << led.message;
+  for (int p = 0; p < 3; ++p)  // tension and shear; one camera tells less of the rest
+    EXPECT_NEAR(led.values[p] / truth[p], 1, 0.15) << p;
+}
+
+/// How far Gauss and Newton's step leads from `values` to the optimum of the trajectory's cost.
+Eigen::VectorXd to_the_trajectorys_optimum(const FitProblem& problem, const ShootingFit& fit) {
+  const TrajectoryObjective trajectory(
+      problem, problem.frames(),
+      time_steps_of_run(problem.cloth, parameter_set(problem, fit.values), fit.time_step_s));
+  const Linearisation linear = trajectory.linearise(fit.values);
+  const Eigen::MatrixXd& j = linear.residual_by_coordinate;
+  return (j.transpose() * j).ldlt().solve(-j.transpose() * linear.residual);
+}
+
+TEST(ShootingFit, TendsToTheTrajectorysOptimumAsItsGapsClose) {
+  // Given nodes as fine as the mesh, so that every gap is seen
+  const FitProblem problem = tiny_problem(6);
+  ShootingOptions options{.window_frames = 6,
+                          .nodes = 5,
+                          .rounds = 1,
+                          .iterations = 60,
+                          .least_gain = 1e-12,
+                          .loss = Loss::squared};
+  std::vector<double> distance;
+  for (const double gap_m : {1e-3, 1e-4, 1e-5, 1e-6}) {
+    options.first_gap_m = options.last_gap_m = gap_m;
+    const ShootingFit fit =
+        fit_by_shooting(problem, problem.frames(), true_values(problem), options, {});
+    ASSERT_TRUE(fit.usable) << fit.message;
+    distance.push_back(to_the_trajectorys_optimum(problem, fit).norm());
+  }
+  // Gaps as wide as what the observations tell of a state leave the windows their freedom; once
+  // they are narrower the distance falls with the square of their sigma.
+  EXPECT_GT(distance[0], 0.1);
+  EXPECT_LT(distance[1], distance[0]);
+  EXPECT_LT(distance[2], 0.03 * distance[1]);
+  EXPECT_LT(distance[3], 0.015 * distance[2]);
+}
+
+TEST(ShootingFit, EndsSoonWhenItIsCancelled) {
+  const FitProblem problem = tiny_problem(4);
+  int calls = 0;
+
+  const ShootingFit fit = fit_by_shooting(problem, problem.frames(), problem.space.start(), {},
+                                          [&](const Progress&) { return ++calls < 2; });
+
+  EXPECT_TRUE(fit.cancelled);
+  EXPECT_EQ(calls, 2);
+}
+
 TEST(ShootingObjective, RefusesWindowsThatDoNotFit) {
   const ExactWindows exact(tiny_problem(1), 5, 3);
   const auto make = [&](const ShootingWindows& windows, const Continuity& continuity) {
