@@ -55,6 +55,16 @@ std::vector<FollowedPoint> driven_points(const FitProblem& problem, int frames) 
   return points;
 }
 
+/// A track without noise has no scale by which to tell an outlier: motion itself stands out then.
+SmoothingSpline smooth_path(const std::vector<double>& time_s, const Eigen::MatrixXd& samples) {
+  constexpr double kMostOutliers = 0.1;  // of the samples
+  SmoothingSpline path = fit_smoothing_spline(time_s, samples);
+  const auto outliers = static_cast<double>(std::ranges::count(path.outlier, true));
+  if (outliers > kMostOutliers * static_cast<double>(time_s.size()))
+    path = fit_smoothing_spline(time_s, samples, {}, {.robust = false});
+  return path;
+}
+
 /// The markers, smoothed. Adds the squares of the splines' sigma to `squared_sigma`.
 std::vector<FollowedPoint> smoothed_markers(const FitProblem& problem, int frames,
                                             const TrackStatesOptions& options,
@@ -74,7 +84,7 @@ std::vector<FollowedPoint> smoothed_markers(const FitProblem& problem, int frame
       time_s.push_back(problem.frame_time_s[static_cast<size_t>(f)]);
     }
     if (seen.size() < kFewest) continue;
-    const SmoothingSpline path = fit_smoothing_spline(time_s, track(Eigen::all, seen));
+    const SmoothingSpline path = smooth_path(time_s, track(Eigen::all, seen));
     for (const double sigma : path.value_sigma)
       if (std::isfinite(sigma)) squared_sigma.push_back(sigma * sigma);
     FollowedPoint point{.place_m = problem.marker_place_m.col(m),
@@ -176,6 +186,21 @@ TrackStates recorded_states_of_tracks(const FitProblem& problem,
                      "at least 3 x 3 markers that are tracked over 8 frames or more",
                      "fit the trajectory: it needs no states");
   return result;
+}
+
+std::unique_ptr<StateObjective> state_objective_of_tracks(const FitProblem& problem,
+                                                          const TrackStates& tracks, bool full,
+                                                          const TimeSteps& steps) {
+  constexpr double kFewestSteps = 10;
+  constexpr double kLeastSigmaM = 1e-6;  // of tracks without noise
+  double interval_s = problem.frame_time_s.back() - problem.frame_time_s.front();
+  for (size_t f = 1; f < problem.frame_time_s.size(); ++f)
+    interval_s = std::min(interval_s, problem.frame_time_s[f] - problem.frame_time_s[f - 1]);
+  return std::make_unique<StateObjective>(
+      problem, tracks.states,
+      full ? full_cost_transitions(tracks.states) : small_cost_transitions(tracks.states),
+      std::min(steps.run_s, interval_s / kFewestSteps),
+      std::max(tracks.position_sigma_m, kLeastSigmaM));
 }
 
 }  // namespace clothfit

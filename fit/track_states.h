@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include "fit/problem.h"
@@ -39,5 +40,12 @@ struct TrackStates {
 /// Throws InputError for a problem without 3D tracks, or where fewer than two frames have a state.
 TrackStates recorded_states_of_tracks(const FitProblem& problem,
                                       const TrackStatesOptions& options = {});
+
+/// The founding paper's cost over these states, `full` or `small` (fit/state_objective.h), in units
+/// of their sigma. Frames are cut into at least ten time steps, however long the scheme is stable
+/// for: its velocities are those of half a step before, which a smoothed track's are not.
+std::unique_ptr<StateObjective> state_objective_of_tracks(const FitProblem& problem,
+                                                          const TrackStates& tracks, bool full,
+                                                          const TimeSteps& steps);
 
 }  // namespace clothfit
