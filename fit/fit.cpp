@@ -11,6 +11,7 @@
 #include <span>
 
 #include "data/input_error.h"
+#include "fit/lead_in.h"
 #include "fit/marker_offsets.h"
 #include "fit/observed_motion.h"
 #include "fit/other_mesh.h"
@@ -393,8 +394,8 @@ RefineResult search_and_refine(const FitProblem& coarse_problem, const FitProble
   return refine_on(coarse_problem, problem, options, best.values, kHorizonShares, progress, report);
 }
 
-/// The whole way to the optimum: from a given start, and from the ranges where there is none or
-/// where it does not lead to an optimum.
+/// The whole way to the optimum: from a given start or where another cost leads, and from the
+/// ranges where there is neither or where it does not lead to an optimum.
 RefineResult identify(const FitInput& input, const FitProblem& problem, const FitOptions& options,
                       const ProgressCallback& progress, FitReport& report,
                       std::vector<Candidate>& candidates) {
@@ -402,11 +403,21 @@ RefineResult identify(const FitInput& input, const FitProblem& problem, const Fi
       make_problem(input, options, coarse(problem, options, problem.cloth.mesh.columns),
                    coarse(problem, options, problem.cloth.mesh.rows));
   RefineResult from_start;
-  if (options.start) {
-    const Eigen::VectorXd start = given_start(problem, *options.start);
+  const bool led = options.cost != LeadingCost::trajectory;
+  if (options.start || led) {
+    Eigen::VectorXd start =
+        options.start ? given_start(problem, *options.start) : problem.space.start();
+    if (led) {
+      LeadIn lead = lead_in(problem, coarse_problem, options, start, progress);
+      report.stages.push_back(lead.stage);
+      from_start.cancelled = lead.cancelled;
+      if (lead.cancelled) return from_start;
+      if (lead.usable) start = std::move(lead.values);
+    }
     from_start = refine_on(coarse_problem, problem, options, start, kGivenShares, progress, report);
     if (from_start.cancelled || (from_start.usable && from_start.converged)) return from_start;
-    report.stages.push_back("the given start leads to no optimum");
+    report.stages.push_back(led ? "the " + to_string(options.cost) + " cost leads to no optimum"
+                                : "the given start leads to no optimum");
   }
   RefineResult found =
       search_and_refine(coarse_problem, problem, options, progress, report, candidates);
@@ -742,6 +753,9 @@ void FitOptions::validate() const {
   require(!resume || !checkpoint.empty(), "resume", "a --checkpoint to go on from");
   require(checkpoint.empty() || (!start && !forecast), "checkpoint",
           "a fit that searches: without --start and --forecast");
+  require(cost == LeadingCost::trajectory || checkpoint.empty(), "checkpoint",
+          "a fit that searches: with --cost trajectory");
+  require(cost == LeadingCost::trajectory || !forecast, "cost", "a fit: without --forecast");
   require(substep_scale >= 1 && std::isfinite(substep_scale), "substep-scale", "1 or more");
   require(start_nodes >= 2 && start_nodes <= 30, "start-nodes", "2 to 30 nodes a side");
   require(marker_offset_sigma_m >= 0 && std::isfinite(marker_offset_sigma_m), "marker-offsets",

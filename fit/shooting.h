@@ -39,7 +39,7 @@ struct Continuity {
 /// the trajectory's as the continuity's sigma goes to 0; with one window it is that.
 ///
 /// Short windows cannot lose the cloth however wrong the parameters are, so that the cost has wide
-/// basins: what makes multiple shooting converge from afar [bock1984].
+/// basins: what makes multiple shooting converge from afar [bock1983].
 ///
 /// As an Objective its window states are those of `corrections`, and derivatives are by the
 /// parameters alone; `equations` has both. Constant offsets of markers are not taken out. Windows

@@ -49,8 +49,86 @@ TimeSteps steps_at(const FitProblem& problem, const Eigen::VectorXd& values, dou
   return stable_time_steps(problem.cloth, parameter_set(problem, values)).times(1 / margin);
 }
 
-bool has_tracks3d(const FitProblem& problem) {
-  return !problem.observations.empty() && !problem.observations.front().camera;
+/// One round of shooting: the windows' guesses, their continuity and the loss stay the same.
+struct Round {
+  const FitProblem& problem;
+  int frames;
+  const ShootingWindows& windows;
+  Continuity continuity;
+  double stability_margin;
+  double huber_threshold = std::numeric_limits<double>::infinity();
+
+  std::unique_ptr<ShootingObjective> objective_at(
+      const TimeSteps& steps, const ShootingObjective::Corrections& corrections) const {
+    auto objective =
+        std::make_unique<ShootingObjective>(problem, frames, steps, windows, continuity);
+    if (!corrections.empty()) objective->set_corrections(corrections);
+    return objective;
+  }
+
+  /// The cost of a trial, priors included; infinite where it is refused. One that asks for finer
+  /// time steps than the objective's is judged with these: the jump of the cost is small beside
+  /// what it changes. One that asks for far finer ones is refused.
+  double cost_of_trial(const ShootingObjective& objective, const Eigen::VectorXd& values,
+                       const ShootingObjective::Corrections& corrections) const {
+    constexpr double kFinest = 1.0 / 2;  // as refine() has it
+    std::unique_ptr<ShootingObjective> finer;
+    const TimeSteps now = objective.steps();
+    if (!is_stable(problem, parameter_set(problem, values), now)) {
+      const TimeSteps safe = steps_at(problem, values, stability_margin);
+      const TimeSteps both{std::min(now.run_s, safe.run_s), std::min(now.rest_s, safe.rest_s)};
+      if (both.run_s < kFinest * now.run_s || both.rest_s < kFinest * now.rest_s)
+        return std::numeric_limits<double>::infinity();
+      finer = objective_at(both, corrections);
+    }
+    const ShootingObjective& judge = finer ? *finer : objective;
+    return judge.cost(judge.residual(values, corrections), huber_threshold) +
+           prior_cost(problem, values).cost;
+  }
+};
+
+/// A point of the fit, with the equations there.
+struct Point {
+  Eigen::VectorXd coordinates;
+  std::unique_ptr<ShootingObjective> objective;  ///< with the corrections there
+  ShootingObjective::Equations equations;
+};
+
+/// What one step did.
+struct Step {
+  bool taken = false;
+  double gain = 0;   ///< of the cost
+  double moved = 0;  ///< most, of a coordinate of the parameters
+  int trials = 0;    ///< plain runs
+};
+
+/// Shorter and shorter steps until one lowers the cost. `at` moves there, but for its equations,
+/// which keep all but the cost.
+Step take_step(const Round& round, const Ranges& ranges, double& damping, Point& at) {
+  constexpr double kLeastDamping = 1e-9, kMostDamping = 1e8;
+  Step result;
+  const std::vector<bool> held = ranges.blocked(at.coordinates, at.equations.chain.border_right);
+  for (; damping <= kMostDamping; damping *= 10) {
+    const BorderedChainSolution step = damped_step(at.equations.chain, damping, held);
+    const Eigen::VectorXd next =
+        (at.coordinates + step.border).cwiseMax(ranges.lower).cwiseMin(ranges.upper);
+    if (!next.allFinite()) continue;
+    ShootingObjective::Corrections corrections = at.objective->corrections();
+    for (size_t w = 0; w < corrections.size(); ++w) corrections[w] += step.blocks[w];
+    ++result.trials;
+    const double cost =
+        round.cost_of_trial(*at.objective, round.problem.space.values(next), corrections);
+    if (!(cost <= at.equations.cost)) continue;
+    result.taken = true;
+    result.gain = at.equations.cost - cost;
+    result.moved = (next - at.coordinates).cwiseAbs().maxCoeff();
+    at.coordinates = next;
+    at.objective->set_corrections(std::move(corrections));
+    at.equations.cost = cost;
+    damping = std::max(kLeastDamping, 0.1 * damping);
+    break;
+  }
+  return result;
 }
 
 }  // namespace
@@ -67,14 +145,13 @@ std::optional<ShootingWindows> make_windows(const FitProblem& problem, int frame
     windows.position_m.push_back(position_m);
     windows.velocity_m_per_s.push_back(velocity_m_per_s);
   };
-  if (has_tracks3d(problem)) {
-    const TrackStates tracks = recorded_states_of_tracks(problem);
+  if (const std::optional<TrackStates> tracks = find_states_of_tracks(problem)) {
     for (size_t w = 1; w < wanted.size(); ++w) {
-      const auto next = std::ranges::lower_bound(tracks.frame, wanted[w]);
-      if (next == tracks.frame.end() || *next >= frames) break;
+      const auto next = std::ranges::lower_bound(tracks->frame, wanted[w]);
+      if (next == tracks->frame.end() || *next >= frames) break;
       if (*next <= windows.first_frame.back()) continue;
-      const auto n = static_cast<size_t>(next - tracks.frame.begin());
-      add(*next, tracks.states.position_m[n], tracks.states.velocity_m_per_s[n]);
+      const auto n = static_cast<size_t>(next - tracks->frame.begin());
+      add(*next, tracks->states.position_m[n], tracks->states.velocity_m_per_s[n]);
     }
     return windows;
   }
@@ -121,14 +198,14 @@ BorderedChainSolution damped_step(const BorderedChain& equations, double damping
 
 ShootingFit fit_by_shooting(const FitProblem& problem, int frames, const Eigen::VectorXd& start,
                             const ShootingOptions& options, const ProgressCallback& progress) {
-  constexpr double kLeastDamping = 1e-9, kMostDamping = 1e8;
-  constexpr double kFinest = 1.0 / 2;  // as refine() has it
-  constexpr double kStill = 1e-6;      // of a coordinate: a step that is not worth a linearisation
+  constexpr double kStill = 1e-6;  // of a coordinate: a step that is not worth a linearisation
   ShootingFit result;
   const ParameterSpace& space = problem.space;
   const Ranges ranges(space);
-  Eigen::VectorXd x = space.coordinates(start).cwiseMax(ranges.lower).cwiseMin(ranges.upper);
-  result.values = space.values(x);
+  Point at{.coordinates = space.coordinates(start).cwiseMax(ranges.lower).cwiseMin(ranges.upper),
+           .objective = {},
+           .equations = {}};
+  result.values = space.values(at.coordinates);
   std::optional<ShootingWindows> windows = make_windows(problem, frames, result.values, options);
   if (!windows) {
     result.message = "the simulation that was to guess the windows' states diverged";
@@ -137,116 +214,62 @@ ShootingFit fit_by_shooting(const FitProblem& problem, int frames, const Eigen::
   const double window_s =
       (problem.frame_time_s[static_cast<size_t>(frames - 1)] - problem.frame_time_s.front()) /
       windows->count();
-  double spring_steps = 0;
+  const auto steps_now = [&] { return steps_at(problem, result.values, options.stability_margin); };
   bool out_of_work = false;
-  for (int round = 0; round < options.rounds && !out_of_work; ++round) {
-    const double share = options.rounds > 1 ? round / (options.rounds - 1.0) : 1;
+  for (int n = 0; n < options.rounds && windows && !out_of_work; ++n) {
+    const double share = options.rounds > 1 ? n / (options.rounds - 1.0) : 1;
     const double gap_m =
         options.first_gap_m * std::pow(options.last_gap_m / options.first_gap_m, share);
-    const Continuity continuity{gap_m, gap_m / window_s};
-    const auto objective_at = [&](const TimeSteps& steps,
-                                  const ShootingObjective::Corrections& corrections) {
-      auto made = std::make_unique<ShootingObjective>(problem, frames, steps, *windows, continuity);
-      made->set_corrections(corrections);
-      return made;
-    };
-    std::unique_ptr<ShootingObjective> objective = std::make_unique<ShootingObjective>(
-        problem, frames, steps_at(problem, result.values, options.stability_margin), *windows,
-        continuity);
-    const Eigen::VectorXd before = objective->residuals({result.values}).front();
+    Round round{.problem = problem,
+                .frames = frames,
+                .windows = *windows,
+                .continuity = {gap_m, gap_m / window_s},
+                .stability_margin = options.stability_margin};
+    at.objective = round.objective_at(steps_now(), {});
+    const Eigen::VectorXd before = at.objective->residuals({result.values}).front();
     ++result.runs;
-    if (before.size() == 0) {
+    if (options.loss == Loss::huber) round.huber_threshold = kHuberScales * robust_scale(before);
+    at.equations = at.objective->equations(result.values, round.huber_threshold);
+    result.runs += at.equations.runs;
+    if (before.size() == 0 || !at.equations.usable) {
       result.message = "a window cannot be simulated from the starting values";
-      return result;
-    }
-    const double huber = options.loss == Loss::huber ? kHuberScales * robust_scale(before)
-                                                     : std::numeric_limits<double>::infinity();
-    ShootingObjective::Equations here = objective->equations(result.values, huber);
-    result.runs += here.runs;
-    if (!here.usable) {
-      result.message = "the derivatives at the starting values could not be computed";
       return result;
     }
     double damping = 1e-3;
     bool settled = false;
-    for (int n = 0; n < options.iterations && !settled && !out_of_work; ++n) {
-      if (progress && !progress({.stage = "shooting " + objective->name(),
+    for (int i = 1;; ++i) {
+      if (progress && !progress({.stage = "shooting " + at.objective->name(),
                                  .done = static_cast<double>(result.iterations),
                                  .total = static_cast<double>(options.rounds * options.iterations),
                                  .unit = "iterations",
-                                 .note = "cost " + std::to_string(here.cost)})) {
+                                 .note = "cost " + std::to_string(at.equations.cost)})) {
         result.cancelled = true;
         result.message = "cancelled";
         return result;
       }
       ++result.iterations;
-      const std::vector<bool> held = ranges.blocked(x, here.chain.border_right);
-      // Shorter steps until one lowers the cost; a trial is a plain run.
-      for (;;) {
-        const BorderedChainSolution step = damped_step(here.chain, damping, held);
-        const Eigen::VectorXd next =
-            (x + step.border).cwiseMax(ranges.lower).cwiseMin(ranges.upper);
-        ShootingObjective::Corrections corrections = objective->corrections();
-        for (size_t w = 0; w < corrections.size(); ++w) corrections[w] += step.blocks[w];
-        const Eigen::VectorXd values = space.values(next);
-        // A trial that asks for finer time steps is judged with them: the jump of the cost is small
-        // beside what it changes. One that asks for far finer ones is refused.
-        std::unique_ptr<ShootingObjective> finer;
-        double cost = std::numeric_limits<double>::infinity();
-        if (next.allFinite()) {
-          const TimeSteps now = objective->steps();
-          if (!is_stable(problem, parameter_set(problem, values), now)) {
-            const TimeSteps safe = steps_at(problem, values, options.stability_margin);
-            const TimeSteps both{std::min(now.run_s, safe.run_s),
-                                 std::min(now.rest_s, safe.rest_s)};
-            if (both.run_s >= kFinest * now.run_s && both.rest_s >= kFinest * now.rest_s)
-              finer = objective_at(both, objective->corrections());
-          }
-          const ShootingObjective& judge = finer ? *finer : *objective;
-          cost = judge.cost(judge.residual(values, corrections), huber) +
-                 prior_cost(problem, values).cost;
-          ++result.runs;
-        }
-        if (cost <= here.cost) {
-          const double gain = here.cost - cost;
-          const double moved = (next - x).cwiseAbs().maxCoeff();
-          settled = gain <= options.least_gain * here.cost || moved < kStill;
-          x = next;
-          result.values = values;
-          objective->set_corrections(std::move(corrections));
-          here.cost = cost;
-          damping = std::max(kLeastDamping, 0.1 * damping);
-          break;
-        }
-        damping *= 10;
-        if (damping > kMostDamping) {
-          settled = true;
-          break;
-        }
-      }
-      spring_steps = result.runs * objective->spring_steps_per_run();
-      out_of_work = spring_steps > options.most_spring_steps;
-      if (settled || out_of_work || n + 1 == options.iterations) break;
+      const Step step = take_step(round, ranges, damping, at);
+      result.values = space.values(at.coordinates);
+      result.runs += step.trials;
+      result.cost = at.equations.cost;
+      settled =
+          !step.taken || step.gain <= options.least_gain * at.equations.cost || step.moved < kStill;
+      out_of_work = result.runs * at.objective->spring_steps_per_run() > options.most_spring_steps;
+      if (settled || out_of_work || i >= options.iterations) break;
       // Time steps follow the parameters; all trials of one iteration have the same.
-      objective = objective_at(steps_at(problem, result.values, options.stability_margin),
-                               objective->corrections());
-      ShootingObjective::Equations there = objective->equations(result.values, huber);
-      result.runs += there.runs;
-      if (!there.usable) break;
-      here = std::move(there);
+      at.objective = round.objective_at(steps_now(), at.objective->corrections());
+      at.equations = at.objective->equations(result.values, round.huber_threshold);
+      result.runs += at.equations.runs;
+      if (!at.equations.usable) break;
     }
-    result.cost = here.cost;
-    result.time_step_s = objective->time_step_s();
-    result.corrections = objective->corrections();
-    result.windows = objective->windows();
+    result.time_step_s = at.objective->time_step_s();
+    result.corrections = at.objective->corrections();
+    result.windows = at.objective->windows();
     result.usable = true;
     result.message = out_of_work ? "not converged at the limit of work"
                      : settled   ? "converged"
                                  : "still falling";
-    if (round + 1 < options.rounds) {
-      windows = objective->recentred(result.values);
-      if (!windows) break;
-    }
+    if (n + 1 < options.rounds) windows = at.objective->recentred(result.values);
   }
   return result;
 }

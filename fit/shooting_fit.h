@@ -38,7 +38,7 @@ struct ShootingFit {
 
 /// Windows of about equal length over the first `frames` frames, with guesses of their states: from
 /// smoothed 3D tracks where there are any (fit/track_states.h; windows begin in frames that have a
-/// state), else from a free run at `values`. None where that run diverges.
+/// state), else from a free run at `values`. None where there is neither.
 std::optional<ShootingWindows> make_windows(const FitProblem& problem, int frames,
                                             const Eigen::VectorXd& values,
                                             const ShootingOptions& options);

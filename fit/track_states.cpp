@@ -136,13 +136,11 @@ Eigen::MatrixXd field_through(const Mesh& mesh, const Eigen::Matrix2Xd& place_m,
 
 }  // namespace
 
-TrackStates recorded_states_of_tracks(const FitProblem& problem,
-                                      const TrackStatesOptions& options) {
+std::optional<TrackStates> find_states_of_tracks(const FitProblem& problem,
+                                                 const TrackStatesOptions& options) {
   constexpr int kMostNodes = 17;  // a side: as the densest meshes of recordings have
   constexpr int kFewestAlongASide = 3;
-  if (problem.observations.empty() || problem.observations.front().camera)
-    throw InputError("states", "the recording is observed in pixels",
-                     "3D tracks: states are positions and velocities in space");
+  if (problem.observations.empty() || problem.observations.front().camera) return std::nullopt;
   const int frames = problem.first_held_out;
   TrackStates result;
   std::vector<double> squared_sigma;
@@ -181,11 +179,21 @@ TrackStates recorded_states_of_tracks(const FitProblem& problem,
     result.states.position_m.push_back(position_m * weights.transpose());
     result.states.velocity_m_per_s.push_back(velocity_m_per_s * weights.transpose());
   }
-  if (result.frame.size() < 2)
+  if (result.frame.size() < 2) return std::nullopt;
+  return result;
+}
+
+TrackStates recorded_states_of_tracks(const FitProblem& problem,
+                                      const TrackStatesOptions& options) {
+  if (problem.observations.empty() || problem.observations.front().camera)
+    throw InputError("states", "the recording is observed in pixels",
+                     "3D tracks: states are positions and velocities in space");
+  std::optional<TrackStates> found = find_states_of_tracks(problem, options);
+  if (!found)
     throw InputError("states", "fewer than two fitted frames have a state",
                      "at least 3 x 3 markers that are tracked over 8 frames or more",
                      "fit the trajectory: it needs no states");
-  return result;
+  return *std::move(found);
 }
 
 std::unique_ptr<StateObjective> state_objective_of_tracks(const FitProblem& problem,

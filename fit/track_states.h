@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "fit/problem.h"
@@ -37,7 +38,11 @@ struct TrackStates {
 /// A smoothing spline takes from fast motion what it takes from noise, so that velocities are too
 /// low where the frame rate does not resolve the motion (docs/theory/identification.md).
 ///
-/// Throws InputError for a problem without 3D tracks, or where fewer than two frames have a state.
+/// Nothing for a problem without 3D tracks, or where fewer than two frames have a state.
+std::optional<TrackStates> find_states_of_tracks(const FitProblem& problem,
+                                                 const TrackStatesOptions& options = {});
+
+/// The same; throws InputError where there is nothing.
 TrackStates recorded_states_of_tracks(const FitProblem& problem,
                                       const TrackStatesOptions& options = {});
 

@@ -155,6 +155,8 @@ TEST(TrackStates, AreRefusedWhereThereAreNone) {
   const FitProblem brief = make_problem(
       synthetic_input({.mesh = 5, .markers = 5, .frames = 7, .held_out_from = 7}), {}, 5, 5);
 
+  EXPECT_FALSE(find_states_of_tracks(pixels));
+  EXPECT_FALSE(find_states_of_tracks(brief));
   EXPECT_THROW(recorded_states_of_tracks(pixels), InputError);
   EXPECT_THROW(recorded_states_of_tracks(brief), InputError);
 }
