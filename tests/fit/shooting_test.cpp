@@ -4,6 +4,7 @@
 #include "fit/shooting.h"
 
 #include <gtest/gtest.h>
+#include <tbb/global_control.h>
 
 #include <Eigen/Cholesky>
 #include <cmath>
@@ -354,6 +355,21 @@ TEST(ShootingFit, TendsToTheTrajectorysOptimumAsItsGapsClose) {
   EXPECT_LT(distance[1], distance[0]);
   EXPECT_LT(distance[2], 0.03 * distance[1]);
   EXPECT_LT(distance[3], 0.015 * distance[2]);
+}
+
+TEST(ShootingFit, GivesTheSameBitsForAnyNumberOfThreads) {
+  const FitProblem problem = tiny_problem(7);
+  ShootingOptions options{.window_frames = 5, .iterations = 3};
+  std::vector<ShootingFit> fits;
+  for (const size_t threads : {1, 4}) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+    fits.push_back(fit_by_shooting(problem, problem.frames(), problem.space.start(), options, {}));
+  }
+
+  ASSERT_TRUE(fits[0].usable && fits[1].usable);
+  EXPECT_EQ(fits[0].values, fits[1].values);
+  EXPECT_EQ(fits[0].cost, fits[1].cost);
+  EXPECT_EQ(fits[0].corrections, fits[1].corrections);
 }
 
 TEST(ShootingFit, EndsSoonWhenItIsCancelled) {
