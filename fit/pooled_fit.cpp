@@ -23,8 +23,8 @@ struct Part {
   Eigen::MatrixXd information;
 };
 
-Part expand_one(const FitProblem& problem, double time_step_s, const Eigen::VectorXd& values) {
-  const TrajectoryObjective objective(problem, problem.first_held_out, time_step_s);
+Part expand_one(const FitProblem& problem, const TimeSteps& steps, const Eigen::VectorXd& values) {
+  const TrajectoryObjective objective(problem, problem.first_held_out, steps);
   const Linearisation linear = objective.linearise(values);
   Part part;
   if (!linear.usable) return part;
@@ -49,20 +49,19 @@ std::vector<bool> held_at(const Eigen::VectorXd& x, const Eigen::VectorXd& lower
   return held;
 }
 
-std::vector<double> stable_steps_s(std::span<const FitProblem* const> problems,
-                                   const std::vector<Eigen::VectorXd>& values) {
-  std::vector<double> steps_s;
+std::vector<TimeSteps> stable_steps(std::span<const FitProblem* const> problems,
+                                    const std::vector<Eigen::VectorXd>& values) {
+  std::vector<TimeSteps> steps;
   for (size_t n = 0; n < problems.size(); ++n)
-    steps_s.push_back(
-        stable_time_step_s(problems[n]->cloth, parameter_set(*problems[n], values[n])));
-  return steps_s;
+    steps.push_back(stable_time_steps(problems[n]->cloth, parameter_set(*problems[n], values[n])));
+  return steps;
 }
 
 }  // namespace
 
-PooledCost::PooledCost(std::span<const FitProblem* const> problems, std::vector<double> time_step_s)
-    : problems_(problems), time_step_s_(std::move(time_step_s)), places_(problems.size()) {
-  if (problems.empty() || time_step_s_.size() != problems.size())
+PooledCost::PooledCost(std::span<const FitProblem* const> problems, std::vector<TimeSteps> steps)
+    : problems_(problems), steps_(std::move(steps)), places_(problems.size()) {
+  if (problems.empty() || steps_.size() != problems.size())
     throw InputError("pooled fit", "no recordings, or not a time step for each", "at least one");
   const ParameterSpace& first = problems.front()->space;
   for (const FitParameter& parameter : first.parameters) {
@@ -137,8 +136,7 @@ double PooledCost::at(const Eigen::VectorXd& coordinates) const {
   const std::vector<Eigen::VectorXd> values_of = values(coordinates);
   std::vector<double> costs(problems_.size(), std::numeric_limits<double>::infinity());
   tbb::parallel_for(size_t{0}, problems_.size(), [&](size_t n) {
-    const TrajectoryObjective objective(*problems_[n], problems_[n]->first_held_out,
-                                        time_step_s_[n]);
+    const TrajectoryObjective objective(*problems_[n], problems_[n]->first_held_out, steps_[n]);
     const Eigen::VectorXd residual = objective.residuals({values_of[n]}).front();
     if (residual.size() == objective.residual_count())
       costs[n] = 0.5 * residual.squaredNorm() + prior_cost(*problems_[n], values_of[n]).cost;
@@ -152,7 +150,7 @@ PooledCost::Expansion PooledCost::expand(const Eigen::VectorXd& coordinates) con
   const std::vector<Eigen::VectorXd> values_of = values(coordinates);
   std::vector<Part> parts(problems_.size());
   tbb::parallel_for(size_t{0}, problems_.size(), [&](size_t n) {
-    parts[n] = expand_one(*problems_[n], time_step_s_[n], values_of[n]);
+    parts[n] = expand_one(*problems_[n], steps_[n], values_of[n]);
   });
   Expansion result{.usable = true,
                    .gradient = Eigen::VectorXd::Zero(size_),
@@ -230,9 +228,9 @@ PooledFit fit_pooled(std::span<const FitProblem* const> problems,
   }
   constexpr double kLeastDamping = 1e-9, kMostDamping = 1e6;
   for (int round = 0; round < options.rounds; ++round) {
-    std::vector<double> steps_s = stable_steps_s(problems, result.values);
-    for (double& step_s : steps_s) step_s /= options.stability_margin;
-    const PooledCost pooled(problems, steps_s);
+    std::vector<TimeSteps> steps = stable_steps(problems, result.values);
+    for (TimeSteps& of : steps) of = of.times(1 / options.stability_margin);
+    const PooledCost pooled(problems, steps);
     const Eigen::VectorXd lower = pooled.lower(), upper = pooled.upper();
     Eigen::VectorXd x = pooled.coordinates(result.values).cwiseMax(lower).cwiseMin(upper);
     const Eigen::VectorXd began = x;

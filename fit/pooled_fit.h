@@ -15,9 +15,9 @@ namespace clothfit {
 /// own. Coordinates: the shared ones, then those of each recording in turn.
 class PooledCost {
  public:
-  /// A time step for each problem. The problems must outlive the cost. Throws InputError unless
+  /// Time steps for each problem. The problems must outlive the cost. Throws InputError unless
   /// they are at least one and have the same parameters of the physics.
-  PooledCost(std::span<const FitProblem* const> problems, std::vector<double> time_step_s);
+  PooledCost(std::span<const FitProblem* const> problems, std::vector<TimeSteps> steps);
 
   int size() const { return size_; }
   int shared() const { return static_cast<int>(shared_.size()); }
@@ -53,7 +53,7 @@ class PooledCost {
     int first = 0;         ///< their first coordinate
   };
   std::span<const FitProblem* const> problems_;
-  std::vector<double> time_step_s_;
+  std::vector<TimeSteps> steps_;
   std::vector<std::vector<int>> shared_;  ///< [shared][problem]: index in its space
   std::vector<Place> places_;
   int size_ = 0;

@@ -1,0 +1,361 @@
+#include "fit/identify.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <span>
+
+#include "data/input_error.h"
+#include "fit/lead_in.h"
+#include "fit/observed_motion.h"
+#include "fit/parameter_search.h"
+#include "model/stability.h"
+
+namespace clothfit {
+namespace {
+
+/// The search runs on a mesh of half the resolution: a run costs a sixteenth (a quarter of the
+/// springs, and a quarter of the steps where damping limits them), and the basin is the same.
+constexpr int kCoarsening = 2;
+
+/// Shares of the fitted frames that the refinement's stages look at: whole trajectories of folding
+/// cloth diverge from a start that is only roughly right. Those shorter than the search's window
+/// are left out.
+constexpr double kSearchShare = 0.4;
+constexpr double kHorizonShares[] = {0.4, 0.7};
+constexpr double kFineShares[] = {kSearchShare, 0.7};
+/// A given start may be far off, and nothing has been simulated yet.
+constexpr double kGivenShares[] = {0.1, 0.2, 0.4};
+/// Closer than this factor to an end of its range a logarithmic parameter is at that end.
+constexpr double kEnd = 1.5;
+constexpr int kFewestFrames = 8;
+
+/// Spring-steps that a search over the usual share may cost; its time step is cut no finer than
+/// that. A longer window is allowed as much more.
+constexpr double kSearchSpringSteps = 1.2e9;
+
+/// How finely a stage is solved. The last one goes to the rounding of the reported digits; those
+/// before only lead there, and look at slopes over wider spans: the cost of folding cloth is rough,
+/// and its trend is what a start far away needs.
+struct Effort {
+  int iterations = RefineOptions().iterations;
+  int rounds = 0;
+  double least_gain = 0;
+  Derivatives derivatives = Derivatives::tangents;
+  double difference_step = 0;
+  double trust_region_radius = RefineOptions().trust_region_radius;
+  bool exact_in_the_end = false;
+  double most_spring_steps = 0;  ///< a stage stops there: a wrong model may lead it on for hours
+};
+/// Coordinates of a fit for which the limits of work below are meant.
+constexpr double kUsualCoordinates = 20;
+constexpr Effort kCoarseEffort{.rounds = 3,
+                               .least_gain = 1e-3,
+                               .derivatives = Derivatives::forward,
+                               .difference_step = 2e-2,
+                               .most_spring_steps = 1e9};
+constexpr Effort kTrendEffort{.rounds = 2,
+                              .least_gain = 1e-4,
+                              .derivatives = Derivatives::forward,
+                              .difference_step = 5e-3,
+                              .most_spring_steps = 5e9};
+constexpr Effort kApproachEffort{.iterations = 6,  // the coarse mesh's derivatives lead no further
+                                 .rounds = 1,
+                                 .least_gain = 1e-3,
+                                 .derivatives = Derivatives::tangents,
+                                 .most_spring_steps = 1e10};
+constexpr Effort kRoughEffort{.rounds = 2,
+                              .least_gain = 1e-4,
+                              .derivatives = Derivatives::tangents,
+                              .trust_region_radius = 1e4,
+                              .most_spring_steps = 1e10};
+constexpr Effort kFinalEffort{.rounds = 6,
+                              .least_gain = 1e-7,
+                              .derivatives = Derivatives::tangents,
+                              .trust_region_radius = 1e6,
+                              .exact_in_the_end = true,
+                              .most_spring_steps = 2e10};
+
+int horizon_frames(const FitProblem& problem, double share) {
+  const int wanted = static_cast<int>(std::lround(share * problem.first_held_out));
+  return std::clamp(wanted, std::min(kFewestFrames, problem.first_held_out),
+                    problem.first_held_out);
+}
+
+/// Natural lengths, where they are fitted, are those of one mesh.
+int coarse(const FitProblem& problem, const FitOptions& options, int count) {
+  if (problem.spring_set != SpringSet::fabric) return count;
+  int smallest = kSmallestMesh;
+  if (problem.start == StartKind::unknown) smallest = std::max(smallest, options.start_nodes + 1);
+  return std::max(std::min(count, smallest), (count - 1) / kCoarsening + 1);
+}
+
+/// The time steps of a search: stable at the upper corner of the ranges if the budget allows; else
+/// as fine as the budget allows, and individuals that would need a finer one rank last.
+TimeSteps search_time_steps(const FitProblem& problem, const FitOptions& options, int frames) {
+  Eigen::VectorXd corner = problem.space.start();
+  for (int p = 0; p < problem.space.size(); ++p)
+    if (is_physical(problem.space.parameters[static_cast<size_t>(p)].role))
+      corner[p] = problem.space.parameters[static_cast<size_t>(p)].upper;
+  const TimeSteps stable = stable_time_steps(problem.cloth, parameter_set(problem, corner));
+  const double simulated_s =
+      problem.frame_time_s[static_cast<size_t>(frames - 1)] - problem.frame_time_s.front();
+  const auto simulations = static_cast<double>(search_simulations(options));
+  const double affordable_s = simulated_s * static_cast<double>(problem.cloth.spring_count()) *
+                              simulations /
+                              (kSearchSpringSteps * options.search_share / kSearchShare);
+  // Long recordings would otherwise leave steps at which hardly any individual is stable.
+  const TimeSteps of_middle =
+      stable_time_steps(problem.cloth, parameter_set(problem, problem.space.start()));
+  const double run_s = std::max(stable.run_s, std::min(affordable_s, of_middle.run_s));
+  return {run_s, std::max(run_s, stable.rest_s)};
+}
+
+/// The search over the physical parameters on a coarse mesh and a short window, with its line in
+/// the report.
+SearchedParameters search(const TrajectoryObjective& objective, const FitOptions& options,
+                          const Eigen::VectorXd& start, const ProgressCallback& progress,
+                          FitReport& report) {
+  SearchedParameters found = search_parameters(objective, options, start, progress);
+  const Mesh& mesh = objective.problem().cloth.mesh;
+  report.search_cost = found.best_cost;
+  report.stages.push_back(
+      fmt::format("{}; {} simulations, mesh {} x {}, {} frames, time step {:.3g} s, cost in sigmas",
+                  found.message, found.simulations, mesh.columns, mesh.rows, objective.frames(),
+                  objective.time_step_s()));
+  return found;
+}
+
+/// A stage of the refinement: which mesh, how much of the recording, how hard.
+struct Stage {
+  const FitProblem& problem;
+  const FitProblem* derivatives_of = nullptr;  ///< a coarser mesh's; null: its own
+  double share = 1;                            ///< of the fitted frames
+  const Effort& effort;
+};
+
+RefineOptions refine_options_of(const Effort& effort, const FitProblem& problem,
+                                const FitOptions& options) {
+  // An unknown start has hundreds of coordinates, each with its derivatives.
+  const double coordinates_share = std::max(1.0, problem.space.size() / kUsualCoordinates);
+  return {.iterations = effort.iterations,
+          .rounds = effort.rounds,
+          .least_gain = effort.least_gain,
+          .derivatives = effort.derivatives,
+          .difference_step = effort.difference_step,
+          .exact_in_the_end = effort.exact_in_the_end,
+          .loss = options.loss,
+          .trust_region_radius = effort.trust_region_radius,
+          .most_spring_steps = options.work * coordinates_share * effort.most_spring_steps,
+          .substep_scale = options.substep_scale};
+}
+
+/// One refinement, with its line in the report.
+RefineResult refine_stage(const Stage& stage, const FitOptions& options,
+                          const Eigen::VectorXd& start, const ProgressCallback& progress,
+                          FitReport& report) {
+  const FitProblem& problem = stage.problem;
+  const RefineOptions refine_options = refine_options_of(stage.effort, problem, options);
+  const int frames = horizon_frames(problem, stage.share);
+  const auto make_objective = [&](const TimeSteps& steps) -> std::unique_ptr<Objective> {
+    if (stage.derivatives_of == nullptr)
+      return std::make_unique<TrajectoryObjective>(problem, frames, steps);
+    // What is stable for the fine mesh is far more so for the coarse one.
+    const double coarser =
+        problem.cloth.mesh.spacing_s_m() / stage.derivatives_of->cloth.mesh.spacing_s_m();
+    return std::make_unique<CoarselyDifferentiated>(problem, *stage.derivatives_of, frames, steps,
+                                                    steps.times(1 / coarser));
+  };
+  RefineResult result = refine(problem, make_objective, start, refine_options, progress);
+  report.stages.push_back(fmt::format(
+      "refinement on {} x {}{} over {} frames: {} iterations, {} simulations, time step {:.3g} s, "
+      "residuals of {:.2f} sigma; {}",
+      problem.cloth.mesh.columns, problem.cloth.mesh.rows,
+      stage.derivatives_of == nullptr ? "" : " with the coarse mesh's derivatives", frames,
+      result.solver_iterations, result.simulations, result.time_step_s, result.robust_scale,
+      result.message));
+  return result;
+}
+
+/// The cost of a search (Objective::mean_length), at time steps that are stable for these values.
+double search_cost(const TrajectoryObjective& objective, const Eigen::VectorXd& values) {
+  const FitProblem& problem = objective.problem();
+  const TimeSteps stable = stable_time_steps(problem.cloth, parameter_set(problem, values))
+                               .times(1 / RefineOptions().stability_margin);
+  const TimeSteps& searched = objective.steps();
+  const TrajectoryObjective safe(
+      problem, objective.frames(),
+      {std::min(searched.run_s, stable.run_s), std::min(searched.rest_s, stable.rest_s)});
+  return safe.mean_length(safe.residuals({values}).front());
+}
+
+/// Whether the model follows the cloth over the window of a search (fit/observed_motion.h).
+bool follows(const FitProblem& problem, const Eigen::VectorXd& values) {
+  const double any_step_s = std::numeric_limits<double>::infinity();
+  const TrajectoryObjective window(problem, horizon_frames(problem, kSearchShare), any_step_s);
+  return search_cost(window, values) < cost_of_following(window);
+}
+
+/// Logarithmic parameters that a coarse mesh has driven to an end of their range go back to where a
+/// fit begins: there the residuals hardly change with the logarithm, and a first step on the finer
+/// mesh would leap across the range.
+Eigen::VectorXd away_from_ends(const ParameterSpace& space, const Eigen::VectorXd& values) {
+  const Eigen::VectorXd start = space.start();
+  Eigen::VectorXd result = values;
+  for (int p = 0; p < space.size(); ++p) {
+    const FitParameter& parameter = space.parameters[static_cast<size_t>(p)];
+    if (parameter.scale != ParameterScale::logarithmic) continue;
+    const bool at_end = values[p] < kEnd * parameter.lower || values[p] > parameter.upper / kEnd;
+    if (at_end) result[p] = start[p];
+  }
+  return result;
+}
+
+/// Refinement, stage after stage: on the coarse mesh over growing horizons, then on the fit's own
+/// mesh, first with the coarse one's derivatives.
+RefineResult refine_on(const FitProblem& coarse_problem, const FitProblem& problem,
+                       const FitOptions& options, const Eigen::VectorXd& start,
+                       std::span<const double> coarse_shares, const ProgressCallback& progress,
+                       FitReport& report) {
+  const double least_share = options.start ? 0 : options.search_share;
+  RefineResult best;
+  best.values = start;
+  const auto improve = [&](const Stage& stage) {
+    best = refine_stage(stage, options, best.values, progress, report);
+    return !best.cancelled && best.usable;
+  };
+  // Where the model follows the cloth already the coarse mesh has nothing more to teach.
+  if (!follows(problem, start) && !follows(coarse_problem, start)) {
+    for (const double share : coarse_shares)
+      if (share >= least_share &&
+          !improve({.problem = coarse_problem, .share = share, .effort = kTrendEffort}))
+        return best;
+    best.values = away_from_ends(problem.space, best.values);
+    if (!improve({.problem = problem,
+                  .derivatives_of = &coarse_problem,
+                  .share = std::max(kSearchShare, least_share),
+                  .effort = kApproachEffort}))
+      return best;
+  }
+  best.values = away_from_ends(problem.space, best.values);
+  for (const double share : kFineShares)
+    if (share >= least_share &&
+        !improve({.problem = problem, .share = share, .effort = kRoughEffort}))
+      return best;
+  improve({.problem = problem, .effort = kFinalEffort});
+  return best;
+}
+
+/// The one of the optima of a search that gets furthest over a short horizon on the coarse mesh.
+/// `candidates` are all of them, the best few refined, up to the first that follows the cloth.
+RefineResult pick_best(const TrajectoryObjective& objective, const FitOptions& options,
+                       const std::vector<SearchOptimum>& optima, const ProgressCallback& progress,
+                       FitReport& report, std::vector<Candidate>& candidates) {
+  RefineResult best;
+  best.values = optima.front().values;
+  best.cost = std::numeric_limits<double>::infinity();
+  bool enough = false;
+  for (const SearchOptimum& optimum : optima) {
+    candidates.push_back({.values = optimum.values, .cost = optimum.cost, .runs = optimum.runs});
+    if (enough || static_cast<int>(candidates.size()) > options.refine_best) continue;
+    RefineResult result = refine_stage(
+        {.problem = objective.problem(), .share = options.search_share, .effort = kCoarseEffort},
+        options, optimum.values, progress, report);
+    if (result.cancelled) return result;
+    if (!result.usable) continue;
+    const double cost = search_cost(objective, result.values);
+    if (std::isfinite(cost))
+      candidates.back() = {
+          .values = result.values, .cost = cost, .runs = optimum.runs, .refined = true};
+    if (result.cost < best.cost) best = std::move(result);
+    enough = candidates.back().cost < cost_of_following(objective);
+  }
+  return best;
+}
+
+/// Where a fit begins without a search: the values given, within their ranges.
+Eigen::VectorXd given_start(const FitProblem& problem, const std::map<std::string, double>& given) {
+  Eigen::VectorXd values = problem.space.start();
+  for (const auto& [name, value] : given) {
+    const int p = problem.space.index(name);
+    if (p < 0)
+      throw InputError("--start", "the fit has no parameter '" + name + "'",
+                       "a fit of the same parameter set and effects");
+    const FitParameter& parameter = problem.space.parameters[static_cast<size_t>(p)];
+    values[p] = std::clamp(value, parameter.lower, parameter.upper);
+  }
+  return values;
+}
+
+/// From the ranges to the optimum. `candidates` are what the search found on the way.
+RefineResult search_and_refine(const FitProblem& coarse_problem, const FitProblem& problem,
+                               const FitOptions& options, const ProgressCallback& progress,
+                               FitReport& report, std::vector<Candidate>& candidates) {
+  Eigen::VectorXd start = problem.space.start();
+  if (problem.start == StartKind::unknown) {
+    // A search needs to know where the cloth begins: from the middle of the ranges, over the first
+    // frames, which say more of the start than of the fabric.
+    const RefineResult first =
+        refine_stage({.problem = coarse_problem, .share = 0, .effort = kCoarseEffort}, options,
+                     start, progress, report);
+    if (first.cancelled || !first.usable) return first;
+    for (int p = 0; p < problem.space.size(); ++p)
+      if (problem.space.parameters[static_cast<size_t>(p)].role == ParameterRole::start)
+        start[p] = first.values[p];
+  }
+  const int frames = horizon_frames(coarse_problem, options.search_share);
+  const TrajectoryObjective objective(coarse_problem, frames,
+                                      search_time_steps(coarse_problem, options, frames));
+  const SearchedParameters found = search(objective, options, start, progress, report);
+  if (found.optima.empty() || found.cancelled) {
+    RefineResult none;
+    none.cancelled = found.cancelled;
+    none.message = "no individual of the search could be simulated to the end of its window";
+    return none;
+  }
+  const RefineResult best =
+      pick_best(objective, options, found.optima, progress, report, candidates);
+  if (best.cancelled) return best;
+  return refine_on(coarse_problem, problem, options, best.values, kHorizonShares, progress, report);
+}
+
+}  // namespace
+
+RefineOptions final_refinement(const FitProblem& problem, const FitOptions& options) {
+  return refine_options_of(kFinalEffort, problem, options);
+}
+
+RefineResult identify(const FitInput& input, const FitProblem& problem, const FitOptions& options,
+                      const ProgressCallback& progress, FitReport& report,
+                      std::vector<Candidate>& candidates) {
+  const FitProblem coarse_problem =
+      make_problem(input, options, coarse(problem, options, problem.cloth.mesh.columns),
+                   coarse(problem, options, problem.cloth.mesh.rows));
+  RefineResult from_start;
+  const bool led = options.cost != LeadingCost::trajectory;
+  if (options.start || led) {
+    Eigen::VectorXd start =
+        options.start ? given_start(problem, *options.start) : problem.space.start();
+    if (led) {
+      LeadIn lead = lead_in(problem, coarse_problem, options, start, progress);
+      report.stages.push_back(lead.stage);
+      from_start.cancelled = lead.cancelled;
+      if (lead.cancelled) return from_start;
+      if (lead.usable) start = std::move(lead.values);
+    }
+    from_start = refine_on(coarse_problem, problem, options, start, kGivenShares, progress, report);
+    if (from_start.cancelled || (from_start.usable && from_start.converged)) return from_start;
+    report.stages.push_back(led ? "the " + to_string(options.cost) + " cost leads to no optimum"
+                                : "the given start leads to no optimum");
+  }
+  RefineResult found =
+      search_and_refine(coarse_problem, problem, options, progress, report, candidates);
+  const bool better =
+      found.cancelled || !from_start.usable || (found.usable && found.cost < from_start.cost);
+  return better ? found : from_start;
+}
+
+}  // namespace clothfit
