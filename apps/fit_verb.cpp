@@ -35,6 +35,7 @@ struct FitFlags {
   std::string mesh;
   fs::path forecast;
   std::string springs;  ///< empty: the earlier fit's, or the fabric
+  std::string cost = "trajectory";
   std::string search = "paper";
   std::string loss = "huber";
   fs::path start;
@@ -115,6 +116,7 @@ std::string command_text(const FitVerbOptions& options, const FitFlags& flags) {
   if (!flags.forecast.empty()) text += " --forecast " + flags.forecast.string();
   if (!flags.start.empty()) text += " --start " + flags.start.string();
   if (!flags.springs.empty()) text += " --springs " + flags.springs;
+  if (flags.cost != "trajectory") text += " --cost " + flags.cost;
   if (flags.search != "paper") text += " --search " + flags.search;
   if (flags.loss != "huber") text += " --loss " + flags.loss;
   const auto add = [&](const char* flag, const auto& value, const auto& default_value) {
@@ -239,6 +241,12 @@ void add_fit_verb(CLI::App& program, VerbAction& action) {
                    "Let every marker be seen beside its place by a constant, with this standard "
                    "deviation: 0.01 or 10mm; 0 for none")
       ->transform(length_in_metres());
+  verb->add_option(
+          "--cost", flags->cost,
+          "What leads to where the trajectory's cost takes over: the trajectory's own after "
+          "a search, shooting, or the founding paper's over states from 3D tracks")
+      ->check(CLI::IsMember({"trajectory", "shooting", "full", "small"}))
+      ->capture_default_str();
   verb->add_option("--search", flags->search,
                    "The founding paper's evolutionary strategy, or CMA-ES with restarts and as "
                    "many simulations")
@@ -298,6 +306,7 @@ void add_fit_verb(CLI::App& program, VerbAction& action) {
                                                earlier ? &*earlier : nullptr);
       if (starts) options->fit.start = known_values(*earlier);
       if (!starts) options->fit.forecast = std::move(earlier);
+      options->fit.cost = *leading_cost_named(flags->cost);
       options->fit.search = flags->search == "cma" ? SearchMethod::cma : SearchMethod::paper;
       options->fit.loss = flags->loss == "squared" ? Loss::squared : Loss::huber;
       options->command = command_text(*options, *flags);

@@ -170,6 +170,9 @@ void FitOptions::validate() const {
   require(!resume || !checkpoint.empty(), "resume", "a --checkpoint to go on from");
   require(checkpoint.empty() || (!start && !forecast), "checkpoint",
           "a fit that searches: without --start and --forecast");
+  require(cost == LeadingCost::trajectory || checkpoint.empty(), "checkpoint",
+          "a fit that searches: with --cost trajectory");
+  require(cost == LeadingCost::trajectory || !forecast, "cost", "a fit: without --forecast");
   require(substep_scale >= 1 && std::isfinite(substep_scale), "substep-scale", "1 or more");
   require(start_nodes >= 2 && start_nodes <= 30, "start-nodes", "2 to 30 nodes a side");
   require(marker_offset_sigma_m >= 0 && std::isfinite(marker_offset_sigma_m), "marker-offsets",

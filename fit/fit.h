@@ -32,6 +32,17 @@ enum class Loss { squared, huber };
 /// CMA-ES with restarts.
 enum class SearchMethod { paper, cma };
 
+/// The cost that leads a fit from its start to where the trajectory's takes over; the optimum is
+/// always the trajectory's. `trajectory`: a search, then a growing horizon. `shooting`: windows
+/// with states of their own (fit/shooting.h). `full`, `small`: the founding paper's over states
+/// from smoothed 3D tracks (fit/track_states.h).
+enum class LeadingCost { trajectory, shooting, full, small };
+
+std::string to_string(LeadingCost cost);
+
+/// The cost of that name; nothing where there is none.
+std::optional<LeadingCost> leading_cost_named(const std::string& name);
+
 /// Which observations a fit uses.
 enum class ObservationKind { automatic, tracks3d, tracks2d };
 
@@ -42,6 +53,7 @@ struct FitOptions {
   int mesh_columns = 0;                      ///< 0: the recording's suggestion
   int mesh_rows = 0;
   unsigned long long seed = 1;
+  LeadingCost cost = LeadingCost::trajectory;  ///< others: a search only if they lead nowhere
   SearchMethod search = SearchMethod::paper;
   int population = 100;       ///< individuals of the evolutionary search [louchet1995]
   int generations = 40;       ///< at most; the search stops earlier when it no longer gains

@@ -9,6 +9,7 @@
 #include <span>
 
 #include "data/input_error.h"
+#include "fit/lead_in.h"
 #include "fit/observed_motion.h"
 #include "fit/parameter_search.h"
 #include "model/stability.h"
@@ -334,11 +335,21 @@ RefineResult identify(const FitInput& input, const FitProblem& problem, const Fi
       make_problem(input, options, coarse(problem, options, problem.cloth.mesh.columns),
                    coarse(problem, options, problem.cloth.mesh.rows));
   RefineResult from_start;
-  if (options.start) {
-    const Eigen::VectorXd start = given_start(problem, *options.start);
+  const bool led = options.cost != LeadingCost::trajectory;
+  if (options.start || led) {
+    Eigen::VectorXd start =
+        options.start ? given_start(problem, *options.start) : problem.space.start();
+    if (led) {
+      LeadIn lead = lead_in(problem, coarse_problem, options, start, progress);
+      report.stages.push_back(lead.stage);
+      from_start.cancelled = lead.cancelled;
+      if (lead.cancelled) return from_start;
+      if (lead.usable) start = std::move(lead.values);
+    }
     from_start = refine_on(coarse_problem, problem, options, start, kGivenShares, progress, report);
     if (from_start.cancelled || (from_start.usable && from_start.converged)) return from_start;
-    report.stages.push_back("the given start leads to no optimum");
+    report.stages.push_back(led ? "the " + to_string(options.cost) + " cost leads to no optimum"
+                                : "the given start leads to no optimum");
   }
   RefineResult found =
       search_and_refine(coarse_problem, problem, options, progress, report, candidates);

@@ -380,6 +380,49 @@ TEST(Fit, BeginsWithTheParametersOfAnEarlierFitWithoutASearch) {
   EXPECT_THROW(fit(tiny_input(), options, {}), InputError);
 }
 
+TEST(Fit, EndsAtTheTrajectorysOptimumWhicheverCostLeadsThere) {
+  const SyntheticCloth truth;
+  const FitInput input = synthetic_input(truth);
+  const FitReport searched = fit(input, quick(), {});
+  ASSERT_TRUE(searched.usable()) << searched.message;
+  for (const LeadingCost cost : {LeadingCost::shooting, LeadingCost::full, LeadingCost::small}) {
+    SCOPED_TRACE(to_string(cost));
+    EXPECT_EQ(leading_cost_named(to_string(cost)), cost);
+    FitOptions options = quick();
+    options.cost = cost;
+
+    const FitReport led = fit(input, options, {});
+
+    ASSERT_EQ(led.stop, FitStop::converged) << led.message;
+    EXPECT_TRUE(led.search_cost.empty());  // nothing had to be searched for
+    EXPECT_THAT(led.stages.front(), testing::HasSubstr(to_string(cost)));
+    for (const char* name : {"tension_warp", "tension_weft", "shear"}) {
+      const ParameterEstimate& one = find(searched.result, name);
+      // Both ended at the optimum, each with the time step of its last round.
+      EXPECT_NEAR(find(led.result, name).value, one.value, 0.3 * one.sigma) << name;
+    }
+  }
+}
+
+TEST(Fit, TakesShootingButNoStatesFromPixels) {
+  const FitInput input = synthetic_input({.seed = 4});
+  FitOptions options = quick();
+  options.observations = ObservationKind::tracks2d;
+  options.cost = LeadingCost::shooting;
+  const SyntheticCloth truth;
+
+  const FitReport led = fit(input, options, {});
+
+  ASSERT_TRUE(led.usable()) << led.message;
+  EXPECT_TRUE(led.search_cost.empty());
+  expect_within(led.result, "tension_warp", truth.fabric.tension_warp_n_per_m, 0.06);
+  expect_within(led.result, "shear", truth.fabric.shear_n_per_m, 0.04);
+  for (const LeadingCost cost : {LeadingCost::full, LeadingCost::small}) {
+    options.cost = cost;
+    EXPECT_THROW(fit(input, options, {}), InputError);
+  }
+}
+
 TEST(Fit, LooksFurtherWhereItIsAskedTo) {
   FitOptions options;
   options.start.emplace();
