@@ -49,9 +49,11 @@ FurtherLooks look_further(const FitInput& input, const TrajectoryObjective& obje
   }
   if (options.two_meshes) {
     const Mesh& mesh = problem.cloth.mesh;
-    const int least = std::max(kSmallestMesh, options.start_nodes + 1);
-    const FitProblem other = make_problem(input, options, other_mesh_count(mesh.columns, least),
-                                          other_mesh_count(mesh.rows, least));
+    const int least = problem.start == StartKind::unknown
+                          ? std::max(kSmallestMesh, options.start_nodes + 1)
+                          : kSmallestMesh;
+    const auto [columns, rows] = other_mesh_of(mesh.columns, mesh.rows, least);
+    const FitProblem other = make_problem(input, options, columns, rows);
     looks.other_mesh = fit_on_other_mesh(other, values, final_refinement(other, options), progress);
     report.stages.push_back(fmt::format("the fit again on {} x {}, for the mesh's share: {}",
                                         looks.other_mesh.columns, looks.other_mesh.rows,
@@ -236,6 +238,9 @@ FitReport fit(const FitInput& input, const FitOptions& options, const ProgressCa
         objective, values,
         {.loss = options.loss, .bootstrap = options.bootstrap, .seed = options.seed},
         refined.residual_by_coordinate);
+    if (options.bootstrap > 0 && uncertainty.bootstrap_lower.size() == 0)
+      report.stages.push_back(
+          "no bootstrap: fewer than two blocks, or a coordinate that the residuals say nothing of");
     if (!uncertainty.usable)
       return stopped(std::move(report), FitStop::diverged,
                      "the derivatives at the optimum could not be computed");

@@ -214,37 +214,46 @@ Eigen::VectorXd away_from_ends(const ParameterSpace& space, const Eigen::VectorX
   return result;
 }
 
+/// How refinement comes to where it starts.
+struct Approach {
+  std::span<const double> coarse_shares;  ///< horizons on the coarse mesh
+  double least_share = 0;                 ///< shorter ones are left out, on either mesh
+  bool by_coarse_mesh = false;            ///< whether it started there
+};
+
 /// Refinement, stage after stage: on the coarse mesh over growing horizons, then on the fit's own
-/// mesh, first with the coarse one's derivatives.
+/// mesh, first with the coarse one's derivatives. Where the model follows the cloth already the
+/// coarse mesh has nothing more to teach, and one short horizon is enough.
 RefineResult refine_on(const FitProblem& coarse_problem, const FitProblem& problem,
                        const FitOptions& options, const Eigen::VectorXd& start,
-                       std::span<const double> coarse_shares, const ProgressCallback& progress,
+                       const Approach& approach, const ProgressCallback& progress,
                        FitReport& report) {
-  const double least_share = options.start ? 0 : options.search_share;
   RefineResult best;
   best.values = start;
   const auto improve = [&](const Stage& stage) {
     best = refine_stage(stage, options, best.values, progress, report);
     return !best.cancelled && best.usable;
   };
-  // Where the model follows the cloth already the coarse mesh has nothing more to teach.
-  if (!follows(problem, start) && !follows(coarse_problem, start)) {
-    for (const double share : coarse_shares)
-      if (share >= least_share &&
+  const bool follows_it = follows(problem, start) || follows(coarse_problem, start);
+  if (!follows_it) {
+    for (const double share : approach.coarse_shares)
+      if (share >= approach.least_share &&
           !improve({.problem = coarse_problem, .share = share, .effort = kTrendEffort}))
         return best;
     best.values = away_from_ends(problem.space, best.values);
     if (!improve({.problem = problem,
                   .derivatives_of = &coarse_problem,
-                  .share = std::max(kSearchShare, least_share),
+                  .share = std::max(kSearchShare, approach.least_share),
                   .effort = kApproachEffort}))
       return best;
   }
-  best.values = away_from_ends(problem.space, best.values);
-  for (const double share : kFineShares)
-    if (share >= least_share &&
-        !improve({.problem = problem, .share = share, .effort = kRoughEffort}))
-      return best;
+  if (!follows_it || approach.by_coarse_mesh)
+    best.values = away_from_ends(problem.space, best.values);
+  for (const double share : kFineShares) {
+    if (share < approach.least_share) continue;
+    if (!improve({.problem = problem, .share = share, .effort = kRoughEffort})) return best;
+    if (follows_it) break;
+  }
   improve({.problem = problem, .effort = kFinalEffort});
   return best;
 }
@@ -319,7 +328,11 @@ RefineResult search_and_refine(const FitProblem& coarse_problem, const FitProble
   const RefineResult best =
       pick_best(objective, options, found.optima, progress, report, candidates);
   if (best.cancelled) return best;
-  return refine_on(coarse_problem, problem, options, best.values, kHorizonShares, progress, report);
+  return refine_on(coarse_problem, problem, options, best.values,
+                   {.coarse_shares = kHorizonShares,
+                    .least_share = options.search_share,
+                    .by_coarse_mesh = true},
+                   progress, report);
 }
 
 }  // namespace
@@ -346,7 +359,8 @@ RefineResult identify(const FitInput& input, const FitProblem& problem, const Fi
       if (lead.cancelled) return from_start;
       if (lead.usable) start = std::move(lead.values);
     }
-    from_start = refine_on(coarse_problem, problem, options, start, kGivenShares, progress, report);
+    from_start = refine_on(coarse_problem, problem, options, start, {.coarse_shares = kGivenShares},
+                           progress, report);
     if (from_start.cancelled || (from_start.usable && from_start.converged)) return from_start;
     report.stages.push_back(led ? "the " + to_string(options.cost) + " cost leads to no optimum"
                                 : "the given start leads to no optimum");

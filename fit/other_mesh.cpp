@@ -1,12 +1,14 @@
 #include "fit/other_mesh.h"
 
+#include <algorithm>
 #include <cassert>
 
 namespace clothfit {
 
-int other_mesh_count(int count, int least) {
-  const int coarser = (count - 1) / 2 + 1;
-  return coarser >= least ? coarser : 2 * count - 1;
+std::pair<int, int> other_mesh_of(int columns, int rows, int least) {
+  const auto coarser = [](int count) { return (count - 1) / 2 + 1; };
+  if (std::min(coarser(columns), coarser(rows)) >= least) return {coarser(columns), coarser(rows)};
+  return {2 * columns - 1, 2 * rows - 1};
 }
 
 OtherMesh fit_on_other_mesh(const FitProblem& other, const Eigen::VectorXd& values,

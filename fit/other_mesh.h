@@ -1,5 +1,7 @@
 #pragma once
 
+#include <utility>
+
 #include "fit/refine.h"
 
 namespace clothfit {
@@ -13,9 +15,9 @@ struct OtherMesh {
   Eigen::VectorXd shift;
 };
 
-/// The number of vertices a side of the other mesh: half the cells where at least `least` vertices
-/// are left, else twice as many.
-int other_mesh_count(int count, int least);
+/// Columns and rows of the other mesh: half the cells each way where at least `least` vertices are
+/// left a side, else twice as many, so that cells keep their proportions.
+std::pair<int, int> other_mesh_of(int columns, int rows, int least);
 
 /// Refines from `values`, the optimum on the fit's own mesh, on that of `other`, whose parameters
 /// and observations are the same.

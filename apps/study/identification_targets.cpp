@@ -136,10 +136,12 @@ bool is_stiffness(const std::string& parameter) {
 struct Covered {
   double low = 1, high = 0;
   void add(double share) {
-    low = std::min(low, share);
-    high = std::max(high, share);
+    // No trial at all is no coverage.
+    const double known = std::isnan(share) ? 0 : share;
+    low = std::min(low, known);
+    high = std::max(high, known);
   }
-  bool within_target() const { return low >= 0.85 && high <= 0.95; }
+  bool within_target() const { return low <= high && low >= 0.85 && high <= 0.95; }
   std::string text() const { return fmt::format("{:.0f} to {:.0f} %", 100 * low, 100 * high); }
 };
 

@@ -256,17 +256,23 @@ Coverage90 coverage_90(const std::vector<RecoverTrial>& trials, const std::strin
 RecoverTrial recover_once(const RecoverOptions& options, int, std::uint64_t seed) {
   const auto began = std::chrono::steady_clock::now();
   std::optional<TrackerErrors> tracker;
-  const SyntheticRecording recording = [&] {
-    if (!options.pictures) return make_synthetic_recording(options.scene, seed);
-    RenderedRecording rendered = make_rendered_recording(options.scene, *options.pictures, seed);
-    tracker = rendered.tracker;
-    return std::move(rendered.recording);
-  }();
-  if (tracker && tracker->accepted == 0)
-    return {.stop = FitStop::diverged,
-            .message = "the tracker stands by no marker",
-            .parameters = {},
-            .tracker = tracker};
+  const auto without_a_fit = [&](const std::string& why) {
+    return RecoverTrial{
+        .stop = FitStop::diverged, .message = why, .parameters = {}, .tracker = tracker};
+  };
+  SyntheticRecording recording;
+  if (options.pictures) {
+    try {
+      RenderedRecording rendered = make_rendered_recording(options.scene, *options.pictures, seed);
+      tracker = rendered.tracker;
+      recording = std::move(rendered.recording);
+    } catch (const InputError& nothing_seen) {
+      return without_a_fit(nothing_seen.what());
+    }
+    if (tracker->accepted == 0) return without_a_fit("the tracker stands by no marker");
+  } else {
+    recording = make_synthetic_recording(options.scene, seed);
+  }
   FitOptions fit_options = options.fit;
   fit_options.seed = seed;
   fit_options.threads = 1;  // trials run side by side

@@ -10,10 +10,11 @@ namespace clothfit {
 namespace {
 
 TEST(OtherMesh, HasHalfTheCellsWhereEnoughVerticesAreLeft) {
-  EXPECT_EQ(other_mesh_count(17, 7), 9);
-  EXPECT_EQ(other_mesh_count(13, 7), 7);
-  EXPECT_EQ(other_mesh_count(11, 7), 21);
-  EXPECT_EQ(other_mesh_count(2, 7), 3);
+  EXPECT_EQ(other_mesh_of(17, 13, 7), std::pair(9, 7));
+  EXPECT_EQ(other_mesh_of(11, 11, 7), std::pair(21, 21));
+  EXPECT_EQ(other_mesh_of(2, 5, 7), std::pair(3, 9));
+  // Both ways alike: half the cells would leave too few along the rows.
+  EXPECT_EQ(other_mesh_of(17, 9, 7), std::pair(33, 17));
 }
 
 TEST(OtherMesh, ShowsWhatACoarseMeshDoesToTheParameters) {
