@@ -192,17 +192,25 @@ double search_cost(const TrajectoryObjective& objective, const Eigen::VectorXd& 
   return safe.mean_length(safe.residuals({values}).front());
 }
 
-/// Whether the model follows the cloth over the window of a search (fit/observed_motion.h).
+/// The frames that a search looks at by default, at whatever steps are stable.
+TrajectoryObjective usual_window(const FitProblem& problem) {
+  return {problem, horizon_frames(problem, kSearchShare), std::numeric_limits<double>::infinity()};
+}
+
+double window_cost(const FitProblem& problem, const Eigen::VectorXd& values) {
+  return search_cost(usual_window(problem), values);
+}
+
+/// Whether the model follows the cloth there (fit/observed_motion.h).
 bool follows(const FitProblem& problem, const Eigen::VectorXd& values) {
-  const double any_step_s = std::numeric_limits<double>::infinity();
-  const TrajectoryObjective window(problem, horizon_frames(problem, kSearchShare), any_step_s);
-  return search_cost(window, values) < cost_of_following(window);
+  return window_cost(problem, values) < cost_of_following(usual_window(problem));
 }
 
 /// Logarithmic parameters that a coarse mesh has driven to an end of their range go back to where a
 /// fit begins: there the residuals hardly change with the logarithm, and a first step on the finer
-/// mesh would leap across the range.
-Eigen::VectorXd away_from_ends(const ParameterSpace& space, const Eigen::VectorXd& values) {
+/// mesh would leap across the range. Not where that costs more: a cloth may belong there.
+Eigen::VectorXd away_from_ends(const FitProblem& problem, const Eigen::VectorXd& values) {
+  const ParameterSpace& space = problem.space;
   const Eigen::VectorXd start = space.start();
   Eigen::VectorXd result = values;
   for (int p = 0; p < space.size(); ++p) {
@@ -211,7 +219,7 @@ Eigen::VectorXd away_from_ends(const ParameterSpace& space, const Eigen::VectorX
     const bool at_end = values[p] < kEnd * parameter.lower || values[p] > parameter.upper / kEnd;
     if (at_end) result[p] = start[p];
   }
-  return result;
+  return window_cost(problem, result) <= window_cost(problem, values) ? result : values;
 }
 
 /// How refinement comes to where it starts.
@@ -240,15 +248,14 @@ RefineResult refine_on(const FitProblem& coarse_problem, const FitProblem& probl
       if (share >= approach.least_share &&
           !improve({.problem = coarse_problem, .share = share, .effort = kTrendEffort}))
         return best;
-    best.values = away_from_ends(problem.space, best.values);
+    best.values = away_from_ends(problem, best.values);
     if (!improve({.problem = problem,
                   .derivatives_of = &coarse_problem,
                   .share = std::max(kSearchShare, approach.least_share),
                   .effort = kApproachEffort}))
       return best;
   }
-  if (!follows_it || approach.by_coarse_mesh)
-    best.values = away_from_ends(problem.space, best.values);
+  if (!follows_it || approach.by_coarse_mesh) best.values = away_from_ends(problem, best.values);
   for (const double share : kFineShares) {
     if (share < approach.least_share) continue;
     if (!improve({.problem = problem, .share = share, .effort = kRoughEffort})) return best;
