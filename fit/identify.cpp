@@ -219,6 +219,7 @@ Eigen::VectorXd away_from_ends(const FitProblem& problem, const Eigen::VectorXd&
     const bool at_end = values[p] < kEnd * parameter.lower || values[p] > parameter.upper / kEnd;
     if (at_end) result[p] = start[p];
   }
+  if (result == values) return values;
   return window_cost(problem, result) <= window_cost(problem, values) ? result : values;
 }
 

@@ -41,22 +41,52 @@ struct Box {
 class SharedEvaluation final : public ceres::EvaluationCallback {
  public:
   SharedEvaluation(const ObjectiveMaker& make_objective, std::unique_ptr<Objective>& objective,
-                   const RefineOptions& options, const Box& box, double huber_threshold,
-                   const Eigen::VectorXd& coordinates)
+                   const RefineOptions& options, const Box& box, const Eigen::VectorXd& coordinates)
       : problem_(objective->problem()),
         make_objective_(make_objective),
         objective_(objective),
         coarsest_(objective->steps()),
         options_(options),
         box_(box),
-        huber_threshold_(huber_threshold),
         coordinates_(coordinates),
-        held_(static_cast<size_t>(coordinates.size()), false) {}
+        held_(static_cast<size_t>(coordinates.size()), false) {
+    evaluate(true);
+    if (now_.usable) robust_scale_ = clothfit::robust_scale(now_.residual);
+  }
 
+  void PrepareForEvaluation(bool evaluate_jacobians, bool) override {
+    evaluate(evaluate_jacobians);
+  }
+
+  const Linearisation& now() const { return now_; }
+  /// Of the residuals at the start.
+  double robust_scale() const { return robust_scale_; }
+  double huber_threshold() const {
+    return options_.loss == Loss::huber ? kHuberScales * robust_scale_
+                                        : std::numeric_limits<double>::infinity();
+  }
+  /// The residuals at the coordinates as they are now; empty where there are none.
+  Eigen::VectorXd residual_here() {
+    evaluate(false);
+    return now_.usable ? now_.residual : Eigen::VectorXd();
+  }
+  /// Coordinates that are held at a bound.
+  bool is_held(int p) const { return held_[static_cast<size_t>(p)]; }
+  int simulations() const { return simulations_; }
+  /// Whether the last derivatives were updated.
+  bool are_updated() const { return updates_ > 0; }
+  /// Whether the last derivatives are those that belong to `coordinates`, or were kept for them.
+  bool is_linearised_at(const Eigen::VectorXd& coordinates) const {
+    return now_.usable && has_derivatives_for_.size() == coordinates.size() &&
+           has_derivatives_for_ == coordinates;
+  }
+  double spring_steps() const { return simulations_ * objective_->spring_steps_per_run(); }
+
+ private:
   /// Ceres asks again, with the Jacobian, for a point that it has accepted. Differences come with
   /// the residuals at once: a trial step's run alone would leave most lanes idle, and most trial
   /// steps are accepted.
-  void PrepareForEvaluation(bool evaluate_jacobians, bool) override {
+  void evaluate(bool evaluate_jacobians) {
     const bool is_new = evaluated_.size() != coordinates_.size() || evaluated_ != coordinates_;
     if (!is_new && (has_jacobian_ || !evaluate_jacobians)) return;
     evaluated_ = coordinates_;
@@ -81,20 +111,6 @@ class SharedEvaluation final : public ceres::EvaluationCallback {
     if (has_jacobian_) simulations_ += now_.runs;
   }
 
-  const Linearisation& now() const { return now_; }
-  /// Coordinates that are held at a bound.
-  bool is_held(int p) const { return held_[static_cast<size_t>(p)]; }
-  int simulations() const { return simulations_; }
-  /// Whether the last derivatives were updated.
-  bool are_updated() const { return updates_ > 0; }
-  /// Whether the last derivatives are those that belong to `coordinates`, or were kept for them.
-  bool is_linearised_at(const Eigen::VectorXd& coordinates) const {
-    return now_.usable && has_derivatives_for_.size() == coordinates.size() &&
-           has_derivatives_for_ == coordinates;
-  }
-  double spring_steps() const { return simulations_ * objective_->spring_steps_per_run(); }
-
- private:
   /// Makes the objective anew with finer time steps where a trial asks for them: the jump of the
   /// cost is small beside what such a trial changes, and to refuse it would hold back all other
   /// coordinates for many steps. A trial that asks for far finer ones is refused.
@@ -154,7 +170,7 @@ class SharedEvaluation final : public ceres::EvaluationCallback {
     Eigen::VectorXd gradient = Eigen::VectorXd::Zero(coordinates_.size());
     for (const Objective::Block& block : objective_->blocks()) {
       const auto r = now_.residual.segment(block.offset, block.dimension);
-      const double weight = std::min(1.0, huber_threshold_ / std::max(r.norm(), 1e-300));
+      const double weight = std::min(1.0, huber_threshold() / std::max(r.norm(), 1e-300));
       gradient +=
           weight *
           now_.residual_by_coordinate.middleRows(block.offset, block.dimension).transpose() * r;
@@ -177,7 +193,7 @@ class SharedEvaluation final : public ceres::EvaluationCallback {
   TimeSteps coarsest_;  ///< that the round began with
   const RefineOptions& options_;
   const Box& box_;
-  double huber_threshold_;
+  double robust_scale_ = 1;
   const Eigen::VectorXd& coordinates_;
   Eigen::VectorXd evaluated_, ran_at_, linearised_at_, has_derivatives_for_;
   Eigen::VectorXd residual_there_;  ///< where it was linearised
@@ -294,7 +310,10 @@ std::string ending(const ceres::Solver::Summary& summary) {
 }
 
 struct Round {
+  bool started = false;  ///< whether there were residuals and derivatives at the start
   ceres::Solver::Summary summary;
+  double robust_scale = 1;      ///< of the residuals at the start
+  double robust_scale_end = 1;  ///< and in the end, where the loss asks for it
   Eigen::VectorXd values;
   Eigen::MatrixXd residual_by_coordinate;  ///< there; empty where it was not had exactly
   bool derivatives_updated = false;
@@ -303,22 +322,25 @@ struct Round {
 
 /// `objective` may be cut finer in time on the way.
 Round solve(const ObjectiveMaker& make_objective, std::unique_ptr<Objective>& objective,
-            const Eigen::VectorXd& start, double huber_threshold,
-            const RefineOptions& refine_options, double most_spring_steps,
-            const ProgressCallback& progress) {
+            const Eigen::VectorXd& start, const RefineOptions& refine_options,
+            double most_spring_steps, const ProgressCallback& progress) {
   const FitProblem& problem = objective->problem();
   const ParameterSpace& space = problem.space;
   Eigen::VectorXd coordinates = space.coordinates(start);
   const Box box(space);
   coordinates = coordinates.cwiseMax(box.lower).cwiseMin(box.upper);
-  SharedEvaluation shared(make_objective, objective, refine_options, box, huber_threshold,
-                          coordinates);
+  SharedEvaluation shared(make_objective, objective, refine_options, box, coordinates);
+  Round round;
+  round.simulations = shared.simulations();
+  round.started = shared.now().usable;
+  round.robust_scale = round.robust_scale_end = shared.robust_scale();
+  if (!round.started) return round;
 
   ceres::Problem::Options problem_options;
   problem_options.evaluation_callback = &shared;
   problem_options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
   ceres::Problem least_squares(problem_options);
-  ceres::HuberLoss huber(huber_threshold);
+  ceres::HuberLoss huber(shared.huber_threshold());
   ceres::LossFunction* const loss = refine_options.loss == Loss::huber ? &huber : nullptr;
   double* const block = coordinates.data();
   least_squares.AddParameterBlock(block, space.size());
@@ -349,15 +371,18 @@ Round solve(const ObjectiveMaker& make_objective, std::unique_ptr<Objective>& ob
                      .note = {}},
                     shared, most_spring_steps);
   options.callbacks.push_back(&reporter);
-  Round round;
   ceres::Solve(options, &least_squares, &round.summary);
   round.values = space.values(coordinates);
-  round.simulations = shared.simulations();
   const bool exact =
       refine_options.derivatives == Derivatives::tangents && !objective->has_cheap_derivatives();
   round.derivatives_updated = exact && shared.are_updated();
   if (exact && !round.derivatives_updated && shared.is_linearised_at(coordinates))
     round.residual_by_coordinate = shared.now().residual_by_coordinate;
+  if (refine_options.loss == Loss::huber) {
+    const Eigen::VectorXd residual = shared.residual_here();
+    if (residual.size() > 0) round.robust_scale_end = robust_scale(residual);
+  }
+  round.simulations = shared.simulations();
   return round;
 }
 
@@ -384,21 +409,15 @@ RefineResult refine(const FitProblem& problem, const ObjectiveMaker& make_object
     result.converged = false;
     std::unique_ptr<Objective> objective =
         make_objective(stable().times(1 / (options.stability_margin * options.substep_scale)));
+    Round round =
+        solve(make_objective, objective, result.values, options, spring_steps_left, progress);
+    result.simulations += round.simulations;
     result.time_step_s = objective->time_step_s();
-    const Eigen::VectorXd before = objective->residuals({result.values}).front();
-    ++result.simulations;
-    if (before.size() == 0) {
+    if (!round.started) {
       result.message = "the simulation from the starting values did not work out";
       return result;
     }
-    result.robust_scale = robust_scale(before);
-    const double huber_threshold = options.loss == Loss::huber
-                                       ? kHuberScales * result.robust_scale
-                                       : std::numeric_limits<double>::infinity();
-    Round round = solve(make_objective, objective, result.values, huber_threshold, options,
-                        spring_steps_left, progress);
-    result.simulations += round.simulations;
-    result.time_step_s = objective->time_step_s();
+    result.robust_scale = round.robust_scale;
     spring_steps_left -= round.simulations * objective->spring_steps_per_run();
     result.solver_iterations += static_cast<int>(round.summary.iterations.size());
     result.message = ending(round.summary);
@@ -422,12 +441,7 @@ RefineResult refine(const FitProblem& problem, const ObjectiveMaker& make_object
     const bool has_room =
         !objective->needs_stable_step() ||
         (largest.run_s > kRoom * taken.run_s && (!rests || largest.rest_s > kRoom * taken.rest_s));
-    bool same_scale = true;
-    if (options.loss == Loss::huber) {
-      const Eigen::VectorXd after = objective->residuals({result.values}).front();
-      const double scale_now = after.size() > 0 ? robust_scale(after) : result.robust_scale;
-      same_scale = scale_now > 0.8 * result.robust_scale;
-    }
+    const bool same_scale = round.robust_scale_end > 0.8 * round.robust_scale;
     result.converged = has_room && settled &&
                        !(options.exact_in_the_end && round.derivatives_updated) &&
                        (same_scale || moved < 1e-3);
