@@ -22,6 +22,7 @@
 #include "apps/verb.h"
 #include "apps/version.h"
 #include "data/input_error.h"
+#include "data/number_text.h"
 #include "data/output_folder.h"
 #include "data/text_file.h"
 
@@ -39,7 +40,19 @@ struct FitFlags {
   std::string search = "paper";
   std::string loss = "huber";
   fs::path start;
+  std::vector<std::string> priors;
 };
+
+ParameterPrior parse_prior(const std::string& text) {
+  const size_t equals = text.find('='), comma = text.find(',');
+  if (equals < comma && comma < text.size()) {
+    const auto mean = parse_number(text.substr(equals + 1, comma - equals - 1));
+    const auto sigma = parse_number(text.substr(comma + 1));
+    if (mean && sigma) return {.name = text.substr(0, equals), .mean = *mean, .sigma = *sigma};
+  }
+  throw InputError("--prior", "'" + text + "' is not a prior",
+                   "PARAMETER=MEAN,SIGMA, such as clock_offset.time=0,0.002");
+}
 
 /// Nothing where the text is not a mesh that a fit takes.
 std::optional<GridSize> parse_mesh(const std::string& text) {
@@ -111,6 +124,7 @@ std::string command_text(const FitVerbOptions& options, const FitFlags& flags) {
   const FitOptions defaults;
   std::string text = "clothfit fit " + options.recording.string();
   for (const std::string& effect : options.fit.effects) text += " --effect " + effect;
+  for (const std::string& prior : flags.priors) text += " --prior " + prior;
   if (flags.observations != "automatic") text += " --observations " + flags.observations;
   if (!flags.mesh.empty()) text += " --mesh " + flags.mesh;
   if (!flags.forecast.empty()) text += " --forecast " + flags.forecast.string();
@@ -205,8 +219,14 @@ void add_fit_verb(CLI::App& program, VerbAction& action) {
       ->required()
       ->type_name("RECORDING");
   verb->add_option("--effect", options->fit.effects,
-                   "Effect to fit beside those the recording declares; may be repeated")
+                   "Effect to fit beside those the recording declares, of motion or of the "
+                   "measurement; may be repeated")
       ->type_name("NAME");
+  verb->add_option(
+          "--prior", flags->priors,
+          "What is known of a parameter from elsewhere, its mean and standard deviation in "
+          "its unit: clock_offset.time=0,0.002; may be repeated")
+      ->type_name("PARAMETER=MEAN,SIGMA");
   verb->add_option("--observations", flags->observations,
                    "What to fit to: 3D tracks where there are any, unless told otherwise")
       ->check(CLI::IsMember({"automatic", "tracks3d", "tracks2d"}))
@@ -306,6 +326,8 @@ void add_fit_verb(CLI::App& program, VerbAction& action) {
                                                earlier ? &*earlier : nullptr);
       if (starts) options->fit.start = known_values(*earlier);
       if (!starts) options->fit.forecast = std::move(earlier);
+      for (const std::string& prior : flags->priors)
+        options->fit.priors.push_back(parse_prior(prior));
       options->fit.cost = *leading_cost_named(flags->cost);
       options->fit.search = flags->search == "cma" ? SearchMethod::cma : SearchMethod::paper;
       options->fit.loss = flags->loss == "squared" ? Loss::squared : Loss::huber;

@@ -12,6 +12,7 @@
 #include "data/nearest_name.h"
 #include "data/number_text.h"
 #include "fit/cloth_setup.h"
+#include "fit/measurement_effects/registry.h"
 #include "fit/problem.h"
 #include "fit/simulation.h"
 #include "model/effects/registry.h"
@@ -173,6 +174,10 @@ FitResult complete_parameters(const Recording& recording, GivenParameters given)
   // What is declared, where the options say nothing else.
   GivenParameters all;
   all.effects = recording.declared;
+  // How things were measured changes nothing in what moves.
+  std::erase_if(all.effects, [](const DeclaredEffect& effect) {
+    return measurement_effect_named(effect.name) != nullptr;
+  });
   for (DeclaredEffect& effect : all.effects) {
     const std::string where = fmt::format("{}:{}", file, effect.line);
     const auto numbers =

@@ -20,7 +20,7 @@
 #include "data/input_error.h"
 #include "data/output_folder.h"
 #include "data/text_file.h"
-#include "model/effects/registry.h"
+#include "fit/measurement_effects/registry.h"
 
 namespace clothfit {
 namespace {
@@ -70,7 +70,7 @@ std::vector<StudiedModel> models_of(const std::vector<std::string>& effects) {
       if (const std::string name = text.substr(begin, end - begin); name == kMarkerOffsets) {
         model.marker_offsets = true;
       } else {
-        find_effect(name, "--effect");
+        require_effect(name, "--effect");
         model.effects.push_back(name);
       }
       begin = end + 1;

@@ -11,6 +11,7 @@
 #include "fit/identify.h"
 #include "fit/marker_offsets.h"
 #include "fit/parameter_estimates.h"
+#include "fit/predictor.h"
 #include "fit/problem.h"
 #include "fit/report_residuals.h"
 #include "fit/simulation.h"
@@ -116,17 +117,19 @@ std::pair<int, int> mesh_of(const ClothDescription& cloth, const FitOptions& opt
 /// the fitted frames ask for, or what the earlier fit of a forecast found for markers of such
 /// names. None where there are none.
 Eigen::Matrix3Xd marker_offsets(const FitProblem& problem, const MarkerSet& markers,
-                                const FitOptions& options,
-                                const std::vector<Eigen::Matrix3Xd>& mesh_positions,
-                                FitReport& report) {
+                                const FitOptions& options, const Predictor& predictor,
+                                const MarkerRun& run, FitReport& report) {
   const std::vector<MarkerOffset> known =
       options.forecast ? options.forecast->marker_offsets : std::vector<MarkerOffset>();
   const auto count = static_cast<Eigen::Index>(markers.markers.size());
   Eigen::Matrix3Xd offset_m;
   if (problem.marker_offset_sigma_m > 0) {
-    offset_m = estimate_offsets(problem.observations.front(),
-                                marker_positions(problem.vertex_weights, mesh_positions),
-                                problem.first_held_out, problem.marker_offset_sigma_m);
+    const ObservationSet& set = problem.observations.front();
+    std::vector<Eigen::Matrix3Xd> predicted = run.position_m;
+    for (const Observation& row : set.rows)
+      predicted[static_cast<size_t>(row.frame)].col(row.marker) = *predictor.predict(0, row, run);
+    offset_m =
+        estimate_offsets(set, predicted, problem.first_held_out, problem.marker_offset_sigma_m);
   } else if (!known.empty()) {
     offset_m = Eigen::Matrix3Xd::Zero(3, count);
     for (const MarkerOffset& offset : known)
@@ -193,6 +196,10 @@ void FitOptions::validate() const {
   require(!two_meshes || spring_set == SpringSet::fabric, "two-meshes",
           "--springs fabric: natural lengths are those of one mesh");
   require(threads >= 0, "threads", "0 (all) or more");
+  for (const ParameterPrior& prior : priors)
+    require(std::isfinite(prior.mean) && std::isfinite(prior.sigma) && prior.sigma > 0, "prior",
+            "a mean and, more than 0, a standard deviation");
+  require(priors.empty() || !forecast, "prior", "a fit: without --forecast");
 }
 
 FitReport fit(const FitInput& input, const FitOptions& options, const ProgressCallback& progress) {
@@ -261,8 +268,11 @@ FitReport fit(const FitInput& input, const FitOptions& options, const ProgressCa
     report.stages.push_back("forecast: nothing fitted");
   }
 
-  const auto trajectories = run_model(problem, {values}, problem.frames(), steps_at(values));
-  if (trajectories.front().empty())
+  const Predictor predictor(problem, values);
+  const SimulateResult run = std::move(
+      run_model(problem, {values}, problem.frames(), steps_at(values), predictor.needs_velocities())
+          .front());
+  if (!run.usable())
     return stopped(std::move(report), FitStop::diverged,
                    "the model diverged when it was run on through all frames");
   double longest_frame_s = 0;
@@ -272,17 +282,19 @@ FitReport fit(const FitInput& input, const FitOptions& options, const ProgressCa
   result.substeps = static_cast<int>(std::ceil(longest_frame_s / result.time_step_s - 1e-9));
   fill_parameters(problem, options, values, uncertainty, looks, result);
   const std::vector<Eigen::Matrix3Xd> fitted_frames(
-      trajectories.front().begin(), trajectories.front().begin() + problem.first_held_out);
+      run.position_m.begin(), run.position_m.begin() + problem.first_held_out);
   explain_by_strain_limit(
       problem, values,
       springs_on_limit(problem.cloth, parameter_set(problem, values).springs, fitted_frames),
       result.parameters);
   report.model = describe_model(problem, input.recording, values);
   report.model.time_step_s = result.time_step_s;
-  fill_residuals(
-      problem, trajectories.front(),
-      marker_offsets(problem, input.recording.markers, options, trajectories.front(), report),
-      report);
+  MarkerRun markers = marker_run(problem, run);
+  const Eigen::Matrix3Xd offset_m =
+      marker_offsets(problem, input.recording.markers, options, predictor, markers, report);
+  if (offset_m.cols() > 0)
+    for (Eigen::Matrix3Xd& positions : markers.position_m) positions += offset_m;
+  fill_residuals(problem, predictor, markers, report);
   for (const ObservationSet& set : problem.observations)
     result.observations_used += static_cast<int>(set.rows.size());
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();

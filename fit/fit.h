@@ -46,11 +46,20 @@ std::optional<LeadingCost> leading_cost_named(const std::string& name);
 /// Which observations a fit uses.
 enum class ObservationKind { automatic, tracks3d, tracks2d };
 
+/// Gaussian knowledge about a parameter of a fit, in its unit.
+struct ParameterPrior {
+  std::string name;  ///< such as tension_warp, or EFFECT.PARAMETER
+  double mean = 0;
+  double sigma = 0;  ///< > 0
+};
+
 struct FitOptions {
   ObservationKind observations = ObservationKind::automatic;  ///< automatic: 3D where there are any
   SpringSet spring_set = SpringSet::fabric;  ///< others come with the paper's strain limit
-  std::vector<std::string> effects;          ///< effects to fit beside those the recording declares
-  int mesh_columns = 0;                      ///< 0: the recording's suggestion
+  /// Effects to fit beside those the recording declares, of motion or of the measurement.
+  std::vector<std::string> effects;
+  std::vector<ParameterPrior> priors;
+  int mesh_columns = 0;  ///< 0: the recording's suggestion
   int mesh_rows = 0;
   unsigned long long seed = 1;
   LeadingCost cost = LeadingCost::trajectory;  ///< others: a search only if they lead nowhere

@@ -5,6 +5,7 @@
 #include <limits>
 #include <map>
 
+#include "fit/predictor.h"
 #include "model/relax.h"
 #include "model/simulate.h"
 #include "model/stability.h"
@@ -112,17 +113,25 @@ double TrajectoryObjective::spring_steps_per_run() const {
 
 std::vector<Eigen::VectorXd> TrajectoryObjective::residuals(
     const std::vector<Eigen::VectorXd>& values) const {
-  const auto trajectories = run_model(problem(), values, frames_, steps());
+  std::vector<Predictor> predictors;
+  int frames = frames_;
+  for (const Eigen::VectorXd& of : values) {
+    predictors.emplace_back(problem(), of);
+    frames = std::max(frames, predictors.back().frames_to_run(frames_));
+  }
+  const bool velocities = !predictors.empty() && predictors.front().needs_velocities();
+  const std::vector<SimulateResult> runs =
+      run_model(problem(), values, frames, steps(), velocities);
   std::vector<Eigen::VectorXd> results(values.size());
   for (size_t n = 0; n < values.size(); ++n) {
-    if (trajectories[n].empty()) continue;
-    const auto markers = marker_positions(problem().vertex_weights, trajectories[n]);
+    if (!runs[n].usable()) continue;
+    const MarkerRun markers = marker_run(problem(), runs[n]);
     Eigen::VectorXd residual(residual_count());
     bool visible = true;
     for (const Block& block : blocks()) {
       const ObservationSet& set = problem().observations[static_cast<size_t>(block.set)];
       const Observation& row = set.rows[static_cast<size_t>(block.row)];
-      const auto predicted = set.predict(markers[static_cast<size_t>(row.frame)].col(row.marker));
+      const auto predicted = predictors[n].predict(block.set, row, markers);
       if (!predicted) {
         visible = false;
         break;
@@ -146,34 +155,36 @@ Linearisation TrajectoryObjective::linearise(const Eigen::VectorXd& values) cons
   if (of.start == StartKind::at_rest)
     start_at_rest_with_tangents(of.cloth, set, along, of.gravity_m_per_s2.norm(),
                                 of.frame_time_s.front(), steps().rest_s);
+  const Predictor predictor(of, values);
   const Schedule schedule{
-      .frame_time_s = {of.frame_time_s.begin(), of.frame_time_s.begin() + frames_},
-      .time_step_s = time_step_s()};
+      .frame_time_s = {of.frame_time_s.begin(),
+                       of.frame_time_s.begin() + predictor.frames_to_run(frames_)},
+      .time_step_s = time_step_s(),
+      .velocities = predictor.needs_velocities()};
   const TangentResult run = simulate_with_tangents(of.cloth, set, along, schedule);
   result.runs = 1 + of.space.size();
   if (!run.run.usable()) return result;
 
-  const auto markers = marker_positions(of.vertex_weights, run.run.position_m);
+  const MarkerRun markers = marker_run(of, run.run);
   const auto parameters = static_cast<size_t>(of.space.size());
-  std::vector<std::vector<Eigen::Matrix3Xd>> marker_tangents(parameters);
-  for (size_t p = 0; p < parameters; ++p)
-    marker_tangents[p] = marker_positions(of.vertex_weights, run.position_tangent[p]);
+  std::vector<MarkerRun> tangents(parameters);
+  for (size_t p = 0; p < parameters; ++p) {
+    tangents[p].position_m = marker_positions(of.vertex_weights, run.position_tangent[p]);
+    if (schedule.velocities)
+      tangents[p].velocity_m_per_s = marker_positions(of.vertex_weights, run.velocity_tangent[p]);
+  }
+  Eigen::Matrix3Xd change(3, of.space.size());
   result.residual.resize(residual_count());
   result.residual_by_coordinate.resize(residual_count(), of.space.size());
   for (const Block& block : blocks()) {
     const ObservationSet& observed = of.observations[static_cast<size_t>(block.set)];
     const Observation& row = observed.rows[static_cast<size_t>(block.row)];
-    const auto frame = static_cast<size_t>(row.frame);
-    Eigen::Matrix3d by_position;
-    const auto predicted = observed.predict(markers[frame].col(row.marker), &by_position);
+    const auto predicted = predictor.predict(block.set, row, markers, tangents, change);
     if (!predicted) return result;
     result.residual.segment(block.offset, block.dimension) =
         (*predicted - row.observed).head(block.dimension) / row.sigma;
-    for (size_t p = 0; p < parameters; ++p) {
-      const Eigen::Vector3d change = by_position * marker_tangents[p][frame].col(row.marker);
-      result.residual_by_coordinate.col(static_cast<Eigen::Index>(p))
-          .segment(block.offset, block.dimension) = change.head(block.dimension) / row.sigma;
-    }
+    result.residual_by_coordinate.middleRows(block.offset, block.dimension) =
+        change.topRows(block.dimension) / row.sigma;
   }
   take_offsets_out(result.residual);
   take_offsets_out(result.residual_by_coordinate);

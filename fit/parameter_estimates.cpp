@@ -82,7 +82,9 @@ void explain_by_correlation(const ParameterSpace& space, const Uncertainty& unce
   if (other < 0 || !(std::abs(correlation) > kAlike)) return;
   const FitParameter& alike = space.parameters[static_cast<size_t>(other)];
   std::string name = alike.name;
-  if (alike.role == ParameterRole::nuisance) name += " (how the scene was placed)";
+  if (alike.role == ParameterRole::nuisance)
+    name += alike.name.find('.') != std::string::npos ? " (how it was measured)"
+                                                      : " (how the scene was placed)";
   if (alike.role == ParameterRole::start) name += " (where the cloth was at the start)";
   parameter.reason +=
       fmt::format("; it can hardly be told from {} (correlation {:.3f})", name, correlation);

@@ -2,6 +2,7 @@
 
 #include <ceres/jet.h>
 #include <ceres/rotation.h>
+#include <fmt/format.h>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
@@ -12,6 +13,7 @@
 #include "calib/projection.h"
 #include "data/input_error.h"
 #include "fit/cloth_setup.h"
+#include "fit/measurement_effects/registry.h"
 #include "fit/sheet_placement.h"
 #include "model/effects/registry.h"
 #include "model/fabric_conversion.h"
@@ -166,10 +168,42 @@ void add_springs(const Recording& recording, const FitOptions& options, FitProbl
   }
 }
 
+/// Adds an effect of the measurement and binds its parameters: to `given` values, else to the fit.
+void add_measurement_effect(const MeasurementEffectEntry& entry, const std::string& where,
+                            const std::map<std::string, std::vector<double>>& given,
+                            const FitOptions& options, FitProblem& problem) {
+  const EffectDescription description = entry.describe();
+  const std::map<std::string, double> values = by_parameter(description, where, given);
+  FitProblem::MeasurementTerm term{.effect = entry.make(), .parameters = {}};
+  for (const EffectParameter& parameter : description.parameters) {
+    const auto value = values.find(parameter.name);
+    if (value != values.end() || options.forecast) {
+      // How another recording was measured says nothing of this one.
+      const double known = value != values.end() ? value->second : parameter.neutral;
+      term.parameters.push_back({.parameter = -1, .constant = known});
+      continue;
+    }
+    term.parameters.push_back({.parameter = problem.space.size(), .constant = 0});
+    problem.space.parameters.push_back({.name = description.name + "." + parameter.name,
+                                        .unit = parameter.unit,
+                                        .role = ParameterRole::nuisance,
+                                        .scale = parameter.scale,
+                                        .lower = parameter.lower,
+                                        .upper = parameter.upper,
+                                        .start = parameter.neutral,
+                                        .typical = parameter.typical});
+  }
+  problem.measurement.push_back(std::move(term));
+}
+
 /// Adds an effect to the cloth and binds its parameters: to `given` values, else to the fit.
 void add_effect(const std::string& name, const std::string& where,
                 const std::map<std::string, std::vector<double>>& given, const FitOptions& options,
                 FitProblem& problem) {
+  require_effect(name, where);
+  if (const MeasurementEffectEntry* entry = measurement_effect_named(name)) {
+    return add_measurement_effect(*entry, where, given, options, problem);
+  }
   problem.cloth.add_effect(name, where);
   const EffectDescription& description = problem.cloth.effect_descriptions.back();
   const std::map<std::string, double> values = by_parameter(description, where, given);
@@ -280,6 +314,29 @@ void add_sheet_motion(FitProblem& problem) {
   };
   for (const char* name : {"sheet_turn_x", "sheet_turn_y", "sheet_turn_z"}) add(name, "rad", 0.1);
   for (const char* name : {"sheet_shift_x", "sheet_shift_y", "sheet_shift_z"}) add(name, "m", 0.05);
+}
+
+/// What is known of parameters from elsewhere.
+void add_given_priors(const FitOptions& options, FitProblem& problem) {
+  for (const ParameterPrior& prior : options.priors) {
+    const int p = problem.space.index(prior.name);
+    std::string names;
+    for (const FitParameter& parameter : problem.space.parameters)
+      if (parameter.role != ParameterRole::start)
+        names += (names.empty() ? "" : ", ") + parameter.name;
+    if (p < 0)
+      throw InputError("--prior", "the fit has no parameter '" + prior.name + "'",
+                       "one of " + names);
+    const FitParameter& parameter = problem.space.parameters[static_cast<size_t>(p)];
+    if (!(prior.mean >= parameter.lower && prior.mean <= parameter.upper))
+      throw InputError("--prior", fmt::format("{} = {:g}", prior.name, prior.mean),
+                       fmt::format("{:g} to {:g} ({}), where the fit looks", parameter.lower,
+                                   parameter.upper, parameter.unit));
+    problem.priors.push_back(
+        {.indices = {p},
+         .mean = Eigen::VectorXd::Constant(1, prior.mean),
+         .sqrt_information = Eigen::MatrixXd::Constant(1, 1, 1 / prior.sigma)});
+  }
 }
 
 Eigen::VectorXd spring_numbers(const FitProblem& problem, const Eigen::VectorXd& values) {
@@ -396,6 +453,7 @@ FitProblem make_problem(const FitInput& input, const FitOptions& options, int me
         problem.observations, problem.marker_place_m, problem.frame_time_s, problem.first_held_out,
         mesh, world_from_sheet, {.nodes = options.start_nodes}, problem.space, problem.priors);
   }
+  add_given_priors(options, problem);
   return problem;
 }
 
@@ -507,9 +565,9 @@ bool is_stable(const FitProblem& problem, const ParameterSet& set, const TimeSte
          (!rests || stable_rest_step_s(problem.cloth, set) >= steps.rest_s);
 }
 
-std::vector<std::vector<Eigen::Matrix3Xd>> run_model(const FitProblem& problem,
-                                                     const std::vector<Eigen::VectorXd>& values,
-                                                     int frames, const TimeSteps& steps) {
+std::vector<SimulateResult> run_model(const FitProblem& problem,
+                                      const std::vector<Eigen::VectorXd>& values, int frames,
+                                      const TimeSteps& steps, bool velocities) {
   std::vector<ParameterSet> sets;
   std::vector<size_t> owner;
   for (size_t n = 0; n < values.size(); ++n) {
@@ -518,18 +576,18 @@ std::vector<std::vector<Eigen::Matrix3Xd>> run_model(const FitProblem& problem,
     sets.push_back(std::move(set));
     owner.push_back(n);
   }
-  std::vector<std::vector<Eigen::Matrix3Xd>> trajectories(values.size());
-  if (sets.empty()) return trajectories;
+  std::vector<SimulateResult> runs(values.size(), {.reason = StopReason::diverged});
+  if (sets.empty()) return runs;
   if (problem.start == StartKind::at_rest)
     start_at_rest(problem.cloth, sets, problem.gravity_m_per_s2.norm(),
                   problem.frame_time_s.front(), steps.rest_s);
   const Schedule schedule{
       .frame_time_s = {problem.frame_time_s.begin(), problem.frame_time_s.begin() + frames},
-      .time_step_s = steps.run_s};
+      .time_step_s = steps.run_s,
+      .velocities = velocities};
   std::vector<SimulateResult> results = simulate(problem.cloth, sets, schedule);
-  for (size_t n = 0; n < results.size(); ++n)
-    if (results[n].usable()) trajectories[owner[n]] = std::move(results[n].position_m);
-  return trajectories;
+  for (size_t n = 0; n < results.size(); ++n) runs[owner[n]] = std::move(results[n]);
+  return runs;
 }
 
 }  // namespace clothfit

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <map>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -12,11 +13,14 @@
 #include "model/cloth.h"
 #include "model/fabric.h"
 #include "model/relax.h"
+#include "model/simulate.h"
 #include "model/spring_set.h"
 #include "model/surface.h"
 #include "model/tangent_step.h"
 
 namespace clothfit {
+
+class MeasurementEffect;
 
 /// A recording made ready to be fitted on one mesh: everything that stays the same while parameters
 /// change.
@@ -44,6 +48,12 @@ struct FitProblem {
   Eigen::Matrix<double, 3, 2> level_axes;
   std::vector<Binding> sheet_motion;  ///< of the placed sheet: turn (rad) and shift (m); or none
   std::vector<GaussianPrior> priors;
+  /// An effect of the measurement with its parameters, in the description's order.
+  struct MeasurementTerm {
+    std::shared_ptr<const MeasurementEffect> effect;
+    std::vector<Binding> parameters;
+  };
+  std::vector<MeasurementTerm> measurement;
   double marker_offset_sigma_m = 0;  ///< prior of fit/marker_offsets.h; 0: markers have none
 
   int frames() const { return static_cast<int>(frame_time_s.size()); }
@@ -67,10 +77,10 @@ std::vector<Direction> directions(const FitProblem& problem, const Eigen::Vector
 /// Whether a run of the model, and the relaxation of a start at rest, are stable at these steps.
 bool is_stable(const FitProblem& problem, const ParameterSet& set, const TimeSteps& steps);
 
-/// Simulated mesh positions in frames [0, frames) for each parameter vector; empty where the run
+/// The model's run through frames [0, frames) for each parameter vector; not usable where it
 /// diverged or the time steps would not be stable. A start at rest is relaxed first.
-std::vector<std::vector<Eigen::Matrix3Xd>> run_model(const FitProblem& problem,
-                                                     const std::vector<Eigen::VectorXd>& values,
-                                                     int frames, const TimeSteps& steps);
+std::vector<SimulateResult> run_model(const FitProblem& problem,
+                                      const std::vector<Eigen::VectorXd>& values, int frames,
+                                      const TimeSteps& steps, bool velocities = false);
 
 }  // namespace clothfit

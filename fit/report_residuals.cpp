@@ -77,18 +77,16 @@ void add_trivial_predictors(const FitProblem& problem, const ObservationSet& set
 
 }  // namespace
 
-void fill_residuals(const FitProblem& problem, const std::vector<Eigen::Matrix3Xd>& mesh_positions,
-                    const Eigen::Matrix3Xd& marker_offset_m, FitReport& report) {
-  std::vector<Eigen::Matrix3Xd> markers = marker_positions(problem.vertex_weights, mesh_positions);
-  if (marker_offset_m.cols() > 0)
-    for (Eigen::Matrix3Xd& positions : markers) positions += marker_offset_m;
+void fill_residuals(const FitProblem& problem, const Predictor& predictor, const MarkerRun& run,
+                    FitReport& report) {
   const auto frames = static_cast<size_t>(problem.frames());
-  for (const ObservationSet& set : problem.observations) {
+  for (size_t s = 0; s < problem.observations.size(); ++s) {
+    const ObservationSet& set = problem.observations[s];
     FitReport::Residuals residuals{.kind = set.kind, .unit = set.unit};
     Accumulator fitted, held_out;
     std::vector<Accumulator> by_frame(frames);
     for (const Observation& row : set.rows) {
-      const auto predicted = set.predict(markers[static_cast<size_t>(row.frame)].col(row.marker));
+      const auto predicted = predictor.predict(static_cast<int>(s), row, run);
       if (!predicted) continue;  // the model moved it behind the camera: no pixel to compare
       const bool is_held_out = row.frame >= problem.first_held_out;
       const Eigen::VectorXd difference = (*predicted - row.observed).head(set.dimension);

@@ -48,7 +48,8 @@ void make_exact(FitProblem& problem, unsigned seed) {
   const double time_step_s =
       stable_time_step_s(problem.cloth, parameter_set(problem, values)) / 1.5;
   const auto markers = marker_positions(
-      problem.vertex_weights, run_model(problem, {values}, problem.frames(), time_step_s).front());
+      problem.vertex_weights,
+      run_model(problem, {values}, problem.frames(), time_step_s).front().position_m);
   for (Observation& row : problem.observations.front().rows)
     row.observed = markers[static_cast<size_t>(row.frame)].col(row.marker);
 }

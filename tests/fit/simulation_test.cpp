@@ -203,7 +203,7 @@ TEST(Simulation, OfADescribedFitIsTheFitsOwn) {
     const Simulation simulation = make_simulation(describe_model(problem, input.recording, values));
 
     const SimulateResult result = run(simulation, time_step_s);
-    const auto own = run_model(problem, {values}, problem.frames(), time_step_s).front();
+    const auto own = run_model(problem, {values}, problem.frames(), time_step_s).front().position_m;
     ASSERT_FALSE(own.empty());
     // A pose is rounded on its way through a quaternion (1e-16), the path through a second spline
     // (1e-13 of its sizes), and half a second of motion multiplies that by a hundred or so.
@@ -227,7 +227,7 @@ TEST(Simulation, OfADescribedFitTouchesTheRecordingsObstacle) {
     values[problem.space.index("contact_mesh.stiffness")] = stiffness_pa_per_m;
     const double time_step_s =
         0.5 * stable_time_step_s(problem.cloth, parameter_set(problem, values));
-    const auto own = run_model(problem, {values}, problem.frames(), time_step_s).front();
+    const auto own = run_model(problem, {values}, problem.frames(), time_step_s).front().position_m;
     const Simulation simulation = make_simulation(describe_model(problem, input.recording, values));
     // As above, where the sheet's pose is rounded.
     EXPECT_LT(largest_difference_m(run(simulation, time_step_s).position_m, own), 1e-9);
@@ -273,7 +273,7 @@ TEST(Simulation, OfAFitOfThePapersSpringsIsTheFitsOwnFromItsFileToo) {
     EXPECT_EQ(to_vector(simulation.parameters.springs), to_vector(springs));
     EXPECT_EQ(simulation.cloth.strain_limit.mode, StrainLimitMode::positions);
     const SimulateResult result = run(simulation, time_step_s);
-    const auto own = run_model(problem, {values}, problem.frames(), time_step_s).front();
+    const auto own = run_model(problem, {values}, problem.frames(), time_step_s).front().position_m;
     ASSERT_FALSE(own.empty());
     EXPECT_LT(largest_difference_m(result.position_m, own), 1e-6);
     EXPECT_GT((own.back() - own.front()).norm(), 0.1);
@@ -295,7 +295,7 @@ TEST(Simulation, OfAFitThatBeginsInMotionIsTheFitsOwnToTheLastBit) {
 
   EXPECT_EQ(simulation.start, StartKind::unknown);
   const SimulateResult result = run(simulation, time_step_s);
-  const auto own = run_model(problem, {values}, problem.frames(), time_step_s).front();
+  const auto own = run_model(problem, {values}, problem.frames(), time_step_s).front().position_m;
   ASSERT_FALSE(own.empty());
   EXPECT_EQ(largest_difference_m(result.position_m, own), 0);
   // It moves at once: 1 m/s in the middle, for a sixtieth of a second.

@@ -70,8 +70,12 @@ FitInput synthetic_input(const SyntheticCloth& truth) {
   const Eigen::Matrix3Xd flat = flat_positions(mesh);
   parameters.start_position_m = Eigen::Vector3d::UnitX() * flat.row(0) + along_t * flat.row(1);
   Schedule schedule{.frame_time_s = {}, .time_step_s = 1.0 / 60 / 200};
-  for (int f = 0; f < truth.frames; ++f) schedule.frame_time_s.push_back(f / 60.0);
-  const SimulateResult run = simulate(cloth, {&parameters, 1}, schedule).front();
+  if (truth.clock_offset_s > 0) schedule.frame_time_s.push_back(0);
+  for (int f = 0; f < truth.frames; ++f)
+    schedule.frame_time_s.push_back(f / 60.0 + truth.clock_offset_s);
+  SimulateResult run = simulate(cloth, {&parameters, 1}, schedule).front();
+  if (truth.clock_offset_s > 0) run.position_m.erase(run.position_m.begin());
+  const Eigen::Vector3d middle = parameters.start_position_m.rowwise().mean();
 
   const Surface surface = make_surface(truth.mesh, truth.mesh, kSize, kSize, places);
   const CameraParameters camera = synthetic_camera();
@@ -82,7 +86,7 @@ FitInput synthetic_input(const SyntheticCloth& truth) {
   for (int f = 0; f < truth.frames; ++f) {
     const Eigen::Matrix3Xd seen = surface.evaluate(run.position_m[static_cast<size_t>(f)]);
     for (int m = 0; m < seen.cols(); ++m) {
-      const Eigen::Vector3d point = seen.col(m);
+      const Eigen::Vector3d point = middle + truth.scale * (seen.col(m) - middle);
       Eigen::Vector3d noise;
       for (double& coordinate : noise) coordinate = normal(generator);
       input.tracks3d.push_back({.frame = f,

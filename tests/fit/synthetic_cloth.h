@@ -22,6 +22,8 @@ struct SyntheticCloth {
   int held_out_from = 26;
   double noise_m = 5e-4;
   double noise_px = 0.3;
+  double clock_offset_s = 0;  ///< >= 0: frames show the cloth so much later than their time says
+  double scale = 1;           ///< of what is measured, about the sheet's middle
   unsigned seed = 1;
 };
 

@@ -1,0 +1,32 @@
+#include "fit/measurement_effects/clock_offset.h"
+
+namespace clothfit::clock_offset {
+namespace {
+
+class ClockOffset final : public MeasurementEffect {
+ public:
+  bool shifts_time() const override { return true; }
+
+  void shift_time(const Sighting&, Parameters p, MeasuredNumber& seen_s) const override {
+    seen_s += p[0];
+  }
+};
+
+}  // namespace
+
+EffectDescription describe() {
+  return {.name = "clock_offset",
+          .summary = "an observation of time t shows the cloth at t + time",
+          .parameters = {{.name = "time",
+                          .unit = "s",
+                          .neutral = 0,
+                          .lower = -0.2,
+                          .upper = 0.2,
+                          .typical = 1e-3}}};
+}
+
+std::unique_ptr<MeasurementEffect> make() {
+  return std::make_unique<ClockOffset>();
+}
+
+}  // namespace clothfit::clock_offset

@@ -1,0 +1,16 @@
+#pragma once
+
+#include <memory>
+
+#include "fit/measurement_effects/measurement_effect.h"
+#include "model/effects/effect.h"
+
+/// What is measured is larger than what is there, by a factor about the middle of the placed sheet:
+/// a calibration target whose squares are not as long as stated. Parameter: factor (1), neutral at
+/// 1. Ours.
+namespace clothfit::scale {
+
+EffectDescription describe();
+std::unique_ptr<MeasurementEffect> make();
+
+}  // namespace clothfit::scale

@@ -1,0 +1,190 @@
+#include "fit/predictor.h"
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+
+namespace clothfit {
+
+/// A time as weights on the frames of a run:
+/// x(t) = sum over k of  position[k] x(frame + k) + velocity[k] v(frame + k).
+struct Predictor::Instant {
+  struct Weights {
+    std::array<double, 2> position{}, velocity{};
+  };
+  size_t frame = 0;
+  Weights place, rate;  ///< of x and of dx/dt
+
+  Eigen::Vector3d of(const Weights& weights, const MarkerRun& run, int marker) const {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (size_t k = 0; k < 2; ++k) {
+      if (weights.position[k] != 0)
+        sum += weights.position[k] * run.position_m[frame + k].col(marker);
+      if (weights.velocity[k] != 0)
+        sum += weights.velocity[k] * run.velocity_m_per_s[frame + k].col(marker);
+    }
+    return sum;
+  }
+};
+
+/// Where a marker appears to be, with derivatives by where it is and by a group of parameters.
+struct Predictor::Sight {
+  Instant instant;
+  Eigen::Vector3d position_m;
+  Eigen::Matrix3d by_place;
+  Eigen::Matrix<double, 3, kParametersAtOnce> by_parameter;
+};
+
+MarkerRun marker_run(const FitProblem& problem, const SimulateResult& run) {
+  return {.position_m = marker_positions(problem.vertex_weights, run.position_m),
+          .velocity_m_per_s = marker_positions(problem.vertex_weights, run.velocity_m_per_s)};
+}
+
+Predictor::Predictor(const FitProblem& problem, const Eigen::VectorXd& values)
+    : problem_(problem), sheet_middle_m_(problem.placed_sheet_m.rowwise().mean()) {
+  Parameters constants;
+  struct Place {
+    size_t effect, parameter;
+  };
+  std::vector<Place> places;
+  for (size_t e = 0; e < problem.measurement.size(); ++e) {
+    const FitProblem::MeasurementTerm& term = problem.measurement[e];
+    needs_velocities_ = needs_velocities_ || term.effect->shifts_time();
+    constants.emplace_back();
+    for (size_t p = 0; p < term.parameters.size(); ++p) {
+      const Binding& binding = term.parameters[p];
+      constants.back().emplace_back(binding.value(values));
+      if (binding.parameter < 0) continue;
+      fitted_.push_back(binding.parameter);
+      places.push_back({e, p});
+    }
+  }
+  slope_ = problem.space.value_by_coordinate(values)(fitted_);
+  for (size_t first = 0; first < std::max<size_t>(1, places.size()); first += kParametersAtOnce) {
+    groups_.push_back(constants);
+    for (size_t n = first; n < std::min(places.size(), first + kParametersAtOnce); ++n)
+      groups_.back()[places[n].effect][places[n].parameter]
+          .v[static_cast<Eigen::Index>(kMeasuredPlace + n - first)] = 1;
+  }
+}
+
+MeasuredNumber Predictor::seen_s(const Sighting& sighting, const Parameters& parameters) const {
+  MeasuredNumber time_s(sighting.time_s);
+  for (size_t e = 0; e < parameters.size(); ++e)
+    problem_.measurement[e].effect->shift_time(sighting, parameters[e], time_s);
+  return time_s;
+}
+
+int Predictor::frames_to_run(int frames) const {
+  if (!needs_velocities_) return frames;
+  const std::vector<double>& frame_time_s = problem_.frame_time_s;
+  double last_s = frame_time_s[static_cast<size_t>(frames - 1)];
+  for (size_t s = 0; s < problem_.observations.size(); ++s) {
+    for (const Observation& row : problem_.observations[s].rows) {
+      if (row.frame >= frames) break;  // rows are sorted by frame
+      const Sighting sighting{.set = static_cast<int>(s),
+                              .marker = row.marker,
+                              .frame = row.frame,
+                              .time_s = frame_time_s[static_cast<size_t>(row.frame)],
+                              .sheet_middle_m = sheet_middle_m_};
+      last_s = std::max(last_s, seen_s(sighting, groups_.front()).a);
+    }
+  }
+  const auto enough = std::ranges::lower_bound(frame_time_s, last_s) - frame_time_s.begin() + 1;
+  return static_cast<int>(std::min<std::ptrdiff_t>(enough, problem_.frames()));
+}
+
+Predictor::Instant Predictor::instant(double time_s, size_t run_frames) const {
+  const std::vector<double>& frame_time_s = problem_.frame_time_s;
+  const auto end = frame_time_s.begin() + static_cast<std::ptrdiff_t>(run_frames);
+  const auto next = std::upper_bound(frame_time_s.begin(), end, time_s);
+  Instant at;
+  if (next == frame_time_s.begin() || next == end) {
+    const bool before = next == frame_time_s.begin();
+    at.frame = before ? 0 : run_frames - 1;
+    at.place.position[0] = 1;
+    if (before && problem_.start != StartKind::unknown) return at;
+    at.place.velocity[0] = time_s - frame_time_s[at.frame];
+    at.rate.velocity[0] = 1;
+    return at;
+  }
+  at.frame = static_cast<size_t>(next - frame_time_s.begin()) - 1;
+  const double h = *next - frame_time_s[at.frame];
+  const double u = (time_s - frame_time_s[at.frame]) / h;
+  at.place.position = {1 + u * u * (2 * u - 3), u * u * (3 - 2 * u)};
+  at.place.velocity = {h * u * (1 - u) * (1 - u), -h * u * u * (1 - u)};
+  at.rate.position = {-6 * u * (1 - u) / h, 6 * u * (1 - u) / h};
+  at.rate.velocity = {(1 - u) * (1 - 3 * u), u * (3 * u - 2)};
+  return at;
+}
+
+Predictor::Sight Predictor::sight(int set, const Observation& row, const MarkerRun& run,
+                                  const Parameters& parameters) const {
+  Sight result;
+  if (parameters.empty()) {
+    result.instant.frame = static_cast<size_t>(row.frame);
+    result.instant.place.position[0] = 1;
+    result.position_m = run.position_m[result.instant.frame].col(row.marker);
+    result.by_place.setIdentity();
+    return result;
+  }
+  const Sighting sighting{.set = set,
+                          .marker = row.marker,
+                          .frame = row.frame,
+                          .time_s = problem_.frame_time_s[static_cast<size_t>(row.frame)],
+                          .sheet_middle_m = sheet_middle_m_};
+  const MeasuredNumber time_s = seen_s(sighting, parameters);
+  if (needs_velocities_) {
+    result.instant = instant(time_s.a, run.position_m.size());
+  } else {
+    result.instant.frame = static_cast<size_t>(row.frame);
+    result.instant.place.position[0] = 1;
+  }
+  const Eigen::Vector3d place_m = result.instant.of(result.instant.place, run, row.marker);
+  const Eigen::Vector3d rate = result.instant.of(result.instant.rate, run, row.marker);
+  MeasuredPoint point;
+  for (int c = 0; c < 3; ++c) {
+    point[c] = MeasuredNumber(place_m[c], c);
+    point[c].v += rate[c] * time_s.v;
+  }
+  for (size_t e = 0; e < parameters.size(); ++e)
+    problem_.measurement[e].effect->move(sighting, parameters[e], point);
+  for (int c = 0; c < 3; ++c) {
+    result.position_m[c] = point[c].a;
+    result.by_place.row(c) = point[c].v.head<kMeasuredPlace>();
+    result.by_parameter.row(c) = point[c].v.tail<kParametersAtOnce>();
+  }
+  return result;
+}
+
+std::optional<Eigen::Vector3d> Predictor::predict(int set, const Observation& row,
+                                                  const MarkerRun& run) const {
+  const ObservationSet& observer = problem_.observations[static_cast<size_t>(set)];
+  return observer.predict(sight(set, row, run, groups_.front()).position_m);
+}
+
+std::optional<Eigen::Vector3d> Predictor::predict(
+    int set, const Observation& row, const MarkerRun& run, std::span<const MarkerRun> tangents,
+    Eigen::Ref<Eigen::Matrix3Xd> by_coordinate) const {
+  assert(static_cast<Eigen::Index>(tangents.size()) == by_coordinate.cols());
+  const ObservationSet& observer = problem_.observations[static_cast<size_t>(set)];
+  const Sight first = sight(set, row, run, groups_.front());
+  Eigen::Matrix3d by_position;
+  const auto predicted = observer.predict(first.position_m, &by_position);
+  if (!predicted) return std::nullopt;
+  const Eigen::Matrix3d by_place = by_position * first.by_place;
+  for (size_t p = 0; p < tangents.size(); ++p)
+    by_coordinate.col(static_cast<Eigen::Index>(p)) =
+        by_place * first.instant.of(first.instant.place, tangents[p], row.marker);
+  for (size_t group = 0; group < groups_.size(); ++group) {
+    const size_t begin = group * kParametersAtOnce;
+    const size_t end = std::min(fitted_.size(), begin + kParametersAtOnce);
+    const Sight seen = group == 0 ? first : sight(set, row, run, groups_[group]);
+    for (size_t n = begin; n < end; ++n)
+      by_coordinate.col(fitted_[n]) += slope_[static_cast<Eigen::Index>(n)] * by_position *
+                                       seen.by_parameter.col(static_cast<Eigen::Index>(n - begin));
+  }
+  return predicted;
+}
+
+}  // namespace clothfit

@@ -1,0 +1,69 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "fit/measurement_effects/measurement_effect.h"
+#include "fit/problem.h"
+
+namespace clothfit {
+
+/// How the markers of a run of the model moved: 3 x markers in each of its frames (m, world);
+/// velocities where they were asked for.
+struct MarkerRun {
+  std::vector<Eigen::Matrix3Xd> position_m, velocity_m_per_s;
+};
+
+MarkerRun marker_run(const FitProblem& problem, const SimulateResult& run);
+
+/// What the observations of a problem should be, for values of its parameters, given how the
+/// markers of the model moved: seen when and where the effects of the measurement say
+/// (fit/measurement_effects), by the observer of their set.
+///
+/// Between frames markers follow the cubic through the places and velocities at both (Hermite;
+/// error O(interval^4)), after the last one they go straight on. Before the first one cloth is
+/// where it starts, or, where it starts in motion, has come straight.
+class Predictor {
+ public:
+  /// `problem` must outlive it.
+  Predictor(const FitProblem& problem, const Eigen::VectorXd& values);
+
+  /// Whether it looks between frames and so asks for the markers' velocities.
+  bool needs_velocities() const { return needs_velocities_; }
+
+  /// How many frames a run must have for the observations before frame `frames`.
+  int frames_to_run(int frames) const;
+
+  /// Nothing behind a camera. A pixel's third number is 0.
+  std::optional<Eigen::Vector3d> predict(int set, const Observation& row,
+                                         const MarkerRun& run) const;
+
+  /// The same with its derivatives by the space's coordinates, 3 x coordinates, from those of the
+  /// markers' motion. Velocities of `tangents` are looked at where those of `run` are.
+  std::optional<Eigen::Vector3d> predict(int set, const Observation& row, const MarkerRun& run,
+                                         std::span<const MarkerRun> tangents,
+                                         Eigen::Ref<Eigen::Matrix3Xd> by_coordinate) const;
+
+ private:
+  struct Instant;
+  struct Sight;
+  using Parameters = std::vector<std::vector<MeasuredNumber>>;  ///< [effect][parameter]
+
+  MeasuredNumber seen_s(const Sighting& sighting, const Parameters& parameters) const;
+  Instant instant(double time_s, size_t run_frames) const;
+  Sight sight(int set, const Observation& row, const MarkerRun& run,
+              const Parameters& parameters) const;
+
+  const FitProblem& problem_;
+  bool needs_velocities_ = false;
+  Eigen::Vector3d sheet_middle_m_;
+  /// Which parameters of the fit are the measurement's, and d value / d coordinate of these. Their
+  /// derivatives are carried in groups; there is one group at least.
+  std::vector<int> fitted_;
+  Eigen::VectorXd slope_;
+  std::vector<Parameters> groups_;
+};
+
+}  // namespace clothfit

@@ -1,0 +1,107 @@
+// When and where observations see the markers of a run. What each effect of the measurement does is
+// in measurement_effects/; derivatives of whole residuals in objective_test.cpp.
+#include "fit/predictor.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "data/input_error.h"
+#include "synthetic_cloth.h"
+
+namespace clothfit {
+namespace {
+
+FitProblem problem_with(const std::vector<std::string>& effects) {
+  return make_problem(synthetic_input({.frames = 8, .held_out_from = 8}), {.effects = effects}, 9,
+                      9);
+}
+
+/// Every marker on one cubic in time, with its velocity.
+MarkerRun cubic_run(const FitProblem& problem, int frames) {
+  MarkerRun run;
+  const auto markers = problem.marker_place_m.cols();
+  for (int f = 0; f < frames; ++f) {
+    const double t = problem.frame_time_s[static_cast<size_t>(f)];
+    const Eigen::Vector3d at(t * t * t, 1 - 2 * t * t, 3 * t);
+    const Eigen::Vector3d speed(3 * t * t, -4 * t, 3);
+    run.position_m.push_back(at.replicate(1, markers));
+    run.velocity_m_per_s.push_back(speed.replicate(1, markers));
+  }
+  return run;
+}
+
+Eigen::VectorXd with_offset(const FitProblem& problem, double offset_s) {
+  Eigen::VectorXd values = problem.space.start();
+  values[problem.space.index("clock_offset.time")] = offset_s;
+  return values;
+}
+
+TEST(Predictor, WithoutMeasurementEffectsSeesTheMarkerAtItsFrame) {
+  const FitProblem problem = problem_with({});
+  const MarkerRun run = cubic_run(problem, 8);
+  const Predictor predictor(problem, problem.space.start());
+
+  EXPECT_FALSE(predictor.needs_velocities());
+  EXPECT_EQ(predictor.frames_to_run(5), 5);
+  for (const Observation& row : problem.observations[0].rows)
+    EXPECT_EQ(*predictor.predict(0, row, run),
+              run.position_m[static_cast<size_t>(row.frame)].col(row.marker));
+}
+
+TEST(Predictor, FollowsACubicExactlyBetweenFrames) {
+  const FitProblem problem = problem_with({"clock_offset"});
+  const MarkerRun run = cubic_run(problem, 8);
+  for (const double offset_s : {0.0, 1e-3, 0.4 / 60, 1.7 / 60}) {
+    const Predictor predictor(problem, with_offset(problem, offset_s));
+    ASSERT_TRUE(predictor.needs_velocities());
+    for (const Observation& row : problem.observations[0].rows) {
+      const double t = problem.frame_time_s[static_cast<size_t>(row.frame)] + offset_s;
+      if (t > problem.frame_time_s.back()) continue;
+      const Eigen::Vector3d at(t * t * t, 1 - 2 * t * t, 3 * t);
+      EXPECT_LT((*predictor.predict(0, row, run) - at).norm(), 1e-14);
+    }
+  }
+}
+
+TEST(Predictor, StandsBeforeTheFirstFrameAndGoesStraightAfterTheLast) {
+  // Given a cloth let go flat, whose markers would fly at 3 m/s from the first frame on
+  const FitProblem problem = problem_with({"clock_offset"});
+  const MarkerRun run = cubic_run(problem, 8);
+  const Observation first{.frame = 0, .marker = 0}, last{.frame = 7, .marker = 0};
+
+  const Predictor early(problem, with_offset(problem, -0.01));
+  EXPECT_EQ(*early.predict(0, first, run), run.position_m[0].col(0));
+
+  const Predictor late(problem, with_offset(problem, 0.01));
+  const Eigen::Vector3d straight_on =
+      run.position_m[7].col(0) + 0.01 * run.velocity_m_per_s[7].col(0);
+  EXPECT_LT((*late.predict(0, last, run) - straight_on).norm(), 1e-15);
+}
+
+TEST(Predictor, RunsOnToTheFrameAfterTheLastOneLookedAt) {
+  const FitProblem problem = problem_with({"clock_offset"});
+  const auto frames = [&](double offset_s) {
+    return Predictor(problem, with_offset(problem, offset_s)).frames_to_run(4);
+  };
+  EXPECT_EQ(frames(0), 4);
+  EXPECT_EQ(frames(0.5 / 60), 5);
+  EXPECT_EQ(frames(1.5 / 60), 6);
+  EXPECT_EQ(frames(-0.5 / 60), 4);
+  EXPECT_EQ(frames(1), 8);  // there are no more
+}
+
+TEST(Predictor, RefusesUnknownEffectsWithTheNamesOfBothKinds) {
+  try {
+    problem_with({"clock_ofset"});
+    FAIL() << "not refused";
+  } catch (const InputError& error) {
+    const std::string text = error.what();
+    EXPECT_NE(text.find("no effect 'clock_ofset'"), std::string::npos) << text;
+    EXPECT_NE(text.find("viscous_damping"), std::string::npos) << text;
+    EXPECT_NE(text.find("clock_offset"), std::string::npos) << text;
+  }
+}
+
+}  // namespace
+}  // namespace clothfit
