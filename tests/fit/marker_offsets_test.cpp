@@ -149,14 +149,7 @@ TEST(MarkerOffsets, AreEstimatedFromTheFittedFramesAlone) {
 }
 
 std::map<std::string, double> true_values() {
-  const Fabric truth = SyntheticCloth{}.fabric;
-  return {{"tension_warp", truth.tension_warp_n_per_m},
-          {"tension_weft", truth.tension_weft_n_per_m},
-          {"shear", truth.shear_n_per_m},
-          {"flexion_warp", truth.flexion_warp_n_per_m},
-          {"flexion_weft", truth.flexion_weft_n_per_m},
-          {"damping_warp", truth.damping_warp_s},
-          {"damping_weft", truth.damping_weft_s}};
+  return named(SyntheticCloth{}.fabric);
 }
 
 /// How far the worst of the five stiffnesses ends from the truth, as a logarithm, from a start that

@@ -21,20 +21,11 @@ SyntheticCloth tiny(unsigned seed) {
 }
 
 std::map<std::string, double> truth() {
-  const Fabric fabric = SyntheticCloth{}.fabric;
-  return {{"tension_warp", fabric.tension_warp_n_per_m},
-          {"tension_weft", fabric.tension_weft_n_per_m},
-          {"shear", fabric.shear_n_per_m},
-          {"flexion_warp", fabric.flexion_warp_n_per_m},
-          {"flexion_weft", fabric.flexion_weft_n_per_m},
-          {"damping_warp", fabric.damping_warp_s},
-          {"damping_weft", fabric.damping_weft_s}};
+  return named(SyntheticCloth{}.fabric);
 }
 
 Eigen::VectorXd true_values(const FitProblem& problem) {
-  Eigen::VectorXd values = problem.space.start();
-  for (const auto& [name, value] : truth()) values[problem.space.index(name)] = value;
-  return values;
+  return start_with(problem, SyntheticCloth{}.fabric);
 }
 
 /// The problem's observations without noise: where the model with the true fabric has the markers,

@@ -27,19 +27,7 @@ SyntheticCloth tiny(unsigned seed, int frames = 20) {
 }
 
 Eigen::VectorXd true_values(const FitProblem& problem) {
-  const Fabric fabric = SyntheticCloth{}.fabric;
-  Eigen::VectorXd values = problem.space.start();
-  const auto set = [&](const char* name, double value) {
-    values[problem.space.index(name)] = value;
-  };
-  set("tension_warp", fabric.tension_warp_n_per_m);
-  set("tension_weft", fabric.tension_weft_n_per_m);
-  set("shear", fabric.shear_n_per_m);
-  set("flexion_warp", fabric.flexion_warp_n_per_m);
-  set("flexion_weft", fabric.flexion_weft_n_per_m);
-  set("damping_warp", fabric.damping_warp_s);
-  set("damping_weft", fabric.damping_weft_s);
-  return values;
+  return start_with(problem, SyntheticCloth{}.fabric);
 }
 
 /// A problem with windows that begin with the states of its own run at the truth, and observations

@@ -64,20 +64,7 @@ struct DenseRecording {
       }
   }
 
-  Eigen::VectorXd true_values() const {
-    Eigen::VectorXd values = problem.space.start();
-    const auto set = [&](const char* name, double value) {
-      values[problem.space.index(name)] = value;
-    };
-    set("tension_warp", kFabric.tension_warp_n_per_m);
-    set("tension_weft", kFabric.tension_weft_n_per_m);
-    set("shear", kFabric.shear_n_per_m);
-    set("flexion_warp", kFabric.flexion_warp_n_per_m);
-    set("flexion_weft", kFabric.flexion_weft_n_per_m);
-    set("damping_warp", kFabric.damping_warp_s);
-    set("damping_weft", kFabric.damping_weft_s);
-    return values;
-  }
+  Eigen::VectorXd true_values() const { return start_with(problem, kFabric); }
 };
 
 /// Largest errors of a coordinate, 0.2 s from the tracks' ends and further.
