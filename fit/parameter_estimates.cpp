@@ -84,6 +84,7 @@ void explain_by_correlation(const ParameterSpace& space, const Uncertainty& unce
   std::string name = alike.name;
   if (alike.role == ParameterRole::nuisance) name += " (how the scene was placed)";
   if (alike.role == ParameterRole::start) name += " (where the cloth was at the start)";
+  if (alike.role == ParameterRole::drive) name += " (how the drive was measured)";
   parameter.reason +=
       fmt::format("; it can hardly be told from {} (correlation {:.3f})", name, correlation);
 }
@@ -162,7 +163,7 @@ void fill_parameters(const FitProblem& problem, const FitOptions& options,
 
   for (int p = 0; p < problem.space.size(); ++p) {
     const FitParameter& parameter = problem.space.parameters[static_cast<size_t>(p)];
-    if (parameter.role == ParameterRole::effect || parameter.role == ParameterRole::start) continue;
+    if (parameter.role == ParameterRole::effect || !is_listed(parameter.role)) continue;
     auto& list = parameter.role == ParameterRole::springs ? result.parameters : result.nuisance;
     list.push_back(estimate_of(p, parameter.name));
   }

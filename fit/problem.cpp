@@ -282,6 +282,20 @@ void add_sheet_motion(FitProblem& problem) {
   for (const char* name : {"sheet_shift_x", "sheet_shift_y", "sheet_shift_z"}) add(name, "m", 0.05);
 }
 
+void add_drive_correction(const std::vector<TrackedPoint>& tracked, const Recording& recording,
+                          const FitOptions& options, FitProblem& problem) {
+  if (options.drive_knots == 0) return;
+  if (tracked.empty())
+    throw InputError("--drive-knots",
+                     "no held point of " + recording_file(recording) + " is tracked",
+                     "a held point with motion: tracked",
+                     "leave it out: fixed points and known paths have no noise");
+  const auto last = static_cast<size_t>(problem.first_held_out - 1);
+  problem.drive_correction =
+      make_drive_correction(tracked, problem.frame_time_s.front(), problem.frame_time_s[last],
+                            options.drive_knots, recording.markers, problem.space, problem.priors);
+}
+
 Eigen::VectorXd spring_numbers(const FitProblem& problem, const Eigen::VectorXd& values) {
   Eigen::VectorXd numbers(static_cast<Eigen::Index>(problem.spring_numbers.size()));
   for (size_t n = 0; n < problem.spring_numbers.size(); ++n)
@@ -396,6 +410,7 @@ FitProblem make_problem(const FitInput& input, const FitOptions& options, int me
         problem.observations, problem.marker_place_m, problem.frame_time_s, problem.first_held_out,
         mesh, world_from_sheet, {.nodes = options.start_nodes}, problem.space, problem.priors);
   }
+  if (!options.forecast) add_drive_correction(drive.tracked, recording, options, problem);
   return problem;
 }
 
@@ -430,6 +445,8 @@ ParameterSet parameter_set(const FitProblem& problem, const Eigen::VectorXd& val
       set.start_position_m.col(v) =
           turned(turn, problem.placed_sheet_m.col(v) - middle).value + middle + shift;
   }
+  if (!problem.drive_correction.points.empty())
+    set.held_shift = drive_shifts(problem.drive_correction, values, problem.cloth.held.size());
   return set;
 }
 
@@ -496,6 +513,16 @@ std::vector<Direction> directions(const FitProblem& problem, const Eigen::Vector
         along(shifting).start_position_m.col(v) =
             slope[shifting.parameter] * Eigen::Vector3d::Unit(column);
       }
+    }
+  }
+  for (const DriveCorrection::Point& point : problem.drive_correction.points) {
+    for (size_t n = 0; n < point.values.size(); ++n) {
+      Direction& direction = along(point.values[n]);
+      direction.held_motion.resize(problem.cloth.held.size());
+      direction.held_motion[static_cast<size_t>(point.held)] =
+          drive_shift_by_value(problem.drive_correction, static_cast<int>(n) / 3,
+                               slope[point.values[n].parameter] *
+                                   Eigen::Vector3d::Unit(static_cast<Eigen::Index>(n) % 3));
     }
   }
   return result;
