@@ -143,6 +143,7 @@ std::string command_text(const FitVerbOptions& options, const FitFlags& flags) {
   if (options.fit.stop_cost) text += fmt::format(" --stop-cost {}", *options.fit.stop_cost);
   add("--search-share", options.fit.search_share, defaults.search_share);
   add("--marker-offsets", options.fit.marker_offset_sigma_m, defaults.marker_offset_sigma_m);
+  add("--drive-knots", options.fit.drive_knots, defaults.drive_knots);
   add("--start-nodes", options.fit.start_nodes, defaults.start_nodes);
   add("--work", options.fit.work, defaults.work);
   add("--substep-scale", options.fit.substep_scale, defaults.substep_scale);
@@ -261,6 +262,11 @@ void add_fit_verb(CLI::App& program, VerbAction& action) {
                    "Let every marker be seen beside its place by a constant, with this standard "
                    "deviation: 0.01 or 10mm; 0 for none")
       ->transform(length_in_metres());
+  verb->add_option("--drive-knots", options->fit.drive_knots,
+                   "Fit what the measured motion of tracked held points is off by, at so many "
+                   "knots over the fitted frames; 0 takes the smoothed tracks as exact")
+      ->type_name("N")
+      ->capture_default_str();
   verb->add_option(
           "--cost", flags->cost,
           "What leads to where the trajectory's cost takes over: the trajectory's own after "

@@ -16,9 +16,8 @@ std::string place_text(const Eigen::Vector2d& at_m) {
   return "(" + std::to_string(at_m.x()) + ", " + std::to_string(at_m.y()) + ")";
 }
 
-std::function<Eigen::Vector3d(double)> follow(SmoothingSpline spline) {
-  const auto shared = std::make_shared<const SmoothingSpline>(std::move(spline));
-  return [shared](double time_s) { return Eigen::Vector3d(shared->position(time_s)); };
+std::function<Eigen::Vector3d(double)> follow(std::shared_ptr<const SmoothingSpline> spline) {
+  return [spline](double time_s) { return Eigen::Vector3d(spline->position(time_s)); };
 }
 
 std::function<Eigen::Vector3d(double)> follow_path(const HeldPath& path) {
@@ -26,12 +25,13 @@ std::function<Eigen::Vector3d(double)> follow_path(const HeldPath& path) {
   for (size_t n = 0; n < path.position_m.size(); ++n)
     samples.col(static_cast<Eigen::Index>(n)) = path.position_m[n];
   // A known path is not noisy: the spline goes through every sample.
-  return follow(
-      fit_smoothing_spline(path.time_s, samples, {}, {.smoothing = 1e-30, .robust = false}));
+  return follow(std::make_shared<const SmoothingSpline>(
+      fit_smoothing_spline(path.time_s, samples, {}, {.smoothing = 1e-30, .robust = false})));
 }
 
-SmoothingSpline smooth_track(const Recording& recording, int marker, const Tracks3d& tracks,
-                             const std::vector<double>& frame_time_s) {
+TrackedPoint smooth_track(const Recording& recording, int marker, const Tracks3d& tracks,
+                          const std::vector<double>& frame_time_s) {
+  TrackedPoint point{.held = 0, .marker = marker, .path = {}, .sigma = {}};
   std::vector<double> time_s;
   std::vector<Eigen::Vector3d> places;
   std::vector<double> sigma;
@@ -53,7 +53,11 @@ SmoothingSpline smooth_track(const Recording& recording, int marker, const Track
   Eigen::MatrixXd samples(3, static_cast<Eigen::Index>(places.size()));
   for (size_t n = 0; n < places.size(); ++n) samples.col(static_cast<Eigen::Index>(n)) = places[n];
   if (!all_stated) sigma.clear();
-  return fit_smoothing_spline(time_s, samples, sigma);
+  point.path =
+      std::make_shared<const SmoothingSpline>(fit_smoothing_spline(time_s, samples, sigma));
+  for (size_t n = 0; n < sigma.size(); ++n)
+    if (!point.path->outlier[n]) point.sigma.push_back(sigma[n]);
+  return point;
 }
 
 int marker_at(const Recording& recording, const Eigen::Vector2d& at_m) {
@@ -103,8 +107,11 @@ Drive make_drive(const Recording& recording, const Mesh& mesh, const Tracks3d& t
     hold(point, nullptr, mesh, drive.held);
     if (point.motion == HeldMotion::tracked) {
       const int marker = marker_at(recording, point.at_m);
-      drive.held.back().motion = follow(smooth_track(recording, marker, tracks, frame_time_s));
+      TrackedPoint tracked = smooth_track(recording, marker, tracks, frame_time_s);
+      tracked.held = static_cast<int>(drive.held.size()) - 1;
+      drive.held.back().motion = follow(tracked.path);
       drive.driving_markers.push_back(marker);
+      drive.tracked.push_back(std::move(tracked));
     }
   }
   return drive;

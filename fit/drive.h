@@ -1,17 +1,28 @@
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include "data/recording.h"
 #include "data/tracks.h"
+#include "fit/smoothing_spline.h"
 #include "model/cloth.h"
 
 namespace clothfit {
+
+/// A held point that follows its marker's measured track.
+struct TrackedPoint {
+  int held = 0;                                 ///< index into Drive::held
+  int marker = 0;                               ///< that lies at the point
+  std::shared_ptr<const SmoothingSpline> path;  ///< through the marker's track
+  std::vector<double> sigma;  ///< that the path's samples, its knots, were given; empty: all alike
+};
 
 /// The prescribed points of a recording's cloth on a mesh, with their motion.
 struct Drive {
   std::vector<HeldVertexWeights> held;
   std::vector<int> driving_markers;  ///< markers whose own track drives a held point
+  std::vector<TrackedPoint> tracked;
 };
 
 /// Adds a point or an edge that stays where the start shape has it or, where `path` is given,

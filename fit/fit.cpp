@@ -63,12 +63,12 @@ FurtherLooks look_further(const FitInput& input, const TrajectoryObjective& obje
   return looks;
 }
 
-/// Of all parameters but those of the start, of which there may be hundreds.
+/// Of all parameters that reports list.
 void fill_correlation(const ParameterSpace& space, const Uncertainty& uncertainty,
                       FitReport& report) {
   std::vector<int> shown;
   for (int p = 0; p < space.size(); ++p) {
-    if (space.parameters[static_cast<size_t>(p)].role == ParameterRole::start) continue;
+    if (!is_listed(space.parameters[static_cast<size_t>(p)].role)) continue;
     shown.push_back(p);
     report.correlation_names.push_back(space.parameters[static_cast<size_t>(p)].name);
   }
@@ -153,6 +153,18 @@ Eigen::Matrix3Xd marker_offsets(const FitProblem& problem, const MarkerSet& mark
   return offset_m;
 }
 
+/// What the fit made of the drive's noise, as a line of the report.
+std::string drive_line(const FitProblem& problem, const Eigen::VectorXd& values) {
+  const DriveCorrection& correction = problem.drive_correction;
+  const std::vector<double> fitted(problem.frame_time_s.begin(),
+                                   problem.frame_time_s.begin() + problem.first_held_out);
+  return fmt::format(
+      "drive corrected at {} knots for each of {} tracked points: {:.2g} mm rms per coordinate "
+      "over the fitted frames, {:.2g} mm foreseen from the tracks' noise",
+      correction.knots(), correction.points.size(),
+      1e3 * rms_correction_m(correction, values, fitted), 1e3 * correction.prior_rms_m);
+}
+
 FitReport stopped(FitReport report, FitStop stop, const std::string& message) {
   report.stop = stop;
   report.message = message;
@@ -184,12 +196,15 @@ void FitOptions::validate() const {
           "a length in metres, 0 (none) or more");
   require(marker_offset_sigma_m == 0 || !forecast, "marker-offsets",
           "a fit: a forecast takes those of the earlier one");
+  require(drive_knots == 0 || (drive_knots >= 4 && drive_knots <= 1000), "drive-knots",
+          "4 to 1000 knots, or 0 (none)");
   require(work > 0 && std::isfinite(work), "work", "more than 0");
   require(bootstrap == 0 || (bootstrap >= 19 && bootstrap <= 100000), "bootstrap",
           "19 to 100000 replicates");
   const auto need_a_fit = [&](bool asked, const std::string& name) {
     require(!asked || !forecast, name, "a fit: without --forecast");
   };
+  need_a_fit(drive_knots > 0, "drive-knots");
   need_a_fit(profile, "profile");
   need_a_fit(bootstrap > 0, "bootstrap");
   need_a_fit(two_meshes, "two-meshes");
@@ -254,6 +269,8 @@ FitReport fit(const FitInput& input, const FitOptions& options, const ProgressCa
     fill_correlation(problem.space, uncertainty, report);
     result.basins = basins_of(problem.space, std::move(candidates), values, uncertainty);
     add_uncertainty(problem, values, uncertainty, report);
+    if (!problem.drive_correction.points.empty())
+      report.stages.push_back(drive_line(problem, values));
     bool cancelled = false;
     const ProgressCallback watched = [&](const Progress& now) {
       cancelled = cancelled || (progress && !progress(now));

@@ -80,6 +80,9 @@ struct FitOptions {
   int start_nodes = 6;  ///< per side, of the corrections of a start that is unknown
   /// Standard deviation of constant offsets of the markers (fit/marker_offsets.h); 0: none.
   double marker_offset_sigma_m = 0;
+  /// Knots of the corrections of tracked held points (fit/drive_correction.h), 4 to 1000; 0: the
+  /// smoothed tracks are taken as exact. Each costs three directions of derivatives a point.
+  int drive_knots = 0;
   double work = 1;           ///< > 0; times the limits of work of the refinement's stages
   double substep_scale = 1;  ///< >= 1; more cuts time finer than stability asks
   bool profile = false;      ///< intervals from the profiled cost where it is no parabola

@@ -85,7 +85,9 @@ void explain_by_correlation(const ParameterSpace& space, const Uncertainty& unce
   if (alike.role == ParameterRole::nuisance)
     name += alike.name.find('.') != std::string::npos ? " (how it was measured)"
                                                       : " (how the scene was placed)";
+  if (alike.role == ParameterRole::drive) name += " (what a drive's track is off by)";
   if (alike.role == ParameterRole::start) name += " (where the cloth was at the start)";
+  if (alike.role == ParameterRole::drive) name += " (how the drive was measured)";
   parameter.reason +=
       fmt::format("; it can hardly be told from {} (correlation {:.3f})", name, correlation);
 }
@@ -164,7 +166,7 @@ void fill_parameters(const FitProblem& problem, const FitOptions& options,
 
   for (int p = 0; p < problem.space.size(); ++p) {
     const FitParameter& parameter = problem.space.parameters[static_cast<size_t>(p)];
-    if (parameter.role == ParameterRole::effect || parameter.role == ParameterRole::start) continue;
+    if (parameter.role == ParameterRole::effect || !is_listed(parameter.role)) continue;
     auto& list = parameter.role == ParameterRole::springs ? result.parameters : result.nuisance;
     list.push_back(estimate_of(p, parameter.name));
   }

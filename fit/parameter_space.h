@@ -9,13 +9,18 @@
 
 namespace clothfit {
 
-/// What a parameter is of: the fabric's springs, an effect, how things were measured, or where the
-/// cloth was when the recording began.
-enum class ParameterRole { springs, effect, nuisance, start };
+/// What a parameter is of: the fabric's springs, an effect, how things were measured, where the
+/// cloth was when the recording began, or what the measured motion of its held points was off by.
+enum class ParameterRole { springs, effect, nuisance, start, drive };
 
 /// Whether it says something of the cloth's physics, which is what searches look for.
 inline bool is_physical(ParameterRole role) {
   return role == ParameterRole::springs || role == ParameterRole::effect;
+}
+
+/// Whether reports list it: of a start or of a drive there may be hundreds.
+inline bool is_listed(ParameterRole role) {
+  return role != ParameterRole::start && role != ParameterRole::drive;
 }
 
 /// A number that a fit may change.

@@ -322,8 +322,7 @@ void add_given_priors(const FitOptions& options, FitProblem& problem) {
     const int p = problem.space.index(prior.name);
     std::string names;
     for (const FitParameter& parameter : problem.space.parameters)
-      if (parameter.role != ParameterRole::start)
-        names += (names.empty() ? "" : ", ") + parameter.name;
+      if (is_listed(parameter.role)) names += (names.empty() ? "" : ", ") + parameter.name;
     if (p < 0)
       throw InputError("--prior", "the fit has no parameter '" + prior.name + "'",
                        "one of " + names);
@@ -337,6 +336,20 @@ void add_given_priors(const FitOptions& options, FitProblem& problem) {
          .mean = Eigen::VectorXd::Constant(1, prior.mean),
          .sqrt_information = Eigen::MatrixXd::Constant(1, 1, 1 / prior.sigma)});
   }
+}
+
+void add_drive_correction(const std::vector<TrackedPoint>& tracked, const Recording& recording,
+                          const FitOptions& options, FitProblem& problem) {
+  if (options.drive_knots == 0) return;
+  if (tracked.empty())
+    throw InputError("--drive-knots",
+                     "no held point of " + recording_file(recording) + " is tracked",
+                     "a held point with motion: tracked",
+                     "leave it out: fixed points and known paths have no noise");
+  const auto last = static_cast<size_t>(problem.first_held_out - 1);
+  problem.drive_correction =
+      make_drive_correction(tracked, problem.frame_time_s.front(), problem.frame_time_s[last],
+                            options.drive_knots, recording.markers, problem.space, problem.priors);
 }
 
 Eigen::VectorXd spring_numbers(const FitProblem& problem, const Eigen::VectorXd& values) {
@@ -453,6 +466,7 @@ FitProblem make_problem(const FitInput& input, const FitOptions& options, int me
         problem.observations, problem.marker_place_m, problem.frame_time_s, problem.first_held_out,
         mesh, world_from_sheet, {.nodes = options.start_nodes}, problem.space, problem.priors);
   }
+  if (!options.forecast) add_drive_correction(drive.tracked, recording, options, problem);
   add_given_priors(options, problem);
   return problem;
 }
@@ -488,6 +502,8 @@ ParameterSet parameter_set(const FitProblem& problem, const Eigen::VectorXd& val
       set.start_position_m.col(v) =
           turned(turn, problem.placed_sheet_m.col(v) - middle).value + middle + shift;
   }
+  if (!problem.drive_correction.points.empty())
+    set.held_shift = drive_shifts(problem.drive_correction, values, problem.cloth.held.size());
   return set;
 }
 
@@ -554,6 +570,16 @@ std::vector<Direction> directions(const FitProblem& problem, const Eigen::Vector
         along(shifting).start_position_m.col(v) =
             slope[shifting.parameter] * Eigen::Vector3d::Unit(column);
       }
+    }
+  }
+  for (const DriveCorrection::Point& point : problem.drive_correction.points) {
+    for (size_t n = 0; n < point.values.size(); ++n) {
+      Direction& direction = along(point.values[n]);
+      direction.held_motion.resize(problem.cloth.held.size());
+      direction.held_motion[static_cast<size_t>(point.held)] =
+          drive_shift_by_value(problem.drive_correction, static_cast<int>(n) / 3,
+                               slope[point.values[n].parameter] *
+                                   Eigen::Vector3d::Unit(static_cast<Eigen::Index>(n) % 3));
     }
   }
   return result;

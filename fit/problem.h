@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "fit/drive.h"
+#include "fit/drive_correction.h"
 #include "fit/fit.h"
 #include "fit/observations.h"
 #include "fit/parameter_space.h"
@@ -47,6 +48,7 @@ struct FitProblem {
   std::vector<Binding> tilt;                  ///< rotation of gravity about two level axes; or none
   Eigen::Matrix<double, 3, 2> level_axes;
   std::vector<Binding> sheet_motion;  ///< of the placed sheet: turn (rad) and shift (m); or none
+  DriveCorrection drive_correction;   ///< of tracked held points; or none
   std::vector<GaussianPrior> priors;
   /// An effect of the measurement with its parameters, in the description's order.
   struct MeasurementTerm {

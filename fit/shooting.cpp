@@ -7,6 +7,7 @@
 #include <cassert>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "data/input_error.h"
 #include "fit/node_weights.h"
@@ -160,6 +161,7 @@ ShootingObjective::Model ShootingObjective::model_at(const Eigen::VectorXd& valu
     if (held[h].motion) continue;
     const Eigen::Vector3d place = model.fixed_place_m.col(static_cast<Eigen::Index>(h));
     held[h].motion = [place](double) { return place; };
+    if (!model.set.held_shift.empty()) model.set.held_shift[h] = nullptr;
   }
   for (const Direction& direction : model.along) {
     Eigen::Matrix3Xd change = Eigen::Matrix3Xd::Zero(3, model.fixed_place_m.cols());
@@ -194,8 +196,11 @@ std::vector<Direction> ShootingObjective::begin(int window, const Eigen::VectorX
   Eigen::Matrix3Xd place_m(3, held), velocity_m_per_s(3, held);
   for (Eigen::Index h = 0; h < held; ++h) {
     const auto& motion = model.cloth_of_later.held[static_cast<size_t>(h)].motion;
-    place_m.col(h) = motion(time_s);
-    velocity_m_per_s.col(h) = (place_m.col(h) - motion(time_s - time_step_s())) / time_step_s();
+    const auto place_at = [&](double at_s) {
+      return shifted(motion(at_s), model.set, static_cast<size_t>(h), at_s);
+    };
+    place_m.col(h) = place_at(time_s);
+    velocity_m_per_s.col(h) = (place_m.col(h) - place_at(time_s - time_step_s())) / time_step_s();
   }
   const auto with_held = [&](const Eigen::Matrix3Xd& field, const Eigen::Matrix3Xd& at_held) {
     return Eigen::Matrix3Xd(field +
@@ -214,15 +219,26 @@ std::vector<Direction> ShootingObjective::begin(int window, const Eigen::VectorX
     still.effects.emplace_back(effect.size(), 0.0);
   for (size_t d = 0; d < model.along.size(); ++d) {
     Direction& direction = model.along[d];
-    const Eigen::Matrix3Xd& change = model.fixed_place_along_m[d];
-    direction.start_position_m = change * held_move_.transpose();
+    Eigen::Matrix3Xd change = model.fixed_place_along_m[d];
+    const auto driven = std::exchange(direction.held_motion, {});
     direction.start_velocity_m_per_s.resize(3, 0);
-    direction.start_effect_memory.clear();
-    direction.held_motion.clear();
     for (Eigen::Index h = 0; h < held; ++h) {
+      const auto n = static_cast<size_t>(h);
+      if (!driven.empty() && driven[n] && of.cloth.held[n].motion) {
+        change.col(h) = driven[n](time_s);
+        const Eigen::Vector3d rate =
+            (change.col(h) - driven[n](time_s - time_step_s())) / time_step_s();
+        if (direction.start_velocity_m_per_s.cols() == 0)
+          direction.start_velocity_m_per_s.setZero(3, held_move_.rows());
+        direction.start_velocity_m_per_s += rate * held_move_.col(h).transpose();
+        direction.held_motion.push_back(driven[n]);
+        continue;
+      }
       const Eigen::Vector3d moved = change.col(h);
       direction.held_motion.push_back([moved](double) { return moved; });
     }
+    direction.start_position_m = change * held_move_.transpose();
+    direction.start_effect_memory.clear();
   }
   std::vector<Direction> own(static_cast<size_t>(state_size()), still);
   const Eigen::Matrix3Xd at_held = Eigen::Matrix3Xd::Zero(3, held);

@@ -70,11 +70,14 @@ SheetPose pose_of(const Mesh& mesh, const Eigen::Matrix3Xd& position_m) {
   return {.position_m = corner, .orientation = Eigen::Quaterniond(axes).normalized()};
 }
 
-/// A held point's motion at the frames. A natural cubic spline, such as the smoothing spline of a
-/// tracked point, is found again by the one through its values at its knots, which are frames.
-HeldPath sample(const HeldVertexWeights& held, const std::vector<double>& time_s) {
-  HeldPath path{.time_s = time_s, .position_m = {}};
-  for (const double t : time_s) path.position_m.push_back(held.motion(t));
+/// A held point's motion, its correction included, at the frames and at the correction's knots. A
+/// natural cubic spline, such as the smoothing spline of a tracked point and a correction are
+/// together, is found again by the one through its values at its knots.
+HeldPath sample(const FitProblem& problem, const ParameterSet& set, size_t held) {
+  HeldPath path{.time_s = corrected_times(problem.drive_correction, problem.frame_time_s),
+                .position_m = {}};
+  for (const double t : path.time_s)
+    path.position_m.push_back(shifted(problem.cloth.held[held].motion(t), set, held, t));
   return path;
 }
 
@@ -171,9 +174,8 @@ ModelDescription describe_model(const FitProblem& problem, const Recording& reco
   for (const HeldPoint& point : recording.held) {
     ModelHeldPoint held{.point = point, .path = {}};
     held.point.file.reset();
-    const HeldVertexWeights& first = problem.cloth.held[next];
     if (point.motion == HeldMotion::path) held.path = read_held_path(*point.file);
-    if (point.motion == HeldMotion::tracked) held.path = sample(first, problem.frame_time_s);
+    if (point.motion == HeldMotion::tracked) held.path = sample(problem, set, next);
     if (point.motion != HeldMotion::fixed) held.point.motion = HeldMotion::path;
     model.held.push_back(std::move(held));
     const bool along_s = point.edge == ClothEdge::top || point.edge == ClothEdge::bottom;

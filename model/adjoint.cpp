@@ -60,6 +60,7 @@ class Run {
  public:
   Run(const Cloth& cloth, const ParameterSet& set, const SimulationFields& fields, int intervals)
       : cloth_(cloth),
+        set_(set),
         factors_(fields.spring_factors.get()),
         stepper_(cloth),
         sweep_(cloth.mesh),
@@ -134,7 +135,7 @@ class Run {
     target_m_ = start_target_m_;
     for (size_t h = 0; h < cloth_.held.size(); ++h) {
       if (!cloth_.held[h].motion) continue;
-      const Eigen::Vector3d place = cloth_.held[h].motion(time_s);
+      const Eigen::Vector3d place = shifted(cloth_.held[h].motion(time_s), set_, h, time_s);
       const auto column = static_cast<Eigen::Index>(h);
       target_m_.x(0, column) = place.x();
       target_m_.y(0, column) = place.y();
@@ -342,6 +343,7 @@ class Run {
   }
 
   const Cloth& cloth_;
+  const ParameterSet& set_;
   const SpringFactors<SingleLane>* factors_;
   EulerStepper<SingleLane> stepper_;
   ClothSweep<SingleLane> sweep_;

@@ -54,6 +54,13 @@ void Cloth::add_effect(const std::string& name, const std::string& where) {
   effects.push_back(entry.make());
 }
 
+Eigen::Vector3d shifted(const Eigen::Vector3d& motion_m, const ParameterSet& set, size_t held,
+                        double time_s) {
+  assert(set.held_shift.empty() || held < set.held_shift.size());
+  if (set.held_shift.empty() || !set.held_shift[held]) return motion_m;
+  return motion_m + set.held_shift[held](time_s);
+}
+
 size_t Cloth::spring_count() const {
   size_t count = 0;
   for (const std::vector<Spring>& type : springs) count += type.size();

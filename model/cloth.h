@@ -60,6 +60,14 @@ struct ParameterSet {
   /// What each effect of the cloth remembers at the start (EffectMemory's numbers); empty, as a
   /// whole or for an effect: nothing.
   std::vector<Eigen::VectorXd> start_effect_memory;
+  /// Of each held point, what is added to its motion (world, m); empty, as a whole or for a point:
+  /// nothing. A point without a motion of its own ignores it: the start shape says where it stays.
+  std::vector<std::function<Eigen::Vector3d(double time_s)>> held_shift;
 };
+
+/// Where a set wants a held point with a motion of its own at `time_s`: at `motion_m`, where that
+/// motion has it then, and the set's shift added. Without one these are the bits of `motion_m`.
+Eigen::Vector3d shifted(const Eigen::Vector3d& motion_m, const ParameterSet& set, size_t held,
+                        double time_s);
 
 }  // namespace clothfit

@@ -111,8 +111,10 @@ void slow(double share, LaneVectors<L>& velocity_m_per_s) {
 template <class L>
 void settle(const HeavyAir& heavy, double time_s, std::span<const ParameterSet> group,
             LaneState<L>& state) {
-  for (int l = 0; l < L::kCount; ++l)
-    set_start(l, group[std::min(static_cast<size_t>(l), group.size() - 1)], state);
+  const auto set_of = [&](Eigen::Index lane) -> const ParameterSet& {
+    return group[std::min(static_cast<size_t>(lane), group.size() - 1)];
+  };
+  for (int l = 0; l < L::kCount; ++l) set_start(l, set_of(l), state);
   EulerStepper<L> stepper(heavy.cloth);
   const LaneParameters<L> parameters = lane_parameters<L>(heavy.cloth, group);
   const LaneVectors<L> from_m = stepper.held().locate(state.position_m);
@@ -120,8 +122,9 @@ void settle(const HeavyAir& heavy, double time_s, std::span<const ParameterSet> 
   for (int n = 0; n < heavy.steps; ++n) {
     for (size_t h = 0; h < heavy.cloth.held.size(); ++h) {
       if (!heavy.cloth.held[h].motion) continue;
-      const Eigen::Vector3d there = heavy.cloth.held[h].motion(time_s);
+      const Eigen::Vector3d by_motion = heavy.cloth.held[h].motion(time_s);
       for (Eigen::Index l = 0; l < L::kCount; ++l) {
+        const Eigen::Vector3d there = shifted(by_motion, set_of(l), h, time_s);
         const auto place = [&](auto& target, const auto& from, double to) {
           const auto column = static_cast<Eigen::Index>(h);
           target(l, column) =
@@ -152,7 +155,7 @@ void settle(const HeavyAir& heavy, double time_s, const ParameterSet& set,
       const auto place = [&](auto& target, const auto& from, Eigen::Index lane, double to) {
         target(lane, column) = on_the_way(from(lane, column), to, heavy.way(n));
       };
-      const Eigen::Vector3d there = heavy.cloth.held[h].motion(time_s);
+      const Eigen::Vector3d there = shifted(heavy.cloth.held[h].motion(time_s), set, h, time_s);
       place(target_m.value.x, from_m.value.x, 0, there.x());
       place(target_m.value.y, from_m.value.y, 0, there.y());
       place(target_m.value.z, from_m.value.z, 0, there.z());

@@ -16,14 +16,14 @@ class LaneRun {
  public:
   LaneRun(const Cloth& cloth, std::span<const ParameterSet> group)
       : cloth_(cloth),
+        group_(group),
         stepper_(cloth),
         parameters_(lane_parameters<L>(cloth, group)),
         state_(LaneState<L>::of(cloth)) {
-    for (int l = 0; l < L::kCount; ++l) {
-      const ParameterSet& set = group[std::min(static_cast<size_t>(l), group.size() - 1)];
-      set_start(l, set, state_);
-    }
+    for (int l = 0; l < L::kCount; ++l) set_start(l, set_of(l), state_);
     held_target_m_ = stepper_.held().locate(state_.position_m);
+    shifted_ =
+        std::ranges::any_of(group, [](const ParameterSet& set) { return !set.held_shift.empty(); });
   }
 
   const LaneState<L>& state() const { return state_; }
@@ -49,13 +49,29 @@ class LaneRun {
       const Eigen::Vector3d target = cloth_.held[h].motion(time_s);
       const auto column = static_cast<Eigen::Index>(h);
       using Number = typename L::Number;
+      if (shifted_) {
+        for (int l = 0; l < L::kCount; ++l) {
+          const Eigen::Vector3d own = shifted(target, set_of(l), h, time_s);
+          held_target_m_.x(l, column) = static_cast<Number>(own.x());
+          held_target_m_.y(l, column) = static_cast<Number>(own.y());
+          held_target_m_.z(l, column) = static_cast<Number>(own.z());
+        }
+        continue;
+      }
       held_target_m_.x.col(column).setConstant(static_cast<Number>(target.x()));
       held_target_m_.y.col(column).setConstant(static_cast<Number>(target.y()));
       held_target_m_.z.col(column).setConstant(static_cast<Number>(target.z()));
     }
   }
 
+  /// Lanes to spare repeat the last set.
+  const ParameterSet& set_of(int lane) const {
+    return group_[std::min(static_cast<size_t>(lane), group_.size() - 1)];
+  }
+
   const Cloth& cloth_;
+  std::span<const ParameterSet> group_;
+  bool shifted_ = false;  ///< whether any set shifts a held point: else all lanes have one target
   EulerStepper<L> stepper_;
   LaneParameters<L> parameters_;
   LaneState<L> state_;

@@ -19,7 +19,7 @@ TangentResult run_group(const Cloth& cloth, const ParameterSet& set,
     for (size_t h = 0; h < cloth.held.size(); ++h) {
       if (!cloth.held[h].motion) continue;
       const auto column = static_cast<Eigen::Index>(h);
-      const Eigen::Vector3d place = cloth.held[h].motion(time_s);
+      const Eigen::Vector3d place = shifted(cloth.held[h].motion(time_s), set, h, time_s);
       target_m.value.x(0, column) = place.x();
       target_m.value.y(0, column) = place.y();
       target_m.value.z(0, column) = place.z();

@@ -157,19 +157,18 @@ EquilibriumResult find_equilibrium(const HangingCloth& cloth,
   return result;
 }
 
-Eigen::Matrix3Xd held_targets_m(const Cloth& cloth, const Eigen::Matrix3Xd& start_position_m,
-                                double time_s) {
+Eigen::Matrix3Xd held_targets_m(const Cloth& cloth, const ParameterSet& parameters, double time_s) {
   Eigen::Matrix3Xd target_m =
       Eigen::Matrix3Xd::Zero(3, static_cast<Eigen::Index>(cloth.held.size()));
   for (size_t h = 0; h < cloth.held.size(); ++h) {
     auto place = target_m.col(static_cast<Eigen::Index>(h));
     if (cloth.held[h].motion) {
-      place = cloth.held[h].motion(time_s);
+      place = shifted(cloth.held[h].motion(time_s), parameters, h, time_s);
       continue;
     }
     for (const auto& [vertex, weight] : cloth.held[h].weights)
-      if (vertex >= 0 && vertex < start_position_m.cols())
-        place += weight * start_position_m.col(vertex);
+      if (vertex >= 0 && vertex < parameters.start_position_m.cols())
+        place += weight * parameters.start_position_m.col(vertex);
   }
   return target_m;
 }
@@ -177,8 +176,8 @@ Eigen::Matrix3Xd held_targets_m(const Cloth& cloth, const Eigen::Matrix3Xd& star
 EquilibriumResult find_equilibrium(const Cloth& cloth, const ParameterSet& parameters,
                                    const EquilibriumOptions& options, double time_s) {
   return find_equilibrium(HangingCloth::of(cloth, parameters), cloth.held,
-                          held_targets_m(cloth, parameters.start_position_m, time_s),
-                          parameters.start_position_m, options);
+                          held_targets_m(cloth, parameters, time_s), parameters.start_position_m,
+                          options);
 }
 
 }  // namespace clothfit

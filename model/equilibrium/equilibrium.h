@@ -73,8 +73,7 @@ EquilibriumResult find_equilibrium(const HangingCloth& cloth,
                                    const Eigen::Matrix3Xd& start_position_m,
                                    const EquilibriumOptions& options = {});
 
-/// Where the held points belong at `time_s`: 3 x held.
-Eigen::Matrix3Xd held_targets_m(const Cloth& cloth, const Eigen::Matrix3Xd& start_position_m,
-                                double time_s);
+/// Where the held points belong at `time_s`, the set's shifts added: 3 x held.
+Eigen::Matrix3Xd held_targets_m(const Cloth& cloth, const ParameterSet& parameters, double time_s);
 
 }  // namespace clothfit

@@ -46,7 +46,7 @@ std::vector<Eigen::Matrix3Xd> rest_shapes(const Cloth& cloth,
     EquilibriumResult result = find_equilibrium(
         cloth, set, {.tolerance = kTolerance, .most_iterations = kMostIterations}, time_s);
     turn_towards(cloth, set.gravity_m_per_s2, set.start_position_m,
-                 held_targets_m(cloth, set.start_position_m, time_s), result.position_m);
+                 held_targets_m(cloth, set, time_s), result.position_m);
     shapes[n] = std::move(result.position_m);
   });
   return shapes;

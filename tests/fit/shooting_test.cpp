@@ -79,6 +79,13 @@ FitProblem pixels_at_rest(unsigned seed) {
   return make_problem(input, {.observations = ObservationKind::tracks2d}, 5, 5);
 }
 
+/// One corner follows its noisy track, with corrections.
+FitProblem driven_by_a_track(unsigned seed) {
+  FitInput input = synthetic_input(tiny(seed));
+  input.recording.held[1].motion = HeldMotion::tracked;
+  return make_problem(input, {.drive_knots = 4}, 5, 5);
+}
+
 /// Corrections of some millimetres and centimetres a second.
 ShootingObjective::Corrections some_corrections(const ShootingObjective& objective, unsigned seed) {
   std::mt19937_64 generator(seed);
@@ -111,7 +118,7 @@ TEST(ShootingObjective, WithOneWindowIsTheTrajectoryCost) {
 }
 
 TEST(ShootingObjective, VanishesAtTheTruthWithTheTrueStates) {
-  for (FitProblem problem : {tiny_problem(1), pixels_at_rest(1)}) {
+  for (FitProblem problem : {tiny_problem(1), pixels_at_rest(1), driven_by_a_track(1)}) {
     const ExactWindows exact(std::move(problem), 5, 5);
     const ShootingObjective objective = exact.objective({1e-3, 1e-2});
 
@@ -125,7 +132,7 @@ TEST(ShootingObjective, VanishesAtTheTruthWithTheTrueStates) {
 }
 
 TEST(ShootingObjective, DerivativesByTheParametersAgreeWithDifferences) {
-  for (FitProblem problem : {tiny_problem(2), pixels_at_rest(2)}) {
+  for (FitProblem problem : {tiny_problem(2), pixels_at_rest(2), driven_by_a_track(2)}) {
     const ExactWindows exact(std::move(problem), 5, 3);
     ShootingObjective objective = exact.objective({1e-3, 1e-2});
     objective.set_corrections(some_corrections(objective, 7));

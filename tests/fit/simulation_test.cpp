@@ -212,6 +212,29 @@ TEST(Simulation, OfADescribedFitIsTheFitsOwn) {
   }
 }
 
+TEST(Simulation, OfADescribedFitMovesAsTheCorrectedDriveDid) {
+  FitInput input = synthetic_input({});
+  for (HeldPoint& held : input.recording.held) held.motion = HeldMotion::tracked;
+  // Knots between frames, and held-out frames behind the last.
+  const FitProblem problem = make_problem(input, {.drive_knots = 7}, 5, 5);
+  Eigen::VectorXd values = problem.space.start();
+  for (int p = 0; p < problem.space.size(); ++p)
+    if (problem.space.parameters[static_cast<size_t>(p)].role == ParameterRole::drive)
+      values[p] = 2e-3 * std::sin(5.0 * p);
+  const double time_step_s =
+      0.5 * stable_time_step_s(problem.cloth, parameter_set(problem, values));
+
+  const Simulation simulation = make_simulation(describe_model(problem, input.recording, values));
+
+  const SimulateResult result = run(simulation, time_step_s);
+  const auto own = run_model(problem, {values}, problem.frames(), time_step_s).front().position_m;
+  ASSERT_FALSE(own.empty());
+  // As in the test before: the sum of two splines is one, with the knots of both.
+  EXPECT_LT(largest_difference_m(result.position_m, own), 1e-9);
+  const auto plain = run_model(problem, {problem.space.start()}, problem.frames(), time_step_s);
+  EXPECT_GT(largest_difference_m(plain.front().position_m, own), 1e-3);
+}
+
 TEST(Simulation, OfADescribedFitTouchesTheRecordingsObstacle) {
   // Given a cloth that swings from y > 0 towards a wall at y = -0.02 m
   constexpr double kWall_m = -0.02;

@@ -189,7 +189,7 @@ TEST(Equilibrium, HoldsPointsBetweenVertices) {
 
   ASSERT_TRUE(reference.usable()) << describe(reference.reason);
   ASSERT_TRUE(result.usable()) << describe(result.reason);
-  const Eigen::Matrix3Xd target_m = held_targets_m(hung.cloth, hung.set.start_position_m, 1.5);
+  const Eigen::Matrix3Xd target_m = held_targets_m(hung.cloth, hung.set, 1.5);
   EXPECT_EQ(target_m.col(2), Eigen::Vector3d(0.2, 0.1, -0.03));
   for (int h = 0; h < 3; ++h) {
     Eigen::Vector3d place = Eigen::Vector3d::Zero();
