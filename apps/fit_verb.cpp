@@ -48,10 +48,12 @@ ParameterPrior parse_prior(const std::string& text) {
   if (equals < comma && comma < text.size()) {
     const auto mean = parse_number(text.substr(equals + 1, comma - equals - 1));
     const auto sigma = parse_number(text.substr(comma + 1));
-    if (mean && sigma) return {.name = text.substr(0, equals), .mean = *mean, .sigma = *sigma};
+    if (mean && sigma && *sigma > 0)
+      return {.name = text.substr(0, equals), .mean = *mean, .sigma = *sigma};
   }
   throw InputError("--prior", "'" + text + "' is not a prior",
-                   "PARAMETER=MEAN,SIGMA, such as clock_offset.time=0,0.002");
+                   "PARAMETER=MEAN,SIGMA without spaces, SIGMA more than 0, such as "
+                   "clock_offset.time=0,0.002");
 }
 
 /// Nothing where the text is not a mesh that a fit takes.

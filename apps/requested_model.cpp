@@ -81,6 +81,9 @@ void set_parameter(const std::string& text, GivenParameters& given) {
   if (dot != std::string::npos) {
     const std::string effect = name.substr(0, dot);
     const std::string parameter = name.substr(dot + 1);
+    if (measurement_effect_named(effect) != nullptr)
+      throw InputError("--set " + text, effect + " is an effect of the measurement",
+                       "a parameter of what moves: a simulation is not measured");
     by_parameter(find_effect(effect, "--set " + text).describe(), "--set " + text,
                  {{parameter, {value}}});
     effect_named(effect, given.effects).parameters[parameter] = {value};
@@ -175,8 +178,11 @@ FitResult complete_parameters(const Recording& recording, GivenParameters given)
   GivenParameters all;
   all.effects = recording.declared;
   // How things were measured changes nothing in what moves.
-  std::erase_if(all.effects, [](const DeclaredEffect& effect) {
-    return measurement_effect_named(effect.name) != nullptr;
+  std::erase_if(all.effects, [&](const DeclaredEffect& effect) {
+    const MeasurementEffectEntry* entry = measurement_effect_named(effect.name);
+    if (entry == nullptr) return false;
+    by_parameter(entry->describe(), fmt::format("{}:{}", file, effect.line), effect.parameters);
+    return true;
   });
   for (DeclaredEffect& effect : all.effects) {
     const std::string where = fmt::format("{}:{}", file, effect.line);

@@ -212,8 +212,8 @@ void FitOptions::validate() const {
           "--springs fabric: natural lengths are those of one mesh");
   require(threads >= 0, "threads", "0 (all) or more");
   for (const ParameterPrior& prior : priors)
-    require(std::isfinite(prior.mean) && std::isfinite(prior.sigma) && prior.sigma > 0, "prior",
-            "a mean and, more than 0, a standard deviation");
+    require(std::isfinite(prior.mean) && std::isfinite(prior.sigma) && prior.sigma > 0,
+            "prior " + prior.name, "a mean and, more than 0, a standard deviation");
   require(priors.empty() || !forecast, "prior", "a fit: without --forecast");
 }
 
@@ -285,7 +285,7 @@ FitReport fit(const FitInput& input, const FitOptions& options, const ProgressCa
     report.stages.push_back("forecast: nothing fitted");
   }
 
-  const Predictor predictor(problem, values);
+  Predictor predictor(problem, values);
   const SimulateResult run = std::move(
       run_model(problem, {values}, problem.frames(), steps_at(values), predictor.needs_velocities())
           .front());
@@ -306,11 +306,9 @@ FitReport fit(const FitInput& input, const FitOptions& options, const ProgressCa
       result.parameters);
   report.model = describe_model(problem, input.recording, values);
   report.model.time_step_s = result.time_step_s;
-  MarkerRun markers = marker_run(problem, run);
-  const Eigen::Matrix3Xd offset_m =
-      marker_offsets(problem, input.recording.markers, options, predictor, markers, report);
-  if (offset_m.cols() > 0)
-    for (Eigen::Matrix3Xd& positions : markers.position_m) positions += offset_m;
+  const MarkerRun markers = marker_run(problem, run);
+  predictor.offset_markers(
+      marker_offsets(problem, input.recording.markers, options, predictor, markers, report));
   fill_residuals(problem, predictor, markers, report);
   for (const ObservationSet& set : problem.observations)
     result.observations_used += static_cast<int>(set.rows.size());

@@ -12,6 +12,7 @@
 #include "fit/lead_in.h"
 #include "fit/observed_motion.h"
 #include "fit/parameter_search.h"
+#include "fit/prior_cost.h"
 #include "model/stability.h"
 
 namespace clothfit {
@@ -220,7 +221,9 @@ Eigen::VectorXd away_from_ends(const FitProblem& problem, const Eigen::VectorXd&
     if (at_end) result[p] = start[p];
   }
   if (result == values) return values;
-  return window_cost(problem, result) <= window_cost(problem, values) ? result : values;
+  const bool keeps_to_priors = prior_cost(problem, result).cost <= prior_cost(problem, values).cost;
+  const bool is_no_worse = window_cost(problem, result) <= window_cost(problem, values);
+  return keeps_to_priors && is_no_worse ? result : values;
 }
 
 /// How refinement comes to where it starts.

@@ -73,6 +73,24 @@ std::pair<int, double> nearest_parameter(const Eigen::MatrixXd& correlation, int
   return nearest;
 }
 
+/// In brackets, of what is not the cloth's.
+const char* what_it_is(ParameterRole role) {
+  switch (role) {
+    case ParameterRole::placement:
+      return " (how the scene was placed)";
+    case ParameterRole::measurement:
+      return " (how it was measured)";
+    case ParameterRole::start:
+      return " (where the cloth was at the start)";
+    case ParameterRole::drive:
+      return " (what the drive's track is off by)";
+    case ParameterRole::springs:
+    case ParameterRole::effect:
+      break;
+  }
+  return "";
+}
+
 /// Says so where a parameter is undetermined because another one does the same: where the cloth or
 /// the camera was placed, say, or the scale of gravity.
 void explain_by_correlation(const ParameterSpace& space, const Uncertainty& uncertainty, int p,
@@ -81,15 +99,8 @@ void explain_by_correlation(const ParameterSpace& space, const Uncertainty& unce
   const auto [other, correlation] = nearest_parameter(uncertainty.correlation, p);
   if (other < 0 || !(std::abs(correlation) > kAlike)) return;
   const FitParameter& alike = space.parameters[static_cast<size_t>(other)];
-  std::string name = alike.name;
-  if (alike.role == ParameterRole::nuisance)
-    name += alike.name.find('.') != std::string::npos ? " (how it was measured)"
-                                                      : " (how the scene was placed)";
-  if (alike.role == ParameterRole::drive) name += " (what a drive's track is off by)";
-  if (alike.role == ParameterRole::start) name += " (where the cloth was at the start)";
-  if (alike.role == ParameterRole::drive) name += " (how the drive was measured)";
-  parameter.reason +=
-      fmt::format("; it can hardly be told from {} (correlation {:.3f})", name, correlation);
+  parameter.reason += fmt::format("; it can hardly be told from {}{} (correlation {:.3f})",
+                                  alike.name, what_it_is(alike.role), correlation);
 }
 
 /// The intervals of the p-th parameter.
@@ -188,6 +199,13 @@ void fill_parameters(const FitProblem& problem, const FitOptions& options,
     }
     result.effects.push_back(std::move(effect));
   }
+  for (const FitProblem::MeasurementTerm& term : problem.measurement)
+    for (size_t p = 0; p < term.parameters.size(); ++p)
+      if (const Binding& binding = term.parameters[p]; binding.parameter < 0) {
+        const EffectParameter& parameter = term.description.parameters[p];
+        result.nuisance.push_back(constant(term.description.name + "." + parameter.name,
+                                           parameter.unit, binding.constant, "declared"));
+      }
 }
 
 }  // namespace clothfit

@@ -9,9 +9,10 @@
 
 namespace clothfit {
 
-/// What a parameter is of: the fabric's springs, an effect, how things were measured, where the
-/// cloth was when the recording began, or what the measured motion of its held points was off by.
-enum class ParameterRole { springs, effect, nuisance, start, drive };
+/// What a parameter is of: the fabric's springs, an effect, how the scene was placed, an effect of
+/// the measurement, where the cloth was when the recording began, or what the measured motion of
+/// its held points was off by.
+enum class ParameterRole { springs, effect, placement, measurement, start, drive };
 
 /// Whether it says something of the cloth's physics, which is what searches look for.
 inline bool is_physical(ParameterRole role) {

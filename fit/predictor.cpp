@@ -27,12 +27,12 @@ struct Predictor::Instant {
   }
 };
 
-/// Where a marker appears to be, with derivatives by where it is and by a group of parameters.
-struct Predictor::Sight {
+/// Where a marker appears to be, with derivatives by where it is and by the parameters.
+struct Predictor::Appearance {
   Instant instant;
   Eigen::Vector3d position_m;
-  Eigen::Matrix3d by_place;
-  Eigen::Matrix<double, 3, kParametersAtOnce> by_parameter;
+  Eigen::Matrix3d by_place = Eigen::Matrix3d::Identity();
+  Eigen::Matrix<double, 3, kMeasurementParameters> by_parameter;
 };
 
 MarkerRun marker_run(const FitProblem& problem, const SimulateResult& run) {
@@ -42,36 +42,29 @@ MarkerRun marker_run(const FitProblem& problem, const SimulateResult& run) {
 
 Predictor::Predictor(const FitProblem& problem, const Eigen::VectorXd& values)
     : problem_(problem), sheet_middle_m_(problem.placed_sheet_m.rowwise().mean()) {
-  Parameters constants;
-  struct Place {
-    size_t effect, parameter;
-  };
-  std::vector<Place> places;
-  for (size_t e = 0; e < problem.measurement.size(); ++e) {
-    const FitProblem::MeasurementTerm& term = problem.measurement[e];
+  for (const FitProblem::MeasurementTerm& term : problem.measurement) {
     needs_velocities_ = needs_velocities_ || term.effect->shifts_time();
-    constants.emplace_back();
-    for (size_t p = 0; p < term.parameters.size(); ++p) {
-      const Binding& binding = term.parameters[p];
-      constants.back().emplace_back(binding.value(values));
+    parameters_.emplace_back();
+    for (const Binding& binding : term.parameters) {
+      MeasuredNumber& number = parameters_.back().emplace_back(binding.value(values));
       if (binding.parameter < 0) continue;
+      number.v[kMeasuredPlace + static_cast<Eigen::Index>(fitted_.size())] = 1;
       fitted_.push_back(binding.parameter);
-      places.push_back({e, p});
     }
   }
+  assert(fitted_.size() <= kMeasurementParameters);
   slope_ = problem.space.value_by_coordinate(values)(fitted_);
-  for (size_t first = 0; first < std::max<size_t>(1, places.size()); first += kParametersAtOnce) {
-    groups_.push_back(constants);
-    for (size_t n = first; n < std::min(places.size(), first + kParametersAtOnce); ++n)
-      groups_.back()[places[n].effect][places[n].parameter]
-          .v[static_cast<Eigen::Index>(kMeasuredPlace + n - first)] = 1;
-  }
 }
 
-MeasuredNumber Predictor::seen_s(const Sighting& sighting, const Parameters& parameters) const {
+Sighting Predictor::sighting(const Observation& row) const {
+  return {.time_s = problem_.frame_time_s[static_cast<size_t>(row.frame)],
+          .sheet_middle_m = sheet_middle_m_};
+}
+
+MeasuredNumber Predictor::seen_s(const Sighting& sighting) const {
   MeasuredNumber time_s(sighting.time_s);
-  for (size_t e = 0; e < parameters.size(); ++e)
-    problem_.measurement[e].effect->shift_time(sighting, parameters[e], time_s);
+  for (size_t e = 0; e < parameters_.size(); ++e)
+    problem_.measurement[e].effect->shift_time(sighting, parameters_[e], time_s);
   return time_s;
 }
 
@@ -79,15 +72,10 @@ int Predictor::frames_to_run(int frames) const {
   if (!needs_velocities_) return frames;
   const std::vector<double>& frame_time_s = problem_.frame_time_s;
   double last_s = frame_time_s[static_cast<size_t>(frames - 1)];
-  for (size_t s = 0; s < problem_.observations.size(); ++s) {
-    for (const Observation& row : problem_.observations[s].rows) {
+  for (const ObservationSet& set : problem_.observations) {
+    for (const Observation& row : set.rows) {
       if (row.frame >= frames) break;  // rows are sorted by frame
-      const Sighting sighting{.set = static_cast<int>(s),
-                              .marker = row.marker,
-                              .frame = row.frame,
-                              .time_s = frame_time_s[static_cast<size_t>(row.frame)],
-                              .sheet_middle_m = sheet_middle_m_};
-      last_s = std::max(last_s, seen_s(sighting, groups_.front()).a);
+      last_s = std::max(last_s, seen_s(sighting(row)).a);
     }
   }
   const auto enough = std::ranges::lower_bound(frame_time_s, last_s) - frame_time_s.begin() + 1;
@@ -118,49 +106,39 @@ Predictor::Instant Predictor::instant(double time_s, size_t run_frames) const {
   return at;
 }
 
-Predictor::Sight Predictor::sight(int set, const Observation& row, const MarkerRun& run,
-                                  const Parameters& parameters) const {
-  Sight result;
-  if (parameters.empty()) {
-    result.instant.frame = static_cast<size_t>(row.frame);
-    result.instant.place.position[0] = 1;
+Predictor::Appearance Predictor::appearance(const Observation& row, const MarkerRun& run) const {
+  Appearance result;
+  result.instant.frame = static_cast<size_t>(row.frame);
+  result.instant.place.position[0] = 1;
+  if (parameters_.empty()) {
     result.position_m = run.position_m[result.instant.frame].col(row.marker);
-    result.by_place.setIdentity();
-    return result;
-  }
-  const Sighting sighting{.set = set,
-                          .marker = row.marker,
-                          .frame = row.frame,
-                          .time_s = problem_.frame_time_s[static_cast<size_t>(row.frame)],
-                          .sheet_middle_m = sheet_middle_m_};
-  const MeasuredNumber time_s = seen_s(sighting, parameters);
-  if (needs_velocities_) {
-    result.instant = instant(time_s.a, run.position_m.size());
   } else {
-    result.instant.frame = static_cast<size_t>(row.frame);
-    result.instant.place.position[0] = 1;
+    const Sighting seen = sighting(row);
+    const MeasuredNumber time_s = seen_s(seen);
+    if (needs_velocities_) result.instant = instant(time_s.a, run.position_m.size());
+    const Eigen::Vector3d place_m = result.instant.of(result.instant.place, run, row.marker);
+    const Eigen::Vector3d rate = result.instant.of(result.instant.rate, run, row.marker);
+    MeasuredPoint point;
+    for (int c = 0; c < 3; ++c) {
+      point[c] = MeasuredNumber(place_m[c], c);
+      point[c].v += rate[c] * time_s.v;
+    }
+    for (size_t e = 0; e < parameters_.size(); ++e)
+      problem_.measurement[e].effect->move(seen, parameters_[e], point);
+    for (int c = 0; c < 3; ++c) {
+      result.position_m[c] = point[c].a;
+      result.by_place.row(c) = point[c].v.head<kMeasuredPlace>();
+      result.by_parameter.row(c) = point[c].v.tail<kMeasurementParameters>();
+    }
   }
-  const Eigen::Vector3d place_m = result.instant.of(result.instant.place, run, row.marker);
-  const Eigen::Vector3d rate = result.instant.of(result.instant.rate, run, row.marker);
-  MeasuredPoint point;
-  for (int c = 0; c < 3; ++c) {
-    point[c] = MeasuredNumber(place_m[c], c);
-    point[c].v += rate[c] * time_s.v;
-  }
-  for (size_t e = 0; e < parameters.size(); ++e)
-    problem_.measurement[e].effect->move(sighting, parameters[e], point);
-  for (int c = 0; c < 3; ++c) {
-    result.position_m[c] = point[c].a;
-    result.by_place.row(c) = point[c].v.head<kMeasuredPlace>();
-    result.by_parameter.row(c) = point[c].v.tail<kParametersAtOnce>();
-  }
+  if (marker_offset_m_.cols() > 0) result.position_m += marker_offset_m_.col(row.marker);
   return result;
 }
 
 std::optional<Eigen::Vector3d> Predictor::predict(int set, const Observation& row,
                                                   const MarkerRun& run) const {
   const ObservationSet& observer = problem_.observations[static_cast<size_t>(set)];
-  return observer.predict(sight(set, row, run, groups_.front()).position_m);
+  return observer.predict(appearance(row, run).position_m);
 }
 
 std::optional<Eigen::Vector3d> Predictor::predict(
@@ -168,21 +146,17 @@ std::optional<Eigen::Vector3d> Predictor::predict(
     Eigen::Ref<Eigen::Matrix3Xd> by_coordinate) const {
   assert(static_cast<Eigen::Index>(tangents.size()) == by_coordinate.cols());
   const ObservationSet& observer = problem_.observations[static_cast<size_t>(set)];
-  const Sight first = sight(set, row, run, groups_.front());
+  const Appearance seen = appearance(row, run);
   Eigen::Matrix3d by_position;
-  const auto predicted = observer.predict(first.position_m, &by_position);
+  const auto predicted = observer.predict(seen.position_m, &by_position);
   if (!predicted) return std::nullopt;
-  const Eigen::Matrix3d by_place = by_position * first.by_place;
+  const Eigen::Matrix3d by_place = by_position * seen.by_place;
   for (size_t p = 0; p < tangents.size(); ++p)
     by_coordinate.col(static_cast<Eigen::Index>(p)) =
-        by_place * first.instant.of(first.instant.place, tangents[p], row.marker);
-  for (size_t group = 0; group < groups_.size(); ++group) {
-    const size_t begin = group * kParametersAtOnce;
-    const size_t end = std::min(fitted_.size(), begin + kParametersAtOnce);
-    const Sight seen = group == 0 ? first : sight(set, row, run, groups_[group]);
-    for (size_t n = begin; n < end; ++n)
-      by_coordinate.col(fitted_[n]) += slope_[static_cast<Eigen::Index>(n)] * by_position *
-                                       seen.by_parameter.col(static_cast<Eigen::Index>(n - begin));
+        by_place * seen.instant.of(seen.instant.place, tangents[p], row.marker);
+  for (size_t n = 0; n < fitted_.size(); ++n) {
+    const auto own = static_cast<Eigen::Index>(n);
+    by_coordinate.col(fitted_[n]) += slope_[own] * by_position * seen.by_parameter.col(own);
   }
   return predicted;
 }

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "fit/measurement_effects/measurement_effect.h"
@@ -30,6 +31,10 @@ class Predictor {
   /// `problem` must outlive it.
   Predictor(const FitProblem& problem, const Eigen::VectorXd& values);
 
+  /// Constants by which markers are seen beside where they would be (fit/marker_offsets.h), 3 x
+  /// markers, world. Without derivatives: fits take them out of the cost instead.
+  void offset_markers(Eigen::Matrix3Xd offset_m) { marker_offset_m_ = std::move(offset_m); }
+
   /// Whether it looks between frames and so asks for the markers' velocities.
   bool needs_velocities() const { return needs_velocities_; }
 
@@ -48,22 +53,21 @@ class Predictor {
 
  private:
   struct Instant;
-  struct Sight;
-  using Parameters = std::vector<std::vector<MeasuredNumber>>;  ///< [effect][parameter]
+  struct Appearance;
 
-  MeasuredNumber seen_s(const Sighting& sighting, const Parameters& parameters) const;
+  Sighting sighting(const Observation& row) const;
+  MeasuredNumber seen_s(const Sighting& sighting) const;
   Instant instant(double time_s, size_t run_frames) const;
-  Sight sight(int set, const Observation& row, const MarkerRun& run,
-              const Parameters& parameters) const;
+  Appearance appearance(const Observation& row, const MarkerRun& run) const;
 
   const FitProblem& problem_;
   bool needs_velocities_ = false;
   Eigen::Vector3d sheet_middle_m_;
-  /// Which parameters of the fit are the measurement's, and d value / d coordinate of these. Their
-  /// derivatives are carried in groups; there is one group at least.
+  Eigen::Matrix3Xd marker_offset_m_;                     ///< 3 x markers, or none
+  std::vector<std::vector<MeasuredNumber>> parameters_;  ///< [effect][parameter]
+  /// Which parameters of the fit are the measurement's, and d value / d coordinate of these.
   std::vector<int> fitted_;
   Eigen::VectorXd slope_;
-  std::vector<Parameters> groups_;
 };
 
 }  // namespace clothfit

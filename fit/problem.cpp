@@ -12,6 +12,7 @@
 
 #include "calib/projection.h"
 #include "data/input_error.h"
+#include "data/nearest_name.h"
 #include "fit/cloth_setup.h"
 #include "fit/measurement_effects/registry.h"
 #include "fit/sheet_placement.h"
@@ -172,10 +173,18 @@ void add_springs(const Recording& recording, const FitOptions& options, FitProbl
 void add_measurement_effect(const MeasurementEffectEntry& entry, const std::string& where,
                             const std::map<std::string, std::vector<double>>& given,
                             const FitOptions& options, FitProblem& problem) {
-  const EffectDescription description = entry.describe();
-  const std::map<std::string, double> values = by_parameter(description, where, given);
-  FitProblem::MeasurementTerm term{.effect = entry.make(), .parameters = {}};
-  for (const EffectParameter& parameter : description.parameters) {
+  FitProblem::MeasurementTerm term{
+      .effect = entry.make(), .description = entry.describe(), .parameters = {}};
+  if (!problem.driving_markers.empty())
+    throw InputError(where, term.description.name + ", and a held point that is tracked",
+                     "held points that are fixed or follow a path: a track is measured as the "
+                     "cloth is, and would have to be corrected too");
+  if (term.effect->shifts_time() && problem.cloth.strain_limit.mode != StrainLimitMode::off)
+    throw InputError(where, term.description.name + ", and springs with the paper's strain limit",
+                     "--springs fabric: that limit moves vertices without their velocities, by "
+                     "which a time is looked up between frames");
+  const std::map<std::string, double> values = by_parameter(term.description, where, given);
+  for (const EffectParameter& parameter : term.description.parameters) {
     const auto value = values.find(parameter.name);
     if (value != values.end() || options.forecast) {
       // How another recording was measured says nothing of this one.
@@ -184,9 +193,9 @@ void add_measurement_effect(const MeasurementEffectEntry& entry, const std::stri
       continue;
     }
     term.parameters.push_back({.parameter = problem.space.size(), .constant = 0});
-    problem.space.parameters.push_back({.name = description.name + "." + parameter.name,
+    problem.space.parameters.push_back({.name = term.description.name + "." + parameter.name,
                                         .unit = parameter.unit,
-                                        .role = ParameterRole::nuisance,
+                                        .role = ParameterRole::measurement,
                                         .scale = parameter.scale,
                                         .lower = parameter.lower,
                                         .upper = parameter.upper,
@@ -194,6 +203,12 @@ void add_measurement_effect(const MeasurementEffectEntry& entry, const std::stri
                                         .typical = parameter.typical});
   }
   problem.measurement.push_back(std::move(term));
+  const auto fitted =
+      std::ranges::count(problem.space.parameters, ParameterRole::measurement, &FitParameter::role);
+  if (fitted > kMeasurementParameters)
+    throw InputError(where, fmt::format("{} parameters of the measurement would be fitted", fitted),
+                     fmt::format("{} at most at once", kMeasurementParameters),
+                     "declare values of some, or leave effects out");
 }
 
 /// Adds an effect to the cloth and binds its parameters: to `given` values, else to the fit.
@@ -202,6 +217,9 @@ void add_effect(const std::string& name, const std::string& where,
                 FitProblem& problem) {
   require_effect(name, where);
   if (const MeasurementEffectEntry* entry = measurement_effect_named(name)) {
+    if (options.forecast && where == "--effect")
+      throw InputError("--effect " + name, "asked for in a forecast, which fits nothing",
+                       "a value that the recording declares", "leave it out");
     return add_measurement_effect(*entry, where, given, options, problem);
   }
   problem.cloth.add_effect(name, where);
@@ -286,7 +304,7 @@ void add_gravity_direction(FitProblem& problem) {
     problem.tilt.push_back({.parameter = problem.space.size(), .constant = 0});
     problem.space.parameters.push_back({.name = name,
                                         .unit = "rad",
-                                        .role = ParameterRole::nuisance,
+                                        .role = ParameterRole::placement,
                                         .scale = ParameterScale::linear,
                                         .lower = -0.2,
                                         .upper = 0.2,
@@ -305,7 +323,7 @@ void add_sheet_motion(FitProblem& problem) {
     problem.sheet_motion.push_back({.parameter = problem.space.size(), .constant = 0});
     problem.space.parameters.push_back({.name = name,
                                         .unit = unit,
-                                        .role = ParameterRole::nuisance,
+                                        .role = ParameterRole::placement,
                                         .scale = ParameterScale::linear,
                                         .lower = -range,
                                         .upper = range,
@@ -318,19 +336,23 @@ void add_sheet_motion(FitProblem& problem) {
 
 /// What is known of parameters from elsewhere.
 void add_given_priors(const FitOptions& options, FitProblem& problem) {
+  std::vector<std::string> known;
+  for (const FitParameter& parameter : problem.space.parameters)
+    if (is_listed(parameter.role)) known.push_back(parameter.name);
+  std::vector<std::string> told;
   for (const ParameterPrior& prior : options.priors) {
+    const std::string where = "--prior " + prior.name;
     const int p = problem.space.index(prior.name);
-    std::string names;
-    for (const FitParameter& parameter : problem.space.parameters)
-      if (is_listed(parameter.role)) names += (names.empty() ? "" : ", ") + parameter.name;
     if (p < 0)
-      throw InputError("--prior", "the fit has no parameter '" + prior.name + "'",
-                       "one of " + names);
+      throw InputError(where, "the fit has no such parameter", known_names(prior.name, known));
     const FitParameter& parameter = problem.space.parameters[static_cast<size_t>(p)];
     if (!(prior.mean >= parameter.lower && prior.mean <= parameter.upper))
-      throw InputError("--prior", fmt::format("{} = {:g}", prior.name, prior.mean),
+      throw InputError(where, fmt::format("a mean of {:g}", prior.mean),
                        fmt::format("{:g} to {:g} ({}), where the fit looks", parameter.lower,
                                    parameter.upper, parameter.unit));
+    if (std::ranges::find(told, prior.name) != told.end())
+      throw InputError(where, "is given twice", "one mean and standard deviation a parameter");
+    told.push_back(prior.name);
     problem.priors.push_back(
         {.indices = {p},
          .mean = Eigen::VectorXd::Constant(1, prior.mean),

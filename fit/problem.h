@@ -53,6 +53,7 @@ struct FitProblem {
   /// An effect of the measurement with its parameters, in the description's order.
   struct MeasurementTerm {
     std::shared_ptr<const MeasurementEffect> effect;
+    EffectDescription description;
     std::vector<Binding> parameters;
   };
   std::vector<MeasurementTerm> measurement;

@@ -51,7 +51,9 @@ class SharedEvaluation final : public ceres::EvaluationCallback {
         coordinates_(coordinates),
         held_(static_cast<size_t>(coordinates.size()), false) {
     evaluate(true);
-    if (now_.usable) robust_scale_ = clothfit::robust_scale(now_.residual);
+    if (!now_.usable) return;
+    robust_scale_ = clothfit::robust_scale(now_.residual);
+    hold_at_bounds();  // by Huber's threshold, which only now is known
   }
 
   void PrepareForEvaluation(bool evaluate_jacobians, bool) override {
@@ -67,7 +69,8 @@ class SharedEvaluation final : public ceres::EvaluationCallback {
   }
   /// The residuals at the coordinates as they are now; empty where there are none.
   Eigen::VectorXd residual_here() {
-    evaluate(false);
+    if (evaluated_ != coordinates_)
+      return objective_->residuals({problem_.space.values(coordinates_)}).front();
     return now_.usable ? now_.residual : Eigen::VectorXd();
   }
   /// Coordinates that are held at a bound.

@@ -79,10 +79,17 @@ double StateObjective::spring_steps_per_run() const {
   return steps * static_cast<double>(problem().cloth.spring_count());
 }
 
+ParameterSet StateObjective::between_states(const Eigen::VectorXd& values) const {
+  ParameterSet set = parameter_set(problem(), values);
+  // The recorded states have held points where the tracks drive them.
+  set.held_shift.clear();
+  return set;
+}
+
 std::vector<Eigen::VectorXd> StateObjective::residuals(
     const std::vector<Eigen::VectorXd>& values) const {
   std::vector<ParameterSet> sets;
-  for (const Eigen::VectorXd& point : values) sets.push_back(parameter_set(problem(), point));
+  for (const Eigen::VectorXd& point : values) sets.push_back(between_states(point));
   std::vector<Eigen::VectorXd> results(values.size(), Eigen::VectorXd(residual_count()));
   Eigen::Index offset = 0;
   for (const int transition : transitions_) {
@@ -112,11 +119,12 @@ std::vector<Eigen::VectorXd> StateObjective::residuals(
 
 Linearisation StateObjective::linearise(const Eigen::VectorXd& values) const {
   Linearisation result;
-  ParameterSet set = parameter_set(problem(), values);
+  ParameterSet set = between_states(values);
   std::vector<Direction> along = directions(problem(), values);
   for (Direction& direction : along) {
     direction.start_position_m.resize(3, 0);
     direction.start_velocity_m_per_s.resize(3, 0);
+    direction.held_motion.clear();
   }
   result.runs = 1 + problem().space.size();
   result.residual.resize(residual_count());

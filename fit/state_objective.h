@@ -47,6 +47,8 @@ class StateObjective final : public Objective {
   Linearisation linearise(const Eigen::VectorXd& values) const override;
 
  private:
+  ParameterSet between_states(const Eigen::VectorXd& values) const;
+
   const RecordedStates& states_;
   std::vector<int> transitions_;
   double unit_m_;

@@ -150,20 +150,20 @@ Uncertainty estimate_uncertainty(const TrajectoryObjective& objective,
   fit.weight = huber_weights(objective, fit.residual, threshold);
   const Eigen::MatrixXd weighted = fit.weight.asDiagonal() * fit.jacobian;
   const Eigen::MatrixXd information = weighted.transpose() * fit.jacobian;
-  const double chi_square = fit.residual.cwiseAbs2().dot(fit.weight);
-  result.chi_square_per_dof =
-      chi_square / std::max(1.0, fit.weight.sum() - static_cast<double>(fit.coordinates()));
-
   const Eigen::VectorXd slope = problem.space.value_by_coordinate(values);
   const PriorCost prior = prior_cost(problem, values);
   fit.prior_information = prior.information;
+  const Eigen::MatrixXd inverse = invert(information + prior.information);
+  // A coordinate that its prior holds takes nothing from the residuals.
+  const double fitted = information.cwiseProduct(inverse).sum();
+  const double chi_square = fit.residual.cwiseAbs2().dot(fit.weight);
+  result.chi_square_per_dof = chi_square / std::max(1.0, fit.weight.sum() - fitted);
   const Eigen::MatrixXd covariance =
       invert(information / std::max(1.0, result.chi_square_per_dof) + prior.information);
   const Eigen::VectorXd sigma = covariance.diagonal().cwiseSqrt();
   result.correlation =
       sigma.cwiseInverse().asDiagonal() * covariance * sigma.cwiseInverse().asDiagonal();
 
-  const Eigen::MatrixXd inverse = invert(information + prior.information);
   result.inverse_hessian = inverse;
   const Eigen::VectorXd shift =
       -inverse * (weighted.transpose() * (2 * (half_step_residual - fit.residual)));

@@ -9,19 +9,16 @@
 
 namespace clothfit {
 
-/// A number with its derivatives by the place of a marker (m, world; the first three) and by
-/// parameters of the measurement, so many at a time.
+/// A number with its derivatives by the place of a marker (m, world; the first three) and by the
+/// parameters of the measurement, of which a fit can have so many.
 inline constexpr int kMeasuredPlace = 3;
-inline constexpr int kParametersAtOnce = 9;
-using MeasuredNumber = ceres::Jet<double, kMeasuredPlace + kParametersAtOnce>;
+inline constexpr int kMeasurementParameters = 9;
+using MeasuredNumber = ceres::Jet<double, kMeasuredPlace + kMeasurementParameters>;
 using MeasuredPoint = Eigen::Matrix<MeasuredNumber, 3, 1>;
 
 /// One look at one marker.
 struct Sighting {
-  int set = 0;        ///< of the problem's observations: which camera, or the 3D tracks
-  int marker = 0;     ///< index
-  int frame = 0;      ///< index
-  double time_s = 0;  ///< of the frame, as the recording has it
+  double time_s = 0;  ///< of its frame, as the recording has it
   Eigen::Vector3d sheet_middle_m = Eigen::Vector3d::Zero();  ///< of the placed sheet, world
 };
 

@@ -24,13 +24,6 @@ constexpr std::array kEffects = {
 #undef MEASUREMENT_EFFECT
 };
 
-template <class Entries>
-std::string names_of(const Entries& entries) {
-  std::string names;
-  for (const auto& entry : entries) names += (names.empty() ? "" : ", ") + std::string(entry.name);
-  return names;
-}
-
 }  // namespace
 
 std::span<const MeasurementEffectEntry> measurement_effect_registry() {
@@ -46,9 +39,11 @@ const MeasurementEffectEntry* measurement_effect_named(const std::string& name) 
 void require_effect(const std::string& name, const std::string& where) {
   const auto has_name = [&](const auto& entry) { return name == entry.name; };
   if (std::ranges::any_of(effect_registry(), has_name) || measurement_effect_named(name)) return;
+  std::string names;
+  for (const MeasurementEffectEntry& entry : kEffects)
+    names += (names.empty() ? "" : ", ") + std::string(entry.name);
   throw InputError(where, "there is no effect '" + name + "'",
-                   "known effects: " + names_of(effect_registry()) +
-                       "; of the measurement: " + names_of(kEffects));
+                   "known effects: " + effect_names() + "; of the measurement: " + names);
 }
 
 }  // namespace clothfit

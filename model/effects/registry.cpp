@@ -30,14 +30,18 @@ std::span<const EffectEntry> effect_registry() {
   return kEffects;
 }
 
+std::string effect_names() {
+  std::string names;
+  for (const EffectEntry& entry : kEffects)
+    names += (names.empty() ? "" : ", ") + std::string(entry.name);
+  return names;
+}
+
 const EffectEntry& find_effect(const std::string& name, const std::string& where) {
   const auto found =
       std::ranges::find_if(kEffects, [&](const EffectEntry& entry) { return name == entry.name; });
   if (found != kEffects.end()) return *found;
-  std::string known;
-  for (const EffectEntry& entry : kEffects)
-    known += (known.empty() ? "" : ", ") + std::string(entry.name);
-  throw InputError(where, "there is no effect '" + name + "'", "known effects: " + known);
+  throw InputError(where, "there is no effect '" + name + "'", "known effects: " + effect_names());
 }
 
 }  // namespace clothfit

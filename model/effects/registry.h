@@ -17,6 +17,9 @@ struct EffectEntry {
 /// Every motion effect the program knows, in alphabetical order.
 std::span<const EffectEntry> effect_registry();
 
+/// Their names, for a message.
+std::string effect_names();
+
 /// The entry called `name`. Throws InputError at `where` that lists the known names.
 const EffectEntry& find_effect(const std::string& name, const std::string& where);
 

@@ -17,6 +17,8 @@
 #include "data/input_error.h"
 #include "fit/prior_cost.h"
 #include "fit/refine.h"
+#include "fit/state_objective.h"
+#include "fit/uncertainty.h"
 #include "model/simulate.h"
 #include "synthetic_cloth.h"
 
@@ -339,13 +341,8 @@ struct Found {
 /// Least squares from the truth.
 Found found_in(const FitInput& input, int drive_knots) {
   const FitProblem problem = make_problem(input, {.drive_knots = drive_knots}, 5, 5);
-  const Fabric fabric = SyntheticCloth().fabric;
-  Eigen::VectorXd truth(7);
-  truth << fabric.tension_warp_n_per_m, fabric.tension_weft_n_per_m, fabric.shear_n_per_m,
-      fabric.flexion_warp_n_per_m, fabric.flexion_weft_n_per_m, fabric.damping_warp_s,
-      fabric.damping_weft_s;
-  Eigen::VectorXd start = problem.space.start();
-  start.head(7) = truth;
+  const Eigen::VectorXd start = start_with(problem, SyntheticCloth().fabric);
+  const Eigen::VectorXd truth = start.head(7);
   const RefineResult result =
       refine(problem,
              [&](const TimeSteps&) {
@@ -356,16 +353,14 @@ Found found_in(const FitInput& input, int drive_knots) {
   const TrajectoryObjective objective(problem, kTruthFrames, kTruthStep);
   const Linearisation linear = objective.linearise(result.values);
   if (!linear.usable) return {};
-  const PriorCost prior = prior_cost(problem, result.values);
-  Eigen::Index known = linear.residual.size() - problem.space.size();
-  for (const GaussianPrior& of : problem.priors) known += of.mean.size();
   const Eigen::MatrixXd covariance =
       (linear.residual_by_coordinate.transpose() * linear.residual_by_coordinate +
-       prior.information)
+       prior_cost(problem, result.values).information)
           .inverse();
+  const Uncertainty uncertainty = estimate_uncertainty(
+      objective, result.values, {.loss = Loss::squared}, linear.residual_by_coordinate);
   Found found{.converged = result.usable && result.converged,
-              .chi_square_per_dof =
-                  (linear.residual.squaredNorm() + 2 * prior.cost) / static_cast<double>(known)};
+              .chi_square_per_dof = uncertainty.chi_square_per_dof};
   found.error = (result.values.head(7).array() / truth.array()).log();
   found.in_sigmas = found.error.array() / covariance.diagonal().head(7).array().sqrt();
   return found;
@@ -396,6 +391,30 @@ TEST(DriveCorrection, TakesTheNoiseOfTheDriveOutOfThePhysics) {
   EXPECT_LT(std::sqrt(in_sigmas), 1.5);
   EXPECT_GT(std::sqrt(plain_in_sigmas), 5);
   EXPECT_LT(std::sqrt(error), 0.2 * std::sqrt(plain_error));
+}
+
+TEST(DriveCorrection, LeavesTheCostsOverRecordedStatesAlone) {
+  // Given states that were recorded, their held points where the tracks drive them,
+  const FitInput input = driven_input(1);
+  const FitProblem problem = make_problem(input, {.drive_knots = 4}, 5, 5);
+  const Eigen::VectorXd values = start_with(problem, SyntheticCloth().fabric);
+  const RecordedStates states =
+      simulate_states(problem.cloth, parameter_set(problem, values), kTruthStep, 40 * kTruthStep);
+  const StateObjective objective(problem, states, {10, 40}, kTruthStep);
+
+  // when corrections of some millimetres are looked at,
+  Eigen::VectorXd corrected = values;
+  std::vector<int> drive;
+  for (int p = 0; p < problem.space.size(); ++p)
+    if (problem.space.parameters[static_cast<size_t>(p)].role == ParameterRole::drive) {
+      corrected[p] = 3e-3;
+      drive.push_back(p);
+    }
+
+  // then transitions are what they are.
+  ASSERT_EQ(drive.size(), 24u);
+  EXPECT_EQ(objective.residuals({corrected}).front(), objective.residuals({values}).front());
+  EXPECT_TRUE(objective.linearise(corrected).residual_by_coordinate(Eigen::all, drive).isZero(0));
 }
 
 TEST(DriveCorrection, IsALineOfTheReportAndNoListOfParameters) {

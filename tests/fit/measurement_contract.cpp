@@ -23,19 +23,22 @@ void check_measurement_effect(const std::string& name, const FitInput& input) {
     ASSERT_EQ(neutral.size(), bare.size());
     EXPECT_LT((neutral - bare).cwiseAbs().maxCoeff(), 1e-9);
 
-    // Away from neutral, by a typical change of each parameter.
-    Eigen::VectorXd values = with.space.start();
+    // Away from neutral, on either side, by a typical change of each parameter.
     const EffectDescription description = measurement_effect_named(name)->describe();
-    for (const EffectParameter& parameter : description.parameters)
-      values[with.space.index(name + "." + parameter.name)] += parameter.typical;
-    const Linearisation exact = objective.linearise(values);
-    const Linearisation differences = objective.linearise(values, Derivatives::central, 1e-4);
-    ASSERT_TRUE(exact.usable && differences.usable);
-    for (int p = 0; p < with.space.size(); ++p) {
-      SCOPED_TRACE(with.space.parameters[static_cast<size_t>(p)].name);
-      const auto column = exact.residual_by_coordinate.col(p);
-      const double error = (column - differences.residual_by_coordinate.col(p)).norm();
-      EXPECT_LT(error, 1e-5 * column.norm() + 1e-6);
+    for (const double side : {1.0, -1.0}) {
+      SCOPED_TRACE(side);
+      Eigen::VectorXd values = with.space.start();
+      for (const EffectParameter& parameter : description.parameters)
+        values[with.space.index(name + "." + parameter.name)] += side * parameter.typical;
+      const Linearisation exact = objective.linearise(values);
+      const Linearisation differences = objective.linearise(values, Derivatives::central, 1e-4);
+      ASSERT_TRUE(exact.usable && differences.usable);
+      for (int p = 0; p < with.space.size(); ++p) {
+        SCOPED_TRACE(with.space.parameters[static_cast<size_t>(p)].name);
+        const auto column = exact.residual_by_coordinate.col(p);
+        const double error = (column - differences.residual_by_coordinate.col(p)).norm();
+        EXPECT_LT(error, 1e-5 * column.norm() + 1e-6);
+      }
     }
   }
 }

@@ -6,7 +6,6 @@
 
 #include <cmath>
 
-#include "data/input_error.h"
 #include "synthetic_cloth.h"
 
 namespace clothfit {
@@ -91,16 +90,35 @@ TEST(Predictor, RunsOnToTheFrameAfterTheLastOneLookedAt) {
   EXPECT_EQ(frames(1), 8);  // there are no more
 }
 
-TEST(Predictor, RefusesUnknownEffectsWithTheNamesOfBothKinds) {
-  try {
-    problem_with({"clock_ofset"});
-    FAIL() << "not refused";
-  } catch (const InputError& error) {
-    const std::string text = error.what();
-    EXPECT_NE(text.find("no effect 'clock_ofset'"), std::string::npos) << text;
-    EXPECT_NE(text.find("viscous_damping"), std::string::npos) << text;
-    EXPECT_NE(text.find("clock_offset"), std::string::npos) << text;
-  }
+TEST(Predictor, ComesStraightToAStartInMotion) {
+  FitInput input = synthetic_input({.frames = 8, .held_out_from = 8});
+  input.recording.start = StartKind::unknown;
+  const FitProblem problem =
+      make_problem(input, {.effects = {"clock_offset"}, .start_nodes = 3}, 9, 9);
+  const MarkerRun run = cubic_run(problem, 8);
+  const Predictor early(problem, with_offset(problem, -0.01));
+
+  const auto seen = early.predict(0, {.frame = 0, .marker = 0}, run);
+
+  EXPECT_LT((*seen - (run.position_m[0].col(0) - 0.01 * run.velocity_m_per_s[0].col(0))).norm(),
+            1e-15);
+}
+
+TEST(Predictor, FirstLooksUpTheTimeThenMovesThePlaceThenAddsTheMarkersOffset) {
+  const FitProblem problem = problem_with({"scale", "clock_offset"});
+  const MarkerRun run = cubic_run(problem, 8);
+  Eigen::VectorXd values = with_offset(problem, 0.004);
+  values[problem.space.index("scale.factor")] = 1.1;
+  Predictor predictor(problem, values);
+  const Eigen::Vector3d offset_m(0.01, -0.02, 0.03);
+  predictor.offset_markers(offset_m.replicate(1, problem.marker_place_m.cols()));
+
+  const auto seen = predictor.predict(0, {.frame = 3, .marker = 0}, run);
+
+  const double t = problem.frame_time_s[3] + 0.004;
+  const Eigen::Vector3d at(t * t * t, 1 - 2 * t * t, 3 * t);
+  const Eigen::Vector3d middle = problem.placed_sheet_m.rowwise().mean();
+  EXPECT_LT((*seen - (middle + 1.1 * (at - middle) + offset_m)).norm(), 1e-14);
 }
 
 }  // namespace

@@ -14,6 +14,7 @@
 namespace clothfit {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 
 template <class Call>
@@ -177,6 +178,58 @@ TEST(Problem, AVectorIsDeclaredAsOne) {
   }
 }
 
+TEST(Problem, RefusesEffectsOfTheMeasurementWhereTheyWouldBeWrong) {
+  const FitInput good = synthetic_input({});
+  EXPECT_THAT(refusal([&] { problem_of(good, {.effects = {"clock_ofset"}}); }),
+              AllOf(HasSubstr("no effect 'clock_ofset'"), HasSubstr("viscous_damping"),
+                    HasSubstr("of the measurement: clock_offset")));
+  // A drive that is measured along would have to be corrected too,
+  FitInput tracked = good;
+  for (HeldPoint& point : tracked.recording.held) point.motion = HeldMotion::tracked;
+  for (const char* name : {"scale", "clock_offset"})
+    EXPECT_THAT(refusal([&] { problem_of(tracked, {.effects = {name}}); }),
+                HasSubstr("a held point that is tracked"));
+  // and the paper's strain limit moves vertices at other velocities than they have.
+  EXPECT_THAT(refusal([&] {
+                problem_of(good, {.spring_set = SpringSet::louchet5, .effects = {"clock_offset"}});
+              }),
+              HasSubstr("strain limit"));
+  EXPECT_EQ(
+      refusal([&] { problem_of(good, {.spring_set = SpringSet::louchet5, .effects = {"scale"}}); }),
+      "not refused");
+}
+
+TEST(Problem, APriorWeighsItsParameterAlone) {
+  const FitProblem problem =
+      problem_of(synthetic_input({}), {.priors = {{.name = "shear", .mean = 20, .sigma = 0.5}}});
+  Eigen::VectorXd values = problem.space.start();
+  values[problem.space.index("shear")] = 21.5;
+
+  ASSERT_EQ(problem.priors.size(), 1u);
+  EXPECT_EQ(problem.priors[0].indices, std::vector<int>{problem.space.index("shear")});
+  EXPECT_DOUBLE_EQ(problem.priors[0].residual(values).squaredNorm(), 9);
+}
+
+TEST(Problem, RefusesPriorsThatSayNothingOrTooMuch) {
+  const FitInput input = synthetic_input({});
+  const auto refused = [&](const std::vector<ParameterPrior>& priors) {
+    return refusal([&] { problem_of(input, {.priors = priors}); });
+  };
+  EXPECT_THAT(refused({{.name = "sheer", .mean = 20, .sigma = 1}}),
+              HasSubstr("did you mean `shear`?"));
+  EXPECT_THAT(refused({{.name = "shear", .mean = 1e9, .sigma = 1}}),
+              HasSubstr("where the fit looks"));
+  EXPECT_THAT(refused({{.name = "shear", .mean = NAN, .sigma = 1}}),
+              HasSubstr("where the fit looks"));
+  EXPECT_THAT(refused({{.name = "shear", .mean = 10, .sigma = 1}, {"shear", 50, 1}}),
+              HasSubstr("given twice"));
+  for (const double sigma : {0.0, -1.0, double(NAN)})
+    EXPECT_THAT(refusal([&] {
+                  FitOptions{.priors = {{"shear", 20, sigma}}}.validate();
+                }),
+                HasSubstr("--prior shear"));
+}
+
 TEST(Problem, RefusesWhatCannotBeFitted) {
   const FitInput good = synthetic_input({});
 
@@ -224,6 +277,9 @@ TEST(Problem, RefusesWhatCannotBeFitted) {
   for (const char* name : {"tension_warp", "tension_weft", "shear", "flexion_warp", "flexion_weft",
                            "damping_warp", "damping_weft"})
     earlier.parameters.push_back({.name = name, .value = 1});
+  EXPECT_THAT(
+      refusal([&] { problem_of(good, {.effects = {"clock_offset"}, .forecast = earlier}); }),
+      HasSubstr("asked for in a forecast"));
   EXPECT_THAT(
       refusal([&] { problem_of(good, {.effects = {"viscous_damping"}, .forecast = earlier}); }),
       HasSubstr("holds no value for viscous_damping.rate"));

@@ -24,12 +24,7 @@ FitProblem tiny_problem(unsigned seed, const FitOptions& options = {}) {
 }
 
 Eigen::VectorXd truth_of(const FitProblem& problem) {
-  const Fabric fabric = SyntheticCloth{}.fabric;
-  Eigen::VectorXd values = problem.space.start();
-  values.head<7>() << fabric.tension_warp_n_per_m, fabric.tension_weft_n_per_m,
-      fabric.shear_n_per_m, fabric.flexion_warp_n_per_m, fabric.flexion_weft_n_per_m,
-      fabric.damping_warp_s, fabric.damping_weft_s;
-  return values;
+  return start_with(problem, SyntheticCloth{}.fabric);
 }
 
 TEST(Refine, FindsTheTruthFromAStartThatIsOffByAFactor) {

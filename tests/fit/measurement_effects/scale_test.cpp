@@ -31,5 +31,20 @@ TEST(Scale, IsFoundWhereItWasPlanted) {
   EXPECT_NEAR(report.result.errors.front().fitted.rms, 5e-4, 2e-5);
 }
 
+TEST(Scale, ThatIsDeclaredIsTakenOutAndToldInTheResult) {
+  FitInput input = synthetic_input({.scale = 1.02});
+  input.recording.declared = {{.name = "scale", .parameters = {{"factor", {1.02}}}}};
+
+  const FitReport report = fit(input, {.mesh_columns = 9, .mesh_rows = 9}, {});
+
+  ASSERT_TRUE(report.usable()) << report.message;
+  EXPECT_NEAR(report.result.errors.front().fitted.rms, 5e-4, 2e-5);
+  const auto found =
+      std::ranges::find(report.result.nuisance, "scale.factor", &ParameterEstimate::name);
+  ASSERT_NE(found, report.result.nuisance.end());
+  EXPECT_EQ(found->value, 1.02);
+  EXPECT_EQ(found->state, ParameterState::fixed);
+}
+
 }  // namespace
 }  // namespace clothfit
