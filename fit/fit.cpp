@@ -11,6 +11,7 @@
 #include "fit/identify.h"
 #include "fit/marker_offsets.h"
 #include "fit/parameter_estimates.h"
+#include "fit/parameterised_model.h"
 #include "fit/predictor.h"
 #include "fit/problem.h"
 #include "fit/report_residuals.h"

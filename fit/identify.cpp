@@ -12,6 +12,7 @@
 #include "fit/lead_in.h"
 #include "fit/observed_motion.h"
 #include "fit/parameter_search.h"
+#include "fit/parameterised_model.h"
 #include "fit/prior_cost.h"
 #include "model/stability.h"
 

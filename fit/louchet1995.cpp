@@ -5,6 +5,7 @@
 #include <string>
 
 #include "data/input_error.h"
+#include "fit/parameterised_model.h"
 #include "model/louchet18.h"
 
 namespace clothfit {

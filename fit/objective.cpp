@@ -5,6 +5,7 @@
 #include <limits>
 #include <map>
 
+#include "fit/parameterised_model.h"
 #include "fit/predictor.h"
 #include "model/relax.h"
 #include "model/simulate.h"

@@ -6,6 +6,7 @@
 
 #include "fit/marker_offsets.h"
 #include "fit/problem.h"
+#include "model/relax.h"
 
 namespace clothfit {
 

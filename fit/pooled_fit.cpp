@@ -9,6 +9,7 @@
 
 #include "data/input_error.h"
 #include "fit/objective.h"
+#include "fit/parameterised_model.h"
 #include "fit/prior_cost.h"
 #include "model/stability.h"
 

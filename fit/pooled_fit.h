@@ -7,6 +7,7 @@
 
 #include "data/progress.h"
 #include "fit/problem.h"
+#include "model/relax.h"
 
 namespace clothfit {
 

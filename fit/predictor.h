@@ -8,6 +8,7 @@
 
 #include "fit/measurement_effects/measurement_effect.h"
 #include "fit/problem.h"
+#include "model/simulate.h"
 
 namespace clothfit {
 

@@ -12,12 +12,8 @@
 #include "fit/parameter_space.h"
 #include "fit/start_state.h"
 #include "model/cloth.h"
-#include "model/fabric.h"
-#include "model/relax.h"
-#include "model/simulate.h"
 #include "model/spring_set.h"
 #include "model/surface.h"
-#include "model/tangent_step.h"
 
 namespace clothfit {
 
@@ -66,24 +62,5 @@ struct FitProblem {
 /// Throws InputError for a recording that cannot be fitted as it stands.
 FitProblem make_problem(const FitInput& input, const FitOptions& options, int mesh_columns,
                         int mesh_rows);
-
-/// The fabric for values of the parameters, whose spring set it is.
-Fabric fabric_of(const FitProblem& problem, const Eigen::VectorXd& values);
-
-/// The model's numbers for values of the parameters. The start shape is the placed sheet.
-ParameterSet parameter_set(const FitProblem& problem, const Eigen::VectorXd& values);
-
-/// How the model's numbers change along each coordinate of the space (fit/parameter_space.h): the
-/// derivatives of what parameter_set() returns.
-std::vector<Direction> directions(const FitProblem& problem, const Eigen::VectorXd& values);
-
-/// Whether a run of the model, and the relaxation of a start at rest, are stable at these steps.
-bool is_stable(const FitProblem& problem, const ParameterSet& set, const TimeSteps& steps);
-
-/// The model's run through frames [0, frames) for each parameter vector; not usable where it
-/// diverged or the time steps would not be stable. A start at rest is relaxed first.
-std::vector<SimulateResult> run_model(const FitProblem& problem,
-                                      const std::vector<Eigen::VectorXd>& values, int frames,
-                                      const TimeSteps& steps, bool velocities = false);
 
 }  // namespace clothfit

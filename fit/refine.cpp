@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "data/median.h"
+#include "fit/parameterised_model.h"
 #include "model/stability.h"
 
 namespace clothfit {

@@ -11,6 +11,7 @@
 
 #include "data/input_error.h"
 #include "fit/node_weights.h"
+#include "fit/parameterised_model.h"
 #include "fit/prior_cost.h"
 #include "model/relax.h"
 #include "model/tangents.h"

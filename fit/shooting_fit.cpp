@@ -5,6 +5,7 @@
 #include <limits>
 #include <memory>
 
+#include "fit/parameterised_model.h"
 #include "fit/prior_cost.h"
 #include "fit/refine.h"
 #include "fit/track_states.h"

@@ -10,6 +10,7 @@
 #include "data/input_error.h"
 #include "fit/cloth_setup.h"
 #include "fit/drive.h"
+#include "fit/parameterised_model.h"
 #include "fit/refine.h"
 #include "model/relax.h"
 #include "model/stability.h"

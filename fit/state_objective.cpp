@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "fit/parameterised_model.h"
 #include "model/simulate.h"
 #include "model/tangents.h"
 

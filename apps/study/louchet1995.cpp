@@ -11,6 +11,7 @@
 #include "apps/study/louchet1995_payload.h"
 #include "data/input_error.h"
 #include "fit/executor.h"
+#include "fit/parameterised_model.h"
 
 namespace clothfit {
 namespace {

@@ -14,6 +14,7 @@
 #include "fit/cluster_covariance.h"
 #include "fit/draws.h"
 #include "fit/objective.h"
+#include "fit/parameterised_model.h"
 #include "fit/prior_cost.h"
 #include "fit/problem.h"
 #include "model/stability.h"

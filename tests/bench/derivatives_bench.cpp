@@ -14,6 +14,7 @@
 #include <functional>
 #include <vector>
 
+#include "fit/parameterised_model.h"
 #include "model/adjoint.h"
 #include "model/stability.h"
 #include "model/tangents.h"

@@ -15,6 +15,7 @@
 #include <random>
 
 #include "data/input_error.h"
+#include "fit/parameterised_model.h"
 #include "fit/prior_cost.h"
 #include "fit/refine.h"
 #include "fit/state_objective.h"

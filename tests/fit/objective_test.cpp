@@ -6,6 +6,7 @@
 
 #include <cmath>
 
+#include "fit/parameterised_model.h"
 #include "model/stability.h"
 #include "synthetic_cloth.h"
 

@@ -9,6 +9,7 @@
 #include <random>
 
 #include "data/input_error.h"
+#include "fit/parameterised_model.h"
 #include "model/stability.h"
 #include "synthetic_cloth.h"
 

@@ -9,6 +9,7 @@
 #include <Eigen/Geometry>
 
 #include "data/input_error.h"
+#include "fit/parameterised_model.h"
 #include "synthetic_cloth.h"
 
 namespace clothfit {

@@ -12,6 +12,7 @@
 #include <random>
 
 #include "data/input_error.h"
+#include "fit/parameterised_model.h"
 #include "fit/refine.h"
 #include "fit/shooting_fit.h"
 #include "model/stability.h"

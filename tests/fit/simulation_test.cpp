@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "data/input_error.h"
+#include "fit/parameterised_model.h"
 #include "model/simulate.h"
 #include "model/spring_vector.h"
 #include "model/stability.h"

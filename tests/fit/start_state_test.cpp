@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "fit/objective.h"
+#include "fit/parameterised_model.h"
 #include "synthetic_cloth.h"
 
 namespace clothfit {

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "fit/louchet1995.h"
+#include "fit/parameterised_model.h"
 #include "model/simulate.h"
 
 namespace clothfit {

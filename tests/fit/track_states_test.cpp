@@ -9,6 +9,7 @@
 #include <random>
 
 #include "data/input_error.h"
+#include "fit/parameterised_model.h"
 #include "fit/refine.h"
 #include "model/simulate.h"
 #include "synthetic_cloth.h"
