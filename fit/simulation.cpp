@@ -28,16 +28,6 @@ Fabric fabric_of(const std::map<std::string, double>& values) {
           .damping_weft_s = values.at("damping_weft")};
 }
 
-std::map<std::string, double> named(const Fabric& fabric) {
-  return {{"tension_warp", fabric.tension_warp_n_per_m},
-          {"tension_weft", fabric.tension_weft_n_per_m},
-          {"shear", fabric.shear_n_per_m},
-          {"flexion_warp", fabric.flexion_warp_n_per_m},
-          {"flexion_weft", fabric.flexion_weft_n_per_m},
-          {"damping_warp", fabric.damping_warp_s},
-          {"damping_weft", fabric.damping_weft_s}};
-}
-
 StrainLimitMode mode_of(StrainLimitKind kind) {
   switch (kind) {
     case StrainLimitKind::positions:
@@ -92,6 +82,16 @@ void require_possible(const std::string& effect, const EffectParameter& paramete
 }
 
 }  // namespace
+
+std::map<std::string, double> named(const Fabric& fabric) {
+  return {{"tension_warp", fabric.tension_warp_n_per_m},
+          {"tension_weft", fabric.tension_weft_n_per_m},
+          {"shear", fabric.shear_n_per_m},
+          {"flexion_warp", fabric.flexion_warp_n_per_m},
+          {"flexion_weft", fabric.flexion_weft_n_per_m},
+          {"damping_warp", fabric.damping_warp_s},
+          {"damping_weft", fabric.damping_weft_s}};
+}
 
 ModelSprings springs_of(const SpringParameters& springs) {
   ModelSprings result{.natural_length_m = springs.natural_length_m,

@@ -1,7 +1,9 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <map>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "data/model_description.h"
@@ -21,6 +23,9 @@ struct Simulation {
   StartKind start = StartKind::released_flat;
   std::vector<double> frame_time_s;
 };
+
+/// A fabric's numbers by the names of their parameters.
+std::map<std::string, double> named(const Fabric& fabric);
 
 /// Springs as a model file has them.
 ModelSprings springs_of(const SpringParameters& springs);

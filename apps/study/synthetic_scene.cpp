@@ -7,6 +7,7 @@
 
 #include "data/input_error.h"
 #include "fit/draws.h"
+#include "fit/simulation.h"
 #include "model/cloth.h"
 #include "model/simulate.h"
 #include "model/stability.h"
@@ -72,15 +73,9 @@ Recording scene_recording(const SyntheticScene& scene) {
 }
 
 std::map<std::string, double> scene_truth(const SyntheticScene& scene) {
-  const Fabric& fabric = scene.fabric;
-  return {{"tension_warp", fabric.tension_warp_n_per_m},
-          {"tension_weft", fabric.tension_weft_n_per_m},
-          {"shear", fabric.shear_n_per_m},
-          {"flexion_warp", fabric.flexion_warp_n_per_m},
-          {"flexion_weft", fabric.flexion_weft_n_per_m},
-          {"damping_warp", fabric.damping_warp_s},
-          {"damping_weft", fabric.damping_weft_s},
-          {"viscous_damping.rate", scene.drag_per_s}};
+  std::map<std::string, double> truth = named(scene.fabric);
+  truth["viscous_damping.rate"] = scene.drag_per_s;
+  return truth;
 }
 
 CameraParameters scene_camera(const SyntheticScene& scene, int number, int width_px,

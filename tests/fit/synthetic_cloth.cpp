@@ -27,16 +27,6 @@ CameraParameters synthetic_camera() {
   return camera;
 }
 
-std::map<std::string, double> named(const Fabric& fabric) {
-  return {{"tension_warp", fabric.tension_warp_n_per_m},
-          {"tension_weft", fabric.tension_weft_n_per_m},
-          {"shear", fabric.shear_n_per_m},
-          {"flexion_warp", fabric.flexion_warp_n_per_m},
-          {"flexion_weft", fabric.flexion_weft_n_per_m},
-          {"damping_warp", fabric.damping_warp_s},
-          {"damping_weft", fabric.damping_weft_s}};
-}
-
 Eigen::VectorXd start_with(const FitProblem& problem, const Fabric& fabric) {
   Eigen::VectorXd values = problem.space.start();
   for (const auto& [name, value] : named(fabric)) values[problem.space.index(name)] = value;

@@ -1,10 +1,8 @@
 #pragma once
 
-#include <map>
-#include <string>
-
 #include "fit/fit.h"
 #include "fit/problem.h"
+#include "fit/simulation.h"
 #include "model/fabric.h"
 
 namespace clothfit {
@@ -35,9 +33,6 @@ struct SyntheticCloth {
 /// the vertical, filmed at 60 Hz: simulated at a time step of its own, with noisy 3D tracks and the
 /// noisy pixels of one camera. Tracks state their sigma.
 FitInput synthetic_input(const SyntheticCloth& cloth);
-
-/// The fabric's numbers by the names of its parameters.
-std::map<std::string, double> named(const Fabric& fabric);
 
 /// Where a fit begins, but for the fabric, which is given.
 Eigen::VectorXd start_with(const FitProblem& problem, const Fabric& fabric);
