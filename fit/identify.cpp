@@ -81,6 +81,17 @@ constexpr Effort kFinalEffort{.rounds = 6,
                               .exact_in_the_end = true,
                               .most_spring_steps = 2e10};
 
+/// From a local optimum: on a shorter horizon the same valley leads past it.
+constexpr Effort kSecondLookEffort{.rounds = 3,
+                                   .least_gain = 1e-6,
+                                   .derivatives = Derivatives::tangents,
+                                   .trust_region_radius = 1e4,
+                                   .exact_in_the_end = true,
+                                   .most_spring_steps = 1e10};
+/// Standard deviations by which the squared residuals may exceed what noise alone leaves: a second
+/// look where it is not needed costs less than one that is missed.
+constexpr double kNoiseDeviations = 1;
+
 int horizon_frames(const FitProblem& problem, double share) {
   const int wanted = static_cast<int>(std::lround(share * problem.first_held_out));
   return std::clamp(wanted, std::min(kFewestFrames, problem.first_held_out),
@@ -227,6 +238,34 @@ Eigen::VectorXd away_from_ends(const FitProblem& problem, const Eigen::VectorXd&
   return keeps_to_priors && is_no_worse ? result : values;
 }
 
+/// Whether residuals are no larger than the noise makes them: the sum of n squares is n, give or
+/// take sqrt(2 n).
+bool is_noise_alone(const RefineResult& result) {
+  const auto residuals = static_cast<double>(result.residual_by_coordinate.rows());
+  return 2 * result.cost < 1 + kNoiseDeviations * std::sqrt(2 / residuals);
+}
+
+/// Where the optimum leaves more than noise, the model may be wrong, or the optimum a local one:
+/// over fewer frames the cost has fewer of them. The better of the two.
+RefineResult second_look(const FitProblem& problem, const FitOptions& options,
+                         const RefineResult& first, const ProgressCallback& progress,
+                         FitReport& report) {
+  if (!first.usable || first.cancelled || is_noise_alone(first)) return first;
+  const auto look = [&](double share, const Effort& effort, const Eigen::VectorXd& start) {
+    return refine_stage({.problem = problem, .share = share, .effort = effort}, options, start,
+                        progress, report);
+  };
+  RefineResult second = first;
+  for (const double share : {kSearchShare, 1.0}) {
+    second = look(share, kSecondLookEffort, second.values);
+    if (second.cancelled || !second.usable) return second.cancelled ? second : first;
+  }
+  if (second.cost >= first.cost) return first;
+  second = look(1, kFinalEffort, second.values);
+  const bool better = second.cancelled || (second.usable && second.cost < first.cost);
+  return better ? second : first;
+}
+
 /// How refinement comes to where it starts.
 struct Approach {
   std::span<const double> coarse_shares;  ///< horizons on the coarse mesh
@@ -267,7 +306,10 @@ RefineResult refine_on(const FitProblem& coarse_problem, const FitProblem& probl
     if (follows_it) break;
   }
   improve({.problem = problem, .effort = kFinalEffort});
-  return best;
+  // What was followed from the start is a valley that is known.
+  return follows_it && !approach.by_coarse_mesh
+             ? best
+             : second_look(problem, options, best, progress, report);
 }
 
 /// The one of the optima of a search that gets furthest over a short horizon on the coarse mesh.
