@@ -37,6 +37,20 @@ enum class EffectTest {
   finite     ///< no derivative at neutral: by fits at trial amplitudes
 };
 
+/// Values of a parameter that says how an effect is at work, not how much.
+struct ShapeGrid {
+  std::string parameter;
+  std::vector<double> values;  ///< in its unit; or, per_duration, in units of 1 / duration
+  bool per_duration = false;   ///< of the observed motion: frequencies
+};
+
+/// One law that an effect may follow: data are asked for each law by itself.
+struct EffectLaw {
+  std::string name;                     ///< such as "hem"; empty where an effect has but one
+  std::vector<std::string> amplitudes;  ///< parameters that say how much: neutral is absent
+  std::vector<ShapeGrid> shapes;        ///< tried at each combination; all others stay neutral
+};
+
 /// At the neutral values of all its parameters an effect leaves the trajectory bit-equal;
 /// parameters that say how, not how much, have a neutral value too, at which alone nothing need
 /// vanish.
@@ -45,6 +59,7 @@ struct EffectDescription {
   std::string summary;  ///< one line for a person, with the equation
   std::vector<EffectParameter> parameters;
   EffectTest test = EffectTest::smooth;
+  std::vector<EffectLaw> laws = {};  ///< none: one, of which all parameters are amplitudes
 };
 
 /// What an effect may look at: the state at the beginning of a step, in SI units, world.

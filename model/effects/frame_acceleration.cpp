@@ -26,7 +26,8 @@ EffectDescription describe() {
       .summary = "the frame shakes, F = -m a sin(2 pi (f t + phase))",
       .parameters = Harmonic::parameters(
           {.name = "a", .unit = "m/s2", .neutral = 0, .lower = -20, .upper = 20, .typical = 0.1}),
-      .test = EffectTest::profiled};
+      .test = EffectTest::profiled,
+      .laws = Harmonic::laws("a")};
 }
 
 std::unique_ptr<Effect> make() {

@@ -29,7 +29,8 @@ EffectDescription describe() {
           .summary = "wind with one harmonic, F = A [n . q sin(2 pi (f t + phase))] n",
           .parameters = Harmonic::parameters(
               {.name = "q", .unit = "Pa", .neutral = 0, .lower = -3, .upper = 3, .typical = 0.05}),
-          .test = EffectTest::profiled};
+          .test = EffectTest::profiled,
+          .laws = Harmonic::laws("q")};
 }
 
 std::unique_ptr<Effect> make() {

@@ -45,6 +45,16 @@ struct Harmonic {
                    .typical = 0.05});
     return all;
   }
+
+  /// Of an amplitude named `amplitude`. Half a turn more is the other sign.
+  static std::vector<EffectLaw> laws(const std::string& amplitude) {
+    return {
+        {.name = "",
+         .amplitudes = {amplitude + "_x", amplitude + "_y", amplitude + "_z"},
+         .shapes = {
+             {.parameter = "frequency", .values = {0.5, 1, 1.5, 2, 3, 4, 6}, .per_duration = true},
+             {.parameter = "phase", .values = {0, 0.125, 0.25, 0.375}}}}};
+  }
 };
 
 }  // namespace clothfit

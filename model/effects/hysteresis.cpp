@@ -42,7 +42,10 @@ EffectDescription describe() {
                 .upper = 0.1,
                 .typical = 0.002,
                 .scale = ParameterScale::logarithmic}},
-          .test = EffectTest::profiled};
+          .test = EffectTest::profiled,
+          .laws = {{.name = "",
+                    .amplitudes = {"ratio"},
+                    .shapes = {{.parameter = "yield", .values = {5e-4, 2e-3, 8e-3, 3e-2}}}}}};
 }
 
 std::unique_ptr<Effect> make() {

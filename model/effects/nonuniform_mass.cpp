@@ -116,7 +116,16 @@ EffectDescription describe() {
                           .lower = 0.02,
                           .upper = 1,
                           .typical = 0.01}},
-          .test = EffectTest::profiled};
+          .test = EffectTest::profiled,
+          .laws = {{.name = "hem",
+                    .amplitudes = {"hem"},
+                    .shapes = {{.parameter = "hem_width", .values = {0.005, 0.01, 0.02, 0.04}}}},
+                   {.name = "gradient", .amplitudes = {"gradient_s", "gradient_t"}, .shapes = {}},
+                   {.name = "patch",
+                    .amplitudes = {"patch"},
+                    .shapes = {{.parameter = "patch_s", .values = {0.2, 0.5, 0.8}},
+                               {.parameter = "patch_t", .values = {0.2, 0.5, 0.8}},
+                               {.parameter = "patch_radius", .values = {0.05, 0.12}}}}}};
 }
 
 std::unique_ptr<Effect> make() {

@@ -85,7 +85,16 @@ EffectDescription describe() {
                      place("patch_t", 0.5, 0, 1), place("patch_radius", 0.3, 0.1, 1),
                      amplitude("edge", 5), place("edge_width", 0.15, 0.05, 0.5),
                      amplitude("gradient_s", 0.9), amplitude("gradient_t", 0.9)},
-      .test = EffectTest::profiled};
+      .test = EffectTest::profiled,
+      .laws = {{.name = "patch",
+                .amplitudes = {"patch"},
+                .shapes = {{.parameter = "patch_s", .values = {0.2, 0.5, 0.8}},
+                           {.parameter = "patch_t", .values = {0.2, 0.5, 0.8}},
+                           {.parameter = "patch_radius", .values = {0.2, 0.4}}}},
+               {.name = "edge",
+                .amplitudes = {"edge"},
+                .shapes = {{.parameter = "edge_width", .values = {0.1, 0.25}}}},
+               {.name = "gradient", .amplitudes = {"gradient_s", "gradient_t"}, .shapes = {}}}};
 }
 
 std::unique_ptr<Effect> make() {

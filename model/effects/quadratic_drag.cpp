@@ -37,9 +37,11 @@ EffectDescription describe() {
   return {
       .name = "quadratic_drag",
       .summary = "drag with the square of the speed, F = -A/2 (c_n |v_n| v_n + c_t |v_t| v_t)",
-      .parameters = {
-          {.name = "c_n", .unit = "kg/m3", .neutral = 0, .lower = 0, .upper = 10, .typical = 0.1},
-          {.name = "c_t", .unit = "kg/m3", .neutral = 0, .lower = 0, .upper = 2, .typical = 0.02}}};
+      .parameters =
+          {{.name = "c_n", .unit = "kg/m3", .neutral = 0, .lower = 0, .upper = 10, .typical = 0.1},
+           {.name = "c_t", .unit = "kg/m3", .neutral = 0, .lower = 0, .upper = 2, .typical = 0.02}},
+      .laws = {{.name = "normal", .amplitudes = {"c_n"}, .shapes = {}},
+               {.name = "tangential", .amplitudes = {"c_t"}, .shapes = {}}}};
 }
 
 std::unique_ptr<Effect> make() {

@@ -42,7 +42,10 @@ EffectDescription describe() {
                 .upper = 10,
                 .typical = 0.05,
                 .scale = ParameterScale::logarithmic}},
-          .test = EffectTest::profiled};
+          .test = EffectTest::profiled,
+          .laws = {{.name = "",
+                    .amplitudes = {"ratio"},
+                    .shapes = {{.parameter = "time", .values = {0.02, 0.07, 0.25, 1}}}}}};
 }
 
 std::unique_ptr<Effect> make() {

@@ -114,7 +114,10 @@ EffectDescription describe() {
                           .lower = 0.005,
                           .upper = 0.1,
                           .typical = 0.002}},
-          .test = EffectTest::finite};
+          .test = EffectTest::finite,
+          .laws = {{.name = "",
+                    .amplitudes = {"stiffness"},
+                    .shapes = {{.parameter = "thickness", .values = {0.01, 0.03}}}}}};
 }
 
 std::unique_ptr<Effect> make() {

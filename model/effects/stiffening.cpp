@@ -34,6 +34,7 @@ struct Law {
 }  // namespace
 
 EffectDescription describe() {
+  const ShapeGrid strains{.parameter = "strain", .values = {3e-3, 0.01, 0.03, 0.1}};
   return {.name = "stiffening",
           .summary = "a tension curve that bends, T = k l0 amplitude e^2 / (|e| + strain)",
           .parameters = {{.name = "stretched",
@@ -55,7 +56,9 @@ EffectDescription describe() {
                           .upper = 0.2,
                           .typical = 0.01,
                           .scale = ParameterScale::logarithmic}},
-          .test = EffectTest::profiled};
+          .test = EffectTest::profiled,
+          .laws = {{.name = "stretched", .amplitudes = {"stretched"}, .shapes = {strains}},
+                   {.name = "compressed", .amplitudes = {"compressed"}, .shapes = {strains}}}};
 }
 
 std::unique_ptr<Effect> make() {

@@ -32,7 +32,8 @@ EffectDescription describe() {
                                           .lower = -0.1,
                                           .upper = 0.1,
                                           .typical = 0.002}),
-      .test = EffectTest::profiled};
+      .test = EffectTest::profiled,
+      .laws = Harmonic::laws("amplitude")};
 }
 
 std::unique_ptr<Effect> make() {

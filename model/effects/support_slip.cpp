@@ -50,7 +50,10 @@ EffectDescription describe() {
                           .lower = 0,
                           .upper = 10,
                           .typical = 0.02}},
-          .test = EffectTest::finite};
+          .test = EffectTest::finite,
+          .laws = {{.name = "",
+                    .amplitudes = {"mobility"},
+                    .shapes = {{.parameter = "threshold", .values = {0, 0.05, 0.2}}}}}};
 }
 
 std::unique_ptr<Effect> make() {

@@ -15,7 +15,9 @@
 namespace clothfit {
 namespace {
 
+using testing::Contains;
 using testing::HasSubstr;
+using testing::Not;
 
 TEST(EffectRegistry, ListsEffectsInAlphabeticalOrderEachOnce) {
   const auto effects = effect_registry();
@@ -27,6 +29,32 @@ TEST(EffectRegistry, ListsEffectsInAlphabeticalOrderEachOnce) {
 
 TEST(EffectRegistry, EveryEffectKeepsTheContract) {
   for (const EffectEntry& entry : effect_registry()) expect_effect_contract(entry.name, {});
+}
+
+TEST(EffectRegistry, EveryLawIsMadeOfItsEffectsParametersWithinTheirRanges) {
+  for (const EffectEntry& entry : effect_registry()) {
+    const EffectDescription effect = entry.describe();
+    const auto parameter = [&](const std::string& name) {
+      return std::ranges::find(effect.parameters, name, &EffectParameter::name);
+    };
+    for (const EffectLaw& law : effect.laws) {
+      SCOPED_TRACE(effect.name + " " + law.name);
+      EXPECT_FALSE(law.amplitudes.empty());
+      for (const std::string& amplitude : law.amplitudes)
+        EXPECT_NE(parameter(amplitude), effect.parameters.end()) << amplitude;
+      for (const ShapeGrid& shape : law.shapes) {
+        const auto found = parameter(shape.parameter);
+        ASSERT_NE(found, effect.parameters.end()) << shape.parameter;
+        EXPECT_THAT(law.amplitudes, Not(Contains(shape.parameter)));
+        EXPECT_FALSE(shape.values.empty());
+        if (shape.per_duration) continue;
+        for (const double value : shape.values) {
+          EXPECT_GE(value, found->lower);
+          EXPECT_LE(value, found->upper);
+        }
+      }
+    }
+  }
 }
 
 TEST(EffectRegistry, FindsEveryEffectByItsName) {
