@@ -56,18 +56,6 @@ ParameterPrior parse_prior(const std::string& text) {
                    "clock_offset.time=0,0.002");
 }
 
-/// Nothing where the text is not a mesh that a fit takes.
-std::optional<GridSize> parse_mesh(const std::string& text) {
-  const std::optional<GridSize> mesh = parse_grid_size(text);
-  return mesh && is_possible_mesh(mesh->columns, mesh->rows) ? mesh : std::nullopt;
-}
-
-std::string check_mesh(const std::string& text) {
-  if (parse_mesh(text)) return "";
-  return fmt::format("'{}' is not a mesh, such as 17x17 (each at least 2, {} vertices at most)",
-                     text, kMostMeshVertices);
-}
-
 /// CLI11 wraps a negative number into a huge one.
 std::string check_seed(const std::string& text) {
   return text.starts_with('-') ? "'" + text + "' is not a seed: a whole number, 0 or more" : "";

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <string_view>
 
 namespace clothfit {
@@ -13,5 +14,11 @@ struct GridSize {
 
 /// "17x13": columns and rows. Nothing where the text is not two whole numbers with an x between.
 std::optional<GridSize> parse_grid_size(std::string_view text);
+
+/// The mesh that --mesh names. Nothing where the text is not one that a fit takes.
+std::optional<GridSize> parse_mesh(std::string_view text);
+
+/// For CLI11: empty, or what is wrong with the text of --mesh.
+std::string check_mesh(const std::string& text);
 
 }  // namespace clothfit

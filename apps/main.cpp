@@ -30,6 +30,7 @@ int run(int argc, char** argv) {
   clothfit::add_calibrate_verb(program, action);
   clothfit::add_track_verb(program, action);
   clothfit::add_fit_verb(program, action);
+  clothfit::add_diagnose_verb(program, action);
   clothfit::add_simulate_verb(program, action);
   clothfit::add_recover_verb(program, action);
   clothfit::add_experiment_verb(program, action);

@@ -382,13 +382,6 @@ std::string check_assignment(const std::string& text) {
   return parse_assignment(text) ? "" : "'" + text + "' is not NAME=NUMBER";
 }
 
-std::string check_mesh(const std::string& text) {
-  const std::optional<GridSize> mesh = parse_grid_size(text);
-  if (mesh && is_possible_mesh(mesh->columns, mesh->rows)) return "";
-  return fmt::format("'{}' is not a mesh, such as 17x17 (each at least 2, {} vertices at most)",
-                     text, kMostMeshVertices);
-}
-
 }  // namespace
 
 void add_simulate_verb(CLI::App& program, VerbAction& action) {

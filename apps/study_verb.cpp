@@ -49,13 +49,6 @@ FitOptions study_defaults() {
   return options;
 }
 
-std::string check_mesh(const std::string& text) {
-  const auto mesh = parse_grid_size(text);
-  if (mesh && is_possible_mesh(mesh->columns, mesh->rows)) return "";
-  return fmt::format("'{}' is not a mesh, such as 17x17 (each at least 2, {} vertices at most)",
-                     text, kMostMeshVertices);
-}
-
 /// What a model has beside effects.
 constexpr const char* kMarkerOffsets = "marker_offsets";
 

@@ -15,6 +15,7 @@ using VerbAction = std::function<int()>;
 void add_calibrate_verb(CLI::App& program, VerbAction& action);
 void add_track_verb(CLI::App& program, VerbAction& action);
 void add_fit_verb(CLI::App& program, VerbAction& action);
+void add_diagnose_verb(CLI::App& program, VerbAction& action);
 void add_simulate_verb(CLI::App& program, VerbAction& action);
 void add_recover_verb(CLI::App& program, VerbAction& action);
 void add_demo_verb(CLI::App& program, VerbAction& action);

@@ -298,6 +298,8 @@ FitReport fit(const FitInput& input, const FitOptions& options, const ProgressCa
     longest_frame_s =
         std::max(longest_frame_s, problem.frame_time_s[f] - problem.frame_time_s[f - 1]);
   result.substeps = static_cast<int>(std::ceil(longest_frame_s / result.time_step_s - 1e-9));
+  for (int p = 0; p < problem.space.size(); ++p)
+    report.values[problem.space.parameters[static_cast<size_t>(p)].name] = values[p];
   fill_parameters(problem, options, values, uncertainty, looks, result);
   const std::vector<Eigen::Matrix3Xd> fitted_frames(
       run.position_m.begin(), run.position_m.begin() + problem.first_held_out);

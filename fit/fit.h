@@ -104,6 +104,8 @@ struct FitReport {
   FitResult result;
   bool usable() const { return stop == FitStop::converged || stop == FitStop::reached_limit; }
   ModelDescription model;  ///< what was found, with all that a simulation needs
+  /// Every parameter of the fit by name, those of the start and of the drive among them.
+  std::map<std::string, double> values;
 
   /// What the sigma of each parameter of the physics is made of (fit/uncertainty.h).
   struct SigmaParts {

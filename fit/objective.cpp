@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <numeric>
 
 #include "fit/parameterised_model.h"
 #include "fit/predictor.h"
@@ -148,11 +149,24 @@ std::vector<Eigen::VectorXd> TrajectoryObjective::residuals(
 }
 
 Linearisation TrajectoryObjective::linearise(const Eigen::VectorXd& values) const {
+  std::vector<int> all(static_cast<size_t>(problem().space.size()));
+  std::iota(all.begin(), all.end(), 0);
+  return linearise_by(values, all);
+}
+
+Linearisation TrajectoryObjective::linearise_by(const Eigen::VectorXd& values,
+                                                std::span<const int> coordinates) const {
   Linearisation result;
   if (!is_stable(values)) return result;
   const FitProblem& of = problem();
   ParameterSet set = parameter_set(of, values);
-  std::vector<Direction> along = directions(of, values);
+  // How the cloth is looked at changes no run.
+  std::vector<int> simulated;
+  for (const int p : coordinates)
+    if (of.space.parameters[static_cast<size_t>(p)].role != ParameterRole::measurement)
+      simulated.push_back(p);
+  std::vector<Direction> every = directions(of, values), along;
+  for (const int p : simulated) along.push_back(std::move(every[static_cast<size_t>(p)]));
   if (of.start == StartKind::at_rest)
     start_at_rest_with_tangents(of.cloth, set, along, of.gravity_m_per_s2.norm(),
                                 of.frame_time_s.front(), steps().rest_s);
@@ -163,20 +177,22 @@ Linearisation TrajectoryObjective::linearise(const Eigen::VectorXd& values) cons
       .time_step_s = time_step_s(),
       .velocities = predictor.needs_velocities()};
   const TangentResult run = simulate_with_tangents(of.cloth, set, along, schedule);
-  result.runs = 1 + of.space.size();
+  result.runs = 1 + static_cast<int>(simulated.size());
   if (!run.run.usable()) return result;
 
   const MarkerRun markers = marker_run(of, run.run);
-  const auto parameters = static_cast<size_t>(of.space.size());
-  std::vector<MarkerRun> tangents(parameters);
-  for (size_t p = 0; p < parameters; ++p) {
-    tangents[p].position_m = marker_positions(of.vertex_weights, run.position_tangent[p]);
+  std::vector<MarkerRun> tangents(static_cast<size_t>(of.space.size()));
+  for (size_t n = 0; n < simulated.size(); ++n) {
+    MarkerRun& tangent = tangents[static_cast<size_t>(simulated[n])];
+    tangent.position_m = marker_positions(of.vertex_weights, run.position_tangent[n]);
     if (schedule.velocities)
-      tangents[p].velocity_m_per_s = marker_positions(of.vertex_weights, run.velocity_tangent[p]);
+      tangent.velocity_m_per_s = marker_positions(of.vertex_weights, run.velocity_tangent[n]);
   }
   Eigen::Matrix3Xd change(3, of.space.size());
+  const std::vector<int> chosen(coordinates.begin(), coordinates.end());
   result.residual.resize(residual_count());
-  result.residual_by_coordinate.resize(residual_count(), of.space.size());
+  result.residual_by_coordinate.resize(residual_count(),
+                                       static_cast<Eigen::Index>(coordinates.size()));
   for (const Block& block : blocks()) {
     const ObservationSet& observed = of.observations[static_cast<size_t>(block.set)];
     const Observation& row = observed.rows[static_cast<size_t>(block.row)];
@@ -185,7 +201,7 @@ Linearisation TrajectoryObjective::linearise(const Eigen::VectorXd& values) cons
     result.residual.segment(block.offset, block.dimension) =
         (*predicted - row.observed).head(block.dimension) / row.sigma;
     result.residual_by_coordinate.middleRows(block.offset, block.dimension) =
-        change.topRows(block.dimension) / row.sigma;
+        change(Eigen::seqN(0, block.dimension), chosen) / row.sigma;
   }
   take_offsets_out(result.residual);
   take_offsets_out(result.residual_by_coordinate);

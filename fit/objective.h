@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -113,6 +114,8 @@ class TrajectoryObjective final : public Objective {
   std::vector<Eigen::VectorXd> residuals(const std::vector<Eigen::VectorXd>& values) const override;
   using Objective::linearise;
   Linearisation linearise(const Eigen::VectorXd& values) const override;
+  /// The same with derivatives by some of the coordinates only, in this order.
+  Linearisation linearise_by(const Eigen::VectorXd& values, std::span<const int> coordinates) const;
 
  private:
   void take_offsets_out(Eigen::Ref<Eigen::MatrixXd> columns) const;

@@ -151,9 +151,13 @@ std::optional<Eigen::Vector3d> Predictor::predict(
   const auto predicted = observer.predict(seen.position_m, &by_position);
   if (!predicted) return std::nullopt;
   const Eigen::Matrix3d by_place = by_position * seen.by_place;
-  for (size_t p = 0; p < tangents.size(); ++p)
-    by_coordinate.col(static_cast<Eigen::Index>(p)) =
-        by_place * seen.instant.of(seen.instant.place, tangents[p], row.marker);
+  for (size_t p = 0; p < tangents.size(); ++p) {
+    auto column = by_coordinate.col(static_cast<Eigen::Index>(p));
+    if (tangents[p].position_m.empty())
+      column.setZero();
+    else
+      column = by_place * seen.instant.of(seen.instant.place, tangents[p], row.marker);
+  }
   for (size_t n = 0; n < fitted_.size(); ++n) {
     const auto own = static_cast<Eigen::Index>(n);
     by_coordinate.col(fitted_[n]) += slope_[own] * by_position * seen.by_parameter.col(own);

@@ -47,7 +47,8 @@ class Predictor {
                                          const MarkerRun& run) const;
 
   /// The same with its derivatives by the space's coordinates, 3 x coordinates, from those of the
-  /// markers' motion. Velocities of `tangents` are looked at where those of `run` are.
+  /// markers' motion; one without frames stands for a motion that does not change. Velocities of
+  /// `tangents` are looked at where those of `run` are.
   std::optional<Eigen::Vector3d> predict(int set, const Observation& row, const MarkerRun& run,
                                          std::span<const MarkerRun> tangents,
                                          Eigen::Ref<Eigen::Matrix3Xd> by_coordinate) const;

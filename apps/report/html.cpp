@@ -24,6 +24,7 @@ p { margin: .5rem 0 .8rem; }
 .verdict strong { display: block; font-size: 1.08rem; margin-bottom: .2rem; }
 .verdict p { margin: 0; }
 .wide { overflow-x: auto; }
+.pair { display: grid; grid-template-columns: 1fr 1fr; gap: 1rem; }
 table { border-collapse: collapse; width: 100%; font-size: .92rem; font-variant-numeric: tabular-nums; margin: .4rem 0 1.2rem; }
 caption { text-align: left; color: var(--soft); padding: 0 0 .4rem; }
 th, td { padding: .32rem .7rem .32rem 0; text-align: left; vertical-align: top; }

@@ -1,0 +1,133 @@
+#include "apps/report/diagnosis_json.h"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "apps/json_file.h"
+#include "apps/version.h"
+
+namespace clothfit {
+namespace {
+
+using nlohmann::ordered_json;
+
+ordered_json term_json(const Term& term) {
+  ordered_json json{{"effect", term.effect}, {"law", term.law}};
+  if (!term.shape.empty()) json["shape"] = term.shape;
+  return json;
+}
+
+ordered_json trial_json(const LawTrial& trial) {
+  ordered_json json = term_json(trial.term);
+  json["foreseen_fall"] = trial.foreseen_fall;
+  json["fall"] = trial.fall;
+  json["cross_validated"] = trial.cross_validated;
+  json["cross_validated_before"] = trial.without_it;
+  json["cross_validated_trivial"] = trial.best_trivial;
+  json["clear_of_neutral"] = trial.clear_of_neutral;
+  json["refused"] = trial.refused;
+  return json;
+}
+
+/// Values that the last fit has for what a term fits.
+ordered_json found_json(const Term& term, const FitReport& found) {
+  ordered_json json = ordered_json::array();
+  const auto add = [&](const std::string& name) {
+    const auto value = found.values.find(term.effect + "." + name);
+    if (value == found.values.end()) return;
+    double sigma = 0;
+    for (const EffectEstimate& effect : found.result.effects)
+      if (effect.name == term.effect)
+        for (const ParameterEstimate& parameter : effect.parameters)
+          if (parameter.name == name) sigma = parameter.sigma;
+    for (const ParameterEstimate& parameter : found.result.nuisance)
+      if (parameter.name == value->first) sigma = parameter.sigma;
+    json.push_back({{"name", name}, {"value", value->second}, {"sigma", sigma}});
+  };
+  for (const std::string& amplitude : term.amplitudes) add(amplitude);
+  if (term.fits_shape)
+    for (const auto& [name, value] : term.shape) add(name);
+  return json;
+}
+
+ordered_json adequacy_json(const Adequacy& of) {
+  return {{"adequate", of.adequate},
+          {"chi_square_per_dof", of.chi_square_per_dof},
+          {"noise_chi_square_per_dof", of.noise_chi_square_per_dof},
+          {"time_correlation", of.time_correlation},
+          {"neighbour_correlation", of.neighbour_correlation},
+          {"smooth_share", of.smooth_share},
+          {"smooth_score", of.smooth_score}};
+}
+
+}  // namespace
+
+void write_diagnosis(const Diagnosis& diagnosis, const std::string& command,
+                     const std::filesystem::path& file) {
+  ordered_json json{{"format", "clothfit-diagnosis/1"},
+                    {"version", program_version()},
+                    {"command", command},
+                    {"recordings", {diagnosis.base.result.recording}},
+                    {"verdict", to_string(diagnosis.verdict)},
+                    {"seconds", diagnosis.seconds}};
+  json["accepted"] = ordered_json::array();
+  for (const AcceptedEffect& accepted : diagnosis.accepted) {
+    ordered_json one = trial_json(accepted.trial);
+    one.erase("refused");
+    ordered_json alike = ordered_json::array({accepted.trial.term.effect});
+    for (const Term& term : accepted.alike)
+      if (std::ranges::find(alike, term.effect) == alike.end()) alike.push_back(term.effect);
+    one["class"] = alike;
+    one["parameters"] = found_json(accepted.trial.term, diagnosis.found);
+    one["instead"] = ordered_json::array();
+    for (const LawTrial& trial : accepted.refused) one["instead"].push_back(trial_json(trial));
+    json["accepted"].push_back(std::move(one));
+  }
+  json["refused"] = ordered_json::array();
+  for (const LawTrial& trial : diagnosis.refused) json["refused"].push_back(trial_json(trial));
+  json["errors"] = ordered_json::array();
+  for (const ObservationErrors& before : diagnosis.base.result.errors) {
+    const auto after =
+        std::ranges::find(diagnosis.found.result.errors, before.kind, &ObservationErrors::kind);
+    if (after == diagnosis.found.result.errors.end()) continue;
+    json["errors"].push_back({{"kind", before.kind},
+                              {"unit", before.unit},
+                              {"noise", before.noise},
+                              {"fitted_before", before.fitted.rms},
+                              {"fitted_after", after->fitted.rms},
+                              {"held_out_before", before.held_out.rms},
+                              {"held_out_after", after->held_out.rms},
+                              {"fitted_before_distance", before.fitted.rms_distance},
+                              {"fitted_after_distance", after->fitted.rms_distance},
+                              {"held_out_before_distance", before.held_out.rms_distance},
+                              {"held_out_after_distance", after->held_out.rms_distance}});
+  }
+  json["adequacy"] = {{"before", adequacy_json(diagnosis.before)},
+                      {"after", adequacy_json(diagnosis.after)}};
+  json["score_frames"] = diagnosis.score_frames;
+  json["candidates"] = ordered_json::array();
+  for (const LawScore& score : diagnosis.scores) {
+    ordered_json one = term_json(score.term);
+    one["share"] = score.share;
+    one["predicted_fall"] = score.fall;
+    one["parameters"] = ordered_json::array();
+    for (Eigen::Index k = 0; k < score.amount.size(); ++k)
+      one["parameters"].push_back({{"name", score.term.amplitudes[static_cast<size_t>(k)]},
+                                   {"beyond_neutral", score.amount[k]},
+                                   {"sigma", score.sigma[k]}});
+    json["candidates"].push_back(std::move(one));
+  }
+  json["detection_limits"] = ordered_json::array();
+  for (const DetectionLimit& limit : diagnosis.limits)
+    for (Eigen::Index k = 0; k < limit.limit.size(); ++k) {
+      ordered_json one = term_json(limit.term);
+      one["parameter"] = limit.parameter[static_cast<size_t>(k)];
+      one["amplitude"] = limit.limit[k];
+      one["unit"] = limit.unit[static_cast<size_t>(k)];
+      json["detection_limits"].push_back(std::move(one));
+    }
+  json["proposed_law"] = nullptr;
+  write_json(json, file);
+}
+
+}  // namespace clothfit

@@ -1,0 +1,30 @@
+#pragma once
+
+#include "apps/report/fit_tables.h"
+#include "fit/diagnose.h"
+
+namespace clothfit {
+
+/// What the score says of every law (CSV): the shape that it was best at, predicted fall of
+/// chi-square, its share, predicted amplitudes.
+Table candidate_table(const Diagnosis& diagnosis);
+/// The most telling ones, for people.
+Table short_candidate_table(const Diagnosis& diagnosis);
+
+/// Laws with which the model was fitted again, accepted and refused, and why.
+Table trial_table(const Diagnosis& diagnosis);
+
+/// Five standard deviations of every amplitude, and what the score foresees of it.
+Table limit_table(const Diagnosis& diagnosis);
+
+/// One row per kind of observation: fitted and held-out error of the model as declared and as it
+/// was found, in mm or px, beside the noise and the trivial predictors.
+Table before_after_table(const Diagnosis& diagnosis);
+
+/// The tests of step 1, before and after.
+Table adequacy_table(const Diagnosis& diagnosis);
+
+/// "q_x 0.05, q_y 0.21 Pa (frequency 2 Hz)": values that a fit found for a term, with sigma.
+std::string found_text(const Term& term, const FitResult& result);
+
+}  // namespace clothfit

@@ -1,0 +1,160 @@
+#include "fit/diagnosis/adequacy.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <utility>
+
+namespace clothfit {
+namespace {
+
+/// A structure that is surer than this,
+constexpr double kSure = 5;
+/// and larger than this share of the noise's own square, is one.
+constexpr double kLarge = 0.02;
+
+/// Sum of products of residuals that are `pairs` apart, with its standard score.
+struct Correlation {
+  double value = 0, score = 0;
+};
+
+using Place = std::pair<int, int>;  ///< marker, frame
+
+/// Of the residuals of one set of observations, where each marker's lie in each frame.
+std::map<Place, const Objective::Block*> blocks_of(const TrajectoryObjective& objective, int set) {
+  std::map<Place, const Objective::Block*> found;
+  for (const Objective::Block& block : objective.blocks())
+    if (block.set == set) found[{block.marker, block.frame}] = &block;
+  return found;
+}
+
+/// The nearest marker to each that lies further along s or t and no further than 1.5 times the
+/// nearest of all: its neighbours.
+std::vector<std::pair<int, int>> neighbours(const Eigen::Matrix2Xd& place_m) {
+  std::vector<std::pair<int, int>> pairs;
+  for (Eigen::Index m = 0; m < place_m.cols(); ++m) {
+    double nearest = INFINITY;
+    for (Eigen::Index o = 0; o < place_m.cols(); ++o)
+      if (o != m) nearest = std::min(nearest, (place_m.col(o) - place_m.col(m)).norm());
+    for (Eigen::Index o = m + 1; o < place_m.cols(); ++o)
+      if ((place_m.col(o) - place_m.col(m)).norm() < 1.1 * nearest)
+        pairs.emplace_back(static_cast<int>(m), static_cast<int>(o));
+  }
+  return pairs;
+}
+
+Correlation correlation(double products, double squares, double count) {
+  if (count == 0 || squares == 0) return {};
+  // White residuals: each product has variance sigma^4.
+  return {products / squares, products / (squares / count * std::sqrt(count))};
+}
+
+/// cos(pi k x), x from 0 to 1: smooth functions over an interval.
+double wave(int k, double x) {
+  return std::cos(std::numbers::pi * k * x);
+}
+
+/// Products of `along` waves each way over the cloth and `in_time` over the frames, for each
+/// coordinate of each set of observations.
+Eigen::MatrixXd smooth_functions(const TrajectoryObjective& objective, int along, int in_time) {
+  const FitProblem& problem = objective.problem();
+  const Eigen::Vector2d first = problem.marker_place_m.rowwise().minCoeff();
+  const Eigen::Vector2d extent =
+      (problem.marker_place_m.rowwise().maxCoeff() - first).cwiseMax(1e-9);
+  const double begin_s = problem.frame_time_s.front();
+  const double length_s =
+      problem.frame_time_s[static_cast<size_t>(objective.frames() - 1)] - begin_s;
+  int kinds = 0;
+  std::vector<int> first_kind;
+  for (const ObservationSet& set : problem.observations) {
+    first_kind.push_back(kinds);
+    kinds += set.dimension;
+  }
+  const int each = along * along * in_time;
+  Eigen::MatrixXd functions =
+      Eigen::MatrixXd::Zero(objective.residual_count(), static_cast<Eigen::Index>(each) * kinds);
+  for (const Objective::Block& block : objective.blocks()) {
+    const Eigen::Vector2d x =
+        (problem.marker_place_m.col(block.marker) - first).cwiseQuotient(extent);
+    const double t = (problem.frame_time_s[static_cast<size_t>(block.frame)] - begin_s) /
+                     std::max(length_s, 1e-9);
+    for (int c = 0; c < block.dimension; ++c) {
+      Eigen::Index column =
+          static_cast<Eigen::Index>(first_kind[static_cast<size_t>(block.set)] + c) * each;
+      for (int i = 0; i < along; ++i)
+        for (int j = 0; j < along; ++j)
+          for (int k = 0; k < in_time; ++k)
+            functions(block.offset + c, column++) = wave(i, x[0]) * wave(j, x[1]) * wave(k, t);
+    }
+  }
+  return functions;
+}
+
+}  // namespace
+
+Adequacy judge_adequacy(const ModelFit& model, const Projection& projection,
+                        const Projection& noise_alone) {
+  Adequacy result;
+  const Eigen::VectorXd& residual = projection.residual();
+  const TrajectoryObjective objective = model.objective();
+  result.chi_square_per_dof =
+      residual.squaredNorm() / std::max(1.0, projection.weights() - projection.taken());
+  result.noise_chi_square_per_dof = noise_alone.residual().squaredNorm() /
+                                    std::max(1.0, noise_alone.weights() - noise_alone.taken());
+
+  double time_products = 0, time_squares = 0, time_count = 0;
+  double near_products = 0, near_squares = 0, near_count = 0;
+  const std::vector<std::pair<int, int>> near = neighbours(model.problem->marker_place_m);
+  for (size_t s = 0; s < model.problem->observations.size(); ++s) {
+    const auto blocks = blocks_of(objective, static_cast<int>(s));
+    const auto add = [&](const Objective::Block& one, const Objective::Block& other,
+                         double& products, double& squares, double& count) {
+      const auto a = residual.segment(one.offset, one.dimension);
+      const auto b = residual.segment(other.offset, other.dimension);
+      products += a.dot(b);
+      squares += 0.5 * (a.squaredNorm() + b.squaredNorm());
+      count += one.dimension;
+    };
+    for (const auto& [place, block] : blocks) {
+      const auto next = blocks.find({place.first, place.second + 1});
+      if (next != blocks.end()) add(*block, *next->second, time_products, time_squares, time_count);
+    }
+    for (int frame = 0; frame < model.frames; ++frame) {
+      for (const auto& [one, other] : near) {
+        const auto a = blocks.find({one, frame}), b = blocks.find({other, frame});
+        if (a != blocks.end() && b != blocks.end())
+          add(*a->second, *b->second, near_products, near_squares, near_count);
+      }
+    }
+  }
+  const Correlation in_time = correlation(time_products, time_squares, time_count);
+  const Correlation along = correlation(near_products, near_squares, near_count);
+  result.time_correlation = in_time.value;
+  result.time_score = in_time.score;
+  result.neighbour_correlation = along.value;
+  result.neighbour_score = along.score;
+
+  const double chi_square = residual.squaredNorm();
+  constexpr std::pair<int, int> kSets[] = {{1, 4}, {2, 4}, {2, 8}, {3, 8}, {3, 16}};
+  for (const auto& [waves, in_time_waves] : kSets) {
+    const Eigen::MatrixXd functions = smooth_functions(objective, waves, in_time_waves);
+    if (2 * functions.cols() > residual.size()) continue;
+    const Eigen::MatrixXd left = projection.columns(functions);
+    const Eigen::MatrixXd information = left.transpose() * left;
+    const Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver(information);
+    const Eigen::VectorXd pull = left.transpose() * residual;
+    const double taken = pull.dot(solver.solve(pull));
+    const auto rank = static_cast<double>(solver.rank());
+    const double score = (taken - rank) / std::sqrt(2 * rank);
+    if (score > result.smooth_score) {
+      result.smooth_score = score;
+      result.smooth_share = (taken - rank) / chi_square;
+    }
+  }
+  const bool structured = result.smooth_score > kSure && result.smooth_share > kLarge;
+  result.adequate = !structured && result.chi_square_per_dof < 1.2;
+  return result;
+}
+
+}  // namespace clothfit

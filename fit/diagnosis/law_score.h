@@ -1,0 +1,34 @@
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "fit/diagnosis/model_fit.h"
+#include "fit/diagnosis/projection.h"
+
+namespace clothfit {
+
+/// What the linearised model foresees of adding an effect by one law.
+struct LawScore {
+  Term term;                ///< at the shape that foresees most
+  Eigen::VectorXd amount;   ///< of its amplitudes beyond neutral, in their units
+  Eigen::VectorXd sigma;    ///< of each from the noise, all else free; infinite where unseen
+  double fall = 0;          ///< of chi-square
+  double share = 0;         ///< of it in all that the projected residual has above its noise
+  Eigen::MatrixXd columns;  ///< projected derivatives of the residuals by its amplitudes
+  int shapes = 1;           ///< that were tried
+};
+
+/// The projection of a model: its own parameters, priors and discretisation taken out. Residuals
+/// beyond three robust scales, or three sigmas where that is more, weigh less.
+Projection project(const DiagnosisSetup& setup, const ModelFit& model,
+                   const Eigen::MatrixXd& unit_directions);
+
+/// The score test [rao1948] of each law at its neutral value: derivatives there, projected, against
+/// the projected residual; amplitudes within their ranges. In the order of `laws`; a law whose
+/// effect cannot act in this model is left out.
+std::vector<LawScore> score_laws(const DiagnosisSetup& setup, const ModelFit& model,
+                                 const Projection& projection, const std::vector<LawShapes>& laws,
+                                 const ProgressCallback& progress);
+
+}  // namespace clothfit

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+
+namespace clothfit {
+
+/// Residuals near an optimum with everything taken out of them that the model may still move: its
+/// parameters J under their priors P, and directions E of unit variance in which the model's own
+/// discretisation errs. What is left of a vector v under the weights W,
+///
+///   v - [J E] H^-1 [J E]' W v,   H = [J E]' W [J E] + diag(P, I),
+///
+/// is what generalised least squares with the covariance W^-1 + E E' cannot explain by J.
+class Projection {
+ public:
+  /// `weight`: Huber's, of each residual. `prior_gradient`: of half the sum of the priors' squares.
+  Projection(const Eigen::MatrixXd& jacobian, const Eigen::MatrixXd& prior_information,
+             const Eigen::VectorXd& prior_gradient, const Eigen::MatrixXd& unit_directions,
+             const Eigen::VectorXd& weight, const Eigen::VectorXd& residual);
+
+  /// What is left of the residual, and of columns; times the square roots of the weights.
+  const Eigen::VectorXd& residual() const { return residual_; }
+  Eigen::MatrixXd columns(const Eigen::MatrixXd& of) const;
+
+  /// Numbers that the residual loses by it, of its weights' sum.
+  double taken() const { return taken_; }
+  double weights() const { return root_weight_.squaredNorm(); }
+
+ private:
+  Eigen::VectorXd root_weight_;
+  Eigen::MatrixXd moved_;  ///< sqrt(W) [J E]
+  Eigen::LDLT<Eigen::MatrixXd> information_;
+  Eigen::VectorXd residual_;
+  double taken_ = 0;
+};
+
+/// How well columns explain what is left of a residual: of least squares with both projected.
+struct Explained {
+  Eigen::VectorXd amount;       ///< of each column
+  Eigen::MatrixXd information;  ///< of the amounts
+  double fall = 0;              ///< of the sum of squares
+};
+
+/// Amounts stay within their ends.
+Explained explain(const Eigen::VectorXd& residual, const Eigen::MatrixXd& columns,
+                  const Eigen::VectorXd& lower, const Eigen::VectorXd& upper);
+
+/// The largest canonical correlation between what two sets of columns span: 1 where one direction
+/// is common to both.
+double canonical_correlation(const Eigen::MatrixXd& one, const Eigen::MatrixXd& other);
+
+}  // namespace clothfit

@@ -1,0 +1,133 @@
+#include "fit/diagnosis/term.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "data/input_error.h"
+#include "fit/measurement_effects/registry.h"
+#include "model/effects/registry.h"
+
+namespace clothfit {
+namespace {
+
+/// How far a grid's value lies from the furthest of its neighbours; of a lone one, half of itself.
+double spacing(const std::vector<double>& values, double at) {
+  double below = 0, above = 0;
+  for (const double value : values) {
+    if (value < at) below = below == 0 ? at - value : std::min(below, at - value);
+    if (value > at) above = above == 0 ? value - at : std::min(above, value - at);
+  }
+  const double wider = std::max(below, above);
+  return wider > 0 ? wider : 0.5 * std::abs(at);
+}
+
+/// All combinations of the values that a law's shapes are tried at.
+LawShapes shapes_of(const EffectDescription& effect, const EffectLaw& law, double duration_s) {
+  Term term{.effect = effect.name,
+            .law = law.name,
+            .amplitudes = law.amplitudes,
+            .shape = {},
+            .shape_sigma = {}};
+  LawShapes result{term};
+  for (const ShapeGrid& grid : law.shapes) {
+    const auto parameter =
+        std::ranges::find(effect.parameters, grid.parameter, &EffectParameter::name);
+    const double in_unit_per_value = grid.per_duration ? 1 / duration_s : 1;
+    LawShapes wider;
+    for (const Term& narrow : result) {
+      for (const double value : grid.values) {
+        const double in_unit = value * in_unit_per_value;
+        if (in_unit < parameter->lower || in_unit > parameter->upper) continue;
+        wider.push_back(narrow);
+        wider.back().shape[grid.parameter] = in_unit;
+        wider.back().shape_sigma[grid.parameter] = spacing(grid.values, value) * in_unit_per_value;
+      }
+    }
+    result = std::move(wider);
+  }
+  return result;
+}
+
+std::vector<EffectLaw> laws_of(const EffectDescription& effect) {
+  if (!effect.laws.empty()) return effect.laws;
+  EffectLaw all{.name = "", .amplitudes = {}, .shapes = {}};
+  for (const EffectParameter& parameter : effect.parameters)
+    all.amplitudes.push_back(parameter.name);
+  return {all};
+}
+
+bool has_tracked_point(const Recording& recording) {
+  return std::ranges::any_of(
+      recording.held, [](const HeldPoint& point) { return point.motion == HeldMotion::tracked; });
+}
+
+}  // namespace
+
+std::string Term::title() const {
+  return law.empty() ? effect : effect + " (" + law + ")";
+}
+
+std::vector<std::string> Term::parameters() const {
+  std::vector<std::string> names;
+  for (const std::string& amplitude : amplitudes) names.push_back(effect + "." + amplitude);
+  return names;
+}
+
+std::string title(const std::vector<Term>& terms) {
+  std::string text;
+  for (const Term& term : terms) text += (text.empty() ? "" : " + ") + term.title();
+  return text.empty() ? "base" : text;
+}
+
+EffectDescription describe_effect(const std::string& name) {
+  require_effect(name, name);
+  if (const MeasurementEffectEntry* entry = measurement_effect_named(name))
+    return entry->describe();
+  return std::ranges::find_if(effect_registry(),
+                              [&](const EffectEntry& entry) { return name == entry.name; })
+      ->describe();
+}
+
+FitInput with_terms(FitInput input, const std::vector<Term>& terms) {
+  for (const Term& term : terms) {
+    std::vector<DeclaredEffect>& declared = input.recording.declared;
+    auto effect = std::ranges::find(declared, term.effect, &DeclaredEffect::name);
+    if (effect == declared.end()) {
+      DeclaredEffect neutral{.name = term.effect, .parameters = {}};
+      for (const EffectParameter& parameter : describe_effect(term.effect).parameters)
+        neutral.parameters[parameter.name] = {parameter.neutral};
+      declared.push_back(std::move(neutral));
+      effect = std::prev(declared.end());
+    }
+    for (const auto& [parameter, value] : term.shape) {
+      effect->parameters[parameter] = {value};
+      if (term.fits_shape) effect->parameters.erase(parameter);
+    }
+    for (const std::string& amplitude : term.amplitudes) effect->parameters.erase(amplitude);
+  }
+  return input;
+}
+
+std::vector<LawShapes> laws_to_test(const FitInput& input, const FitOptions& options,
+                                    double duration_s) {
+  std::vector<std::string> names, present = options.effects;
+  for (const DeclaredEffect& effect : input.recording.declared) present.push_back(effect.name);
+  for (const EffectEntry& entry : effect_registry()) names.emplace_back(entry.name);
+  if (!has_tracked_point(input.recording))
+    for (const MeasurementEffectEntry& entry : measurement_effect_registry())
+      names.emplace_back(entry.name);
+
+  std::vector<LawShapes> result;
+  for (const std::string& name : names) {
+    if (std::ranges::find(present, name) != present.end()) continue;
+    const EffectDescription effect = describe_effect(name);
+    if (effect.test == EffectTest::finite && effect.laws.empty()) continue;
+    for (const EffectLaw& law : laws_of(effect)) {
+      LawShapes shapes = shapes_of(effect, law, duration_s);
+      if (!shapes.empty()) result.push_back(std::move(shapes));
+    }
+  }
+  return result;
+}
+
+}  // namespace clothfit

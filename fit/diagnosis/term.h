@@ -1,0 +1,48 @@
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "fit/fit.h"
+#include "model/effects/effect.h"
+
+namespace clothfit {
+
+/// An effect that a model has beyond what its recording declares, at work by one of its laws.
+struct Term {
+  std::string effect;
+  std::string law;                      ///< empty where the effect has but one
+  std::vector<std::string> amplitudes;  ///< parameters that are fitted
+  std::map<std::string, double> shape;  ///< of parameters that say how; others are neutral
+  /// How far from there a fit may go: standard deviations of a prior, from the grid's spacing.
+  std::map<std::string, double> shape_sigma;
+  bool fits_shape = false;  ///< whether the shape is fitted too
+
+  std::string title() const;  ///< "nonuniform_mass (hem)"
+  /// Names in the space of a fit, EFFECT.PARAMETER, of the amplitudes.
+  std::vector<std::string> parameters() const;
+  bool same_law(const Term& other) const { return effect == other.effect && law == other.law; }
+};
+
+/// "wind (pressure) + gravity_tilt"; "base" for none.
+std::string title(const std::vector<Term>& terms);
+
+/// The recording as if it declared these effects. Two laws of one effect are that effect with the
+/// parameters of both.
+FitInput with_terms(FitInput input, const std::vector<Term>& terms);
+
+/// An effect's description, of motion or of the measurement. Throws InputError for an unknown name.
+EffectDescription describe_effect(const std::string& name);
+
+/// One law with every shape that it is tested with: the same term but for its shape.
+using LawShapes = std::vector<Term>;
+
+/// Every law that a recording can be asked for: those of all registered effects but the ones that
+/// it declares itself or that `options` add, those that do not apply to it, and those that its
+/// geometry must be guessed for (contact with an obstacle nobody has described). Frequencies run
+/// from the inverse of `duration_s`.
+std::vector<LawShapes> laws_to_test(const FitInput& input, const FitOptions& options,
+                                    double duration_s);
+
+}  // namespace clothfit
