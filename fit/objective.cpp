@@ -168,12 +168,11 @@ Linearisation TrajectoryObjective::linearise(const Eigen::VectorXd& values) cons
 
   const MarkerRun markers = marker_run(of, run.run);
   const auto parameters = static_cast<size_t>(of.space.size());
-  std::vector<MarkerRun> tangents(parameters);
-  for (size_t p = 0; p < parameters; ++p) {
-    tangents[p].position_m = marker_positions(of.vertex_weights, run.position_tangent[p]);
-    if (schedule.velocities)
-      tangents[p].velocity_m_per_s = marker_positions(of.vertex_weights, run.velocity_tangent[p]);
-  }
+  const std::vector<Eigen::Matrix3Xd> none;
+  std::vector<MarkerRun> tangents;
+  for (size_t p = 0; p < parameters; ++p)
+    tangents.push_back(marker_run(of, run.position_tangent[p],
+                                  schedule.velocities ? run.velocity_tangent[p] : none));
   Eigen::Matrix3Xd change(3, of.space.size());
   result.residual.resize(residual_count());
   result.residual_by_coordinate.resize(residual_count(), of.space.size());
