@@ -347,7 +347,7 @@ void add_given_priors(const FitOptions& options, FitProblem& problem) {
     const int p = problem.space.index(prior.name);
     if (p < 0)
       throw InputError(where, "the fit has no such parameter", known_names(prior.name, known));
-    const FitParameter& parameter = problem.space.parameters[static_cast<size_t>(p)];
+    FitParameter& parameter = problem.space.parameters[static_cast<size_t>(p)];
     if (!(prior.mean >= parameter.lower && prior.mean <= parameter.upper))
       throw InputError(where, fmt::format("a mean of {:g}", prior.mean),
                        fmt::format("{:g} to {:g} ({}), where the fit looks", parameter.lower,
@@ -355,6 +355,8 @@ void add_given_priors(const FitOptions& options, FitProblem& problem) {
     if (std::ranges::find(told, prior.name) != told.end())
       throw InputError(where, "is given twice", "one mean and standard deviation a parameter");
     told.push_back(prior.name);
+    // Not searched for, and a neutral value may be where no derivative leads away.
+    if (parameter.role == ParameterRole::measurement) parameter.start = prior.mean;
     problem.priors.push_back(
         {.indices = {p},
          .mean = Eigen::VectorXd::Constant(1, prior.mean),

@@ -211,6 +211,16 @@ TEST(Problem, APriorWeighsItsParameterAlone) {
   EXPECT_DOUBLE_EQ(problem.priors[0].residual(values).squaredNorm(), 9);
 }
 
+TEST(Problem, AnEffectOfTheMeasurementBeginsWhereItsPriorIs) {
+  const FitProblem problem =
+      problem_of(synthetic_input({}),
+                 {.effects = {"clock_offset", "scale"},
+                  .priors = {{.name = "clock_offset.time", .mean = 0.01, .sigma = 0.002}}});
+  const Eigen::VectorXd start = problem.space.start();
+  EXPECT_EQ(start[problem.space.index("clock_offset.time")], 0.01);
+  EXPECT_EQ(start[problem.space.index("scale.factor")], 1);
+}
+
 TEST(Problem, RefusesPriorsThatSayNothingOrTooMuch) {
   const FitInput input = synthetic_input({});
   const auto refused = [&](const std::vector<ParameterPrior>& priors) {
