@@ -183,7 +183,7 @@ TEST(Problem, RefusesEffectsOfTheMeasurementWhereTheyWouldBeWrong) {
   const FitInput good = synthetic_input({});
   EXPECT_THAT(refusal([&] { problem_of(good, {.effects = {"clock_ofset"}}); }),
               AllOf(HasSubstr("no effect 'clock_ofset'"), HasSubstr("viscous_damping"),
-                    HasSubstr("of the measurement: clock_offset")));
+                    HasSubstr("of the measurement: camera_drift, ")));
   // A drive that is measured along would have to be corrected too,
   FitInput tracked = good;
   for (HeldPoint& point : tracked.recording.held) point.motion = HeldMotion::tracked;
