@@ -198,6 +198,9 @@ TEST(Problem, RefusesEffectsOfTheMeasurementWhereTheyWouldBeWrong) {
   EXPECT_EQ(
       refusal([&] { problem_of(good, {.spring_set = SpringSet::louchet5, .effects = {"scale"}}); }),
       "not refused");
+  // 3D tracks have forgotten the camera.
+  EXPECT_THAT(refusal([&] { problem_of(good, {.effects = {"focal_error"}}); }),
+              HasSubstr("--effect: focal_error, and 3D tracks; the pixels of cameras"));
 }
 
 TEST(Problem, APriorWeighsItsParameterAlone) {
