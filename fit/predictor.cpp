@@ -218,11 +218,9 @@ MeasuredPoint Predictor::look(const Sighting& sighting, const Observation& row,
   return point;
 }
 
-std::optional<Predictor::Appearance> Predictor::appearance(const ObservationSet& set,
-                                                           const Observation& row,
-                                                           const MarkerRun& run,
-                                                           bool derivatives) const {
-  Appearance result;
+/// Whether the observer sees it at all.
+bool Predictor::appears(const ObservationSet& set, const Observation& row, const MarkerRun& run,
+                        bool derivatives, Appearance& result) const {
   Instant& at_frame = result.looks.look[0].instant;
   at_frame.frame = static_cast<size_t>(row.frame);
   at_frame.place.position[0] = 1;
@@ -241,25 +239,25 @@ std::optional<Predictor::Appearance> Predictor::appearance(const ObservationSet&
 
   Eigen::Matrix3d by_position;
   const auto seen = set.predict(result.seen, derivatives ? &by_position : nullptr);
-  if (!seen) return std::nullopt;
+  if (!seen) return false;
   result.seen = *seen;
   if (derivatives) result.by_place = (by_position * result.by_place).eval();
-  if (measured_exactly) return result;
+  if (measured_exactly) return true;
   if (derivatives) result.by_parameter = (by_position * result.by_parameter).eval();
-  if (!set.camera) return result;
+  if (!set.camera) return true;
   MeasuredPair pixel(result.coordinate(0), result.coordinate(1));
   for (size_t e = 0; e < parameters_.size(); ++e)
     problem_.measurement[e].effect->move_pixel(from, parameters_[e], pixel);
   for (int c = 0; c < 2; ++c) result.set_coordinate(c, pixel[c]);
-  return result;
+  return true;
 }
 
 std::optional<Eigen::Vector3d> Predictor::predict(int set, const Observation& row,
                                                   const MarkerRun& run) const {
   const ObservationSet& observer = problem_.observations[static_cast<size_t>(set)];
-  const auto appears = appearance(observer, row, run, false);
-  if (!appears) return std::nullopt;
-  return appears->seen;
+  Appearance found;
+  if (!appears(observer, row, run, false, found)) return std::nullopt;
+  return found.seen;
 }
 
 std::optional<Eigen::Vector3d> Predictor::predict(
@@ -267,16 +265,16 @@ std::optional<Eigen::Vector3d> Predictor::predict(
     Eigen::Ref<Eigen::Matrix3Xd> by_coordinate) const {
   assert(static_cast<Eigen::Index>(tangents.size()) == by_coordinate.cols());
   const ObservationSet& observer = problem_.observations[static_cast<size_t>(set)];
-  const auto appears = appearance(observer, row, run, true);
-  if (!appears) return std::nullopt;
+  Appearance found;
+  if (!appears(observer, row, run, true, found)) return std::nullopt;
   for (size_t p = 0; p < tangents.size(); ++p)
     by_coordinate.col(static_cast<Eigen::Index>(p)) =
-        appears->by_place * appears->looks.of(tangents[p], row.marker);
+        found.by_place * found.looks.of(tangents[p], row.marker);
   for (size_t n = 0; n < fitted_.size(); ++n) {
     const auto own = static_cast<Eigen::Index>(n);
-    by_coordinate.col(fitted_[n]) += slope_[own] * appears->by_parameter.col(own);
+    by_coordinate.col(fitted_[n]) += slope_[own] * found.by_parameter.col(own);
   }
-  return appears->seen;
+  return found.seen;
 }
 
 }  // namespace clothfit

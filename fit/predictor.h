@@ -69,8 +69,8 @@ class Predictor {
   Instant instant(double time_s, size_t run_frames) const;
   MeasuredPoint look(const Sighting& sighting, const Observation& row, const MarkerRun& run,
                      Looks& looks) const;
-  std::optional<Appearance> appearance(const ObservationSet& set, const Observation& row,
-                                       const MarkerRun& run, bool derivatives) const;
+  bool appears(const ObservationSet& set, const Observation& row, const MarkerRun& run,
+               bool derivatives, Appearance& result) const;
 
   const FitProblem& problem_;
   bool needs_velocities_ = false;
