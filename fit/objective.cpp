@@ -181,13 +181,11 @@ Linearisation TrajectoryObjective::linearise_by(const Eigen::VectorXd& values,
   if (!run.run.usable()) return result;
 
   const MarkerRun markers = marker_run(of, run.run);
+  const std::vector<Eigen::Matrix3Xd> none;
   std::vector<MarkerRun> tangents(static_cast<size_t>(of.space.size()));
-  for (size_t n = 0; n < simulated.size(); ++n) {
-    MarkerRun& tangent = tangents[static_cast<size_t>(simulated[n])];
-    tangent.position_m = marker_positions(of.vertex_weights, run.position_tangent[n]);
-    if (schedule.velocities)
-      tangent.velocity_m_per_s = marker_positions(of.vertex_weights, run.velocity_tangent[n]);
-  }
+  for (size_t n = 0; n < simulated.size(); ++n)
+    tangents[static_cast<size_t>(simulated[n])] = marker_run(
+        of, run.position_tangent[n], schedule.velocities ? run.velocity_tangent[n] : none);
   Eigen::Matrix3Xd change(3, of.space.size());
   const std::vector<int> chosen(coordinates.begin(), coordinates.end());
   result.residual.resize(residual_count());

@@ -16,7 +16,13 @@ namespace clothfit {
 /// velocities where they were asked for.
 struct MarkerRun {
   std::vector<Eigen::Matrix3Xd> position_m, velocity_m_per_s;
+  /// The same of the surface's slopes there along s and t, x_s and x_t (1, 1/s); or none.
+  std::vector<MarkerRun> slopes;
 };
+
+/// From the motion of the vertices, or from a derivative of it.
+MarkerRun marker_run(const FitProblem& problem, const std::vector<Eigen::Matrix3Xd>& position_m,
+                     const std::vector<Eigen::Matrix3Xd>& velocity_m_per_s);
 
 MarkerRun marker_run(const FitProblem& problem, const SimulateResult& run);
 
@@ -26,7 +32,8 @@ MarkerRun marker_run(const FitProblem& problem, const SimulateResult& run);
 ///
 /// Between frames markers follow the cubic through the places and velocities at both (Hermite;
 /// error O(interval^4)), after the last one they go straight on. Before the first one cloth is
-/// where it starts, or, where it starts in motion, has come straight.
+/// where it starts, or, where it starts in motion, has come straight. Beside its markers the cloth
+/// goes straight on along its slopes there.
 class Predictor {
  public:
   /// `problem` must outlive it.
@@ -55,16 +62,23 @@ class Predictor {
 
  private:
   struct Instant;
+  struct Looks;
   struct Appearance;
 
-  Sighting sighting(const Observation& row) const;
+  Sighting sighting(const ObservationSet& set, const Observation& row) const;
   MeasuredNumber seen_s(const Sighting& sighting) const;
   Instant instant(double time_s, size_t run_frames) const;
-  Appearance appearance(const Observation& row, const MarkerRun& run) const;
+  MeasuredPoint look(const Sighting& sighting, const Observation& row, const MarkerRun& run,
+                     Looks& looks) const;
+  bool appears(const ObservationSet& set, const Observation& row, const MarkerRun& run,
+               bool derivatives, Appearance& result) const;
 
   const FitProblem& problem_;
   bool needs_velocities_ = false;
+  bool mixes_neighbours_ = false;
   Eigen::Vector3d sheet_middle_m_;
+  Eigen::Vector2d pattern_middle_m_;
+  double frame_interval_s_ = 0;                          ///< median
   Eigen::Matrix3Xd marker_offset_m_;                     ///< 3 x markers, or none
   std::vector<std::vector<MeasuredNumber>> parameters_;  ///< [effect][parameter]
   /// Which parameters of the fit are the measurement's, and d value / d coordinate of these.

@@ -11,6 +11,7 @@
 #include "data/input_error.h"
 #include "data/nearest_name.h"
 #include "fit/cloth_setup.h"
+#include "fit/measurement_effects/applicability.h"
 #include "fit/measurement_effects/registry.h"
 #include "fit/sheet_placement.h"
 #include "model/effects/registry.h"
@@ -168,14 +169,8 @@ void add_measurement_effect(const MeasurementEffectEntry& entry, const std::stri
                             const FitOptions& options, FitProblem& problem) {
   FitProblem::MeasurementTerm term{
       .effect = entry.make(), .description = entry.describe(), .parameters = {}};
-  if (!problem.driving_markers.empty())
-    throw InputError(where, term.description.name + ", and a held point that is tracked",
-                     "held points that are fixed or follow a path: a track is measured as the "
-                     "cloth is, and would have to be corrected too");
-  if (term.effect->shifts_time() && problem.cloth.strain_limit.mode != StrainLimitMode::off)
-    throw InputError(where, term.description.name + ", and springs with the paper's strain limit",
-                     "--springs fabric: that limit moves vertices without their velocities, by "
-                     "which a time is looked up between frames");
+  if (const auto why = why_inapplicable(*term.effect, problem))
+    throw InputError(where, term.description.name + ", and " + why->problem, why->expected);
   const std::map<std::string, double> values = by_parameter(term.description, where, given);
   for (const EffectParameter& parameter : term.description.parameters) {
     const auto value = values.find(parameter.name);
@@ -243,6 +238,19 @@ void add_effect(const std::string& name, const std::string& where,
   problem.effects.push_back(std::move(bindings));
 }
 
+/// What an effect of the measurement that looks beside the markers needs.
+void add_slope_weights(FitProblem& problem) {
+  const auto shifts_place = [](const FitProblem::MeasurementTerm& term) {
+    return term.effect->shifts_place();
+  };
+  if (std::ranges::none_of(problem.measurement, shifts_place)) return;
+  const Mesh& mesh = problem.cloth.mesh;
+  for (const SurfaceQuantity slope : {SurfaceQuantity::by_s, SurfaceQuantity::by_t})
+    problem.slope_weights.push_back(
+        vertex_weights(make_surface(mesh.columns, mesh.rows, mesh.width_m, mesh.height_m,
+                                    problem.marker_place_m, SurfaceInterpolation::bicubic, slope)));
+}
+
 void add_effects(const Recording& recording, const FitOptions& options, FitProblem& problem) {
   std::vector<std::string> present;
   const auto absent = [&](const std::string& name) {
@@ -268,6 +276,7 @@ void add_effects(const Recording& recording, const FitOptions& options, FitProbl
     add_effect(name, "--effect", {}, options, problem);
     present.push_back(name);
   }
+  add_slope_weights(problem);
 }
 
 /// Two level directions, and when a camera's pose was estimated, gravity's direction as an unknown
@@ -338,7 +347,7 @@ void add_given_priors(const FitOptions& options, FitProblem& problem) {
     const int p = problem.space.index(prior.name);
     if (p < 0)
       throw InputError(where, "the fit has no such parameter", known_names(prior.name, known));
-    const FitParameter& parameter = problem.space.parameters[static_cast<size_t>(p)];
+    FitParameter& parameter = problem.space.parameters[static_cast<size_t>(p)];
     if (!(prior.mean >= parameter.lower && prior.mean <= parameter.upper))
       throw InputError(where, fmt::format("a mean of {:g}", prior.mean),
                        fmt::format("{:g} to {:g} ({}), where the fit looks", parameter.lower,
@@ -346,6 +355,8 @@ void add_given_priors(const FitOptions& options, FitProblem& problem) {
     if (std::ranges::find(told, prior.name) != told.end())
       throw InputError(where, "is given twice", "one mean and standard deviation a parameter");
     told.push_back(prior.name);
+    // Not searched for, and a neutral value may be where no derivative leads away.
+    if (parameter.role == ParameterRole::measurement) parameter.start = prior.mean;
     problem.priors.push_back(
         {.indices = {p},
          .mean = Eigen::VectorXd::Constant(1, prior.mean),

@@ -35,6 +35,8 @@ struct FitProblem {
   std::map<std::string, int> rejected;  ///< observations left out, by reason
   Eigen::Matrix2Xd marker_place_m;      ///< s, t of each marker, 2 x markers
   Surface::Weights vertex_weights;      ///< markers x vertices
+  /// Of the surface's slopes along s and t, as above; where an effect of the measurement asks.
+  std::vector<Surface::Weights> slope_weights;
   std::vector<int> driving_markers;
 
   ParameterSpace space;

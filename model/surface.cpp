@@ -33,9 +33,9 @@ Eigen::MatrixXd natural_second_derivatives(int n) {
 }
 
 /// Weights (points x n) of the interpolation at the coordinates `x_m` between `n` knots that are
-/// evenly spaced over [0, length_m].
+/// evenly spaced over [0, length_m], or of its `slope` there (1/m).
 Surface::Weights axis_weights(int n, double length_m, const Eigen::VectorXd& x_m,
-                              SurfaceInterpolation interpolation) {
+                              SurfaceInterpolation interpolation, bool slope) {
   Eigen::MatrixXd second_derivatives;
   if (interpolation == SurfaceInterpolation::bicubic) {
     second_derivatives = natural_second_derivatives(n);
@@ -49,12 +49,15 @@ Surface::Weights axis_weights(int n, double length_m, const Eigen::VectorXd& x_m
 
     // On [k, k + 1]: f = (1 - u) f_k + u f_{k+1} + c(1 - u) M_k + c(u) M_{k+1}, c(u) = (u^3 - u)/6.
     Eigen::RowVectorXd weight = Eigen::RowVectorXd::Zero(n);
-    weight(k) = 1 - u;
-    weight(k + 1) = u;
+    weight(k) = slope ? -1 : 1 - u;
+    weight(k + 1) = slope ? 1 : u;
     if (interpolation == SurfaceInterpolation::bicubic) {
       const auto c = [](double v) { return v * (v * v - 1) / 6; };
-      weight += c(1 - u) * second_derivatives.row(k) + c(u) * second_derivatives.row(k + 1);
+      const auto dc = [](double v) { return (3 * v * v - 1) / 6; };
+      weight += (slope ? -dc(1 - u) : c(1 - u)) * second_derivatives.row(k) +
+                (slope ? dc(u) : c(u)) * second_derivatives.row(k + 1);
     }
+    if (slope) weight *= (n - 1) / length_m;
 
     const double smallest = kSmallestRelativeWeight * weight.cwiseAbs().maxCoeff();
     for (int j = 0; j < n; ++j) {
@@ -70,14 +73,17 @@ Surface::Weights axis_weights(int n, double length_m, const Eigen::VectorXd& x_m
 }  // namespace
 
 Surface make_surface(int columns, int rows, double width_m, double height_m,
-                     const Eigen::Matrix2Xd& points, SurfaceInterpolation interpolation) {
+                     const Eigen::Matrix2Xd& points, SurfaceInterpolation interpolation,
+                     SurfaceQuantity quantity) {
   assert(columns >= 2 && rows >= 2);
   assert(width_m > 0 && height_m > 0);
   Surface surface;
   surface.columns = columns;
   surface.rows = rows;
-  surface.row_weights = axis_weights(rows, height_m, points.row(1), interpolation);
-  surface.column_weights = axis_weights(columns, width_m, points.row(0), interpolation);
+  surface.row_weights =
+      axis_weights(rows, height_m, points.row(1), interpolation, quantity == SurfaceQuantity::by_t);
+  surface.column_weights = axis_weights(columns, width_m, points.row(0), interpolation,
+                                        quantity == SurfaceQuantity::by_s);
   return surface;
 }
 

@@ -12,6 +12,10 @@ enum class SurfaceInterpolation {
   bilinear  ///< straight between neighbours; error O(spacing^2): 0.1 to 0.4 mm on a 17 x 17 cloth
 };
 
+/// What weights on the vertices give at a point: its place x, or the surface's slope there along s
+/// or t (m/m), tangent to the cloth and of length 1 where it is not stretched.
+enum class SurfaceQuantity { place, by_s, by_t };
+
 /// The points of a cloth that are looked at, as weights on the vertices of a mesh:
 ///
 ///   x(s, t) = sum_i sum_j R_i(t) C_j(s) P[i, j]
@@ -43,10 +47,12 @@ struct Surface {
 /// vertices over a cloth of `width_m` x `height_m`. Points lie on the cloth; up to a micrometre
 /// outside (what reading a marker file lets pass) counts as the edge. Weights below 1e-12 of the
 /// point's largest are left out: a point at a vertex has one, and far vertices of large meshes none
-/// (the weights fall by 0.27 from vertex to vertex).
+/// (the weights fall by 0.27 from vertex to vertex). Slopes are the derivatives of the places: R_i
+/// or C_j by its coordinate in its stead (1/m); error O(spacing^3) of the bicubic surface.
 Surface make_surface(int columns, int rows, double width_m, double height_m,
                      const Eigen::Matrix2Xd& points,
-                     SurfaceInterpolation interpolation = SurfaceInterpolation::bicubic);
+                     SurfaceInterpolation interpolation = SurfaceInterpolation::bicubic,
+                     SurfaceQuantity quantity = SurfaceQuantity::place);
 
 /// Interpolates `width` fields at once, their values stored side by side: vertex k's are
 /// [k * width, (k + 1) * width), point p's likewise. With `width` 3 that is a 3 x N matrix; with

@@ -32,7 +32,9 @@ LawShapes shapes_of(const EffectDescription& effect, const EffectLaw& law, doubl
   for (const ShapeGrid& grid : law.shapes) {
     const auto parameter =
         std::ranges::find(effect.parameters, grid.parameter, &EffectParameter::name);
-    const double in_unit_per_value = grid.per_duration ? 1 / duration_s : 1;
+    const double in_unit_per_value = grid.per_duration  ? 1 / duration_s
+                                     : grid.of_duration ? duration_s
+                                                        : 1;
     LawShapes wider;
     for (const Term& narrow : result) {
       for (const double value : grid.values) {

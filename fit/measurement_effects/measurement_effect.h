@@ -7,6 +7,8 @@
 #include <span>
 #include <vector>
 
+#include "data/camera_parameters.h"
+
 namespace clothfit {
 
 /// A number with its derivatives by the place of a marker (m, world; the first three) and by the
@@ -15,32 +17,62 @@ inline constexpr int kMeasuredPlace = 3;
 inline constexpr int kMeasurementParameters = 9;
 using MeasuredNumber = ceres::Jet<double, kMeasuredPlace + kMeasurementParameters>;
 using MeasuredPoint = Eigen::Matrix<MeasuredNumber, 3, 1>;
+using MeasuredPair = Eigen::Matrix<MeasuredNumber, 2, 1>;  ///< a pixel, or a way over the cloth
 
 /// One look at one marker.
 struct Sighting {
-  double time_s = 0;  ///< of its frame, as the recording has it
+  double time_s = 0;            ///< of its frame, as the recording has it
+  double first_time_s = 0;      ///< of the recording's first frame
+  double frame_interval_s = 0;  ///< of the recording, median
   Eigen::Vector3d sheet_middle_m = Eigen::Vector3d::Zero();  ///< of the placed sheet, world
+  /// The marker's s and t, from the mean of all markers' on.
+  Eigen::Vector2d from_pattern_middle_m = Eigen::Vector2d::Zero();
+  const CameraParameters* camera = nullptr;  ///< that looks; none of 3D tracks
+  double observed_row_px = 0;                ///< of the picture; where there is a camera
+
+  double since_first_s() const { return time_s - first_time_s; }
 };
 
-/// One way in which what is measured differs from what the cloth does. Each does one of two things
-/// to a prediction, or both; what it does not do, it leaves as it is. At the neutral values of its
-/// parameters it changes nothing.
+/// One way in which what is measured differs from what the cloth does. Each does one of a few
+/// things to a prediction, or some; what it does not do, it leaves as it is. At the neutral values
+/// of its parameters it changes nothing. The hooks stand in the order in which they are called.
 class MeasurementEffect {
  public:
   using Parameters = std::span<const MeasuredNumber>;  ///< in the description's order and units
 
   virtual ~MeasurementEffect() = default;
 
-  /// Whether `shift_time` does anything.
+  /// Whether `shift_time`, `mix_neighbours` and `shift_place` do anything: they look at the cloth
+  /// between frames and beside its markers, which costs.
   virtual bool shifts_time() const { return false; }
+  virtual bool mixes_neighbours() const { return false; }
+  virtual bool shifts_place() const { return false; }
+
+  /// Whether it is one of a camera and says nothing of 3D tracks.
+  virtual bool needs_camera() const { return false; }
 
   /// Shifts the time `seen_s` (s, the model's) at which the marker was really looked at.
   virtual void shift_time(const Sighting& /*sighting*/, Parameters /*parameters*/,
                           MeasuredNumber& /*seen_s*/) const {}
 
+  /// Adds to the weight w of the looks one frame interval d before and after, which are mixed in:
+  /// x(t) + w (x(t + d) - 2 x(t) + x(t - d)).
+  virtual void mix_neighbours(const Sighting& /*sighting*/, Parameters /*parameters*/,
+                              MeasuredNumber& /*weight*/) const {}
+
+  /// Adds to the way `shift_m` (s and t, m) over the cloth from where the marker is said to be to
+  /// where it is. Taken along the surface's slopes there, x_s ds + x_t dt, which leaves out half
+  /// the curvature times the way squared: at 10 /m and 5 mm, 0.1 mm.
+  virtual void shift_place(const Sighting& /*sighting*/, Parameters /*parameters*/,
+                           MeasuredPair& /*shift_m*/) const {}
+
   /// Moves the place (world, m) at which the marker appears to be.
   virtual void move(const Sighting& /*sighting*/, Parameters /*parameters*/,
                     MeasuredPoint& /*position_m*/) const {}
+
+  /// Moves the pixel at which the camera shows it. Called of cameras only.
+  virtual void move_pixel(const Sighting& /*sighting*/, Parameters /*parameters*/,
+                          MeasuredPair& /*pixel*/) const {}
 };
 
 }  // namespace clothfit

@@ -40,8 +40,9 @@ enum class EffectTest {
 /// Values of a parameter that says how an effect is at work, not how much.
 struct ShapeGrid {
   std::string parameter;
-  std::vector<double> values;  ///< in its unit; or, per_duration, in units of 1 / duration
-  bool per_duration = false;   ///< of the observed motion: frequencies
+  std::vector<double> values;  ///< in its unit, or as the two below say
+  bool per_duration = false;   ///< frequencies, in units of 1 / duration of the observed motion
+  bool of_duration = false;    ///< times since its first frame, as fractions of its duration
 };
 
 /// One law that an effect may follow: data are asked for each law by itself.

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "data/input_error.h"
+#include "fit/measurement_effects/applicability.h"
 #include "fit/measurement_effects/registry.h"
 #include "fit/objective.h"
 
@@ -13,6 +15,14 @@ void check_measurement_effect(const std::string& name, const FitInput& input) {
   for (const ObservationKind kind : {ObservationKind::tracks3d, ObservationKind::tracks2d}) {
     SCOPED_TRACE(kind == ObservationKind::tracks3d ? "3D" : "2D");
     const FitProblem without = make_problem(input, {.observations = kind}, 7, 7);
+    const auto effect = measurement_effect_named(name)->make();
+    if (effect->needs_camera() && kind == ObservationKind::tracks3d) {
+      EXPECT_TRUE(why_inapplicable(*effect, without).has_value());
+      EXPECT_THROW(make_problem(input, {.observations = kind, .effects = {name}}, 7, 7),
+                   InputError);
+      continue;
+    }
+    EXPECT_FALSE(why_inapplicable(*effect, without).has_value());
     const FitProblem with = make_problem(input, {.observations = kind, .effects = {name}}, 7, 7);
     const TrajectoryObjective plain(without, kFrames, kStepS), objective(with, kFrames, kStepS);
 

@@ -121,5 +121,54 @@ TEST(Predictor, FirstLooksUpTheTimeThenMovesThePlaceThenAddsTheMarkersOffset) {
   EXPECT_LT((*seen - (middle + 1.1 * (at - middle) + offset_m)).norm(), 1e-14);
 }
 
+TEST(Predictor, MixesTheLooksOneFrameIntervalBeforeAndAfter) {
+  const FitProblem problem = problem_with({"temporal_smoothing"});
+  const MarkerRun run = cubic_run(problem, 8);
+  Eigen::VectorXd values = problem.space.start();
+  values[problem.space.index("temporal_smoothing.w")] = 0.2;
+  const Predictor predictor(problem, values);
+
+  ASSERT_TRUE(predictor.needs_velocities());
+  EXPECT_GE(predictor.frames_to_run(4), 5);
+  for (const int frame : {1, 3, 6}) {
+    // A cubic's second difference is its second derivative.
+    const double d = 1.0 / 60, t = problem.frame_time_s[static_cast<size_t>(frame)];
+    const Eigen::Vector3d at(t * t * t, 1 - 2 * t * t, 3 * t), bend(6 * t, -4, 0);
+    const auto seen = predictor.predict(0, {.frame = frame, .marker = 0}, run);
+    EXPECT_LT((*seen - (at + 0.2 * d * d * bend)).norm(), 1e-14);
+  }
+}
+
+TEST(Predictor, GoesAlongTheSlopesBesideAMarkerAtTheTimeItLooksAt) {
+  // Given a marker that is 2 mm and -3 mm elsewhere, on slopes that change steadily
+  const FitProblem problem = problem_with({"marker_placement", "clock_offset"});
+  MarkerRun run = cubic_run(problem, 8);
+  const Eigen::Vector3d by_s(1, 0, 0.5), by_t(0, -1, 0.2), change(0.3, -4, 2);
+  const auto steady = [&](const Eigen::Vector3d& from) {
+    MarkerRun slope;
+    for (const double t : problem.frame_time_s) {
+      slope.position_m.push_back((from + t * change).replicate(1, problem.marker_place_m.cols()));
+      slope.velocity_m_per_s.push_back(change.replicate(1, problem.marker_place_m.cols()));
+    }
+    return slope;
+  };
+  run.slopes = {steady(by_s), steady(by_t)};
+  Eigen::VectorXd values = with_offset(problem, 0.004);
+  values[problem.space.index("marker_placement.shift_s")] = 0.002;
+  values[problem.space.index("marker_placement.shift_t")] = -0.003;
+
+  const auto seen = Predictor(problem, values).predict(0, {.frame = 3, .marker = 5}, run);
+
+  const double t = problem.frame_time_s[3] + 0.004;
+  const Eigen::Vector3d at(t * t * t, 1 - 2 * t * t, 3 * t);
+  EXPECT_LT((*seen - (at + 0.002 * (by_s + t * change) - 0.003 * (by_t + t * change))).norm(),
+            1e-14);
+}
+
+TEST(Predictor, LooksUpSlopesOnlyWhereAnEffectAsks) {
+  EXPECT_TRUE(problem_with({"scale", "clock_offset"}).slope_weights.empty());
+  EXPECT_EQ(problem_with({"in_surface_sliding"}).slope_weights.size(), 2u);
+}
+
 }  // namespace
 }  // namespace clothfit

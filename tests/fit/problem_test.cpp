@@ -183,7 +183,7 @@ TEST(Problem, RefusesEffectsOfTheMeasurementWhereTheyWouldBeWrong) {
   const FitInput good = synthetic_input({});
   EXPECT_THAT(refusal([&] { problem_of(good, {.effects = {"clock_ofset"}}); }),
               AllOf(HasSubstr("no effect 'clock_ofset'"), HasSubstr("viscous_damping"),
-                    HasSubstr("of the measurement: clock_offset")));
+                    HasSubstr("of the measurement: camera_drift, ")));
   // A drive that is measured along would have to be corrected too,
   FitInput tracked = good;
   for (HeldPoint& point : tracked.recording.held) point.motion = HeldMotion::tracked;
@@ -198,6 +198,9 @@ TEST(Problem, RefusesEffectsOfTheMeasurementWhereTheyWouldBeWrong) {
   EXPECT_EQ(
       refusal([&] { problem_of(good, {.spring_set = SpringSet::louchet5, .effects = {"scale"}}); }),
       "not refused");
+  // 3D tracks have forgotten the camera.
+  EXPECT_THAT(refusal([&] { problem_of(good, {.effects = {"focal_error"}}); }),
+              HasSubstr("--effect: focal_error, and 3D tracks; the pixels of cameras"));
 }
 
 TEST(Problem, APriorWeighsItsParameterAlone) {
@@ -209,6 +212,16 @@ TEST(Problem, APriorWeighsItsParameterAlone) {
   ASSERT_EQ(problem.priors.size(), 1u);
   EXPECT_EQ(problem.priors[0].indices, std::vector<int>{problem.space.index("shear")});
   EXPECT_DOUBLE_EQ(problem.priors[0].residual(values).squaredNorm(), 9);
+}
+
+TEST(Problem, AnEffectOfTheMeasurementBeginsWhereItsPriorIs) {
+  const FitProblem problem =
+      problem_of(synthetic_input({}),
+                 {.effects = {"clock_offset", "scale"},
+                  .priors = {{.name = "clock_offset.time", .mean = 0.01, .sigma = 0.002}}});
+  const Eigen::VectorXd start = problem.space.start();
+  EXPECT_EQ(start[problem.space.index("clock_offset.time")], 0.01);
+  EXPECT_EQ(start[problem.space.index("scale.factor")], 1);
 }
 
 TEST(Problem, RefusesPriorsThatSayNothingOrTooMuch) {

@@ -1,8 +1,10 @@
 #include "synthetic_cloth.h"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <numbers>
 #include <random>
+#include <utility>
 
 #include "calib/projection.h"
 #include "model/cloth.h"
@@ -33,6 +35,28 @@ Eigen::VectorXd start_with(const FitProblem& problem, const Fabric& fabric) {
   return values;
 }
 
+namespace {
+
+/// The motion between the frames of a run with velocities, of which those of 1 / 480 s leave less
+/// than a micrometre out.
+SyntheticMotion motion_of(SimulateResult run, double interval_s, int mesh, double size_m) {
+  return [run = std::move(run), interval_s, mesh, size_m](double time_s,
+                                                          const Eigen::Vector2d& place_m) {
+    const double at = std::max(time_s, 0.0) / interval_s;
+    const size_t k = std::min(static_cast<size_t>(at), run.position_m.size() - 2);
+    const double u = at - static_cast<double>(k);
+    const Eigen::Matrix3Xd vertices =
+        (1 + u * u * (2 * u - 3)) * run.position_m[k] +
+        u * u * (3 - 2 * u) * run.position_m[k + 1] +
+        interval_s * u * (1 - u) *
+            ((1 - u) * run.velocity_m_per_s[k] - u * run.velocity_m_per_s[k + 1]);
+    return Eigen::Vector3d(
+        make_surface(mesh, mesh, size_m, size_m, place_m).evaluate(vertices).col(0));
+  };
+}
+
+}  // namespace
+
 FitInput synthetic_input(const SyntheticCloth& truth) {
   constexpr double kSize = 0.4;
   constexpr double kMass = 0.03;
@@ -53,7 +77,9 @@ FitInput synthetic_input(const SyntheticCloth& truth) {
   for (int i = 0; i < truth.markers; ++i) {
     for (int j = 0; j < truth.markers; ++j) {
       const int m = i * truth.markers + j;
-      places.col(m) << kSize * j / (truth.markers - 1), kSize * i / (truth.markers - 1);
+      const double margin = truth.marker_margin_m, span = kSize - 2 * margin;
+      places.col(m) << margin + span * j / (truth.markers - 1),
+          margin + span * i / (truth.markers - 1);
       const std::string name = std::string("m") + std::to_string(m);
       recording.markers.markers.push_back({.name = name, .s_m = places(0, m), .t_m = places(1, m)});
       recording.markers.index[name] = m;
@@ -79,6 +105,14 @@ FitInput synthetic_input(const SyntheticCloth& truth) {
   if (truth.clock_offset_s > 0) schedule.frame_time_s.push_back(0);
   for (int f = 0; f < truth.frames; ++f)
     schedule.frame_time_s.push_back(f / 60.0 + truth.clock_offset_s);
+  SyntheticMotion motion;
+  if (truth.seen) {
+    constexpr double kFineS = 1.0 / 480, kBeyondS = 0.1;
+    Schedule fine{.frame_time_s = {}, .time_step_s = schedule.time_step_s, .velocities = true};
+    for (int f = 0; f * kFineS < truth.frames / 60.0 + kBeyondS; ++f)
+      fine.frame_time_s.push_back(f * kFineS);
+    motion = motion_of(simulate(cloth, {&parameters, 1}, fine).front(), kFineS, truth.mesh, kSize);
+  }
   SimulateResult run = simulate(cloth, {&parameters, 1}, schedule).front();
   if (truth.clock_offset_s > 0) run.position_m.erase(run.position_m.begin());
   const Eigen::Vector3d middle = parameters.start_position_m.rowwise().mean();
@@ -90,7 +124,9 @@ FitInput synthetic_input(const SyntheticCloth& truth) {
   std::mt19937_64 generator(truth.seed);
   std::normal_distribution<double> normal;
   for (int f = 0; f < truth.frames; ++f) {
-    const Eigen::Matrix3Xd seen = surface.evaluate(run.position_m[static_cast<size_t>(f)]);
+    Eigen::Matrix3Xd seen = surface.evaluate(run.position_m[static_cast<size_t>(f)]);
+    for (int m = 0; truth.seen && m < seen.cols(); ++m)
+      seen.col(m) = truth.seen(motion, f / 60.0, places.col(m));
     for (int m = 0; m < seen.cols(); ++m) {
       const Eigen::Vector3d point = middle + truth.scale * (seen.col(m) - middle);
       Eigen::Vector3d noise;
@@ -100,6 +136,7 @@ FitInput synthetic_input(const SyntheticCloth& truth) {
                                 .position_m = point + truth.noise_m * noise,
                                 .sigma_m = truth.noise_m});
       Eigen::Vector2d pixel = *project(camera, camera_from_world(camera) * point);
+      if (truth.pixel) pixel = truth.pixel(pixel);
       for (double& coordinate : pixel) coordinate += truth.noise_px * normal(generator);
       input.tracks2d[camera.name].push_back(
           {.frame = f, .marker = m, .position_px = pixel, .sigma_px = truth.noise_px});

@@ -1,11 +1,18 @@
 #pragma once
 
+#include <Eigen/Core>
+#include <functional>
+
 #include "fit/fit.h"
 #include "fit/problem.h"
 #include "fit/simulation.h"
 #include "model/fabric.h"
 
 namespace clothfit {
+
+/// Where the point of a cloth at s, t (m) is at a time (s): x (m, world). Before 0 it stands.
+using SyntheticMotion =
+    std::function<Eigen::Vector3d(double time_s, const Eigen::Vector2d& place_m)>;
 
 /// A small cloth whose every number is known: the truth that fits are to find again.
 struct SyntheticCloth {
@@ -20,6 +27,7 @@ struct SyntheticCloth {
   double critical_elongation = 0;  ///< of every spring, mode `positions`; 0: no strain limit
   int mesh = 9;                    ///< columns and rows
   int markers = 7;                 ///< columns and rows, evenly spread, corners included
+  double marker_margin_m = 0;      ///< or so far from the edges
   int frames = 36;
   int held_out_from = 26;
   double noise_m = 5e-4;
@@ -27,6 +35,13 @@ struct SyntheticCloth {
   double clock_offset_s = 0;  ///< >= 0: frames show the cloth so much later than their time says
   double scale = 1;           ///< of what is measured, about the sheet's middle
   unsigned seed = 1;
+  /// Where a marker that is said to be at a place appears to be in a frame that is said to be of a
+  /// time; or none: where it is then.
+  std::function<Eigen::Vector3d(const SyntheticMotion& motion, double time_s,
+                                const Eigen::Vector2d& place_m)>
+      seen;
+  /// Where a pixel appears to be; or none: where it is.
+  std::function<Eigen::Vector2d(const Eigen::Vector2d& pixel)> pixel;
 };
 
 /// The cloth of 0.4 m and 30 g, hung by its upper corners, let go flat and turned 25 degrees out of

@@ -274,5 +274,42 @@ TEST(Surface, WholeOperatorAgreesWithEvaluation) {
   EXPECT_LT((through_matrix - surface.evaluate(vertices)).cwiseAbs().maxCoeff(), 1e-14);
 }
 
+TEST(Surface, HasTheSlopesOfItsPlaces) {
+  // Given vertices anywhere, and points that leave room for a difference
+  constexpr double kStep_m = 1e-5;
+  const Eigen::Matrix2Xd points = (0.98 * random_points(60, 9)).array() + 0.001;
+  const Eigen::Matrix3Xd vertices = Eigen::Matrix3Xd::Random(3, 6 * 11);
+  const auto at = [&](const Eigen::Matrix2Xd& where, SurfaceQuantity quantity) {
+    return make_surface(6, 11, kWidth_m, kHeight_m, where, SurfaceInterpolation::bicubic, quantity)
+        .evaluate(vertices);
+  };
+
+  for (const int axis : {0, 1}) {
+    const Eigen::Vector2d step = kStep_m * Eigen::Vector2d::Unit(axis);
+    const Eigen::Matrix3Xd differences = (at(points.colwise() + step, SurfaceQuantity::place) -
+                                          at(points.colwise() - step, SurfaceQuantity::place)) /
+                                         (2 * kStep_m);
+    const Eigen::Matrix3Xd slopes =
+        at(points, axis == 0 ? SurfaceQuantity::by_s : SurfaceQuantity::by_t);
+    // The differences' own error: step^2 / 6 of a third derivative of about 10 / spacing^3.
+    EXPECT_LT((slopes - differences).cwiseAbs().maxCoeff(), 1e-4);
+    EXPECT_GT(slopes.cwiseAbs().maxCoeff(), 10);
+  }
+}
+
+TEST(Surface, HasTheSlopesOfAPlaneEverywhere) {
+  const Eigen::Matrix2Xd points = random_points(50, 12);
+  const Eigen::Matrix3Xd vertices = sample(vertex_points(7, 5), plane);
+  for (const auto interpolation : {SurfaceInterpolation::bicubic, SurfaceInterpolation::bilinear}) {
+    const auto slopes = [&](SurfaceQuantity quantity) {
+      return make_surface(7, 5, kWidth_m, kHeight_m, points, interpolation, quantity)
+          .evaluate(vertices);
+    };
+    const Eigen::Vector3d by_s(0.9, 0.1, -0.4), by_t(-0.2, 0.7, -0.6);
+    EXPECT_LT((slopes(SurfaceQuantity::by_s).colwise() - by_s).cwiseAbs().maxCoeff(), 1e-12);
+    EXPECT_LT((slopes(SurfaceQuantity::by_t).colwise() - by_t).cwiseAbs().maxCoeff(), 1e-12);
+  }
+}
+
 }  // namespace
 }  // namespace clothfit

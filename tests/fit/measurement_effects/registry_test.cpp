@@ -22,10 +22,40 @@ TEST(MeasurementEffectRegistry, IsSortedAndNamesWhatItDescribes) {
     EXPECT_EQ(description.name, entry.name);
     EXPECT_FALSE(description.summary.empty());
     for (const EffectParameter& parameter : description.parameters) {
-      EXPECT_LT(parameter.lower, parameter.neutral);
+      EXPECT_LE(parameter.lower, parameter.neutral);
       EXPECT_GT(parameter.upper, parameter.neutral);
       EXPECT_GT(parameter.typical, 0);
     }
+  }
+}
+
+TEST(MeasurementEffectRegistry, MakesEveryLawOfItsEffectsParametersWithinTheirRanges) {
+  for (const MeasurementEffectEntry& entry : measurement_effect_registry()) {
+    const EffectDescription effect = entry.describe();
+    std::set<std::string> in_no_law;
+    for (const EffectParameter& parameter : effect.parameters) in_no_law.insert(parameter.name);
+    bool has_shapes = false;
+    for (const EffectLaw& law : effect.laws) {
+      SCOPED_TRACE(effect.name + " " + law.name);
+      EXPECT_FALSE(law.amplitudes.empty());
+      for (const std::string& amplitude : law.amplitudes)
+        EXPECT_EQ(in_no_law.erase(amplitude), 1u) << amplitude;
+      for (const ShapeGrid& shape : law.shapes) {
+        has_shapes = true;
+        const auto found =
+            std::ranges::find(effect.parameters, shape.parameter, &EffectParameter::name);
+        ASSERT_NE(found, effect.parameters.end()) << shape.parameter;
+        EXPECT_FALSE(shape.values.empty());
+        for (const double value : shape.values) {
+          EXPECT_GE(value, shape.of_duration ? 0 : found->lower);
+          EXPECT_LE(value, shape.of_duration ? 1 : found->upper);
+        }
+      }
+    }
+    for (const EffectLaw& law : effect.laws)
+      for (const ShapeGrid& shape : law.shapes) in_no_law.erase(shape.parameter);
+    EXPECT_TRUE(effect.laws.empty() || in_no_law.empty()) << effect.name;
+    EXPECT_EQ(effect.test == EffectTest::profiled, has_shapes) << effect.name;
   }
 }
 

@@ -1,0 +1,52 @@
+#include "fit/measurement_effects/camera_drift.h"
+
+#include <algorithm>
+#include <iterator>
+
+#include "fit/measurement_effects/rigid_change.h"
+#include "model/effects/vector_parameter.h"
+
+namespace clothfit::camera_drift {
+namespace {
+
+class CameraDrift final : public MeasurementEffect {
+ public:
+  void move(const Sighting& sighting, Parameters p, MeasuredPoint& position_m) const override {
+    const MeasuredNumber since_first_s(sighting.since_first_s());
+    const MeasuredPoint velocity(p[0], p[1], p[2]), turn_rate(p[3], p[4], p[5]);
+    move_rigidly(sighting, turn_rate * since_first_s, velocity * since_first_s, position_m);
+  }
+};
+
+}  // namespace
+
+EffectDescription describe() {
+  std::vector<EffectParameter> parameters = vector_parameter({.name = "velocity",
+                                                              .unit = "m/s",
+                                                              .neutral = 0,
+                                                              .lower = -0.2,
+                                                              .upper = 0.2,
+                                                              .typical = 1e-3});
+  std::ranges::copy(vector_parameter({.name = "turn_rate",
+                                      .unit = "rad/s",
+                                      .neutral = 0,
+                                      .lower = -0.5,
+                                      .upper = 0.5,
+                                      .typical = 2e-3}),
+                    std::back_inserter(parameters));
+  return {
+      .name = "camera_drift",
+      .summary = "the measured world drifts rigidly from the first frame on",
+      .parameters = std::move(parameters),
+      .laws = {
+          {.name = "shift", .amplitudes = {"velocity_x", "velocity_y", "velocity_z"}, .shapes = {}},
+          {.name = "turn",
+           .amplitudes = {"turn_rate_x", "turn_rate_y", "turn_rate_z"},
+           .shapes = {}}}};
+}
+
+std::unique_ptr<MeasurementEffect> make() {
+  return std::make_unique<CameraDrift>();
+}
+
+}  // namespace clothfit::camera_drift

@@ -1,0 +1,50 @@
+#include "fit/measurement_effects/camera_shake.h"
+
+#include <algorithm>
+#include <iterator>
+
+#include "fit/measurement_effects/rigid_change.h"
+#include "model/effects/harmonic.h"
+
+namespace clothfit::camera_shake {
+namespace {
+
+class CameraShake final : public MeasurementEffect {
+ public:
+  void move(const Sighting& sighting, Parameters p, MeasuredPoint& position_m) const override {
+    const MeasuredPoint shift(p[0], p[1], p[2]), turn(p[3], p[4], p[5]);
+    const auto sine = [&](double time_s) { return sine_of_turns(p[6] * time_s + p[7]); };
+    const MeasuredNumber s = sine(sighting.time_s) - sine(sighting.first_time_s);
+    move_rigidly(sighting, turn * s, shift * s, position_m);
+  }
+};
+
+}  // namespace
+
+EffectDescription describe() {
+  std::vector<EffectParameter> parameters = vector_parameter(
+      {.name = "shift", .unit = "m", .neutral = 0, .lower = -0.1, .upper = 0.1, .typical = 1e-3});
+  std::ranges::copy(Harmonic::parameters({.name = "turn",
+                                          .unit = "rad",
+                                          .neutral = 0,
+                                          .lower = -0.1,
+                                          .upper = 0.1,
+                                          .typical = 2e-3}),
+                    std::back_inserter(parameters));
+  std::vector<EffectLaw> laws;
+  for (const char* amplitude : {"shift", "turn"}) {
+    laws.push_back(Harmonic::laws(amplitude).front());
+    laws.back().name = amplitude;
+  }
+  return {.name = "camera_shake",
+          .summary = "the measured world shakes rigidly, with one harmonic",
+          .parameters = std::move(parameters),
+          .test = EffectTest::profiled,
+          .laws = std::move(laws)};
+}
+
+std::unique_ptr<MeasurementEffect> make() {
+  return std::make_unique<CameraShake>();
+}
+
+}  // namespace clothfit::camera_shake

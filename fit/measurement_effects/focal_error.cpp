@@ -1,0 +1,32 @@
+#include "fit/measurement_effects/focal_error.h"
+
+namespace clothfit::focal_error {
+namespace {
+
+class FocalError final : public MeasurementEffect {
+ public:
+  bool needs_camera() const override { return true; }
+
+  void move_pixel(const Sighting& sighting, Parameters p, MeasuredPair& pixel) const override {
+    pixel += (pixel - sighting.camera->centre_px.cast<MeasuredNumber>()) * p[0];
+  }
+};
+
+}  // namespace
+
+EffectDescription describe() {
+  return {.name = "focal_error",
+          .summary = "pixels further from the principal point c by excess (u - c)",
+          .parameters = {{.name = "excess",
+                          .unit = "1",
+                          .neutral = 0,
+                          .lower = -0.2,
+                          .upper = 0.2,
+                          .typical = 1e-3}}};
+}
+
+std::unique_ptr<MeasurementEffect> make() {
+  return std::make_unique<FocalError>();
+}
+
+}  // namespace clothfit::focal_error

@@ -1,0 +1,19 @@
+#pragma once
+
+#include <memory>
+
+#include "fit/measurement_effects/measurement_effect.h"
+#include "model/effects/effect.h"
+
+/// The lens bends more than its calibration says: a pixel at u appears at
+///
+///   u + k1 r^2 (u - c),  r^2 = ((u_x - c_x) / f_x)^2 + ((u_y - c_y) / f_y)^2,
+///
+/// c the principal point and f the focal lengths of the camera. Parameter: k1 (1), neutral at 0. To
+/// first order a change of the k1 of [brown1971]. Of cameras only, of all alike. Ours.
+namespace clothfit::lens_distortion {
+
+EffectDescription describe();
+std::unique_ptr<MeasurementEffect> make();
+
+}  // namespace clothfit::lens_distortion

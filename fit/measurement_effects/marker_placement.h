@@ -1,0 +1,23 @@
+#pragma once
+
+#include <memory>
+
+#include "fit/measurement_effects/measurement_effect.h"
+#include "model/effects/effect.h"
+
+/// The pattern of markers sits elsewhere on the cloth than stated: a marker that is said to be at
+/// (s, t) is at (s + ds, t + dt),
+///
+///   ds = shift_s + stretch_s (s - s_m) - turn (t - t_m)
+///   dt = shift_t + stretch_t (t - t_m) + turn (s - s_m),
+///
+/// (s_m, t_m) the mean of all markers, and appears at x + x_s ds + x_t dt: straight on along the
+/// surface's slopes, which leaves out half the curvature times the way squared (0.1 mm at 10 /m and
+/// 5 mm). Parameters: shift_s, shift_t (m), stretch_s, stretch_t (1), turn (rad), neutral at 0.
+/// Ours.
+namespace clothfit::marker_placement {
+
+EffectDescription describe();
+std::unique_ptr<MeasurementEffect> make();
+
+}  // namespace clothfit::marker_placement

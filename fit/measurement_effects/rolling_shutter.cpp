@@ -1,0 +1,33 @@
+#include "fit/measurement_effects/rolling_shutter.h"
+
+namespace clothfit::rolling_shutter {
+namespace {
+
+class RollingShutter final : public MeasurementEffect {
+ public:
+  bool shifts_time() const override { return true; }
+  bool needs_camera() const override { return true; }
+
+  void shift_time(const Sighting& sighting, Parameters p, MeasuredNumber& seen_s) const override {
+    seen_s += p[0] * (sighting.observed_row_px / sighting.camera->image_height - 0.5);
+  }
+};
+
+}  // namespace
+
+EffectDescription describe() {
+  return {.name = "rolling_shutter",
+          .summary = "a pixel in row y of H is seen readout (y / H - 1/2) later",
+          .parameters = {{.name = "readout",
+                          .unit = "s",
+                          .neutral = 0,
+                          .lower = -0.05,
+                          .upper = 0.05,
+                          .typical = 1e-3}}};
+}
+
+std::unique_ptr<MeasurementEffect> make() {
+  return std::make_unique<RollingShutter>();
+}
+
+}  // namespace clothfit::rolling_shutter

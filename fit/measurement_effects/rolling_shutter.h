@@ -1,0 +1,18 @@
+#pragma once
+
+#include <memory>
+
+#include "fit/measurement_effects/measurement_effect.h"
+#include "model/effects/effect.h"
+
+/// The camera reads its picture row by row: a pixel in row y of H is seen readout (y / H - 1/2)
+/// later than its frame's time says, which is that of the middle row. The row is that of the
+/// observed pixel, whose noise moves the time by less than a thousandth of the readout. Parameter:
+/// readout (s), neutral at 0; negative where the last row is read first. Of cameras only, of all
+/// alike. Ours.
+namespace clothfit::rolling_shutter {
+
+EffectDescription describe();
+std::unique_ptr<MeasurementEffect> make();
+
+}  // namespace clothfit::rolling_shutter

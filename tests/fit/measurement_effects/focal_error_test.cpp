@@ -1,0 +1,30 @@
+// A focal length that is not the calibrated one: found again where it was planted.
+#include "fit/measurement_effects/focal_error.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/fit/measurement_contract.h"
+#include "tests/fit/planted_effect.h"
+#include "tests/fit/synthetic_cloth.h"
+
+namespace clothfit {
+namespace {
+
+TEST(FocalError, KeepsToTheContract) {
+  check_measurement_effect("focal_error", synthetic_input({}));
+}
+
+TEST(FocalError, IsFoundWhereItWasPlanted) {
+  constexpr double kExcess = 0.03;
+  const auto pixel = [](const Eigen::Vector2d& at) {
+    const Eigen::Vector2d centre(480, 360);
+    return Eigen::Vector2d(centre + (1 + kExcess) * (at - centre));
+  };
+
+  expect_found(synthetic_input({.pixel = pixel}), {.name = "focal_error",
+                                                   .truth = {{"excess", kExcess}},
+                                                   .observations = ObservationKind::tracks2d});
+}
+
+}  // namespace
+}  // namespace clothfit
