@@ -66,7 +66,7 @@ struct Line {
   ModelFit model;
   std::vector<AcceptedEffect> accepted;
   double cost = 0;
-  bool finished = false;
+  bool finished = false;  ///< no law more leads on from here
   std::vector<LawTrial> refused;
 };
 
@@ -78,9 +78,20 @@ struct Shortlist {
 
 class Search {
  public:
-  Search(const DiagnosisSetup& setup, const DiagnoseOptions& options,
-         const std::vector<LawShapes>& laws, double threshold, const ProgressCallback& progress)
-      : setup_(setup), options_(options), laws_(laws), threshold_(threshold), progress_(progress) {}
+  Search(const DiagnosisSetup& setup, const DiagnoseOptions& options, std::vector<LawShapes> laws,
+         double threshold, const ProgressCallback& progress)
+      : setup_(setup),
+        options_(options),
+        laws_(std::move(laws)),
+        threshold_(threshold),
+        progress_(progress) {}
+
+  /// From now on laws are asked for at these shapes alone.
+  void keep_shapes(const std::vector<LawScore>& scores) {
+    laws_.clear();
+    for (const LawScore& score : scores) laws_.push_back({score.term});
+  }
+  const std::vector<LawShapes>& laws() const { return laws_; }
 
   bool cancelled() const { return cancelled_; }
   double cost(const ModelFit& model) const { return chi_square(model, threshold_) + price(model); }
@@ -137,11 +148,10 @@ class Search {
     return list;
   }
 
-  /// Lines that a law more leads to.
-  std::vector<Line> extend(Line& line) {
+  /// Lines that a law more leads to, of those on the list.
+  std::vector<Line> extend(Line& line, const Shortlist& list) {
     std::vector<Line> children;
-    const Shortlist list = shortlist(line.model);
-    if (cancelled_) return {};
+    line.finished = true;
     const CrossValidation before = cross_validate(setup_, line.model, kTimeBlocks, threshold_);
     std::vector<LawTrial> trials;
     int tried = 0;
@@ -197,7 +207,7 @@ class Search {
     if (cancelled_ || !fitted.usable || score.term.shape.empty()) return fitted;
     terms.back().fits_shape = true;
     ModelFit with_shape = fit_model(setup_, terms, values_by_name(*fitted.problem, fitted.values),
-                                    {model.frames}, progress_);
+                                    {model.frames}, progress_, 1);
     cancelled_ = cancelled_ || with_shape.cancelled;
     return with_shape.usable && cost(with_shape) < cost(fitted) ? with_shape : fitted;
   }
@@ -280,7 +290,7 @@ class Search {
 
   const DiagnosisSetup& setup_;
   const DiagnoseOptions& options_;
-  const std::vector<LawShapes>& laws_;
+  std::vector<LawShapes> laws_;
   double threshold_;
   const ProgressCallback& progress_;
   bool cancelled_ = false;
@@ -419,32 +429,34 @@ Diagnosis diagnose(const FitInput& input, const DiagnoseOptions& options,
   };
 
   base.cost = search.cost(base.model);
-  Shortlist first = search.shortlist(base.model);
+  Shortlist list = search.shortlist(base.model);
   if (search.cancelled()) return cancelled();
-  result.score_frames = first.frames;
-  result.scores = std::move(first.scores);
+  result.score_frames = list.frames;
+  result.scores = list.scores;
   for (LawScore& score : result.scores) score.columns.resize(0, 0);
+  search.keep_shapes(result.scores);
 
+  // Always the best line is led on, until nothing leads on from it, or from as many as are
+  // followed.
   std::vector<Line> lines;
   lines.push_back(std::move(base));
-  for (int round = 0; round < options.most_effects; ++round) {
-    std::vector<Line> next;
-    for (Line& line : lines) {
-      if (!line.finished) {
-        std::vector<Line> children = search.extend(line);
-        if (search.cancelled()) return cancelled();
-        for (Line& child : children) child.accepted.back().alike = alike(children, child);
-        line.finished = true;
-        for (Line& child : children) next.push_back(std::move(child));
-      }
-      next.push_back(std::move(line));
-    }
-    std::ranges::stable_sort(next, {}, &Line::cost);
-    drop_repeated(next);
-    if (next.size() > static_cast<size_t>(options.lines))
-      next.erase(next.begin() + options.lines, next.end());
-    lines = std::move(next);
-    if (std::ranges::all_of(lines, &Line::finished) || lines.front().finished) break;
+  for (;;) {
+    const auto next = std::ranges::find_if(lines, [&](const Line& line) {
+      return !line.finished && line.model.terms.size() < static_cast<size_t>(options.most_effects);
+    });
+    if (next == lines.end()) break;
+    if (!next->model.terms.empty()) list = search.shortlist(next->model);
+    if (search.cancelled()) return cancelled();
+    std::vector<Line> children = search.extend(*next, list);
+    if (search.cancelled()) return cancelled();
+    for (Line& child : children) child.accepted.back().alike = alike(children, child);
+    const bool is_end = children.empty() && next == lines.begin();
+    if (is_end && adequacy_of(setup, lines.front().model).adequate) break;
+    std::ranges::move(children, std::back_inserter(lines));
+    std::ranges::stable_sort(lines, {}, &Line::cost);
+    drop_repeated(lines);
+    if (lines.size() > static_cast<size_t>(options.lines))
+      lines.erase(lines.begin() + options.lines, lines.end());
   }
 
   Line& best = lines.front();

@@ -8,11 +8,8 @@ namespace {
 
 /// A model that is wrong has a rough cost, on which a refinement could go on for long; what is
 /// accepted is fitted once more, to the end.
-constexpr RefineOptions kStage{.iterations = 12,
-                               .rounds = 2,
-                               .least_gain = 1e-4,
-                               .trust_region_radius = 1e4,
-                               .most_spring_steps = 1e10};
+constexpr RefineOptions kStage{
+    .iterations = 12, .least_gain = 1e-4, .trust_region_radius = 1e4, .most_spring_steps = 1e10};
 
 void set_neutral(const EffectDescription& effect, const std::vector<Binding>& bindings,
                  Eigen::VectorXd& values) {
@@ -71,7 +68,7 @@ ModelFit model_at(std::shared_ptr<const FitProblem> problem, std::vector<Term> t
 
 ModelFit fit_model(const DiagnosisSetup& setup, const std::vector<Term>& terms,
                    const std::map<std::string, double>& start, const std::vector<int>& horizons,
-                   const ProgressCallback& progress) {
+                   const ProgressCallback& progress, int rounds) {
   ModelFit model{.terms = terms, .problem = problem_of(setup, terms), .values = {}, .linear = {}};
   std::map<std::string, double> known = start;
   for (const Term& term : terms)
@@ -79,6 +76,7 @@ ModelFit fit_model(const DiagnosisSetup& setup, const std::vector<Term>& terms,
       known.try_emplace(term.effect + "." + parameter, value);
   model.values = values_of(*model.problem, known);
   RefineOptions options = kStage;
+  options.rounds = rounds;
   options.loss = setup.options.loss;
   options.substep_scale = setup.options.substep_scale;
   options.most_spring_steps *= setup.options.work;

@@ -46,9 +46,10 @@ std::shared_ptr<const FitProblem> problem_of(const DiagnosisSetup& setup,
 
 /// Refines a model from values known by name over each of the horizons (frames, rising) in turn,
 /// and linearises it at the end of the last one.
+/// `rounds`: of each refinement (fit/refine.h).
 ModelFit fit_model(const DiagnosisSetup& setup, const std::vector<Term>& terms,
                    const std::map<std::string, double>& start, const std::vector<int>& horizons,
-                   const ProgressCallback& progress);
+                   const ProgressCallback& progress, int rounds = 2);
 
 /// The model as it is, linearised over its first frames.
 ModelFit model_at(std::shared_ptr<const FitProblem> problem, std::vector<Term> terms,
