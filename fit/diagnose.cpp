@@ -119,7 +119,7 @@ class Search {
     std::vector<LawShapes> laws = untested(model);
     for (const ModelFit& at : shorter) {
       const Projection projection = project(setup_, at, discretisation_directions(setup_, at));
-      std::vector<LawScore> scores = score_laws(setup_, at, projection, laws, progress_);
+      std::vector<LawScore> scores = score_laws(at, projection, laws, progress_);
       if (scores.empty()) cancelled_ = true;
       if (cancelled_) return {};
       if (list.scores.empty()) {
@@ -467,7 +467,7 @@ Diagnosis diagnose(const FitInput& input, const DiagnoseOptions& options,
       project(setup, best.model, discretisation_directions(setup, best.model));
   std::vector<LawShapes> at_best_shapes;
   for (const LawScore& score : result.scores) at_best_shapes.push_back({score.term});
-  std::vector<LawScore> last = score_laws(setup, best.model, projection, at_best_shapes, progress);
+  std::vector<LawScore> last = score_laws(best.model, projection, at_best_shapes, progress);
   if (last.empty() && !laws.empty()) return cancelled();
   result.limits = limits_of(last, std::sqrt(std::max(1.0, result.after.chi_square_per_dof)));
 

@@ -238,19 +238,6 @@ void add_effect(const std::string& name, const std::string& where,
   problem.effects.push_back(std::move(bindings));
 }
 
-/// What an effect of the measurement that looks beside the markers needs.
-void add_slope_weights(FitProblem& problem) {
-  const auto shifts_place = [](const FitProblem::MeasurementTerm& term) {
-    return term.effect->shifts_place();
-  };
-  if (std::ranges::none_of(problem.measurement, shifts_place)) return;
-  const Mesh& mesh = problem.cloth.mesh;
-  for (const SurfaceQuantity slope : {SurfaceQuantity::by_s, SurfaceQuantity::by_t})
-    problem.slope_weights.push_back(
-        vertex_weights(make_surface(mesh.columns, mesh.rows, mesh.width_m, mesh.height_m,
-                                    problem.marker_place_m, SurfaceInterpolation::bicubic, slope)));
-}
-
 void add_effects(const Recording& recording, const FitOptions& options, FitProblem& problem) {
   std::vector<std::string> present;
   const auto absent = [&](const std::string& name) {
@@ -396,6 +383,19 @@ Rigid3 place_sheet_of(const Recording& recording, FitProblem& problem) {
 }
 
 }  // namespace
+
+void add_slope_weights(FitProblem& problem) {
+  const auto shifts_place = [](const FitProblem::MeasurementTerm& term) {
+    return term.effect->shifts_place();
+  };
+  if (!problem.slope_weights.empty()) return;
+  if (std::ranges::none_of(problem.measurement, shifts_place)) return;
+  const Mesh& mesh = problem.cloth.mesh;
+  for (const SurfaceQuantity slope : {SurfaceQuantity::by_s, SurfaceQuantity::by_t})
+    problem.slope_weights.push_back(
+        vertex_weights(make_surface(mesh.columns, mesh.rows, mesh.width_m, mesh.height_m,
+                                    problem.marker_place_m, SurfaceInterpolation::bicubic, slope)));
+}
 
 FitProblem make_problem(const FitInput& input, const FitOptions& options, int mesh_columns,
                         int mesh_rows) {

@@ -60,6 +60,9 @@ struct FitProblem {
   int frames() const { return static_cast<int>(frame_time_s.size()); }
 };
 
+/// Gives a problem the slopes that an effect of its measurement looks along, where one does.
+void add_slope_weights(FitProblem& problem);
+
 /// Reads a problem out of the input. `mesh_columns` x `mesh_rows` is the mesh of the fit.
 /// Throws InputError for a recording that cannot be fitted as it stands.
 FitProblem make_problem(const FitInput& input, const FitOptions& options, int mesh_columns,

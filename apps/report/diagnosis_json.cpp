@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <vector>
 
 #include "apps/json_file.h"
 #include "apps/version.h"
@@ -74,7 +75,7 @@ void write_diagnosis(const Diagnosis& diagnosis, const std::string& command,
   for (const AcceptedEffect& accepted : diagnosis.accepted) {
     ordered_json one = trial_json(accepted.trial);
     one.erase("refused");
-    ordered_json alike = ordered_json::array({accepted.trial.term.effect});
+    std::vector<std::string> alike{accepted.trial.term.effect};
     for (const Term& term : accepted.alike)
       if (std::ranges::find(alike, term.effect) == alike.end()) alike.push_back(term.effect);
     one["class"] = alike;

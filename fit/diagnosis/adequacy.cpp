@@ -139,7 +139,7 @@ Adequacy judge_adequacy(const ModelFit& model, const Projection& projection,
   constexpr std::pair<int, int> kSets[] = {{1, 4}, {2, 4}, {2, 8}, {3, 8}, {3, 16}};
   for (const auto& [waves, in_time_waves] : kSets) {
     const Eigen::MatrixXd functions = smooth_functions(objective, waves, in_time_waves);
-    if (2 * functions.cols() > residual.size()) continue;
+    if (2 * functions.cols() > functions.rows()) continue;
     const Eigen::MatrixXd left = projection.columns(functions);
     const Eigen::MatrixXd information = left.transpose() * left;
     const Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver(information);

@@ -27,8 +27,8 @@ Projection project(const DiagnosisSetup& setup, const ModelFit& model,
 /// The score test [rao1948] of each law at its neutral value: derivatives there, projected, against
 /// the projected residual; amplitudes within their ranges. In the order of `laws`; a law whose
 /// effect cannot act in this model is left out.
-std::vector<LawScore> score_laws(const DiagnosisSetup& setup, const ModelFit& model,
-                                 const Projection& projection, const std::vector<LawShapes>& laws,
+std::vector<LawScore> score_laws(const ModelFit& model, const Projection& projection,
+                                 const std::vector<LawShapes>& laws,
                                  const ProgressCallback& progress);
 
 }  // namespace clothfit

@@ -1,5 +1,6 @@
 #include "fit/diagnosis/projection.h"
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/QR>
 #include <Eigen/SVD>
 #include <algorithm>
@@ -28,26 +29,34 @@ Projection::Projection(const Eigen::MatrixXd& jacobian, const Eigen::MatrixXd& p
                        const Eigen::MatrixXd& unit_directions, const Eigen::VectorXd& weight,
                        const Eigen::VectorXd& residual)
     : root_weight_(weight.cwiseSqrt()) {
-  const Eigen::Index fitted = jacobian.cols(), units = unit_directions.cols();
-  moved_.resize(jacobian.rows(), fitted + units);
-  moved_ << jacobian, unit_directions;
-  moved_ = root_weight_.asDiagonal() * moved_;
-  const Eigen::MatrixXd of_data = moved_.transpose() * moved_;
-  Eigen::MatrixXd information = of_data;
-  information.topLeftCorner(fitted, fitted) += prior_information;
-  information.diagonal().tail(units).array() += 1;
+  const Eigen::Index rows = jacobian.rows(), fitted = jacobian.cols(),
+                     units = unit_directions.cols();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> prior(prior_information);
+  const Eigen::VectorXd root = prior.eigenvalues().cwiseMax(0).cwiseSqrt();
+
+  moved_ = Eigen::MatrixXd::Zero(rows + fitted + units, fitted + units);
+  moved_.topLeftCorner(rows, fitted) = root_weight_.asDiagonal() * jacobian;
+  moved_.topRightCorner(rows, units) = root_weight_.asDiagonal() * unit_directions;
+  moved_.block(rows, 0, fitted, fitted) = root.asDiagonal() * prior.eigenvectors().transpose();
+  moved_.bottomRightCorner(units, units).setIdentity();
+  Eigen::MatrixXd information = moved_.transpose() * moved_;
   // A coordinate that data and priors say nothing of stays where it is.
   information.diagonal().array() += 1e-12 * std::max(1.0, information.diagonal().maxCoeff());
   information_.compute(information);
-  taken_ = information_.solve(of_data).trace();
-  residual_ = root_weight_.cwiseProduct(residual);
-  Eigen::VectorXd gradient = moved_.transpose() * residual_;
-  gradient.head(fitted) += prior_gradient;
-  residual_ -= moved_ * information_.solve(gradient);
+  const auto of_data = moved_.topRows(rows);
+  taken_ = information_.solve(of_data.transpose() * of_data).trace();
+
+  residual_ = Eigen::VectorXd::Zero(moved_.rows());
+  residual_.head(rows) = root_weight_.cwiseProduct(residual);
+  const Eigen::VectorXd pull = prior.eigenvectors().transpose() * prior_gradient;
+  for (Eigen::Index p = 0; p < fitted; ++p)
+    if (root[p] > 0) residual_[rows + p] = pull[p] / root[p];
+  residual_ -= moved_ * information_.solve(moved_.transpose() * residual_);
 }
 
 Eigen::MatrixXd Projection::columns(const Eigen::MatrixXd& of) const {
-  Eigen::MatrixXd left = root_weight_.asDiagonal() * of;
+  Eigen::MatrixXd left = Eigen::MatrixXd::Zero(moved_.rows(), of.cols());
+  left.topRows(of.rows()) = root_weight_.asDiagonal() * of;
   const Eigen::VectorXd before = left.colwise().squaredNorm();
   left -= moved_ * information_.solve(moved_.transpose() * left);
   for (Eigen::Index k = 0; k < left.cols(); ++k)

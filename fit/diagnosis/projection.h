@@ -11,7 +11,9 @@ namespace clothfit {
 ///
 ///   v - [J E] H^-1 [J E]' W v,   H = [J E]' W [J E] + diag(P, I),
 ///
-/// is what generalised least squares with the covariance W^-1 + E E' cannot explain by J.
+/// is what generalised least squares with the covariance W^-1 + E E' cannot explain by J. Behind
+/// the residuals come rows of the priors and of E, one for each of their numbers: with these it is
+/// an orthogonal projection, and products of projected vectors are those of that least squares.
 class Projection {
  public:
   /// `weight`: Huber's, of each residual. `prior_gradient`: of half the sum of the priors' squares.
@@ -19,7 +21,8 @@ class Projection {
              const Eigen::VectorXd& prior_gradient, const Eigen::MatrixXd& unit_directions,
              const Eigen::VectorXd& weight, const Eigen::VectorXd& residual);
 
-  /// What is left of the residual, and of columns; times the square roots of the weights.
+  /// What is left of the residual, and of columns; times the square roots of the weights. Rows of
+  /// the residuals first.
   const Eigen::VectorXd& residual() const { return residual_; }
   Eigen::MatrixXd columns(const Eigen::MatrixXd& of) const;
 
@@ -29,7 +32,7 @@ class Projection {
 
  private:
   Eigen::VectorXd root_weight_;
-  Eigen::MatrixXd moved_;  ///< sqrt(W) [J E]
+  Eigen::MatrixXd moved_;  ///< sqrt(W) [J E], then the roots of diag(P, I)
   Eigen::LDLT<Eigen::MatrixXd> information_;
   Eigen::VectorXd residual_;
   double taken_ = 0;

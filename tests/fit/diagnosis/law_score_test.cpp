@@ -40,7 +40,7 @@ TEST(LawScore, ForeseesASmallDragAndItsSigma) {
                   .law = "",
                   .amplitudes = {describe_effect("viscous_damping").parameters.front().name}};
 
-  const std::vector<LawScore> scores = score_laws(setup, model, projection, {{term}}, {});
+  const std::vector<LawScore> scores = score_laws(model, projection, {{term}}, {});
 
   ASSERT_EQ(scores.size(), 1u);
   EXPECT_NEAR(scores[0].amount[0], 0.05, 4 * scores[0].sigma[0]);
@@ -60,7 +60,7 @@ TEST(LawScore, IsThatOfNoiseWhereNothingIsHidden) {
   std::vector<LawShapes> laws = laws_to_test(input, kOptions, 0.4);
   std::erase_if(laws, [](const LawShapes& law) { return law.size() > 1; });
 
-  for (const LawScore& score : score_laws(setup, model, projection, laws, {}))
+  for (const LawScore& score : score_laws(model, projection, laws, {}))
     // Beyond 20 one law in 100 000 has its chi-square with one degree of freedom.
     EXPECT_LT(score.fall, 20 + 4 * static_cast<double>(score.amount.size() - 1))
         << score.term.title();

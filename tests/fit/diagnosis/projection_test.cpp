@@ -34,8 +34,8 @@ TEST(Projection, LeavesTheResidualsOfLeastSquares) {
   const Eigen::VectorXd b = root.cwiseProduct(residual);
   const Eigen::VectorXd left = b - a * a.colPivHouseholderQr().solve(b);
 
-  EXPECT_LT((projection.residual() - left).norm(), 1e-9 * left.norm());
-  EXPECT_LT((a.transpose() * projection.columns(residual)).norm(), 1e-9 * left.norm());
+  EXPECT_LT((projection.residual().head(40) - left).norm(), 1e-9 * left.norm());
+  EXPECT_LT((a.transpose() * projection.columns(residual).topRows(40)).norm(), 1e-9 * left.norm());
   EXPECT_NEAR(projection.taken(), 4, 1e-9);
   EXPECT_NEAR(projection.weights(), weight.sum(), 1e-12 * weight.sum());
 }
@@ -58,7 +58,11 @@ TEST(Projection, CountsUnitDirectionsAsACovariance) {
   const Eigen::VectorXd expected =
       -(all.transpose() * inverse * all).ldlt().solve(all.transpose() * inverse * residual);
 
-  EXPECT_LT((explained.amount - expected.tail(2)).norm(), 1e-5 * expected.tail(2).norm());
+  EXPECT_LT((explained.amount - expected.tail(2)).norm(), 1e-8 * expected.tail(2).norm());
+  const double fall = residual.dot(inverse * residual) -
+                      (residual + all * expected).dot(inverse * (residual + all * expected)) -
+                      (residual.dot(inverse * residual) - projection.residual().squaredNorm());
+  EXPECT_NEAR(explained.fall, fall, 1e-8 * projection.residual().squaredNorm());
 }
 
 TEST(Projection, LeavesNothingOfWhatTheModelCanDoItself) {
