@@ -83,9 +83,7 @@ void print_result(const Diagnosis& diagnosis, const fs::path& folder) {
 
 int run_diagnose(DiagnoseFlags flags) {
   FitOptions& fit = flags.options.fit;
-  fit.observations = flags.observations == "tracks3d"   ? ObservationKind::tracks3d
-                     : flags.observations == "tracks2d" ? ObservationKind::tracks2d
-                                                        : ObservationKind::automatic;
+  fit.observations = parse_observations(flags.observations);
   if (const auto mesh = parse_mesh(flags.mesh)) {
     fit.mesh_columns = mesh->columns;
     fit.mesh_rows = mesh->rows;
@@ -137,7 +135,9 @@ void add_diagnose_verb(CLI::App& program, VerbAction& action) {
   verb->add_option("--mesh", flags->mesh, "Columns and rows of the mesh (default: the recording's)")
       ->type_name("CxR")
       ->check(check_mesh);
-  verb->add_option("--seed", options.fit.seed, "Seed of the search")->capture_default_str();
+  verb->add_option("--seed", options.fit.seed, "Seed of the search")
+      ->check(check_seed)
+      ->capture_default_str();
   verb->add_option("--start-nodes", options.fit.start_nodes,
                    "Nodes per side of the corrections of a start in motion (start: unknown)")
       ->capture_default_str();

@@ -56,17 +56,6 @@ ParameterPrior parse_prior(const std::string& text) {
                    "clock_offset.time=0,0.002");
 }
 
-/// CLI11 wraps a negative number into a huge one.
-std::string check_seed(const std::string& text) {
-  return text.starts_with('-') ? "'" + text + "' is not a seed: a whole number, 0 or more" : "";
-}
-
-ObservationKind parse_observations(const std::string& text) {
-  if (text == "tracks3d") return ObservationKind::tracks3d;
-  if (text == "tracks2d") return ObservationKind::tracks2d;
-  return ObservationKind::automatic;
-}
-
 /// The parameter set that is asked for, or that of the earlier fit which `flag` names.
 SpringSet chosen_springs(const std::string& asked, const char* flag, const FitResult* earlier) {
   const std::optional<SpringSet> wanted = spring_set_named(asked);

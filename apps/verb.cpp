@@ -1,5 +1,7 @@
 #include "apps/verb.h"
 
+#include "fit/fit.h"
+
 namespace clothfit {
 
 namespace fs = std::filesystem;
@@ -28,6 +30,16 @@ std::string shown_path(const std::filesystem::path& path) {
 
 std::filesystem::path recording_folder(const std::filesystem::path& typed) {
   return typed.filename() == "recording.yaml" ? fs::absolute(typed).parent_path() : typed;
+}
+
+std::string check_seed(const std::string& text) {
+  return text.starts_with('-') ? "'" + text + "' is not a seed: a whole number, 0 or more" : "";
+}
+
+ObservationKind parse_observations(const std::string& text) {
+  if (text == "tracks3d") return ObservationKind::tracks3d;
+  if (text == "tracks2d") return ObservationKind::tracks2d;
+  return ObservationKind::automatic;
 }
 
 }  // namespace clothfit

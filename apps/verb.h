@@ -7,6 +7,8 @@
 
 namespace clothfit {
 
+enum class ObservationKind;
+
 /// What the chosen verb does; returns an exit code.
 using VerbAction = std::function<int()>;
 
@@ -21,6 +23,13 @@ void add_recover_verb(CLI::App& program, VerbAction& action);
 void add_demo_verb(CLI::App& program, VerbAction& action);
 void add_experiment_verb(CLI::App& program, VerbAction& action);
 void add_study_verb(CLI::App& program, VerbAction& action);
+
+/// For CLI11: empty, or what is wrong with the text of --seed. (It wraps a negative number into a
+/// huge one.)
+std::string check_seed(const std::string& text);
+
+/// What --observations names: tracks3d, tracks2d, or anything else for automatic.
+ObservationKind parse_observations(const std::string& text);
 
 /// Binds --out, whose default is `default_name` in the current directory.
 void add_out_option(CLI::App& verb, std::filesystem::path& out, const std::string& default_name);

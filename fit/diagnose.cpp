@@ -34,7 +34,7 @@ double least_square(Eigen::Index amplitudes) {
   return 25 + 3.6 * static_cast<double>(amplitudes - 1);
 }
 
-/// What a model must gain for an amplitude more (Bayesian information criterion).
+/// What a model must gain for each number more (Bayesian information criterion).
 double price(const ModelFit& model) {
   double amplitudes = 0;
   for (const Term& term : model.terms)
@@ -79,12 +79,13 @@ struct Shortlist {
 class Search {
  public:
   Search(const DiagnosisSetup& setup, const DiagnoseOptions& options, std::vector<LawShapes> laws,
-         double threshold, const ProgressCallback& progress)
+         double threshold, const ProgressCallback& progress, const bool& stopped)
       : setup_(setup),
         options_(options),
         laws_(std::move(laws)),
         threshold_(threshold),
-        progress_(progress) {}
+        progress_(progress),
+        stopped_(stopped) {}
 
   /// From now on laws are asked for at these shapes alone.
   void keep_shapes(const std::vector<LawScore>& scores) {
@@ -93,7 +94,6 @@ class Search {
   }
   const std::vector<LawShapes>& laws() const { return laws_; }
 
-  bool cancelled() const { return cancelled_; }
   double cost(const ModelFit& model) const { return chi_square(model, threshold_) + price(model); }
 
   Shortlist shortlist(const ModelFit& model) {
@@ -107,8 +107,7 @@ class Search {
                                       : fit_model(setup_, model.terms,
                                                   values_by_name(*model.problem, model.values),
                                                   {frames}, progress_);
-      cancelled_ = cancelled_ || fitted.cancelled;
-      if (cancelled_) return {};
+      if (stopped_) return {};
       if (!fitted.usable) continue;
       const bool visible = fitted.linear.residual.squaredNorm() >
                            kVisible * static_cast<double>(fitted.linear.residual.size());
@@ -120,8 +119,7 @@ class Search {
     for (const ModelFit& at : shorter) {
       const Projection projection = project(setup_, at, discretisation_directions(setup_, at));
       std::vector<LawScore> scores = score_laws(at, projection, laws, progress_);
-      if (scores.empty()) cancelled_ = true;
-      if (cancelled_) return {};
+      if (stopped_) return {};
       if (list.scores.empty()) {
         std::ranges::stable_sort(scores, std::greater<>(), &LawScore::share);
         list.scores = std::move(scores);
@@ -159,7 +157,7 @@ class Search {
       if (score.fall < least_square(score.amount.size())) continue;
       if (tried++ == options_.refits) break;
       Line child{.model = refit(line.model, score, list.frames), .accepted = line.accepted};
-      if (cancelled_) return {};
+      if (stopped_) return {};
       LawTrial trial = judge(line.model, before, score, child.model);
       trials.push_back(trial);
       if (!trial.refused.empty()) {
@@ -203,12 +201,10 @@ class Search {
     }
     ModelFit fitted =
         fit_model(setup_, terms, start, horizons_from(first_frames, model.frames), progress_);
-    cancelled_ = cancelled_ || fitted.cancelled;
-    if (cancelled_ || !fitted.usable || score.term.shape.empty()) return fitted;
+    if (stopped_ || !fitted.usable || score.term.shape.empty()) return fitted;
     terms.back().fits_shape = true;
     ModelFit with_shape = fit_model(setup_, terms, values_by_name(*fitted.problem, fitted.values),
                                     {model.frames}, progress_, 1);
-    cancelled_ = cancelled_ || with_shape.cancelled;
     return with_shape.usable && cost(with_shape) < cost(fitted) ? with_shape : fitted;
   }
 
@@ -293,7 +289,7 @@ class Search {
   std::vector<LawShapes> laws_;
   double threshold_;
   const ProgressCallback& progress_;
-  bool cancelled_ = false;
+  const bool& stopped_;  ///< set by `progress_` once it has said so
 };
 
 Adequacy adequacy_of(const DiagnosisSetup& setup, const ModelFit& model) {
@@ -386,8 +382,13 @@ Diagnosis diagnose(const FitInput& input, const DiagnoseOptions& options,
       options.fit.threads > 0
           ? static_cast<size_t>(options.fit.threads)
           : tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
+  bool stopped = false;
+  const ProgressCallback watched = [&](const Progress& now) {
+    stopped = stopped || (progress && !progress(now));
+    return !stopped;
+  };
   Diagnosis result;
-  result.base = fit(input, options.fit, progress);
+  result.base = fit(input, options.fit, watched);
   result.stop = result.base.stop;
   result.message = result.base.message;
   if (!result.base.usable()) return result;
@@ -421,7 +422,7 @@ Diagnosis diagnose(const FitInput& input, const DiagnoseOptions& options,
       options.fit.loss == Loss::huber
           ? kHuberScales * std::max(1.0, robust_scale(base.model.linear.residual))
           : std::numeric_limits<double>::infinity();
-  Search search(setup, options, laws, threshold, progress);
+  Search search(setup, options, std::move(laws), threshold, watched, stopped);
   const auto cancelled = [&] {
     result.stop = FitStop::cancelled;
     result.message = "cancelled";
@@ -430,10 +431,9 @@ Diagnosis diagnose(const FitInput& input, const DiagnoseOptions& options,
 
   base.cost = search.cost(base.model);
   Shortlist list = search.shortlist(base.model);
-  if (search.cancelled()) return cancelled();
+  if (stopped) return cancelled();
   result.score_frames = list.frames;
   result.scores = list.scores;
-  for (LawScore& score : result.scores) score.columns.resize(0, 0);
   search.keep_shapes(result.scores);
 
   // Always the best line is led on, until nothing leads on from it, or from as many as are
@@ -446,9 +446,9 @@ Diagnosis diagnose(const FitInput& input, const DiagnoseOptions& options,
     });
     if (next == lines.end()) break;
     if (!next->model.terms.empty()) list = search.shortlist(next->model);
-    if (search.cancelled()) return cancelled();
+    if (stopped) return cancelled();
     std::vector<Line> children = search.extend(*next, list);
-    if (search.cancelled()) return cancelled();
+    if (stopped) return cancelled();
     for (Line& child : children) child.accepted.back().alike = alike(children, child);
     const bool is_end = children.empty() && next == lines.begin();
     if (is_end && adequacy_of(setup, lines.front().model).adequate) break;
@@ -465,10 +465,8 @@ Diagnosis diagnose(const FitInput& input, const DiagnoseOptions& options,
   result.after = adequacy_of(setup, best.model);
   const Projection projection =
       project(setup, best.model, discretisation_directions(setup, best.model));
-  std::vector<LawShapes> at_best_shapes;
-  for (const LawScore& score : result.scores) at_best_shapes.push_back({score.term});
-  std::vector<LawScore> last = score_laws(best.model, projection, at_best_shapes, progress);
-  if (last.empty() && !laws.empty()) return cancelled();
+  const std::vector<LawScore> last = score_laws(best.model, projection, search.laws(), watched);
+  if (stopped) return cancelled();
   result.limits = limits_of(last, std::sqrt(std::max(1.0, result.after.chi_square_per_dof)));
 
   if (result.accepted.empty()) {
@@ -476,10 +474,15 @@ Diagnosis diagnose(const FitInput& input, const DiagnoseOptions& options,
     result.verdict =
         result.after.adequate ? DiagnosisVerdict::adequate : DiagnosisVerdict::unexplained;
   } else {
-    FitOptions again = options.fit;
+    FitOptions again = options_with(options.fit, best.model.terms);
     again.start = values_by_name(*best.model.problem, best.model.values);
-    result.found = fit(with_terms(input, best.model.terms), again, progress);
-    if (result.found.stop == FitStop::cancelled) return cancelled();
+    result.found = fit(with_terms(input, best.model.terms), again, watched);
+    if (stopped) return cancelled();
+    if (!result.found.usable()) {
+      result.stop = result.found.stop;
+      result.message = "with " + title(best.model.terms) + ": " + result.found.message;
+      return result;
+    }
     result.verdict =
         result.after.adequate ? DiagnosisVerdict::explained : DiagnosisVerdict::partly_explained;
   }

@@ -63,8 +63,8 @@ struct Diagnosis {
   DiagnosisVerdict verdict = DiagnosisVerdict::adequate;
   FitReport base, found;  ///< the fit of the recording as declared, and with what was accepted
   Adequacy before, after;
-  std::vector<LawScore> scores;  ///< of the base model, the most telling first, without columns
-  int score_frames = 0;          ///< horizon of these
+  std::vector<LawScore> scores;          ///< of the base model, the most telling first
+  int score_frames = 0;                  ///< horizon of these
   std::vector<AcceptedEffect> accepted;  ///< in the order in which they were
   std::vector<LawTrial> refused;         ///< the last round's
   std::vector<DetectionLimit> limits;

@@ -26,10 +26,10 @@ std::string verdict_text(const Diagnosis& diagnosis) {
       return "The model explains this recording: nothing is missing that it could show.";
     case DiagnosisVerdict::explained:
       return "The model lacked " + effects_text(diagnosis) +
-             ". With it, what is left looks like noise.";
+             ". With that, what is left looks like noise.";
     case DiagnosisVerdict::partly_explained:
       return "The model lacked " + effects_text(diagnosis) +
-             ". With it, structure still remains that no tested effect explains.";
+             ". With that, structure still remains that no tested effect explains.";
     case DiagnosisVerdict::unexplained:
       return "Something is missing, and no tested effect explains it.";
   }

@@ -14,7 +14,7 @@ constexpr double kSure = 5;
 /// and larger than this share of the noise's own square, is one.
 constexpr double kLarge = 0.02;
 
-/// Sum of products of residuals that are `pairs` apart, with its standard score.
+/// Mean product of pairs of residuals over their mean square, with its standard score.
 struct Correlation {
   double value = 0, score = 0;
 };
@@ -29,8 +29,7 @@ std::map<Place, const Objective::Block*> blocks_of(const TrajectoryObjective& ob
   return found;
 }
 
-/// The nearest marker to each that lies further along s or t and no further than 1.5 times the
-/// nearest of all: its neighbours.
+/// Pairs of markers that are nearest to each other on the cloth, within a tenth: each once.
 std::vector<std::pair<int, int>> neighbours(const Eigen::Matrix2Xd& place_m) {
   std::vector<std::pair<int, int>> pairs;
   for (Eigen::Index m = 0; m < place_m.cols(); ++m) {

@@ -115,9 +115,9 @@ class Bundle {
   static LawScore judge(const Term& term, const Projection& projection,
                         const Eigen::MatrixXd& columns, const Eigen::VectorXd& down,
                         const Eigen::VectorXd& up, const Eigen::VectorXd& slope) {
-    LawScore result{.term = term, .amount = {}, .sigma = {}, .columns = {}};
-    result.columns = projection.columns(columns);
-    const Explained explained = explain(projection.residual(), result.columns, down, up);
+    LawScore result{.term = term, .amount = {}, .sigma = {}};
+    const Explained explained =
+        explain(projection.residual(), projection.columns(columns), down, up);
     result.amount = explained.amount.cwiseProduct(slope);
     result.fall = explained.fall;
     result.sigma = Eigen::VectorXd::Constant(slope.size(), kInfinite);
@@ -200,8 +200,7 @@ std::vector<LawScore> score_laws(const ModelFit& model, const Projection& projec
   std::vector<LawScore> best;
   std::vector<size_t> law_of_best;
   for (size_t n = 0; n < tests.size(); ++n) {
-    if (scores[n].columns.size() == 0) continue;
-    scores[n].shapes = static_cast<int>(laws[law_of_test[n]].size());
+    if (scores[n].amount.size() == 0) continue;
     if (best.empty() || law_of_best.back() != law_of_test[n]) {
       best.push_back(std::move(scores[n]));
       law_of_best.push_back(law_of_test[n]);

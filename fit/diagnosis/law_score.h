@@ -1,6 +1,5 @@
 #pragma once
 
-#include <functional>
 #include <vector>
 
 #include "fit/diagnosis/model_fit.h"
@@ -10,13 +9,11 @@ namespace clothfit {
 
 /// What the linearised model foresees of adding an effect by one law.
 struct LawScore {
-  Term term;                ///< at the shape that foresees most
-  Eigen::VectorXd amount;   ///< of its amplitudes beyond neutral, in their units
-  Eigen::VectorXd sigma;    ///< of each from the noise, all else free; infinite where unseen
-  double fall = 0;          ///< of chi-square
-  double share = 0;         ///< of it in all that the projected residual has above its noise
-  Eigen::MatrixXd columns;  ///< projected derivatives of the residuals by its amplitudes
-  int shapes = 1;           ///< that were tried
+  Term term;               ///< at the shape that foresees most
+  Eigen::VectorXd amount;  ///< of its amplitudes beyond neutral, in their units
+  Eigen::VectorXd sigma;   ///< of each from the noise, all else free; infinite where unseen
+  double fall = 0;         ///< of chi-square
+  double share = 0;        ///< of it in all that the projected residual has above its noise
 };
 
 /// The projection of a model: its own parameters, priors and discretisation taken out. Residuals

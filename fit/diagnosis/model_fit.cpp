@@ -40,17 +40,21 @@ std::map<std::string, double> values_by_name(const FitProblem& problem,
   return named;
 }
 
-std::shared_ptr<const FitProblem> problem_of(const DiagnosisSetup& setup,
-                                             const std::vector<Term>& terms) {
-  FitOptions options = setup.options;
+FitOptions options_with(FitOptions options, const std::vector<Term>& terms) {
   for (const Term& term : terms)
     if (term.fits_shape)
       for (const auto& [parameter, value] : term.shape)
         options.priors.push_back({.name = term.effect + "." + parameter,
                                   .mean = value,
                                   .sigma = term.shape_sigma.at(parameter)});
-  return std::make_shared<const FitProblem>(
-      make_problem(with_terms(setup.input, terms), options, setup.columns, setup.rows));
+  return options;
+}
+
+std::shared_ptr<const FitProblem> problem_of(const DiagnosisSetup& setup,
+                                             const std::vector<Term>& terms) {
+  return std::make_shared<const FitProblem>(make_problem(with_terms(setup.input, terms),
+                                                         options_with(setup.options, terms),
+                                                         setup.columns, setup.rows));
 }
 
 ModelFit model_at(std::shared_ptr<const FitProblem> problem, std::vector<Term> terms,

@@ -40,6 +40,9 @@ struct DiagnosisSetup {
   int columns = 0, rows = 0;  ///< of the mesh
 };
 
+/// The options with the priors of the shapes that terms fit.
+FitOptions options_with(FitOptions options, const std::vector<Term>& terms);
+
 /// The model's problem; all constants of its terms are in.
 std::shared_ptr<const FitProblem> problem_of(const DiagnosisSetup& setup,
                                              const std::vector<Term>& terms);

@@ -1,26 +1,14 @@
 #include "fit/diagnosis/projection.h"
 
 #include <Eigen/Eigenvalues>
-#include <Eigen/QR>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cassert>
-#include <vector>
 
 namespace clothfit {
 namespace {
 
 /// Of a column's own square, that it may lose and still count as something.
 constexpr double kLeastLeft = 1e-9;
-
-/// An orthonormal basis of what columns span.
-Eigen::MatrixXd basis(Eigen::MatrixXd columns) {
-  for (Eigen::Index k = 0; k < columns.cols(); ++k)
-    columns.col(k) /= std::max(columns.col(k).norm(), 1e-300);
-  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(columns);
-  qr.setThreshold(1e-6);
-  return qr.householderQ() * Eigen::MatrixXd::Identity(columns.rows(), qr.rank());
-}
 
 }  // namespace
 
@@ -86,13 +74,6 @@ Explained explain(const Eigen::VectorXd& residual, const Eigen::MatrixXd& column
   }
   result.fall = 2 * pull.dot(result.amount) - result.amount.dot(result.information * result.amount);
   return result;
-}
-
-double canonical_correlation(const Eigen::MatrixXd& one, const Eigen::MatrixXd& other) {
-  const Eigen::MatrixXd first = basis(one), second = basis(other);
-  if (first.cols() == 0 || second.cols() == 0) return 0;
-  const Eigen::MatrixXd cosines = first.transpose() * second;
-  return cosines.jacobiSvd().singularValues()[0];
 }
 
 }  // namespace clothfit

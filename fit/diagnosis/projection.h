@@ -49,8 +49,4 @@ struct Explained {
 Explained explain(const Eigen::VectorXd& residual, const Eigen::MatrixXd& columns,
                   const Eigen::VectorXd& lower, const Eigen::VectorXd& upper);
 
-/// The largest canonical correlation between what two sets of columns span: 1 where one direction
-/// is common to both.
-double canonical_correlation(const Eigen::MatrixXd& one, const Eigen::MatrixXd& other);
-
 }  // namespace clothfit

@@ -97,18 +97,5 @@ TEST(Explain, KeepsAmountsWithinTheirEnds) {
   EXPECT_NEAR(explained.fall, alone * alone * columns.col(1).squaredNorm(), 1e-6);
 }
 
-TEST(CanonicalCorrelation, IsOneForASharedDirectionAndTheCosineOfTwoVectors) {
-  const Eigen::MatrixXd one = random_matrix(30, 2, 13);
-  Eigen::MatrixXd other = random_matrix(30, 2, 14);
-  other.col(1) = one * Eigen::Vector2d(1, 2);
-  EXPECT_NEAR(canonical_correlation(one, other), 1, 1e-12);
-
-  const Eigen::VectorXd a = one.col(0), b = 7 * other.col(0);
-  EXPECT_NEAR(canonical_correlation(a, b), std::abs(a.dot(b)) / (a.norm() * b.norm()), 1e-12);
-  EXPECT_NEAR(canonical_correlation(Eigen::MatrixXd::Identity(4, 2),
-                                    Eigen::MatrixXd::Identity(4, 4).rightCols(2)),
-              0, 1e-12);
-}
-
 }  // namespace
 }  // namespace clothfit
