@@ -66,6 +66,7 @@ UndeclaredOptions options_of(const UndeclaredFlags& flags, const UndeclaredRun& 
                                   : Hide::one;
   if (!flags.clean) options.laws = laws_asked_for(flags.hidden, run.fit.observations);
   options.draw = {.least = flags.least_sigmas, .most = flags.most_sigmas};
+  options.most_mimicked = flags.most_mimicked;
   options.trials = run.trials;
   options.seed = run.seed;
   options.threads = run.threads;
@@ -93,6 +94,8 @@ void add_undeclared_options(CLI::App& verb, UndeclaredFlags& flags) {
   CLI::Option* pairs = add_flag("--pairs", flags.pairs, "Hide two effects at once");
   CLI::Option* withhold = add_flag("--withhold", flags.withhold,
                                    "Leave the hidden effect out of what the diagnosis knows");
+  add("--mimicked", flags.most_mimicked,
+      "Squared multiple correlation with all other effects, below which one is withheld");
   clean->excludes(hidden)->excludes(pairs)->excludes(withhold);
   pairs->excludes(withhold);
   CLI::Option* same =

@@ -18,6 +18,7 @@ struct UndeclaredFlags {
   std::string integrator = "runge-kutta";
   int fitted = 0;  ///< frames; 0: three quarters
   double least_sigmas = DrawOptions{}.least, most_sigmas = DrawOptions{}.most;
+  double most_mimicked = UndeclaredOptions{}.most_mimicked;
   int lines = DiagnoseOptions{}.lines, refits = DiagnoseOptions{}.refits;
 };
 

@@ -18,9 +18,9 @@ namespace clothfit {
 namespace {
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-constexpr double kMimicked = 0.25;  ///< squared multiple correlation of what is withheld, at most
-constexpr double kTold = 0.9;       ///< correlation of two hidden laws, below
-constexpr int kDraws = 20;          ///< of release, shape and direction, before a trial is given up
+constexpr double kTold = 0.9;      ///< correlation of two hidden laws, below
+constexpr int kWithheldDraws = 3;  ///< each asks for the derivatives of every law
+constexpr int kDraws = 20;         ///< of release, shape and direction, before a trial is given up
 enum Series : int { kPartner = 320, kReleases };
 
 /// What a trial hides, with the release that shows it.
@@ -47,10 +47,12 @@ std::vector<HiddenLaw> laws_of_trial(const UndeclaredOptions& options, int index
   return result;
 }
 
-/// Laws with numbers for one release; nothing where one of them cannot be seen in it.
+/// Laws with numbers for one release; nothing where one of them cannot be seen in it. `mimicked` is
+/// lowered to how well others mimic one that is withheld.
 std::optional<Setting> draw_setting(const UndeclaredOptions& options,
                                     const std::vector<HiddenLaw>& laws, std::uint64_t seed,
-                                    std::uint64_t release_seed, Releases& releases) {
+                                    std::uint64_t release_seed, Releases& releases,
+                                    double& mimicked) {
   Setting setting{.release = release_seed, .laws = {}, .right = {}};
   if (laws.empty()) return setting;
   const std::shared_ptr<const Release> release = releases.at(release_seed);
@@ -76,7 +78,8 @@ std::optional<Setting> draw_setting(const UndeclaredOptions& options,
   if (options.hide == UndeclaredOptions::Hide::withheld) {
     setting.mimicked =
         mimicked_by_others(information, setting.laws.front(), release->projected_laws());
-    if (setting.mimicked >= kMimicked) return std::nullopt;
+    mimicked = std::fmin(mimicked, setting.mimicked);
+    if (setting.mimicked >= options.most_mimicked) return std::nullopt;
   }
   return setting;
 }
@@ -194,6 +197,7 @@ void UndeclaredOptions::validate() const {
   };
   require(trials >= 1, "--trials", "at least 1");
   require(threads >= 0, "--threads", "0 (all) or more");
+  require(most_mimicked > 0 && most_mimicked <= 1, "--mimicked", "a share, to 1");
   require(draw.least > 0 && draw.least <= draw.most, "--sigmas", "rising, more than 0");
   require(diagnosis.fit.mesh_columns >= 3 && diagnosis.fit.mesh_columns == diagnosis.fit.mesh_rows,
           "--mesh", "at least 3 vertices a side");
@@ -222,17 +226,18 @@ std::string UndeclaredOptions::key() const {
   std::string without;
   for (const std::string& effect : diagnosis.without) without += " " + effect;
   return fmt::format(
-      "undeclared 1 seed {} hide {} laws {} sigmas {} {} scene {} {} {} {} {} {} {} {} {} {} {} {} "
+      "undeclared 1 seed {} hide {} {} laws {} sigmas {} {} scene {} {} {} {} {} {} {} {} {} {} {} "
+      "{} "
       "{} {} {} {} {} {} {} {} {} {} {} fit {} {} {} {} {} {} {} {} {} diagnosis {} {} {}{}",
-      seed, to_string(hide), hidden, draw.least, draw.most, scene.size_m, scene.mass_kg,
-      f.tension_warp_n_per_m, f.tension_weft_n_per_m, f.shear_n_per_m, f.flexion_warp_n_per_m,
-      f.flexion_weft_n_per_m, f.damping_warp_s, f.damping_weft_s, scene.drag_per_s,
-      to_string(scene.integrator), scene.truth_mesh, scene.truth_steps, scene.markers, scene.frames,
-      scene.held_out_from, scene.frame_rate_hz, scene.before_s, scene.cameras, scene.noise_m,
-      scene.noise_px, scene.missing, scene.outliers, static_cast<int>(fit.observations),
-      fit.mesh_columns, fit.population, fit.generations, fit.refine_best,
-      static_cast<int>(fit.loss), fit.start_nodes, fit.substep_scale, fit.work, diagnosis.lines,
-      diagnosis.refits, diagnosis.most_effects, without);
+      seed, to_string(hide), most_mimicked, hidden, draw.least, draw.most, scene.size_m,
+      scene.mass_kg, f.tension_warp_n_per_m, f.tension_weft_n_per_m, f.shear_n_per_m,
+      f.flexion_warp_n_per_m, f.flexion_weft_n_per_m, f.damping_warp_s, f.damping_weft_s,
+      scene.drag_per_s, to_string(scene.integrator), scene.truth_mesh, scene.truth_steps,
+      scene.markers, scene.frames, scene.held_out_from, scene.frame_rate_hz, scene.before_s,
+      scene.cameras, scene.noise_m, scene.noise_px, scene.missing, scene.outliers,
+      static_cast<int>(fit.observations), fit.mesh_columns, fit.population, fit.generations,
+      fit.refine_best, static_cast<int>(fit.loss), fit.start_nodes, fit.substep_scale, fit.work,
+      diagnosis.lines, diagnosis.refits, diagnosis.most_effects, without);
 }
 
 bool UndeclaredTrial::right_first() const {
@@ -254,14 +259,16 @@ UndeclaredTrial undeclared_once(const UndeclaredOptions& options, int index, std
   for (const HiddenLaw& law : laws) trial.hidden.push_back({.law = law});
   std::optional<Setting> setting;
   const int round = laws.empty() ? index : index / static_cast<int>(options.laws.size());
-  for (int n = 0; n < kDraws && !setting; ++n)
+  const bool withheld = options.hide == UndeclaredOptions::Hide::withheld;
+  trial.mimicked = kNone;
+  for (int n = 0; n < (withheld ? kWithheldDraws : kDraws) && !setting; ++n)
     setting = draw_setting(options, laws, derived_seed(seed, n),
                            derived_seed(derived_seed(options.seed, kReleases), kDraws * round + n),
-                           releases);
+                           releases, trial.mimicked);
   if (!setting) {
-    trial.refused = options.hide == UndeclaredOptions::Hide::withheld
-                        ? fmt::format("the others mimic it, or it is not seen, in {} draws", kDraws)
-                        : fmt::format("not seen within its bounds in {} draws", kDraws);
+    trial.refused = std::isfinite(trial.mimicked)
+                        ? fmt::format("others mimic it, R2 at least {:.3f}", trial.mimicked)
+                        : "not seen within its bounds";
     return trial;
   }
   trial.mimicked = setting->mimicked;
@@ -280,8 +287,7 @@ UndeclaredTrial undeclared_once(const UndeclaredOptions& options, int index, std
   UndeclaredOptions own = options;
   own.diagnosis.fit.seed = seed;
   own.diagnosis.fit.threads = 1;  // trials run side by side
-  if (options.hide == UndeclaredOptions::Hide::withheld)
-    own.diagnosis.without.push_back(laws.front().effect);
+  if (withheld) own.diagnosis.without.push_back(laws.front().effect);
   const auto diagnosis_began = std::chrono::steady_clock::now();
   const Diagnosis diagnosis = diagnose(recording.input, own.diagnosis, {});
   trial.seconds = seconds_since(diagnosis_began);

@@ -26,6 +26,8 @@ struct UndeclaredOptions {
   std::vector<HiddenLaw> laws;  ///< hidden in turn; of pairs the second is drawn from them
   int trials = 20;              ///< of each law, or in all where nothing is hidden
   DrawOptions draw;
+  /// Squared multiple correlation of what is withheld with all that others can do, below.
+  double most_mimicked = 0.25;
   unsigned long long seed = 1;
   int threads = 0;
 
