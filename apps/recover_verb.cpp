@@ -8,6 +8,7 @@
 #include "apps/grid_size.h"
 #include "apps/interrupt.h"
 #include "apps/progress_line.h"
+#include "apps/recover_undeclared.h"
 #include "apps/report/recover_page.h"
 #include "apps/report/recover_tables.h"
 #include "apps/study/recover.h"
@@ -24,6 +25,7 @@ namespace fs = std::filesystem;
 
 struct RecoverFlags {
   RecoverOptions study;
+  UndeclaredFlags undeclared;
   bool render = false;
   PictureOptions pictures;
   std::string picture_size = "1280x960";
@@ -74,6 +76,27 @@ RecoverOptions options_of(const RecoverFlags& flags) {
     options.pictures->exposure_s = 1e-3 * flags.exposure_ms;
   }
   return options;
+}
+
+/// Undeclared effects ask for cloths of their own size, unless they are told another one.
+UndeclaredRun undeclared_run(RecoverFlags flags, const CLI::App& verb, const std::string& command) {
+  const auto is_given = [&](const char* option) { return verb.count(option) > 0; };
+  if (!is_given("--mesh")) flags.mesh = 9;
+  if (!is_given("--markers")) flags.study.scene.markers = 9;
+  if (!is_given("--noise-mm")) flags.noise_mm = 0.5;
+  if (!is_given("--loss")) flags.loss = "huber";
+  const bool of_pixels = flags.observations == "tracks2d";
+  if (!is_given("--before") && of_pixels) flags.study.scene.before_s = 0.25;
+  const RecoverOptions options = options_of(flags);
+  return {.scene = options.scene,
+          .fit = options.fit,
+          .trials = options.trials,
+          .seed = options.seed,
+          .threads = options.threads,
+          .command = command,
+          .out = flags.out,
+          .journal = flags.journal,
+          .resume = flags.resume};
 }
 
 int run_recover(const RecoverFlags& flags, const std::string& command) {
@@ -189,15 +212,26 @@ void add_recover_verb(CLI::App& program, VerbAction& action) {
                    "Where finished trials are kept (default: OUT.journal)")
       ->type_name("FILE");
   verb->add_flag("--resume", flags->resume, "Go on from the journal of an interrupted run");
+  add_undeclared_options(*verb, flags->undeclared);
+  for (const char* other : {"--render", "--start-factor", "--effect"})
+    verb->get_option("--undeclared")->excludes(verb->get_option(other));
   add_out_option(*verb, flags->out, "recover");
   verb->footer(
       "Examples:\n"
       "  clothfit recover --trials 100 --start-factor 5\n"
       "  clothfit recover --observations tracks2d --before 0.25 --trials 20\n"
       "  clothfit recover --drag 0.5 --trials 50\n"
-      "  clothfit recover --render --rate 30 --trials 4");
+      "  clothfit recover --render --rate 30 --trials 4\n"
+      "  clothfit recover --undeclared --trials 20\n"
+      "  clothfit recover --undeclared --clean --observations tracks2d --trials 100");
   verb->callback([flags, verb, &action] {
-    action = [flags, command = command_text(*verb)] { return run_recover(*flags, command); };
+    const std::string command = command_text(*verb);
+    if (flags->undeclared.undeclared)
+      action = [flags, run = undeclared_run(*flags, *verb, command)] {
+        return run_undeclared(flags->undeclared, run);
+      };
+    else
+      action = [flags, command] { return run_recover(*flags, command); };
   });
 }
 

@@ -1,8 +1,7 @@
 #include "apps/study/synthetic_recording.h"
 
-#include "calib/projection.h"
+#include "apps/study/true_sight.h"
 #include "fit/draws.h"
-#include "model/surface.h"
 
 namespace clothfit {
 namespace {
@@ -19,21 +18,6 @@ Recording recording_of(const SyntheticScene& scene) {
     }
   }
   return recording;
-}
-
-/// Positions of the markers in every frame of the recording, 3 x markers each.
-std::vector<Eigen::Matrix3Xd> true_positions(const SyntheticScene& scene,
-                                             const Recording& recording, std::uint64_t seed) {
-  Eigen::Matrix2Xd places(2, static_cast<Eigen::Index>(recording.markers.markers.size()));
-  for (Eigen::Index m = 0; m < places.cols(); ++m)
-    places.col(m) << recording.markers.markers[static_cast<size_t>(m)].s_m,
-        recording.markers.markers[static_cast<size_t>(m)].t_m;
-  const Surface surface =
-      make_surface(scene.truth_mesh, scene.truth_mesh, scene.size_m, scene.size_m, places);
-  std::vector<Eigen::Matrix3Xd> markers;
-  for (const Eigen::Matrix3Xd& position_m : simulate_scene(scene, seed, scene_frame_times_s(scene)))
-    markers.push_back(surface.evaluate(position_m));
-  return markers;
 }
 
 /// Which observations of one observer are lost, and which are gross outliers.
@@ -78,21 +62,27 @@ class Spoiled {
 }  // namespace
 
 SyntheticRecording make_synthetic_recording(const SyntheticScene& scene, std::uint64_t seed) {
+  return make_synthetic_recording(scene, seed, seed);
+}
+
+SyntheticRecording make_synthetic_recording(const SyntheticScene& scene, std::uint64_t release_seed,
+                                            std::uint64_t seed) {
   constexpr double kOutlierM = 0.1, kOutlierPx = 60;
   const double noise_share = scene.noisy ? 1 : 0;
   SyntheticRecording result;
   FitInput& input = result.input;
   input.recording = recording_of(scene);
-  const std::vector<Eigen::Matrix3Xd> markers = true_positions(scene, input.recording, seed);
+  const TrueSight sight(scene, input.recording, release_seed);
   const std::vector<Marker>& places = input.recording.markers.markers;
   const auto marker_count = static_cast<int>(places.size());
 
   Spoiled spoiled(scene, seed, 0);
   Draws noise(seed, kNoise3d, 0);
   for (int f = 0; f < scene.frames; ++f) {
+    const Eigen::Matrix3Xd places_m = sight.places(f);
     for (int m = 0; m < marker_count; ++m) {
       spoiled.draw();
-      Eigen::Vector3d place = markers[static_cast<size_t>(f)].col(m);
+      Eigen::Vector3d place = places_m.col(m);
       for (double& coordinate : place)
         coordinate += noise_share * scene.noise_m * noise.normal() + spoiled.error(kOutlierM);
       if (spoiled.is_lost(f, places[static_cast<size_t>(m)])) continue;
@@ -108,14 +98,13 @@ SyntheticRecording make_synthetic_recording(const SyntheticScene& scene, std::ui
     Draws pixels(seed, kNoise2d, c);
     Tracks2d& tracks = input.tracks2d[camera.name];
     for (int f = 0; f < scene.frames; ++f) {
+      const std::vector<std::optional<Eigen::Vector2d>> seen = sight.pixels(f, camera);
       for (int m = 0; m < marker_count; ++m) {
         lost.draw();
         Eigen::Vector2d error;
         for (double& coordinate : error)
           coordinate = noise_share * scene.noise_px * pixels.normal() + lost.error(kOutlierPx);
-        const auto pixel =
-            project(camera, camera_from_world(camera) *
-                                Eigen::Vector3d(markers[static_cast<size_t>(f)].col(m)));
+        const std::optional<Eigen::Vector2d>& pixel = seen[static_cast<size_t>(m)];
         if (!pixel || lost.is_lost(f, places[static_cast<size_t>(m)])) continue;
         tracks.push_back(
             {.frame = f, .marker = m, .position_px = *pixel + error, .sigma_px = scene.noise_px});

@@ -15,8 +15,11 @@ struct SyntheticRecording {
   std::map<std::string, double> truth;  ///< of the fit's parameters, by name
 };
 
-/// The recording of `seed`. Nothing in it is held out. Throws InputError where the scene's cloth
-/// cannot be simulated.
+/// The recording of `seed`. Throws InputError where the scene's cloth cannot be simulated.
 SyntheticRecording make_synthetic_recording(const SyntheticScene& scene, std::uint64_t seed);
+
+/// The same of one seed's release, seen with the noise of another.
+SyntheticRecording make_synthetic_recording(const SyntheticScene& scene, std::uint64_t release_seed,
+                                            std::uint64_t noise_seed);
 
 }  // namespace clothfit

@@ -16,6 +16,20 @@ namespace clothfit {
 /// Series of draws under a scene's seed: a thing drawn anew does not change the others.
 enum SceneSeries : int { kRelease, kNoise3d, kLosses, kHand, kNoise2d, kPictures };
 
+/// How the truth's motion is had.
+enum class TruthIntegrator {
+  euler,       ///< the scheme of fits
+  runge_kutta  ///< another one, of fourth order (apps/study/runge_kutta_run.h)
+};
+std::string to_string(TruthIntegrator integrator);
+
+/// An effect that is at work in the truth and that its recording does not declare: of motion, or of
+/// the measurement.
+struct HiddenEffect {
+  std::string name;
+  std::vector<double> values;  ///< of all its parameters, in the description's order and units
+};
+
 /// What synthetic recordings are made with. The cloth hangs from its two upper corners, is let go
 /// flat, and swings; how it is turned before that is drawn anew for each recording.
 struct SyntheticScene {
@@ -28,11 +42,14 @@ struct SyntheticScene {
                 .flexion_weft_n_per_m = 7,
                 .damping_warp_s = 2.5e-3,
                 .damping_weft_s = 2e-3};
-  double drag_per_s = 0;      ///< viscous damping of the air; not declared in the recording, >= 0
+  double drag_per_s = 0;  ///< viscous damping of the air; not declared in the recording, >= 0
+  std::vector<HiddenEffect> hidden;
+  TruthIntegrator integrator = TruthIntegrator::euler;
   int truth_mesh = 17;        ///< vertices a side of the simulation that is the truth, >= 3
   double truth_steps = 1;     ///< as many times more time steps than stability asks for, >= 1
   int markers = 17;           ///< a side, evenly spread over the cloth, >= 2
   int frames = 61;            ///< >= 10
+  int held_out_from = 0;      ///< frame from which nothing is fitted; 0: all is
   double frame_rate_hz = 60;  ///< > 0
   double before_s = 0;        ///< the cloth has swung so long when the recording begins, >= 0
   int cameras = 1;            ///< 1 to 4, 1 m away around the cloth's front
@@ -62,7 +79,9 @@ CameraParameters scene_camera(const SyntheticScene& scene, int number, int width
 std::vector<double> scene_frame_times_s(const SyntheticScene& scene);
 
 /// Vertices of the truth's mesh, truth_mesh a side (3 x vertices, world, m), at times (rising, s)
-/// since the release that `seed` draws. Throws InputError where that cannot be simulated.
+/// since the release that `seed` draws, with the hidden effects of motion, for which the
+/// recording's first frame is time 0; effects that move supports are prescribed motions. Throws
+/// InputError where that cannot be simulated.
 std::vector<Eigen::Matrix3Xd> simulate_scene(const SyntheticScene& scene, std::uint64_t seed,
                                              std::span<const double> time_s);
 

@@ -1,0 +1,98 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "apps/study/releases.h"
+#include "fit/diagnose.h"
+#include "fit/executor.h"
+
+namespace clothfit {
+
+/// Undeclared effects: recordings whose truth has an effect that they do not declare are diagnosed,
+/// and what the diagnosis says is held against the truth.
+struct UndeclaredOptions {
+  enum class Hide {
+    one,      ///< a law in each trial, in turn
+    nothing,  ///< clean recordings: whatever is accepted is a false alarm
+    pairs,    ///< that law and another one, each seen beside the other
+    withheld  ///< one, whose effect the diagnosis does not know and the others mimic badly
+  };
+  SyntheticScene scene;
+  DiagnoseOptions diagnosis;
+  Hide hide = Hide::one;
+  std::vector<HiddenLaw> laws;  ///< hidden in turn; of pairs the second is drawn from them
+  int trials = 20;              ///< of each law, or in all where nothing is hidden
+  DrawOptions draw;
+  /// Squared multiple correlation of what is withheld with all that others can do, below.
+  double most_mimicked = 0.25;
+  unsigned long long seed = 1;
+  int threads = 0;
+
+  int count() const;      ///< of trials in all
+  void validate() const;  ///< throws InputError
+  /// One line that names all that determines the trials, for their journal.
+  std::string key() const;
+};
+std::string to_string(UndeclaredOptions::Hide hide);
+
+/// How well an amplitude was found whose very law was accepted.
+struct FoundAmplitude {
+  std::string name;  ///< EFFECT.PARAMETER
+  double truth = 0, estimate = 0, sigma = 0;
+};
+
+/// One law that a trial hid.
+struct HiddenInTrial {
+  HiddenLaw law;
+  std::map<std::string, double> shape;
+  double sigmas = 0;
+  std::vector<std::string> right;  ///< effects that count as it
+  bool named = false;              ///< by an accepted effect that counts as no other hidden one
+  std::vector<FoundAmplitude> found;
+  double amplitude_ratio = 0;  ///< found over true, along the true direction; NaN without `found`
+};
+
+struct UndeclaredTrial {
+  /// Why there was no trial; empty: there was one. Such as a law that this kind of recording does
+  /// not show within its bounds.
+  std::string refused;
+  std::vector<HiddenInTrial> hidden;
+  double mimicked = 0;  ///< squared multiple correlation with all other effects; where withheld
+  FitStop stop = FitStop::diverged;
+  std::string message;
+  DiagnosisVerdict verdict = DiagnosisVerdict::adequate;
+  std::vector<std::string> accepted;  ///< laws' titles, in order
+  std::vector<std::string> accepted_effects;
+  /// rms over coordinates of held-out frames (m or px): of the model as declared, with what was
+  /// accepted, and with the true laws declared; and the noise. NaN where there is none.
+  double before = 0, after = 0, with_truth = 0, noise = 0;
+  double before_fitted = 0, after_fitted = 0;
+  double drawing_seconds = 0, seconds = 0;  ///< the only numbers that differ from run to run
+
+  bool usable() const {
+    return refused.empty() && stop != FitStop::diverged && stop != FitStop::cancelled;
+  }
+  /// Whether the first effect accepted counts as a hidden one; of clean recordings, whether nothing
+  /// was accepted.
+  bool right_first() const;
+  bool all_named() const;  ///< each hidden effect by one of its own
+};
+
+/// Trial `index` of the study. Pure but for its seconds. All laws are hidden in the same releases,
+/// one for each round of the laws: what `releases` knows of one serves them all.
+UndeclaredTrial undeclared_once(const UndeclaredOptions& options, int index, std::uint64_t seed,
+                                Releases& releases);
+
+struct UndeclaredResult {
+  ExecuteStop stop = ExecuteStop::finished;
+  std::string message;
+  std::vector<UndeclaredTrial> trials;
+};
+
+UndeclaredResult recover_undeclared(const UndeclaredOptions& options, Journal* journal,
+                                    const ProgressCallback& progress);
+
+}  // namespace clothfit

@@ -1,0 +1,122 @@
+#include "fit/diagnosis/law_derivatives.h"
+
+#include <tbb/parallel_for.h>
+
+#include <Eigen/QR>
+#include <algorithm>
+
+#include "fit/measurement_effects/applicability.h"
+#include "fit/measurement_effects/registry.h"
+
+namespace clothfit {
+namespace {
+
+/// Laws differentiated in one run: a problem that has each of them once more, at its neutral
+/// values, so that the run stays as it is.
+struct Batch {
+  FitProblem problem;
+  Eigen::VectorXd values;
+  struct Law {
+    size_t index = 0;
+    std::vector<int> coordinates;
+  };
+  std::vector<Law> laws;
+  int amplitudes = 0;
+};
+
+void add(Batch& batch, size_t index, const Term& law) {
+  const EffectDescription effect = describe_effect(law.effect);
+  const MeasurementEffectEntry* entry = measurement_effect_named(law.effect);
+  Batch::Law added{.index = index, .coordinates = {}};
+  std::vector<Binding> bindings;
+  for (const EffectParameter& parameter : effect.parameters) {
+    Binding binding{.parameter = -1, .constant = parameter.neutral};
+    if (const auto shape = law.shape.find(parameter.name); shape != law.shape.end())
+      binding.constant = shape->second;
+    if (std::ranges::find(law.amplitudes, parameter.name) != law.amplitudes.end()) {
+      binding.parameter = batch.problem.space.size();
+      added.coordinates.push_back(binding.parameter);
+      batch.problem.space.parameters.push_back(
+          {.name = law.effect + "." + parameter.name + " " + std::to_string(index),
+           .unit = parameter.unit,
+           .role = entry ? ParameterRole::measurement : ParameterRole::effect,
+           .scale = parameter.scale,
+           .lower = parameter.lower,
+           .upper = parameter.upper,
+           .start = parameter.neutral,
+           .typical = parameter.typical});
+      batch.values.conservativeResize(batch.values.size() + 1);
+      batch.values[batch.values.size() - 1] = parameter.neutral;
+    }
+    bindings.push_back(binding);
+  }
+  if (entry) {
+    batch.problem.measurement.push_back(
+        {.effect = entry->make(), .description = effect, .parameters = std::move(bindings)});
+    add_slope_weights(batch.problem);
+  } else {
+    batch.problem.cloth.add_effect(law.effect, law.effect);
+    batch.problem.effects.push_back(std::move(bindings));
+  }
+  batch.amplitudes += static_cast<int>(added.coordinates.size());
+  batch.laws.push_back(std::move(added));
+}
+
+}  // namespace
+
+std::vector<Eigen::MatrixXd> law_derivatives(const ModelFit& model, std::span<const Term> laws) {
+  int measured = 0;
+  for (const FitProblem::MeasurementTerm& term : model.problem->measurement)
+    for (const Binding& binding : term.parameters) measured += binding.parameter >= 0 ? 1 : 0;
+  std::vector<Batch> batches;
+  // Effects of motion and of the measurement apart: only the former cost derivatives of runs.
+  for (const bool of_measurement : {false, true}) {
+    const int most = of_measurement ? kMeasurementParameters - measured : kLanes;
+    bool begun = false;
+    for (size_t n = 0; n < laws.size(); ++n) {
+      const MeasurementEffectEntry* entry = measurement_effect_named(laws[n].effect);
+      if ((entry != nullptr) != of_measurement) continue;
+      if (entry && why_inapplicable(*entry->make(), *model.problem)) continue;
+      const auto more = static_cast<int>(laws[n].amplitudes.size());
+      if (more > most) continue;
+      if (!begun || batches.back().amplitudes + more > most)
+        batches.push_back({.problem = *model.problem, .values = model.values, .laws = {}});
+      begun = true;
+      add(batches.back(), n, laws[n]);
+    }
+  }
+
+  std::vector<Eigen::MatrixXd> result(laws.size());
+  tbb::parallel_for(size_t{0}, batches.size(), [&](size_t b) {
+    const Batch& batch = batches[b];
+    std::vector<int> all;
+    for (const Batch::Law& law : batch.laws)
+      all.insert(all.end(), law.coordinates.begin(), law.coordinates.end());
+    const TrajectoryObjective objective(batch.problem, model.frames, model.steps);
+    const Linearisation linear = objective.linearise_by(batch.values, all);
+    if (!linear.usable) return;
+    const Eigen::VectorXd slope = batch.problem.space.value_by_coordinate(batch.values);
+    Eigen::Index first = 0;
+    for (const Batch::Law& law : batch.laws) {
+      const auto count = static_cast<Eigen::Index>(law.coordinates.size());
+      result[law.index] = linear.residual_by_coordinate.middleCols(first, count) *
+                          slope(law.coordinates).cwiseInverse().asDiagonal();
+      first += count;
+    }
+  });
+  return result;
+}
+
+double squared_multiple_correlation(const Eigen::VectorXd& of, const Eigen::MatrixXd& columns) {
+  const double all = of.squaredNorm();
+  if (columns.cols() == 0 || all == 0) return 0;
+  // Scaled to one: laws come in units of their own.
+  Eigen::MatrixXd scaled = columns;
+  for (Eigen::Index k = 0; k < scaled.cols(); ++k)
+    if (const double norm = scaled.col(k).norm(); norm > 0) scaled.col(k) /= norm;
+  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(scaled);
+  const Eigen::VectorXd turned = qr.householderQ().adjoint() * of;
+  return std::min(1.0, turned.head(qr.rank()).squaredNorm() / all);
+}
+
+}  // namespace clothfit

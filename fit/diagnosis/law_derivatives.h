@@ -1,0 +1,21 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <span>
+#include <vector>
+
+#include "fit/diagnosis/model_fit.h"
+
+namespace clothfit {
+
+/// Derivatives of a model's whitened residuals by the amplitudes of each law, at their neutral
+/// values and the law's shape: residuals x amplitudes, per unit of the amplitude. Without columns
+/// for a law whose effect cannot act in this model, that a predictor has no room for beside the
+/// model's own effects of the measurement, or where they could not be computed.
+std::vector<Eigen::MatrixXd> law_derivatives(const ModelFit& model, std::span<const Term> laws);
+
+/// The share of a vector's square that columns explain: their squared multiple correlation, of
+/// whatever both were projected to. 0 for none.
+double squared_multiple_correlation(const Eigen::VectorXd& of, const Eigen::MatrixXd& columns);
+
+}  // namespace clothfit
