@@ -146,7 +146,7 @@ class Pursuit {
         for (const LawScore& score : scores)
           for (LawScore& known : list)
             if (known.term.same_law(score.term)) {
-              known.share += score.share;
+              known.share = 0.5 * (known.share + score.share);
               known.fall = std::max(known.fall, score.fall);
             }
       }
@@ -170,6 +170,7 @@ class Pursuit {
   bool add_term() {
     int first_frames = 0;
     const std::vector<LawScore> list = shortlist(first_frames);
+    if (law_.trials.empty()) law_.scores = list;
     ModelFit best;
     CrossValidation best_validated = law_.after;
     size_t best_trial = 0;

@@ -45,6 +45,7 @@ struct ProposedLaw {
   /// describe_model() and with_terms() make of it what simulations and fits take.
   ModelFit model;
   CrossValidation before, after;
+  std::vector<LawScore> scores;   ///< of each term by itself, in the first round, the best first
   std::vector<TermTrial> trials;  ///< in the order in which they were fitted
   bool cancelled = false;
   bool found() const { return !coefficients.empty(); }

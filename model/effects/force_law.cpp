@@ -25,7 +25,8 @@ enum Coefficient : size_t {
   normal_push = push + 3,
   normal_push_by_s,
   normal_push_by_t,
-  push_by_height,
+  pressure,
+  push_by_height = pressure + 3,
   push_by_time = push_by_height + 3,
   coefficients = push_by_time + 3
 };
@@ -60,10 +61,10 @@ struct Law {
         c[normal_drag] +
         c[normal_drag_squared] * select(normal_speed > Real(0.0), normal_speed, -normal_speed);
     const Real tangential = c[tangential_drag] + c[tangential_drag_squared] * length(v_t);
-    const Real pressure =
-        c[normal_push] + along_s * c[normal_push_by_s] + along_t * c[normal_push_by_t];
+    const Real along_n = dot(n, vector(pressure)) + c[normal_push] + along_s * c[normal_push_by_s] +
+                         along_t * c[normal_push_by_t];
     return at.mass_kg *
-           (pressure * n + vector(push) + height * vector(push_by_height) +
+           (along_n * n + vector(push) + height * vector(push_by_height) +
             Real(at.time_s) * vector(push_by_time) - any * v - normal * v_n - tangential * v_t);
   }
 
@@ -72,16 +73,16 @@ struct Law {
                            const std::vector<double>& c) {
     constexpr double kFastest_m_per_s = 20;  // of the tip of a cracking cloth
     const auto size = [&](size_t k) { return std::abs(c[k]); };
+    const auto size_of_vector = [&](size_t k) { return std::hypot(c[k], c[k + 1], c[k + 2]); };
     const double linear = size(drag) + std::max(size(normal_drag), size(tangential_drag)) +
                           size(drag_by_s) + size(drag_by_t);
     const double squared =
         size(drag_squared) + std::max(size(normal_drag_squared), size(tangential_drag_squared));
-    const double along_normal = size(normal_push) + size(normal_push_by_s) + size(normal_push_by_t);
+    const double along_normal = size(normal_push) + size(normal_push_by_s) +
+                                size(normal_push_by_t) + size_of_vector(pressure);
     const double spacing_m = std::min(cloth.mesh.spacing_s_m(), cloth.mesh.spacing_t_m());
     return {.damping_per_s = linear + squared * kFastest_m_per_s,
-            .frequency2_per_s2 =
-                along_normal / spacing_m +
-                std::hypot(c[push_by_height], c[push_by_height + 1], c[push_by_height + 2])};
+            .frequency2_per_s2 = along_normal / spacing_m + size_of_vector(push_by_height)};
   }
 };
 
@@ -115,6 +116,7 @@ std::vector<Entry> entries() {
   all.push_back(of("normal_push", "m/s2", -10, 10, 0.05, "n"));
   all.push_back(of("normal_push_by_s", "m/s2", -10, 10, 0.05, "(2s/w - 1) n"));
   all.push_back(of("normal_push_by_t", "m/s2", -10, 10, 0.05, "(2t/h - 1) n"));
+  add_vector(of("pressure", "m/s2", -5, 5, 0.05, ""), {"(n.x) n", "(n.y) n", "(n.z) n"});
   add_vector(of("push_by_height", "1/s2", -10, 10, 0.1, ""), {"height x", "height y", "height z"});
   add_vector(of("push_by_time", "m/s3", -5, 5, 0.1, ""), {"time x", "time y", "time z"});
   assert(all.size() == coefficients);

@@ -12,7 +12,8 @@
 ///
 /// f_k: drag -v, -|v| v, and the same of the velocity's parts v_n = (n . v) n along the surface's
 /// normal n and v_t = v - v_n in the surface; -v over the cloth's width and height; the unit
-/// vectors x, y, z; n, alone and over the cloth; x, y, z times the height above the world's origin
+/// vectors x, y, z; n, alone and over the cloth; (n . x) n and its like of y and z, the pressure of
+/// air that blows along them; x, y, z times the height above the world's origin
 /// and times the recording's time. Over the cloth means times 2 s / w - 1 or 2 t / h - 1, from -1
 /// at one edge to 1 at the other.
 ///

@@ -12,6 +12,8 @@
 namespace clothfit {
 namespace {
 
+constexpr double kArealDensity_kg_per_m2 = 0.025 / 0.16;  // square_cloth's
+
 std::vector<double> coefficients(const std::map<std::string, double>& named) {
   std::vector<double> values;
   for (const EffectParameter& parameter : force_law::describe().parameters) {
@@ -85,7 +87,6 @@ TEST(ForceLaw, OfTheSquaredPartsIsQuadraticDragOnAFlatSheet) {
   CrumpledCloth cloth(4);
   Uniform uniform(4);
   cloth.position_m = uniform.rotation() * flat_positions(cloth.bare.mesh);
-  constexpr double kArealDensity_kg_per_m2 = 0.025 / 0.16;  // square_cloth's
   const double c_n = 1.3, c_t = 0.4;
 
   const Eigen::Matrix3Xd force =
@@ -93,6 +94,20 @@ TEST(ForceLaw, OfTheSquaredPartsIsQuadraticDragOnAFlatSheet) {
                      {"tangential_drag_squared", c_t / (2 * kArealDensity_kg_per_m2)}});
 
   const Eigen::Matrix3Xd expected = cloth.force_n("quadratic_drag", {c_n, c_t});
+  EXPECT_LT((force - expected).norm(), 1e-13 * expected.norm());
+}
+
+TEST(ForceLaw, OfPressureIsWindOnAFlatSheet) {
+  CrumpledCloth cloth(7);
+  Uniform uniform(7);
+  cloth.position_m = uniform.rotation() * flat_positions(cloth.bare.mesh);
+  const Eigen::Vector3d q(0.03, -0.02, 0.05);  // Pa
+  const Eigen::Vector3d c = q / kArealDensity_kg_per_m2;
+
+  const Eigen::Matrix3Xd force =
+      cloth.force_n({{"pressure_x", c.x()}, {"pressure_y", c.y()}, {"pressure_z", c.z()}});
+
+  const Eigen::Matrix3Xd expected = cloth.force_n("wind", {0, q.x(), q.y(), q.z()});
   EXPECT_LT((force - expected).norm(), 1e-13 * expected.norm());
 }
 
@@ -151,7 +166,7 @@ TEST(ForceLaw, AsksForEachCoefficientOnceAVectorAsOne) {
   EXPECT_EQ(asked, names);
   EXPECT_EQ(std::ranges::count_if(effect.laws,
                                   [](const EffectLaw& law) { return law.amplitudes.size() == 3; }),
-            3);
+            4);
 }
 
 }  // namespace
