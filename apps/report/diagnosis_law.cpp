@@ -157,7 +157,8 @@ std::string proposed_law_html(const Diagnosis& diagnosis) {
   }
   return fmt::format("<pre>{}</pre>\n", escape_xml(law.formula)) +
          paragraph(fmt::format(
-             "An empirical law for what is left: a is a force per mass, v the velocity, n the "
+             "An empirical law for what is left: a is a force per mass, p one per area, v the "
+             "velocity, n the "
              "surface's normal, v_t the velocity in the surface, s / w and t / h the place on the "
              "cloth, T the tension of a spring and e its elongation. It says what the missing "
              "force looks like, not what causes it. Blocks of time that were left out in turn are "

@@ -61,14 +61,18 @@ std::string number_text(double value, double sigma) {
   return fmt::format("{:.{}f}", value, -place);
 }
 
+/// The left side of the formula that a coefficient stands in.
+std::string side_of(const LawCoefficient& one) {
+  if (one.effect == "tension_law") return "T / (k l0)";
+  return force_law::acts_on_area(one.parameter) ? "p" : "a";
+}
+
 std::string formula_of(const std::vector<LawCoefficient>& coefficients) {
-  constexpr std::pair<const char*, const char*> kSides[] = {{"force_law", "a"},
-                                                            {"tension_law", "T / (k l0)"}};
   std::string text;
-  for (const auto& [effect, side] : kSides) {
+  for (const char* side : {"a", "p", "T / (k l0)"}) {
     std::string sum;
     for (const LawCoefficient& one : coefficients) {
-      if (one.effect != effect) continue;
+      if (side_of(one) != side) continue;
       // A term may bring a sign of its own.
       const bool opposed = one.term.starts_with('-');
       const bool minus = (one.value < 0) != opposed;

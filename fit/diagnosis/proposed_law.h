@@ -36,11 +36,11 @@ struct LawCoefficient {
   bool at_bound = false;  ///< at an end of its range: more of it would do better
 };
 
-/// An empirical law for what a model leaves: a force per mass, or a tension, that is a sum of few
-/// terms (model/effects/force_law.h, tension_law.h).
+/// An empirical law for what a model leaves: a force per mass, a pressure, or a tension, that is a
+/// sum of few terms (model/effects/force_law.h, tension_law.h).
 struct ProposedLaw {
   std::vector<LawCoefficient> coefficients;  ///< none: no term foresees frames that were left out
-  std::string formula;                       ///< a line for each of force and tension
+  std::string formula;  ///< a line for each of force per mass a, pressure p, tension T
   /// The model with the law: its terms stand behind those the model had. Fitted, so that
   /// describe_model() and with_terms() make of it what simulations and fits take.
   ModelFit model;

@@ -61,11 +61,11 @@ struct Law {
         c[normal_drag] +
         c[normal_drag_squared] * select(normal_speed > Real(0.0), normal_speed, -normal_speed);
     const Real tangential = c[tangential_drag] + c[tangential_drag_squared] * length(v_t);
-    const Real along_n = dot(n, vector(pressure)) + c[normal_push] + along_s * c[normal_push_by_s] +
+    const Real blowing = dot(n, vector(pressure)) + c[normal_push] + along_s * c[normal_push_by_s] +
                          along_t * c[normal_push_by_t];
-    return at.mass_kg *
-           (along_n * n + vector(push) + height * vector(push_by_height) +
-            Real(at.time_s) * vector(push_by_time) - any * v - normal * v_n - tangential * v_t);
+    return at.mass_kg * (vector(push) + height * vector(push_by_height) +
+                         Real(at.time_s) * vector(push_by_time) - any * v - tangential * v_t) +
+           dot(at.area_m2, n) * (blowing * n - normal * v_n);
   }
 
   /// A push along the normal turns with the surface: stiffness of the order of itself by a spacing.
@@ -74,15 +74,16 @@ struct Law {
     constexpr double kFastest_m_per_s = 20;  // of the tip of a cracking cloth
     const auto size = [&](size_t k) { return std::abs(c[k]); };
     const auto size_of_vector = [&](size_t k) { return std::hypot(c[k], c[k + 1], c[k + 2]); };
-    const double linear = size(drag) + std::max(size(normal_drag), size(tangential_drag)) +
-                          size(drag_by_s) + size(drag_by_t);
-    const double squared =
-        size(drag_squared) + std::max(size(normal_drag_squared), size(tangential_drag_squared));
+    const double per_mass = size(drag) + size(drag_by_s) + size(drag_by_t) + size(tangential_drag) +
+                            (size(drag_squared) + size(tangential_drag_squared)) * kFastest_m_per_s;
+    const double per_area = size(normal_drag) + size(normal_drag_squared) * kFastest_m_per_s;
     const double along_normal = size(normal_push) + size(normal_push_by_s) +
                                 size(normal_push_by_t) + size_of_vector(pressure);
     const double spacing_m = std::min(cloth.mesh.spacing_s_m(), cloth.mesh.spacing_t_m());
-    return {.damping_per_s = linear + squared * kFastest_m_per_s,
-            .frequency2_per_s2 = along_normal / spacing_m + size_of_vector(push_by_height)};
+    const double area_per_mass = largest_area_per_mass(cloth);
+    return {.damping_per_s = per_mass + per_area * area_per_mass,
+            .frequency2_per_s2 =
+                along_normal * area_per_mass / spacing_m + size_of_vector(push_by_height)};
   }
 };
 
@@ -101,8 +102,8 @@ std::vector<Entry> entries() {
   std::vector<Entry> all{
       of("drag", "1/s", 0, 30, 0.1, "-v"),
       of("drag_squared", "1/m", 0, 30, 0.1, "-|v| v"),
-      of("normal_drag", "1/s", 0, 30, 0.1, "-(n.v) n"),
-      of("normal_drag_squared", "1/m", 0, 30, 0.1, "-|n.v| (n.v) n"),
+      of("normal_drag", "Pa s/m", 0, 5, 0.02, "-(n.v) n"),
+      of("normal_drag_squared", "kg/m3", 0, 5, 0.05, "-|n.v| (n.v) n"),
       of("tangential_drag", "1/s", 0, 30, 0.1, "-v_t"),
       of("tangential_drag_squared", "1/m", 0, 30, 0.1, "-|v_t| v_t"),
       of("drag_by_s", "1/s", -5, 5, 0.1, "-(2s/w - 1) v"),
@@ -113,10 +114,10 @@ std::vector<Entry> entries() {
     for (size_t axis = 0; axis < 3; ++axis) all.push_back({three[axis], texts[axis]});
   };
   add_vector(of("push", "m/s2", -5, 5, 0.05, ""), {"x", "y", "z"});
-  all.push_back(of("normal_push", "m/s2", -10, 10, 0.05, "n"));
-  all.push_back(of("normal_push_by_s", "m/s2", -10, 10, 0.05, "(2s/w - 1) n"));
-  all.push_back(of("normal_push_by_t", "m/s2", -10, 10, 0.05, "(2t/h - 1) n"));
-  add_vector(of("pressure", "m/s2", -5, 5, 0.05, ""), {"(n.x) n", "(n.y) n", "(n.z) n"});
+  all.push_back(of("normal_push", "Pa", -3, 3, 0.02, "n"));
+  all.push_back(of("normal_push_by_s", "Pa", -3, 3, 0.02, "(2s/w - 1) n"));
+  all.push_back(of("normal_push_by_t", "Pa", -3, 3, 0.02, "(2t/h - 1) n"));
+  add_vector(of("pressure", "Pa", -3, 3, 0.05, ""), {"(n.x) n", "(n.y) n", "(n.z) n"});
   add_vector(of("push_by_height", "1/s2", -10, 10, 0.1, ""), {"height x", "height y", "height z"});
   add_vector(of("push_by_time", "m/s3", -5, 5, 0.1, ""), {"time x", "time y", "time z"});
   assert(all.size() == coefficients);
@@ -129,8 +130,8 @@ EffectDescription describe() {
   EffectDescription effect{
       .name = "force_law",
       .summary =
-          "an empirical force per mass, F = m sum c_k f_k of velocity, normal, place, height "
-          "and time",
+          "an empirical force, F = m sum c_k a_k + A sum c_k p_k of velocity, normal, place, "
+          "height and time",
       .parameters = {}};
   for (Entry& entry : entries()) effect.parameters.push_back(std::move(entry.parameter));
   // A vector is one law, any other coefficient one by itself.
@@ -152,6 +153,10 @@ EffectDescription describe() {
 
 std::unique_ptr<Effect> make() {
   return std::make_unique<VertexLawEffect<Law>>();
+}
+
+bool acts_on_area(const std::string& parameter) {
+  return parameter.starts_with("normal_") || parameter.starts_with("pressure_");
 }
 
 std::string term_text(const std::string& parameter) {
