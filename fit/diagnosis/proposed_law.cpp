@@ -39,11 +39,13 @@ std::vector<int> horizons_from(int first, int frames) {
   return horizons;
 }
 
-/// Whether frames left out are foretold better: by a tenth of what is above the noise, and in most
-/// of the blocks of time.
+/// Whether frames left out are foretold better: by a tenth of what is above the noise and by two
+/// per cent of the noise itself, below which nothing counts as structure
+/// (fit/diagnosis/adequacy.h), and in most of the blocks of time.
 bool predicts_better(const CrossValidation& one, const CrossValidation& other) {
-  constexpr double kLeastGain = 0.1;
-  if (!one.usable || other.mean - one.mean <= kLeastGain * std::max(0.0, other.mean - 1))
+  constexpr double kLeastGain = 0.1, kLeastOfNoise = 0.02;
+  if (!one.usable ||
+      other.mean - one.mean <= std::max(kLeastOfNoise, kLeastGain * (other.mean - 1)))
     return false;
   size_t blocks = 0;
   for (size_t b = 0; b < one.block.size(); ++b) blocks += one.block[b] < other.block[b] ? 1 : 0;

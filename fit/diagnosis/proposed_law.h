@@ -64,8 +64,9 @@ std::vector<LawScore> score_terms(const DiagnosisSetup& setup, const ModelFit& m
 ///
 /// Each round fits the model again with each of the terms that are foreseen to explain most, from
 /// short horizons on, and keeps the one that predicts frames left out best, where it does so better
-/// than without it: by a tenth of what is above the noise, and in most of the blocks of time. In
-/// the end each term is dropped without which frames left out are predicted no worse.
+/// than without it: by a tenth of what is above the noise, two per cent of the noise at least, and
+/// in most of the blocks of time. In the end each term is dropped without which frames left out are
+/// predicted no worse.
 ProposedLaw propose_law(const DiagnosisSetup& setup, const ModelFit& model,
                         const ProposalOptions& options, const ProgressCallback& progress);
 
