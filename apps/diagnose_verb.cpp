@@ -8,6 +8,7 @@
 #include "apps/interrupt.h"
 #include "apps/progress_line.h"
 #include "apps/report/diagnosis_json.h"
+#include "apps/report/diagnosis_law.h"
 #include "apps/report/diagnosis_page.h"
 #include "apps/report/diagnosis_tables.h"
 #include "apps/steps.h"
@@ -64,6 +65,13 @@ void write_results(const Diagnosis& diagnosis, const Recording& recording,
   csv(candidate_table(diagnosis), "candidates.csv");
   csv(trial_table(diagnosis), "trials.csv");
   csv(limit_table(diagnosis), "limits.csv");
+  if (!diagnosis.residual_force.markers.empty())
+    csv(residual_force_table(diagnosis.residual_force, recording), "residual_force.csv");
+  if (diagnosis.law.found() && diagnosis.with_law.usable()) {
+    fs::create_directories(folder / "law");
+    write_fit_result(diagnosis.with_law.result, folder / "law" / "fit.json");
+    write_model(diagnosis.with_law.model, folder / "law");
+  }
   write_text(diagnosis_page_html(diagnosis, recording, command), folder / "report.html");
 }
 
@@ -77,6 +85,10 @@ void print_result(const Diagnosis& diagnosis, const fs::path& folder) {
                found_text(accepted.trial.term, diagnosis.found.result));
   if (!diagnosis.accepted.empty()) fmt::print("\n");
   print(before_after_table(diagnosis));
+  if (diagnosis.law.found()) {
+    fmt::print("A law for what remains:\n{}\n\n", diagnosis.law.formula);
+    print(law_error_table(diagnosis));
+  }
   print(short_candidate_table(diagnosis));
   fmt::print("Report: {}\n", shown_path(folder / "report.html"));
 }
@@ -104,8 +116,10 @@ int run_diagnose(DiagnoseFlags flags) {
   }
   if (diagnosis.stop == FitStop::cancelled || interrupted()) throw Cancelled();
   if (!diagnosis.usable()) throw NoResult("no diagnosis: " + diagnosis.message);
-  diagnosis.base.result.version = diagnosis.found.result.version = program_version();
-  diagnosis.base.result.command = diagnosis.found.result.command = command;
+  diagnosis.base.result.version = diagnosis.found.result.version =
+      diagnosis.with_law.result.version = program_version();
+  diagnosis.base.result.command = diagnosis.found.result.command =
+      diagnosis.with_law.result.command = command;
   write_results(diagnosis, recording, command, out.path());
   if (interrupted()) throw Cancelled();
   out.publish();

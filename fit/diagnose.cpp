@@ -27,6 +27,8 @@ constexpr double kVisible = 1.2;  ///< chi-square per degree of freedom there
 constexpr int kScoreHorizons = 3;
 constexpr int kFewestFrames = 8;
 
+constexpr int kLeastForForce = 14;  ///< frames that a residual force is taken from
+
 constexpr int kTimeBlocks = 5;  ///< of the cross-validation
 
 /// The square of a standard normal number, and of more of them, that is as unlikely as five sigmas.
@@ -435,6 +437,12 @@ Diagnosis diagnose(const FitInput& input, const DiagnoseOptions& options,
   result.score_frames = list.frames;
   result.scores = list.scores;
   search.keep_shapes(result.scores);
+  // Over few frames, where the cloth's answer to a missing force is still small.
+  const ModelFit early =
+      fit_model(setup, {}, values_by_name(*problem, values),
+                {std::max(list.frames, std::min(kLeastForForce, base.model.frames))}, watched);
+  if (stopped) return cancelled();
+  result.residual_force = residual_force(early.usable ? early : base.model);
 
   // Always the best line is led on, until nothing leads on from it, or from as many as are
   // followed.
@@ -485,6 +493,18 @@ Diagnosis diagnose(const FitInput& input, const DiagnoseOptions& options,
     }
     result.verdict =
         result.after.adequate ? DiagnosisVerdict::explained : DiagnosisVerdict::partly_explained;
+  }
+  if (!result.after.adequate) {
+    result.law = propose_law(
+        setup, best.model,
+        {.blocks = kTimeBlocks, .without = options.without, .threshold = threshold}, watched);
+    if (stopped) return cancelled();
+    if (result.law.found()) {
+      FitOptions again = options_with(options.fit, result.law.model.terms);
+      again.start = values_by_name(*result.law.model.problem, result.law.model.values);
+      result.with_law = fit(with_terms(input, result.law.model.terms), again, watched);
+      if (stopped) return cancelled();
+    }
   }
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
   return result;

@@ -6,6 +6,8 @@
 #include "fit/diagnosis/adequacy.h"
 #include "fit/diagnosis/cross_validation.h"
 #include "fit/diagnosis/law_score.h"
+#include "fit/diagnosis/proposed_law.h"
+#include "fit/diagnosis/residual_force.h"
 #include "fit/diagnosis/term.h"
 #include "fit/fit.h"
 
@@ -68,6 +70,9 @@ struct Diagnosis {
   std::vector<AcceptedEffect> accepted;  ///< in the order in which they were
   std::vector<LawTrial> refused;         ///< the last round's
   std::vector<DetectionLimit> limits;
+  ResidualForce residual_force;  ///< of the model as declared, over its first frames
+  ProposedLaw law;               ///< for what is left, where that has structure
+  FitReport with_law;            ///< the fit with it, where there is one
   double seconds = 0;
   bool usable() const { return stop != FitStop::cancelled && stop != FitStop::diverged; }
 };

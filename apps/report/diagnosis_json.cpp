@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "apps/json_file.h"
+#include "apps/report/diagnosis_law.h"
 #include "apps/version.h"
 
 namespace clothfit {
@@ -127,7 +128,8 @@ void write_diagnosis(const Diagnosis& diagnosis, const std::string& command,
       one["unit"] = limit.unit[static_cast<size_t>(k)];
       json["detection_limits"].push_back(std::move(one));
     }
-  json["proposed_law"] = nullptr;
+  json["residual_force"] = residual_force_json(diagnosis.residual_force);
+  json["proposed_law"] = proposed_law_json(diagnosis);
   write_json(json, file);
 }
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "apps/report/diagnosis_law.h"
 #include "apps/report/diagnosis_tables.h"
 #include "apps/report/fit_figures.h"
 #include "apps/report/html.h"
@@ -154,6 +155,8 @@ std::string diagnosis_page_html(const Diagnosis& diagnosis, const Recording& rec
                                   "Root mean square of one coordinate's residual. The last three "
                                   "columns are guesses that need no model.")));
   body += section("Where and when it is off", maps(diagnosis, recording));
+  body +=
+      section("Which force is missing", residual_force_html(diagnosis.residual_force, recording));
   body += section("Does what is left look like noise?",
                   html_table(adequacy_table(diagnosis),
                              "Residuals after everything that was fitted has been taken out."));
@@ -167,6 +170,7 @@ std::string diagnosis_page_html(const Diagnosis& diagnosis, const Recording& rec
   if (!trials.rows.empty())
     body += section("Which were fitted",
                     wide(html_table(trials, "Round by round: those that the score put first.")));
+  body += section("A law for what remains", proposed_law_html(diagnosis));
   body += section(
       "What would have been seen",
       wide(html_table(limit_table(diagnosis),

@@ -58,6 +58,13 @@ std::vector<EffectLaw> laws_of(const EffectDescription& effect) {
   return {all};
 }
 
+/// Effects that a model has anyway.
+std::vector<std::string> present_effects(const FitInput& input, const FitOptions& options) {
+  std::vector<std::string> present = options.effects;
+  for (const DeclaredEffect& effect : input.recording.declared) present.push_back(effect.name);
+  return present;
+}
+
 bool has_tracked_point(const Recording& recording) {
   return std::ranges::any_of(
       recording.held, [](const HeldPoint& point) { return point.motion == HeldMotion::tracked; });
@@ -110,11 +117,33 @@ FitInput with_terms(FitInput input, const std::vector<Term>& terms) {
   return input;
 }
 
+bool is_empirical(const std::string& effect) {
+  return effect == "force_law" || effect == "tension_law";
+}
+
+std::vector<Term> empirical_laws(const FitInput& input, const FitOptions& options) {
+  const std::vector<std::string> present = present_effects(input, options);
+  std::vector<Term> result;
+  for (const EffectEntry& entry : effect_registry()) {
+    if (!is_empirical(entry.name) || std::ranges::find(present, entry.name) != present.end())
+      continue;
+    const EffectDescription effect = entry.describe();
+    for (const EffectLaw& law : laws_of(effect))
+      result.push_back({.effect = effect.name,
+                        .law = law.name,
+                        .amplitudes = law.amplitudes,
+                        .shape = {},
+                        .shape_sigma = {}});
+  }
+  return result;
+}
+
 std::vector<LawShapes> laws_to_test(const FitInput& input, const FitOptions& options,
                                     double duration_s) {
-  std::vector<std::string> names, present = options.effects;
-  for (const DeclaredEffect& effect : input.recording.declared) present.push_back(effect.name);
-  for (const EffectEntry& entry : effect_registry()) names.emplace_back(entry.name);
+  const std::vector<std::string> present = present_effects(input, options);
+  std::vector<std::string> names;
+  for (const EffectEntry& entry : effect_registry())
+    if (!is_empirical(entry.name)) names.emplace_back(entry.name);
   if (!has_tracked_point(input.recording))
     for (const MeasurementEffectEntry& entry : measurement_effect_registry())
       names.emplace_back(entry.name);

@@ -38,10 +38,17 @@ EffectDescription describe_effect(const std::string& name);
 /// One law with every shape that it is tested with: the same term but for its shape.
 using LawShapes = std::vector<Term>;
 
+/// Whether an effect says what a force looks like and names no cause for it: a law that a diagnosis
+/// proposes is made of its laws (fit/diagnosis/proposed_law.h), and none is tested as a cause.
+bool is_empirical(const std::string& effect);
+
+/// Every law of the empirical effects that a recording does not declare and `options` do not add.
+std::vector<Term> empirical_laws(const FitInput& input, const FitOptions& options);
+
 /// Every law that a recording can be asked for: those of all registered effects but the ones that
-/// it declares itself or that `options` add, those that do not apply to it, and those that its
-/// geometry must be guessed for (contact with an obstacle nobody has described). Frequencies run
-/// from the inverse of `duration_s`.
+/// it declares itself or that `options` add, empirical ones, those that do not apply to it, and
+/// those that its geometry must be guessed for (contact with an obstacle nobody has described).
+/// Frequencies run from the inverse of `duration_s`.
 std::vector<LawShapes> laws_to_test(const FitInput& input, const FitOptions& options,
                                     double duration_s);
 

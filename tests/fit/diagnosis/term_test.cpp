@@ -75,6 +75,23 @@ TEST(LawsToTest, AreThoseOfEffectsThatAreNotThereAlready) {
   EXPECT_THAT(tested(input, {.effects = {"gravity_tilt"}}), Not(Contains("gravity_tilt")));
 }
 
+TEST(LawsToTest, AreNoneOfThoseThatNameNoCause) {
+  FitInput input = synthetic_input({});
+  for (const LawShapes& law : laws_to_test(input, {}, 0.5))
+    EXPECT_FALSE(is_empirical(law.front().effect)) << law.front().title();
+
+  const auto proposed = [&] {
+    std::vector<std::string> titles;
+    for (const Term& term : empirical_laws(input, {})) titles.push_back(term.title());
+    return titles;
+  };
+  EXPECT_THAT(proposed(), Contains("force_law (drag)"));
+  EXPECT_THAT(proposed(), Contains("tension_law (shear_stretched)"));
+  EXPECT_THAT(proposed(), Not(Contains("wind (drag)")));
+  input.recording.declared.push_back({.name = "force_law", .parameters = {}});
+  EXPECT_THAT(proposed(), Not(Contains("force_law (drag)")));
+}
+
 TEST(LawsToTest, TryEachCombinationOfShapesWithFrequenciesInTheDuration) {
   for (const LawShapes& law : laws_to_test(synthetic_input({}), {}, 0.5)) {
     if (law.front().effect == "nonuniform_mass" && law.front().law == "patch") {

@@ -1,0 +1,73 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "fit/diagnosis/cross_validation.h"
+#include "fit/diagnosis/law_score.h"
+#include "fit/diagnosis/model_fit.h"
+
+namespace clothfit {
+
+struct ProposalOptions {
+  int most_terms = 4;
+  int fits = 3;    ///< of terms, in one round: those that are foreseen to explain most
+  int blocks = 5;  ///< of time, of the cross-validation
+  std::vector<std::string> without;  ///< effects whose terms are not asked for
+  /// Residuals beyond it count less (Huber), in sigmas; infinite for squares.
+  double threshold = 1e300;
+};
+
+/// A term with which a model was fitted again.
+struct TermTrial {
+  Term term;
+  double foreseen_fall = 0;                    ///< of chi-square, by the derivatives
+  double cross_validated = 0, without_it = 0;  ///< chi-square per observation left out
+  std::string refused;                         ///< why it is not kept; empty: it is
+};
+
+/// A coefficient of a proposed law.
+struct LawCoefficient {
+  std::string effect, parameter;
+  std::string unit;
+  std::string term;  ///< what it multiplies
+  double value = 0;
+  double sigma = 0;       ///< as fits state it (fit/uncertainty.h)
+  bool at_bound = false;  ///< at an end of its range: more of it would do better
+};
+
+/// An empirical law for what a model leaves: a force per mass, a pressure, or a tension, that is a
+/// sum of few terms (model/effects/force_law.h, tension_law.h).
+struct ProposedLaw {
+  std::vector<LawCoefficient> coefficients;  ///< none: no term foresees frames that were left out
+  std::string formula;  ///< a line for each of force per mass a, pressure p, tension T
+  /// The model with the law: its terms stand behind those the model had. Fitted, so that
+  /// describe_model() and with_terms() make of it what simulations and fits take.
+  ModelFit model;
+  CrossValidation before, after;
+  std::vector<LawScore> scores;   ///< of each term by itself, in the first round, the best first
+  std::vector<TermTrial> trials;  ///< in the order in which they were fitted
+  bool cancelled = false;
+  bool found() const { return !coefficients.empty(); }
+};
+
+/// What the derivatives foresee of each term beyond those that the model has: as score_laws(), but
+/// all at once.
+std::vector<LawScore> score_terms(const DiagnosisSetup& setup, const ModelFit& model,
+                                  const Projection& projection, const std::vector<Term>& terms);
+
+/// Proposes a law by sparse regression: orthogonal matching pursuit [pati1993] over the terms of
+/// the empirical effects, with refits. What is regressed is not a force that is read off
+/// accelerations, whose noise would drown it, but what each term does to everything observed, by
+/// the derivatives of the trajectory, against the residual, with all that the model may still move
+/// taken out of both (fit/diagnosis/projection.h).
+///
+/// Each round fits the model again with each of the terms that are foreseen to explain most, from
+/// short horizons on, and keeps the one that predicts frames left out best, where it does so better
+/// than without it: by a tenth of what is above the noise, two per cent of the noise at least, and
+/// in most of the blocks of time. In the end each term is dropped without which frames left out are
+/// predicted no worse.
+ProposedLaw propose_law(const DiagnosisSetup& setup, const ModelFit& model,
+                        const ProposalOptions& options, const ProgressCallback& progress);
+
+}  // namespace clothfit

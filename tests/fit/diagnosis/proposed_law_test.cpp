@@ -1,0 +1,156 @@
+// Laws that are proposed for simulated recordings whose missing force is known. Not checked here:
+// what the terms do (tests/model/effects/force_law_test.cpp, tension_law_test.cpp).
+#include "fit/diagnosis/proposed_law.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+#include <utility>
+
+#include "fit/parameterised_model.h"
+#include "fit/simulation.h"
+#include "tests/fit/hidden_effect.h"
+#include "tests/fit/synthetic_cloth.h"
+
+namespace clothfit {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+const FitOptions kOptions{.mesh_columns = 9, .mesh_rows = 9, .loss = Loss::squared};
+
+/// What a diagnosis ends with that has found nothing, and the law that is proposed for the rest.
+struct Proposal {
+  FitInput input;
+  DiagnosisSetup setup{.input = input, .options = kOptions, .columns = 9, .rows = 9};
+  ModelFit model;
+  ProposedLaw law;
+
+  explicit Proposal(FitInput recorded) : input(std::move(recorded)) {
+    // From the true fabric on, which spares a search.
+    const auto problem = problem_of(setup, {});
+    const auto start = values_by_name(*problem, start_with(*problem, SyntheticCloth{}.fabric));
+    model = fit_model(setup, {}, start, {10, problem->first_held_out}, {});
+    EXPECT_TRUE(model.usable);
+    law = propose_law(setup, model, {}, {});
+  }
+
+  /// Of a model's residuals on the frames that no fit has seen, in sigmas.
+  static double held_out_rms(const ModelFit& model) {
+    const FitProblem& problem = *model.problem;
+    const TrajectoryObjective all(problem, problem.frames(), model.steps);
+    const Eigen::VectorXd residual = all.residuals({model.values}).front();
+    double sum = 0;
+    int count = 0;
+    for (const Objective::Block& block : all.blocks()) {
+      if (block.frame < problem.first_held_out) continue;
+      sum += residual.segment(block.offset, block.dimension).squaredNorm();
+      count += block.dimension;
+    }
+    return std::sqrt(sum / count);
+  }
+
+  /// A coefficient of the law; 0 +- 0 where it has none.
+  LawCoefficient coefficient(const std::string& parameter) const {
+    const auto found = std::ranges::find(law.coefficients, parameter, &LawCoefficient::parameter);
+    return found != law.coefficients.end() ? *found : LawCoefficient{};
+  }
+
+  void expect_that_it_halves_the_held_out_error() const {
+    EXPECT_LT(law.after.mean, law.before.mean);
+    EXPECT_LT(held_out_rms(law.model), 0.5 * held_out_rms(model));
+  }
+};
+
+const Proposal& of_hidden_drag() {
+  static const Proposal proposal(synthetic_input({.drag_rate_per_s = 1.2}));
+  return proposal;
+}
+
+TEST(ProposedLaw, IsTheHiddenDragWithItsCoefficient) {
+  const Proposal& proposal = of_hidden_drag();
+
+  const LawCoefficient drag = proposal.coefficient("drag");
+  ASSERT_GT(drag.sigma, 0) << proposal.law.formula;
+  EXPECT_NEAR(drag.value, 1.2, 3 * drag.sigma);
+  EXPECT_LT(drag.sigma, 0.12);
+  EXPECT_EQ(proposal.law.coefficients.size(), 1u) << proposal.law.formula;
+  EXPECT_THAT(proposal.law.formula, StartsWith("a = -1."));
+  EXPECT_THAT(proposal.law.formula, HasSubstr(" 1/s v"));
+  proposal.expect_that_it_halves_the_held_out_error();
+}
+
+TEST(ProposedLaw, IsTheHiddenDragWithTheSquareOfTheNormalSpeed) {
+  const double c_n = 2.5;  // kg/m3
+  const Proposal proposal(
+      moved_by({.name = "quadratic_drag", .parameters = {{"c_n", {c_n}}, {"c_t", {0}}}},
+               synthetic_input({})));
+
+  const LawCoefficient drag = proposal.coefficient("normal_drag_squared");
+  ASSERT_GT(drag.sigma, 0) << proposal.law.formula;
+  EXPECT_NEAR(drag.value, c_n / 2, 3 * drag.sigma);
+  EXPECT_LT(drag.sigma, 0.1 * c_n / 2);
+  EXPECT_THAT(proposal.law.formula, StartsWith("p = -1."));
+  EXPECT_THAT(proposal.law.formula, HasSubstr(" kg/m3 |n.v| (n.v) n"));
+  proposal.expect_that_it_halves_the_held_out_error();
+}
+
+TEST(ProposedLaw, HasTwoTermsWhereTwoForcesAreHidden) {
+  DeclaredEffect hidden{.name = "force_law", .parameters = {}};
+  for (const EffectParameter& parameter : describe_effect("force_law").parameters)
+    hidden.parameters[parameter.name] = {0};
+  hidden.parameters["tangential_drag"] = {2};
+  hidden.parameters["normal_push_by_s"] = {0.1};
+  const Proposal proposal(moved_by(hidden, synthetic_input({})));
+
+  for (const auto& [parameter, truth] :
+       std::map<std::string, double>{{"tangential_drag", 2}, {"normal_push_by_s", 0.1}}) {
+    const LawCoefficient found = proposal.coefficient(parameter);
+    ASSERT_GT(found.sigma, 0) << parameter << ": " << proposal.law.formula;
+    EXPECT_NEAR(found.value, truth, 3 * found.sigma) << parameter;
+  }
+  proposal.expect_that_it_halves_the_held_out_error();
+}
+
+TEST(ProposedLaw, SeesATensionCurveThatBends) {
+  const Proposal proposal(
+      moved_by({.name = "stiffening",
+                .parameters = {{"stretched", {2}}, {"compressed", {0}}, {"strain", {0.05}}}},
+               synthetic_input({})));
+
+  EXPECT_THAT(proposal.law.formula, HasSubstr("T / (k l0) = "));
+  proposal.expect_that_it_halves_the_held_out_error();
+}
+
+TEST(ProposedLaw, TakesNoTermWhereNothingIsHidden) {
+  for (const unsigned seed : {1u, 2u, 3u, 4u, 5u}) {
+    const Proposal proposal(synthetic_input({.seed = seed}));
+
+    EXPECT_FALSE(proposal.law.found()) << "seed " << seed << ": " << proposal.law.formula;
+    EXPECT_EQ(proposal.law.formula, "");
+    EXPECT_EQ(proposal.law.model.values, proposal.model.values);
+  }
+}
+
+// The model that comes with a law is one that simulations take, and does there what it did here.
+TEST(ProposedLaw, CanBeSimulatedAsItStands) {
+  const Proposal& proposal = of_hidden_drag();
+  const ModelFit& found = proposal.law.model;
+
+  const Simulation simulation =
+      make_simulation(describe_model(*found.problem, proposal.input.recording, found.values));
+  const SimulateResult result = run(simulation, found.steps.run_s);
+
+  const SimulateResult here =
+      run_model(*found.problem, {found.values}, found.problem->frames(), found.steps).front();
+  ASSERT_TRUE(result.usable());
+  // The same step but for how it divides the frames' intervals; drag is 15 sigmas of 0.5 mm.
+  for (size_t f = 0; f < here.position_m.size(); ++f)
+    EXPECT_LT((result.position_m[f] - here.position_m[f]).cwiseAbs().maxCoeff(), 1e-6);
+}
+
+}  // namespace
+}  // namespace clothfit
