@@ -24,7 +24,10 @@ constexpr double kInfinite = std::numeric_limits<double>::infinity();
 /// values, so that the run stays as it is and only its derivatives are more.
 class Bundle {
  public:
-  explicit Bundle(const ModelFit& model) : problem_(*model.problem), values_(model.values) {}
+  explicit Bundle(const ModelFit& model) : problem_(*model.problem), values_(model.values) {
+    for (const FitProblem::MeasurementTerm& term : problem_.measurement)
+      for (const Binding& binding : term.parameters) of_measurement_ += binding.parameter >= 0;
+  }
 
   /// Whether so many more amplitudes go with those there are: of motion as many as are
   /// differentiated side by side, of the measurement as many as a predictor knows.
@@ -172,6 +175,7 @@ std::vector<LawScore> score_laws(const ModelFit& model, const Projection& projec
     for (size_t n = 0; n < tests.size(); ++n) {
       if ((measurement_effect_named(tests[n]->effect) != nullptr) != of_measurement) continue;
       if (own.empty() || !own.back().has_room(*tests[n])) own.emplace_back(model);
+      if (!own.back().has_room(*tests[n])) continue;  // the model has too many of its own
       own.back().add(n, *tests[n]);
     }
     std::ranges::move(own, std::back_inserter(bundles));
