@@ -4,35 +4,68 @@
 
 namespace clothfit::nonuniform_mass {
 namespace {
-enum Parameter { hem, hem_width, gradient_s, gradient_t, patch, patch_s, patch_t, patch_radius };
+enum Parameter {
+  hem,
+  hem_width,
+  hem_left,
+  hem_right,
+  hem_top,
+  hem_bottom,
+  gradient_s,
+  gradient_t,
+  patch,
+  patch_s,
+  patch_t,
+  patch_radius,
+  kCount
+};
 
-/// The share of the cell around place `x_m` of a side with vertices every `spacing_m` that lies
-/// within `band_m` of the side's ends.
 template <class Real>
-Real band_share(double x_m, double side_m, double spacing_m, const Real& band_m) {
-  const double from = std::max(0.0, x_m - 0.5 * spacing_m);
-  const double to = std::min(side_m, x_m + 0.5 * spacing_m);
-  const Real length(to - from);
-  const auto within_cell = [&](const Real& covered) {
-    const Real some = select(covered > Real(0.0), covered, Real(0.0));
-    return select(some < length, some, length);
-  };
-  const Real covered = within_cell(band_m - Real(from)) + within_cell(band_m - Real(side_m - to));
-  return select(covered < length, covered, length) / length;
-}
+using Parameters = std::array<Real, kCount>;
+
+/// Shares of what a side's vertices carry that lie within a band at the side's beginning, at its
+/// end, and at either. A vertex carries its hat function's part of the cloth, so that a band weighs
+/// the same, and its middle lies at the same place, on every mesh.
+template <class Real>
+struct BandShares {
+  Real at_begin, at_end, at_either;
+
+  BandShares(double x_m, double side_m, double spacing_m, const Real& band_m) {
+    at_begin = within(x_m, side_m, spacing_m, band_m);
+    at_end = within(side_m - x_m, side_m, spacing_m, band_m);
+    const Real both = at_begin + at_end;
+    at_either = select(both < Real(1.0), both, Real(1.0));
+  }
+
+ private:
+  static Real clipped(const Real& u, double least, double most) {
+    const Real some = select(u > Real(least), u, Real(least));
+    return select(some < Real(most), some, Real(most));
+  }
+  /// The part of the hat function of the vertex at `x_m` that lies below `band_m`.
+  static Real within(double x_m, double side_m, double spacing_m, const Real& band_m) {
+    const bool first = x_m < 0.5 * spacing_m, last = side_m - x_m < 0.5 * spacing_m;
+    const Real reach = (band_m - Real(x_m)) / Real(spacing_m);
+    const Real up = clipped(reach, -1.0, 0.0) + Real(1.0), down = clipped(reach, 0.0, 1.0);
+    const Real rising = first ? Real(0.0) : Real(0.5) * up * up;
+    const Real falling = last ? Real(0.0) : down - Real(0.5) * down * down;
+    return (rising + falling) / Real(first || last ? 0.5 : 1.0);
+  }
+};
 
 struct Law {
-  static constexpr int kParameters = 8;
+  static constexpr int kParameters = kCount;
 
   /// The mass at a vertex over its stated mass.
   template <class Real>
-  static Real relative_mass(const Mesh& mesh, double s, double t, const std::array<Real, 8>& p) {
+  static Real relative_mass(const Mesh& mesh, double s, double t, const Parameters<Real>& p) {
     const Real one(1.0);
-    const Real at_sides =
-        band_share(s * mesh.width_m, mesh.width_m, mesh.spacing_s_m(), p[hem_width]);
-    const Real at_ends =
-        band_share(t * mesh.height_m, mesh.height_m, mesh.spacing_t_m(), p[hem_width]);
-    const Real in_hem = one - (one - at_sides) * (one - at_ends);
+    const BandShares<Real> across(s * mesh.width_m, mesh.width_m, mesh.spacing_s_m(), p[hem_width]);
+    const BandShares<Real> down(t * mesh.height_m, mesh.height_m, mesh.spacing_t_m(), p[hem_width]);
+    const Real all_round = one - (one - across.at_either) * (one - down.at_either);
+    const Real in_hem = p[hem] * all_round + p[hem_left] * across.at_begin +
+                        p[hem_right] * across.at_end + p[hem_top] * down.at_begin +
+                        p[hem_bottom] * down.at_end;
 
     const Real right_m = Real(mesh.width_m) * (Real(s) - p[patch_s]);
     const Real down_m = Real(mesh.height_m) * (Real(t) - p[patch_t]);
@@ -40,19 +73,19 @@ struct Law {
     const Real inside = one - (right_m * right_m + down_m * down_m) / (radius_m * radius_m);
     const Real bump = select(inside > Real(0.0), inside * inside * inside, Real(0.0));
 
-    return (one + p[hem] * in_hem) * (one + p[gradient_s] * Real(s - 0.5)) *
+    return (one + in_hem) * (one + p[gradient_s] * Real(s - 0.5)) *
            (one + p[gradient_t] * Real(t - 0.5)) * (one + p[patch] * bump);
   }
 
   template <class Real>
   static Vector3<Real> change(const VertexSight<Real>& at, const Vector3<Real>& force_n,
-                              const std::array<Real, 8>& p) {
+                              const Parameters<Real>& p) {
     return Real(1.0) / relative_mass(*at.mesh, at.s, at.t, p) * force_n;
   }
 
   static EffectRates rates(const Cloth& cloth, const SpringParameters&,
                            const std::vector<double>& parameters) {
-    std::array<double, kParameters> p;
+    Parameters<double> p;
     std::ranges::copy(parameters, p.begin());
     double lightest = 1;
     for (int i = 0; i < cloth.mesh.rows; ++i)
@@ -71,8 +104,8 @@ EffectDescription describe() {
           .parameters = {{.name = "hem",
                           .unit = "ratio",
                           .neutral = 0,
-                          .lower = -0.5,
-                          .upper = 4,
+                          .lower = -0.2,
+                          .upper = 10,
                           .typical = 0.1},
                          {.name = "hem_width",
                           .unit = "m",
@@ -80,6 +113,30 @@ EffectDescription describe() {
                           .lower = 0.001,
                           .upper = 0.1,
                           .typical = 0.001},
+                         {.name = "hem_left",
+                          .unit = "ratio",
+                          .neutral = 0,
+                          .lower = -0.2,
+                          .upper = 10,
+                          .typical = 0.1},
+                         {.name = "hem_right",
+                          .unit = "ratio",
+                          .neutral = 0,
+                          .lower = -0.2,
+                          .upper = 10,
+                          .typical = 0.1},
+                         {.name = "hem_top",
+                          .unit = "ratio",
+                          .neutral = 0,
+                          .lower = -0.2,
+                          .upper = 10,
+                          .typical = 0.1},
+                         {.name = "hem_bottom",
+                          .unit = "ratio",
+                          .neutral = 0,
+                          .lower = -0.2,
+                          .upper = 10,
+                          .typical = 0.1},
                          {.name = "gradient_s",
                           .unit = "ratio",
                           .neutral = 0,
@@ -119,6 +176,9 @@ EffectDescription describe() {
           .test = EffectTest::profiled,
           .laws = {{.name = "hem",
                     .amplitudes = {"hem"},
+                    .shapes = {{.parameter = "hem_width", .values = {0.005, 0.01, 0.02, 0.04}}}},
+                   {.name = "edges",
+                    .amplitudes = {"hem_left", "hem_right", "hem_top", "hem_bottom"},
                     .shapes = {{.parameter = "hem_width", .values = {0.005, 0.01, 0.02, 0.04}}}},
                    {.name = "gradient", .amplitudes = {"gradient_s", "gradient_t"}, .shapes = {}},
                    {.name = "patch",

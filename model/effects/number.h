@@ -129,6 +129,15 @@ Real sine_of_turns(const Real& turns) {
     sum = Real(1.0) - square * sum / Real(static_cast<double>(n * (n + 1)));
   return x * sum;
 }
+/// Of a dual number, by the chain rule.
+template <class Dual>
+requires requires(Dual x) {
+  x.a;
+}
+Dual sine_of_turns(const Dual& turns) {
+  const double slope = 6.283185307179586 * sine_of_turns(turns.a + 0.25);
+  return Dual(sine_of_turns(turns.a), slope * turns.v);
+}
 
 // From lanes to numbers and back.
 

@@ -14,10 +14,12 @@ namespace {
 constexpr double kMass_kg = 0.025, kSide_m = 0.4;  // square_cloth's
 
 struct Masses {
-  double hem = 0, hem_width = 0.01, gradient_s = 0, gradient_t = 0, patch = 0, patch_s = 0.5,
-         patch_t = 0.5, patch_radius = 0.1;
+  double hem = 0, hem_width = 0.01, hem_left = 0, hem_right = 0, hem_top = 0, hem_bottom = 0,
+         gradient_s = 0, gradient_t = 0, patch = 0, patch_s = 0.5, patch_t = 0.5,
+         patch_radius = 0.1;
   std::vector<double> values() const {
-    return {hem, hem_width, gradient_s, gradient_t, patch, patch_s, patch_t, patch_radius};
+    return {hem,        hem_width,  hem_left, hem_right, hem_top, hem_bottom,
+            gradient_s, gradient_t, patch,    patch_s,   patch_t, patch_radius};
   }
 };
 
@@ -56,6 +58,57 @@ TEST(NonuniformMass, AHemWeighsTheSameOnEveryMesh) {
       EXPECT_NEAR(mass.sum(), kMass_kg * (1 + 1.5 * band), 1e-15);
       EXPECT_GT(mass[0] / with(vertices, {}).cloth.mass_kg[0], 1.01);
     }
+  }
+}
+
+// Vertices carry their hat functions' parts of the cloth, and these add up to what is constant or
+// linear over it: an edge weighs, and lies, as the band itself, also where the mesh is coarser than
+// the band is wide.
+TEST(NonuniformMass, AHeavyEdgeWeighsTheSameAndLiesAtTheSamePlaceOnEveryMesh) {
+  for (const double width_m : {0.007, 0.03}) {
+    const double band_kg = kMass_kg * width_m / kSide_m;
+    for (const int vertices : {2, 6, 17}) {
+      SCOPED_TRACE(testing::Message() << width_m << " m, " << vertices);
+      const Eigen::VectorXd plain = with(vertices, {}).cloth.mass_kg;
+      const Eigen::Matrix3Xd flat_m = with(vertices, {}).set.start_position_m;
+      const Eigen::VectorXd from_left_m = flat_m.row(0).transpose(),
+                            from_top_m = flat_m.row(1).transpose();
+      const Eigen::VectorXd from_right_m = kSide_m - from_left_m.array(),
+                            from_bottom_m = kSide_m - from_top_m.array();
+      const auto expect_band = [&](Masses masses, const Eigen::VectorXd& from_edge_m,
+                                   const Eigen::VectorXd& along_edge_m) {
+        masses.hem_width = width_m;
+        const Eigen::VectorXd more = true_mass_kg(with(vertices, masses)) - plain;
+        EXPECT_NEAR(more.sum(), 2 * band_kg, 1e-15);
+        EXPECT_NEAR(more.dot(from_edge_m), 2 * band_kg * width_m / 2, 1e-15);
+        EXPECT_NEAR(more.dot(along_edge_m), 2 * band_kg * kSide_m / 2, 1e-15);
+      };
+
+      expect_band({.hem_left = 2}, from_left_m, from_top_m);
+      expect_band({.hem_right = 2}, from_right_m, from_top_m);
+      expect_band({.hem_top = 2}, from_top_m, from_left_m);
+      expect_band({.hem_bottom = 2}, from_bottom_m, from_left_m);
+    }
+  }
+}
+
+// On a mesh of 2 x 2 every vertex carries some of every edge: its hat function reaches all of them.
+TEST(NonuniformMass, AHeavyEdgeIsCarriedByTheVerticesNearIt) {
+  for (const int vertices : {3, 6, 17}) {
+    SCOPED_TRACE(vertices);
+    const Eigen::VectorXd plain = with(vertices, {}).cloth.mass_kg;
+    const auto heavier_kg = [&](const Masses& masses, int row, int column) {
+      const Eigen::VectorXd more = true_mass_kg(with(vertices, masses)) - plain;
+      return more[row * vertices + column];
+    };
+    const int last = vertices - 1, middle = vertices / 2;
+
+    EXPECT_GT(heavier_kg({.hem_left = 2}, middle, 0), 0);
+    EXPECT_GT(heavier_kg({.hem_right = 2}, middle, last), 0);
+    EXPECT_GT(heavier_kg({.hem_top = 2}, 0, middle), 0);
+    EXPECT_GT(heavier_kg({.hem_bottom = 2}, last, middle), 0);
+    EXPECT_EQ(heavier_kg({.hem_left = 2}, middle, last), 0);
+    EXPECT_EQ(heavier_kg({.hem_bottom = 2}, 0, middle), 0);
   }
 }
 
