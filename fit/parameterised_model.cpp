@@ -179,6 +179,12 @@ std::vector<Direction> directions(const FitProblem& problem, const Eigen::Vector
                                    Eigen::Vector3d::Unit(static_cast<Eigen::Index>(n) % 3));
     }
   }
+  for (const FitProblem::EmergingTerm& term : problem.emerging)
+    result[static_cast<size_t>(term.parameter)].emerging =
+        EmergingEffect{.effect = term.effect,
+                       .parameters = term.values,
+                       .change = term.change / slope[term.parameter],
+                       .start_memory = {}};
   return result;
 }
 

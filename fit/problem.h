@@ -55,6 +55,15 @@ struct FitProblem {
     std::vector<Binding> parameters;
   };
   std::vector<MeasurementTerm> measurement;
+  /// An effect that the cloth does not have, at its neutral values: a parameter of it changes no
+  /// run, but has a direction (EmergingEffect).
+  struct EmergingTerm {
+    int parameter = 0;
+    std::shared_ptr<const Effect> effect;
+    std::vector<double> values;  ///< neutral, but for a change of that parameter
+    double change = 0;           ///< of it
+  };
+  std::vector<EmergingTerm> emerging;
   double marker_offset_sigma_m = 0;  ///< prior of fit/marker_offsets.h; 0: markers have none
 
   int frames() const { return static_cast<int>(frame_time_s.size()); }

@@ -75,6 +75,10 @@ struct HeavyAir {
     }
     direction.start_effect_memory.clear();
     direction.start_velocity_m_per_s.resize(3, 0);
+    if (direction.emerging) {
+      direction.emerging->start_memory.resize(0);
+      if (direction.emerging->effect->shifts_supports()) direction.emerging.reset();
+    }
     return direction;
   }
 
@@ -142,9 +146,9 @@ void settle(const HeavyAir& heavy, double time_s, std::span<const ParameterSet> 
 
 /// One simulation and its derivatives along at most kLanes directions.
 void settle(const HeavyAir& heavy, double time_s, const ParameterSet& set,
-            std::span<const Direction> directions, LaneState<DualLanes>& state) {
+            std::span<const Direction> directions, TangentStepper& stepper,
+            LaneState<DualLanes>& state) {
   state = start_of(heavy.cloth, set, directions);
-  TangentStepper stepper(heavy.cloth);
   const DualParameters parameters = DualParameters::of(heavy.cloth, set, directions);
   const LaneVectors<DualLanes> from_m = stepper.locate(state.position_m);
   LaneVectors<DualLanes> target_m = from_m;
@@ -240,11 +244,15 @@ void start_at_rest_with_tangents(const Cloth& cloth, ParameterSet& set,
     const size_t first = g * kLanes;
     const size_t count = std::min<size_t>(kLanes, directions.size() - first);
     LaneState<DualLanes> state;
-    settle(heavy, time_s, damped, std::span(moved).subspan(first, count), state);
+    const std::span<const Direction> group = std::span(moved).subspan(first, count);
+    TangentStepper stepper(heavy.cloth, group);
+    settle(heavy, time_s, damped, group, stepper, state);
     for (size_t d = 0; d < count; ++d) {
       const auto lane = static_cast<int>(d);
       directions[first + d].start_position_m = state.position_m.tangent.lane(lane);
       directions[first + d].start_velocity_m_per_s.resize(3, 0);
+      if (directions[first + d].emerging)
+        directions[first + d].emerging->start_memory = stepper.emerging_memory(d);
       directions[first + d].start_effect_memory =
           memory_of(cloth, heavy, [&](size_t k) -> Eigen::VectorXd {
             return state.effect_memory[k].row(0).unaryExpr(

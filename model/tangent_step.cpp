@@ -11,6 +11,14 @@ LaneValue<DualLanes> dual(double value, const LaneValue<>& tangent) {
   return LaneValue<DualLanes>::Constant(Dual(value, tangent.matrix()));
 }
 
+/// Adds a share of the difference of two fields to the derivatives along the direction of one lane.
+void add_share(double share, const LaneVectors<SingleLane>& to, const LaneVectors<SingleLane>& from,
+               Eigen::Index lane, LaneVectors<>& tangent) {
+  tangent.x.row(lane) += share * (to.x - from.x);
+  tangent.y.row(lane) += share * (to.y - from.y);
+  tangent.z.row(lane) += share * (to.z - from.z);
+}
+
 }  // namespace
 
 DualParameters DualParameters::of(const Cloth& cloth, const ParameterSet& set,
@@ -88,7 +96,7 @@ LaneState<DualLanes> start_of(const Cloth& cloth, const ParameterSet& set,
   return state;
 }
 
-TangentStepper::TangentStepper(const Cloth& cloth)
+TangentStepper::TangentStepper(const Cloth& cloth, std::span<const Direction> directions)
     : cloth_(cloth),
       inverse_mass_per_kg_(cloth.mass_kg.cwiseInverse()),
       held_value_(cloth),
@@ -99,11 +107,35 @@ TangentStepper::TangentStepper(const Cloth& cloth)
       force_n_(LaneVectors<DualLanes>::zero(cloth.mesh.vertex_count())),
       pull_n_(LaneVectors<DualLanes>::zero(held_value_.count())),
       target_m_(pull_n_),
-      memory_(LaneState<SingleLane>::of(cloth).effect_memory) {
-  for (const std::shared_ptr<const Effect>& effect : cloth.effects) {
-    changes_force_ = changes_force_ || effect->changes_force();
-    shifts_supports_ = shifts_supports_ || effect->shifts_supports();
+      memory_(LaneState<SingleLane>::of(cloth).effect_memory),
+      emerged_n_(force_n_.value),
+      emerged_target_m_(target_m_.value) {
+  const auto note = [&](const Effect& effect) {
+    changes_force_ = changes_force_ || effect.changes_force();
+    shifts_supports_ = shifts_supports_ || effect.shifts_supports();
+  };
+  for (const std::shared_ptr<const Effect>& effect : cloth.effects) note(*effect);
+  for (size_t d = 0; d < directions.size(); ++d) {
+    if (!directions[d].emerging) continue;
+    const EmergingEffect& from = *directions[d].emerging;
+    note(*from.effect);
+    Emerging emerging{.effect = from.effect,
+                      .lane = static_cast<Eigen::Index>(d),
+                      .per_change = 1 / from.change,
+                      .parameters = {},
+                      .memory = EffectMemory<SingleLane>::Zero(1, from.effect->memory_size(cloth))};
+    for (const double value : from.parameters)
+      emerging.parameters.push_back(LaneValue<SingleLane>::Constant(value));
+    if (from.start_memory.size() > 0) emerging.memory.row(0) = from.start_memory.array();
+    emerging_.push_back(std::move(emerging));
   }
+}
+
+Eigen::VectorXd TangentStepper::emerging_memory(size_t direction) const {
+  for (const Emerging& emerging : emerging_)
+    if (emerging.lane == static_cast<Eigen::Index>(direction))
+      return emerging.memory.row(0).matrix();
+  return {};
 }
 
 LaneVectors<DualLanes> TangentStepper::locate(const LaneVectors<DualLanes>& position_m) const {
@@ -140,13 +172,19 @@ void TangentStepper::step(const DualParameters& parameters,
     effect.add_force(value_scene, parameters.value.effects[e], memory_[e], force_n_.value);
     keep_memory(e);
   }
+  for (Emerging& emerging : emerging_) {
+    emerged_n_ = force_n_.value;
+    emerging.effect->add_force(value_scene, emerging.parameters, emerging.memory, emerged_n_);
+    add_share(emerging.per_change, emerged_n_, force_n_.value, emerging.lane, force_n_.tangent);
+  }
 
   const TangentSweep::State at{parameters.value.springs, position.value, velocity.value};
   const bool fused = !changes_force_ && !shifts_supports_;
   const LaneVectors<DualLanes>* target_m = &held_target_m;
   if (fused) {
     tangent_sweep_.step_euler(at, parameters.tangent.springs, parameters.tangent.gravity_m_per_s2,
-                              inverse_mass_per_kg_, effects > 0 ? &force_n_.tangent : nullptr,
+                              inverse_mass_per_kg_,
+                              effects + emerging_.size() > 0 ? &force_n_.tangent : nullptr,
                               time_step_s, position.tangent, velocity.tangent);
     sweep_.step_euler(parameters.value.springs, parameters.value.gravity_m_per_s2,
                       inverse_mass_per_kg_, effects > 0 ? &force_n_.value : nullptr, time_step_s,
@@ -173,6 +211,14 @@ void TangentStepper::step(const DualParameters& parameters,
                               target_m_.value);
         keep_memory(e);
       }
+      for (Emerging& emerging : emerging_) {
+        if (!emerging.effect->shifts_supports()) continue;
+        emerged_target_m_ = target_m_.value;
+        emerging.effect->shift_supports(value_scene, emerging.parameters, pull_n_.value,
+                                        emerging.memory, emerged_target_m_);
+        add_share(emerging.per_change, emerged_target_m_, target_m_.value, emerging.lane,
+                  target_m_.tangent);
+      }
       target_m = &target_m_;
     }
     for (size_t e = 0; e < effects; ++e) {
@@ -182,6 +228,12 @@ void TangentStepper::step(const DualParameters& parameters,
       effect.change_force(scene, parameters.effects[e], force_n_);
       force_n_.value = force_before_;
       effect.change_force(value_scene, parameters.value.effects[e], force_n_.value);
+    }
+    for (const Emerging& emerging : emerging_) {
+      if (!emerging.effect->changes_force()) continue;
+      emerged_n_ = force_n_.value;
+      emerging.effect->change_force(value_scene, emerging.parameters, emerged_n_);
+      add_share(emerging.per_change, emerged_n_, force_n_.value, emerging.lane, force_n_.tangent);
     }
     move_by_forces(force_n_.tangent, parameters.tangent.gravity_m_per_s2, inverse_mass_per_kg_,
                    time_step_s, position.tangent, velocity.tangent);

@@ -4,6 +4,8 @@
 
 #include <array>
 #include <functional>
+#include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -12,6 +14,16 @@
 #include "model/step.h"
 
 namespace clothfit {
+
+/// An effect that the cloth does not have, near its neutral values: what it does for a small change
+/// of one parameter, over that change, is how a simulation begins to change. Its own derivatives
+/// are not asked for, so it costs what it costs in one simulation.
+struct EmergingEffect {
+  std::shared_ptr<const Effect> effect;
+  std::vector<double> parameters;  ///< neutral, but for the change of one
+  double change = 0;               ///< along the direction, whose unit may be another than its
+  Eigen::VectorXd start_memory;    ///< empty: zeros
+};
 
 /// How one simulation changes along a direction: the derivatives of a ParameterSet and of what else
 /// it depends on. What is left empty does not change.
@@ -25,6 +37,7 @@ struct Direction {
   /// Of each held point, how its place changes (m); a point without a motion of its own moves with
   /// the start positions.
   std::vector<std::function<Eigen::Vector3d(double time_s)>> held_motion;
+  std::optional<EmergingEffect> emerging;
 };
 
 /// The parameters of one simulation and their changes along kLanes directions.
@@ -49,8 +62,11 @@ LaneState<DualLanes> start_of(const Cloth& cloth, const ParameterSet& set,
 /// itself has the bits that EulerStepper gives it. Holds scratch memory: one object per thread.
 class TangentStepper {
  public:
-  /// `cloth` must outlive the stepper.
-  explicit TangentStepper(const Cloth& cloth);
+  /// `cloth` must outlive the stepper. Of the directions, the effects that emerge along them.
+  explicit TangentStepper(const Cloth& cloth, std::span<const Direction> directions = {});
+
+  /// What the effect that emerges along a direction remembers; empty where none does.
+  Eigen::VectorXd emerging_memory(size_t direction) const;
 
   /// Where the held points are.
   LaneVectors<DualLanes> locate(const LaneVectors<DualLanes>& position_m) const;
@@ -60,6 +76,15 @@ class TangentStepper {
             double time_s, double time_step_s, LaneState<DualLanes>& state);
 
  private:
+  /// An effect that emerges along the direction of one lane.
+  struct Emerging {
+    std::shared_ptr<const Effect> effect;
+    Eigen::Index lane = 0;
+    double per_change = 0;
+    EffectValues<SingleLane> parameters;
+    EffectMemory<SingleLane> memory;
+  };
+
   void apply_limit(const DualParameters& parameters, double time_step_s,
                    LaneState<DualLanes>& state);
 
@@ -75,6 +100,8 @@ class TangentStepper {
   LaneVectors<DualLanes> force_n_, pull_n_, target_m_;
   LaneVectors<SingleLane> force_before_, target_before_;  ///< what an effect found
   std::vector<EffectMemory<SingleLane>> memory_;
+  std::vector<Emerging> emerging_;
+  LaneVectors<SingleLane> emerged_n_, emerged_target_m_;
 };
 
 }  // namespace clothfit

@@ -11,7 +11,7 @@ namespace {
 /// One simulation and its derivatives along up to kLanes directions.
 TangentResult run_group(const Cloth& cloth, const ParameterSet& set,
                         std::span<const Direction> directions, const Schedule& schedule) {
-  TangentStepper stepper(cloth);
+  TangentStepper stepper(cloth, directions);
   const DualParameters parameters = DualParameters::of(cloth, set, directions);
   LaneState<DualLanes> state = start_of(cloth, set, directions);
   LaneVectors<DualLanes> target_m = stepper.locate(state.position_m);

@@ -258,5 +258,46 @@ TEST(StartAtRest, HasTangentsThatAgreeWithCentralDifferences) {
   }
 }
 
+// An effect that the cloth does not have yet remembers what one that it has at its neutral values
+// would, and a run goes on from that.
+TEST(StartAtRest, HandsOnWhatEmergingEffectsRemember) {
+  constexpr double kStep = 5e-4;
+  for (const char* name : {"relaxation", "hysteresis"}) {
+    SCOPED_TRACE(name);
+    Uniform uniform(3);
+    const Swing swing(uniform);
+    TwoWays ways(swing.cloth, swing.set, {name, "ratio"});
+    ParameterSet without = swing.set, with = ways.set;
+    std::vector<Direction> emerging{ways.emerging}, present{ways.present};
+
+    start_at_rest_with_tangents(swing.cloth, without, emerging, 9.81, 0, kStep);
+    start_at_rest_with_tangents(ways.cloth, with, present, 9.81, 0, kStep);
+
+    EXPECT_EQ(without.start_position_m, with.start_position_m);
+    ASSERT_TRUE(emerging.front().emerging);
+    EXPECT_EQ(emerging.front().emerging->start_memory, with.start_effect_memory.front());
+    EXPECT_GT(with.start_effect_memory.front().norm(), 1e-3);
+    const Eigen::Matrix3Xd& start = present.front().start_position_m;
+    EXPECT_LT((emerging.front().start_position_m - start).norm(), 1e-4 * start.norm());
+    const TangentResult found =
+        simulate_with_tangents(swing.cloth, without, emerging, swing.schedule);
+    const TangentResult expected =
+        simulate_with_tangents(ways.cloth, with, present, swing.schedule);
+    for (size_t f = 1; f < swing.schedule.frame_time_s.size(); ++f) {
+      const Eigen::Matrix3Xd& tangent = expected.position_tangent[0][f];
+      EXPECT_LT((found.position_tangent[0][f] - tangent).norm(), 1e-4 * tangent.norm()) << f;
+      EXPECT_GT(tangent.norm(), 0);
+    }
+    // With nothing remembered it would start as a stress that has not relaxed.
+    emerging.front().emerging->start_memory.resize(0);
+    const Eigen::Matrix3Xd forgetful =
+        simulate_with_tangents(swing.cloth, without, emerging, swing.schedule)
+            .position_tangent[0]
+            .back();
+    const Eigen::Matrix3Xd& last = expected.position_tangent[0].back();
+    EXPECT_GT((forgetful - last).norm(), 0.01 * last.norm());
+  }
+}
+
 }  // namespace
 }  // namespace clothfit

@@ -1,5 +1,8 @@
 #pragma once
 
+#include <algorithm>
+#include <vector>
+
 #include "model/tangents.h"
 #include "tests/model/effect_contract.h"
 #include "tests/model/random_cloth.h"
@@ -46,6 +49,38 @@ inline Swing swing_under(const EffectEntry& entry, Uniform& uniform) {
   swing.set.start_effect_memory = random_memory(swing.cloth, uniform);
   return swing;
 }
+
+/// A law that a cloth may come to have, of which one parameter says how much.
+struct EmergingLaw {
+  const char* effect;
+  const char* amplitude;
+};
+
+/// The way from neutral along a law's amplitude: of a cloth that does not have the effect, and of
+/// the same cloth with the effect behind its own ones, at its neutral values.
+struct TwoWays {
+  Direction emerging, present;
+  Cloth cloth;       ///< that has the effect
+  ParameterSet set;  ///< its own
+
+  TwoWays(const Cloth& without, const ParameterSet& own, const EmergingLaw& law)
+      : cloth(without), set(own) {
+    cloth.add_effect(law.effect, "test");
+    const EffectDescription& effect = cloth.effect_descriptions.back();
+    set.effects.push_back(effect_contract::neutral(effect));
+    for (const std::vector<double>& values : set.effects)
+      present.effects.emplace_back(values.size(), 0.0);
+    const auto amplitude =
+        std::ranges::find(effect.parameters, law.amplitude, &EffectParameter::name);
+    const auto p = static_cast<size_t>(amplitude - effect.parameters.begin());
+    present.effects.back()[p] = 1;
+    emerging.emerging = EmergingEffect{.effect = cloth.effects.back(),
+                                       .parameters = set.effects.back(),
+                                       .change = 1e-5 * amplitude->typical,
+                                       .start_memory = {}};
+    emerging.emerging->parameters[p] += emerging.emerging->change;
+  }
+};
 
 inline Direction random_direction(const Cloth& cloth, Uniform& uniform) {
   Direction d;

@@ -1,5 +1,6 @@
-// Derivatives of whole simulations: against differences, and to the bits of simulate(). What single
-// effects contribute is held against differences in effect_contract.h too.
+// Derivatives of whole simulations: against differences, and to the bits of simulate(); along
+// effects that a cloth does not have, against those of a cloth that has them. What single effects
+// contribute is held against differences in effect_contract.h too.
 
 #include "model/tangents.h"
 
@@ -109,6 +110,68 @@ TEST(Tangents, AgreeWithCentralDifferencesUnderEveryEffect) {
     const Direction direction = random_direction(swing.cloth, uniform);
 
     EXPECT_LT(error_of_tangents(swing.cloth, swing.set, direction, swing.schedule, 1e-6), 1e-6);
+  }
+}
+
+TEST(Tangents, AlongAnEmergingEffectAreThoseOfAClothThatHasItAtItsNeutralValues) {
+  // Forces, also with a memory; inertia; supports. More than go side by side.
+  constexpr EmergingLaw kLaws[] = {{"wind", "q_x"},
+                                   {"wind", "c"},
+                                   {"viscous_damping", "rate"},
+                                   {"frame_acceleration", "a_y"},
+                                   {"gravity_tilt", "about_x"},
+                                   {"relaxation", "ratio"},
+                                   {"hysteresis", "ratio"},
+                                   {"nonuniform_mass", "hem_bottom"},
+                                   {"nonuniform_mass", "gradient_s"},
+                                   {"added_air_mass", "mu"},
+                                   {"support_motion", "amplitude_x"}};
+  Uniform uniform(1);
+  const Swing plain(uniform);
+  Swing windy = plain;
+  windy.cloth.add_effect("wind", "test");
+  windy.set.effects = {{0.1, 0.2, -0.3, 0.4}};
+  for (const Swing* swing : {&plain, static_cast<const Swing*>(&windy)}) {
+    std::vector<Direction> directions;
+    for (const EmergingLaw& law : kLaws)
+      directions.push_back(TwoWays(swing->cloth, swing->set, law).emerging);
+
+    const TangentResult result =
+        simulate_with_tangents(swing->cloth, swing->set, directions, swing->schedule);
+
+    EXPECT_EQ(result.run.position_m,
+              simulate(swing->cloth, {&swing->set, 1}, swing->schedule).front().position_m);
+    for (size_t d = 0; d < directions.size(); ++d) {
+      SCOPED_TRACE(testing::Message() << kLaws[d].effect << '.' << kLaws[d].amplitude << ", "
+                                      << swing->cloth.effects.size() << " effects");
+      const TwoWays with(swing->cloth, swing->set, kLaws[d]);
+      const TangentResult expected =
+          simulate_with_tangents(with.cloth, with.set, {&with.present, 1}, swing->schedule);
+      for (size_t f = 1; f < swing->schedule.frame_time_s.size(); ++f) {
+        const Eigen::Matrix3Xd& tangent = expected.position_tangent[0][f];
+        EXPECT_GT(tangent.norm(), 0);
+        // The small change that stands for a derivative leaves 1e-5 of a law's curvature.
+        EXPECT_LT((result.position_tangent[d][f] - tangent).norm(), 1e-4 * tangent.norm()) << f;
+      }
+    }
+  }
+}
+
+// The two know nothing of each other: the tangent along both is the sum.
+TEST(Tangents, AlongAnEmergingEffectAddToThoseOfAllElse) {
+  Uniform uniform(2);
+  const Swing swing(uniform);
+  const Direction emerging = TwoWays(swing.cloth, swing.set, {"viscous_damping", "rate"}).emerging;
+  const Direction other = random_direction(swing.cloth, uniform);
+  Direction both = other;
+  both.emerging = emerging.emerging;
+
+  const TangentResult result = simulate_with_tangents(
+      swing.cloth, swing.set, std::vector<Direction>{emerging, other, both}, swing.schedule);
+
+  for (size_t f = 1; f < swing.schedule.frame_time_s.size(); ++f) {
+    const auto& tangent = result.position_tangent;
+    EXPECT_LT((tangent[2][f] - tangent[0][f] - tangent[1][f]).norm(), 1e-9 * tangent[2][f].norm());
   }
 }
 
