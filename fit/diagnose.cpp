@@ -6,14 +6,14 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <tuple>
 
 #include "data/input_error.h"
-#include "fit/cluster_covariance.h"
+#include "fit/diagnosis/clearance.h"
 #include "fit/diagnosis/discretisation.h"
+#include "fit/diagnosis/refit.h"
 #include "fit/measurement_effects/registry.h"
-#include "fit/observed_blocks.h"
 #include "fit/parameterised_model.h"
-#include "fit/prior_cost.h"
 #include "fit/uncertainty.h"
 
 namespace clothfit {
@@ -23,18 +23,15 @@ namespace {
 /// large the fit over all frames is biased, and the score with it: the shortest horizon at which
 /// something is missing says best what.
 constexpr double kScoreShares[] = {0.28, 0.4, 0.56, 0.75, 1.0};
-constexpr double kVisible = 1.2;  ///< chi-square per degree of freedom there
-constexpr int kScoreHorizons = 3;
-constexpr int kFewestFrames = 8;
+constexpr double kVisible = 1.2;  ///< chi-square per residual there
+/// A fit that leaves less than this over all frames is not biased by much.
+constexpr double kHardlyBiased = 3;
+constexpr size_t kScoreHorizons = 3;
 
-constexpr int kLeastForForce = 14;  ///< frames that a residual force is taken from
+/// Frames that a residual force is taken from, as a share, at least.
+constexpr double kForceShare = 0.28;
 
 constexpr int kTimeBlocks = 5;  ///< of the cross-validation
-
-/// The square of a standard normal number, and of more of them, that is as unlikely as five sigmas.
-double least_square(Eigen::Index amplitudes) {
-  return 25 + 3.6 * static_cast<double>(amplitudes - 1);
-}
 
 /// What a model must gain for each number more (Bayesian information criterion).
 double price(const ModelFit& model) {
@@ -42,25 +39,7 @@ double price(const ModelFit& model) {
   for (const Term& term : model.terms)
     amplitudes +=
         static_cast<double>(term.amplitudes.size() + (term.fits_shape ? term.shape.size() : 0));
-  return amplitudes * std::log(static_cast<double>(model.linear.residual.size()));
-}
-
-double chi_square(const ModelFit& model, double threshold) {
-  double sum = 2 * prior_cost(*model.problem, model.values).cost;
-  const TrajectoryObjective objective = model.objective();
-  for (const Objective::Block& block : objective.blocks()) {
-    const double length = model.linear.residual.segment(block.offset, block.dimension).norm();
-    sum += length <= threshold ? length * length : threshold * (2 * length - threshold);
-  }
-  return sum;
-}
-
-std::vector<int> horizons_from(int first, int frames) {
-  std::vector<int> horizons;
-  for (double at = first; at < 0.85 * frames; at *= 1.6)
-    horizons.push_back(static_cast<int>(std::lround(at)));
-  horizons.push_back(frames);
-  return horizons;
+  return amplitudes * std::log(static_cast<double>(model.residual_count()));
 }
 
 /// A line of the search: a model, and what was said of the laws that led to it.
@@ -75,102 +54,161 @@ struct Line {
 /// What a line's next law may be: scores averaged over horizons.
 struct Shortlist {
   std::vector<LawScore> scores;
-  int frames = 0;  ///< the shortest horizon
+  double share = 1;  ///< the shortest horizon
 };
+
+Adequacy adequacy_of(const DiagnosisSetup& setup, const ModelFit& model) {
+  return judge_adequacy(model, ModelProjection(model, setup.options.loss),
+                        ModelProjection(model, setup.options.loss, false));
+}
+
+/// The fitted model on the mesh that is analysed: twice the cells a side where that leaves clearly
+/// less, for derivatives of a mesh that cannot follow the cloth mistake one effect for another.
+/// `setup` is given that mesh.
+ModelFit on_analysed_mesh(ModelFit own, DiagnosisSetup& setup) {
+  constexpr double kClearlyLess = 0.05;  // of chi-square, per residual
+  if (setup.options.spring_set != SpringSet::fabric) return own;
+  const DiagnosisSetup other = with_other_mesh(setup, own);
+  if (other.columns < setup.columns) return own;
+  ModelFit finer = fit_on_mesh(other, own);
+  const double least_gain = kClearlyLess * static_cast<double>(own.residual_count());
+  if (!finer.usable || own.residual().squaredNorm() - finer.residual().squaredNorm() < least_gain)
+    return own;
+  linearise_model(finer);
+  if (!finer.usable) return own;
+  setup.columns = other.columns;
+  setup.rows = other.rows;
+  return finer;
+}
 
 class Search {
  public:
   Search(const DiagnosisSetup& setup, const DiagnoseOptions& options, std::vector<LawShapes> laws,
          double threshold, const ProgressCallback& progress, const bool& stopped)
       : setup_(setup),
+        coarse_(setup),
         options_(options),
         laws_(std::move(laws)),
         threshold_(threshold),
         progress_(progress),
-        stopped_(stopped) {}
-
-  /// From now on laws are asked for at these shapes alone.
-  void keep_shapes(const std::vector<LawScore>& scores) {
-    laws_.clear();
-    for (const LawScore& score : scores) laws_.push_back({score.term});
+        stopped_(stopped) {
+    // Twice as coarse; a start in motion has corrections on nodes of its own.
+    constexpr int kSmallest = 9;
+    const auto half = [&](int count) {
+      return std::min(count, std::max({kSmallest, setup.options.start_nodes + 1, (count + 1) / 2}));
+    };
+    if (setup.options.spring_set == SpringSet::fabric) {
+      coarse_.columns = half(setup.columns);
+      coarse_.rows = half(setup.rows);
+    }
   }
-  const std::vector<LawShapes>& laws() const { return laws_; }
 
-  double cost(const ModelFit& model) const { return chi_square(model, threshold_) + price(model); }
+  const std::vector<LawShapes>& laws() const { return laws_; }
+  double cost(const ModelFit& model) const { return model.chi_square(threshold_) + price(model); }
+
+  /// Scores of all laws, each at its best shape, with the derivatives of a coarser mesh.
+  std::vector<LawScore> roughly_scored(const ModelFit& model,
+                                       const std::vector<LawShapes>& laws) const {
+    ModelFit rough = with_derivatives_of(coarse_, model);
+    const ModelFit& by = rough.usable ? rough : model;
+    std::vector<LawScore> scores =
+        score_laws(by, ModelProjection(by, setup_.options.loss), laws, progress_);
+    std::ranges::stable_sort(scores, std::greater<>(), &LawScore::share);
+    return scores;
+  }
 
   Shortlist shortlist(const ModelFit& model) {
-    const int all = model.frames;
     std::vector<ModelFit> shorter;
+    const bool biased = model.residual().squaredNorm() >
+                        kHardlyBiased * static_cast<double>(model.residual_count());
+    Shortlist list;
     for (const double share : kScoreShares) {
-      const int frames =
-          std::clamp(static_cast<int>(std::lround(share * all)), std::min(kFewestFrames, all), all);
-      if (!shorter.empty() && frames == shorter.back().frames) continue;
-      ModelFit fitted = frames == all ? model
-                                      : fit_model(setup_, model.terms,
-                                                  values_by_name(*model.problem, model.values),
-                                                  {frames}, progress_);
+      if (share < 1 && !biased) continue;
+      ModelFit fitted = model;
+      if (share < 1) {
+        fitted = shortened(model, share);
+        refine_model(fitted, setup_, {.rounds = 1}, progress_);
+        if (stopped_) return {};
+        if (fitted.usable) refine_with_discretisation(fitted, setup_, progress_);
+      }
       if (stopped_) return {};
       if (!fitted.usable) continue;
-      const bool visible = fitted.linear.residual.squaredNorm() >
-                           kVisible * static_cast<double>(fitted.linear.residual.size());
-      if (visible || !shorter.empty() || frames == all) shorter.push_back(std::move(fitted));
+      const bool visible =
+          fitted.residual().squaredNorm() > kVisible * static_cast<double>(fitted.residual_count());
+      if (!visible && shorter.empty() && share < 1) continue;
+      if (shorter.empty()) list.share = share;
+      shorter.push_back(std::move(fitted));
       if (shorter.size() == kScoreHorizons) break;
     }
-    Shortlist list{.scores = {}, .frames = shorter.front().frames};
-    std::vector<LawShapes> laws = untested(model);
-    for (const ModelFit& at : shorter) {
-      const Projection projection = project(setup_, at, discretisation_directions(setup_, at));
-      std::vector<LawScore> scores = score_laws(at, projection, laws, progress_);
-      if (stopped_) return {};
-      if (list.scores.empty()) {
-        std::ranges::stable_sort(scores, std::greater<>(), &LawScore::share);
-        list.scores = std::move(scores);
-        laws.clear();  // further horizons judge the best of them, at the shapes found
+    std::vector<LawShapes> laws;
+    for (size_t k = 0; k < shorter.size(); ++k) {
+      const ModelFit& at = shorter[k];
+      if (k == 0) {
+        list.scores = roughly_scored(at, untested(model));
         for (const LawScore& score : list.scores)
           if (laws.size() < static_cast<size_t>(2 * options_.refits)) laws.push_back({score.term});
-        continue;
+        for (LawScore& score : list.scores) score.columns.clear();
+        for (size_t n = 0; n < laws.size(); ++n) list.scores[n].share = 0;
       }
+      const std::vector<LawScore> scores =
+          score_laws(at, ModelProjection(at, setup_.options.loss), laws, progress_);
+      if (stopped_) return {};
       for (const LawScore& score : scores) {
         const auto same = std::ranges::find_if(
             list.scores, [&](const LawScore& known) { return known.term.same_law(score.term); });
-        if (same == list.scores.end()) continue;
-        same->share += score.share;
-        if (score.fall > same->fall) {
-          same->fall = score.fall;
-          same->amount = score.amount;
-          same->sigma = score.sigma;
-        }
+        same->share += score.share / static_cast<double>(shorter.size());
+        if (k > 0 && score.fall <= same->fall) continue;
+        same->fall = score.fall;
+        same->amount = score.amount;
+        same->sigma = score.sigma;
       }
     }
-    for (size_t n = 0; n < std::min(laws.size(), list.scores.size()); ++n)
-      list.scores[n].share /= static_cast<double>(shorter.size());
+    // What a fit over all frames starts with.
+    const std::vector<LawShapes> best = laws;
+    std::vector<LawScore> whole =
+        shorter.size() == 1 && list.share == 1
+            ? score_laws(shorter.front(), ModelProjection(shorter.front(), setup_.options.loss),
+                         best, progress_)
+            : score_laws(model, ModelProjection(model, setup_.options.loss), best, progress_);
+    if (stopped_) return {};
+    for (LawScore& score : whole)
+      for (LawScore& known : list.scores)
+        if (known.term.same_law(score.term)) known.columns = std::move(score.columns);
     std::ranges::stable_sort(list.scores, std::greater<>(), &LawScore::share);
     return list;
   }
 
   /// Lines that a law more leads to, of those on the list.
   std::vector<Line> extend(Line& line, const Shortlist& list) {
-    std::vector<Line> children;
     line.finished = true;
-    const CrossValidation before = cross_validate(setup_, line.model, kTimeBlocks, threshold_);
-    std::vector<LawTrial> trials;
-    int tried = 0;
+    std::vector<Tried> tried;
     for (const LawScore& score : list.scores) {
-      if (score.fall < least_square(score.amount.size())) continue;
-      if (tried++ == options_.refits) break;
-      Line child{.model = refit(line.model, score, list.frames), .accepted = line.accepted};
+      if (score.fall < least_fall(score.amount.size()) || score.columns.empty()) continue;
+      if (tried.size() == static_cast<size_t>(options_.refits)) break;
+      tried.push_back(
+          {.score = &score,
+           .model = fit_with_law(setup_, line.model, score, list.share, threshold_, progress_)});
       if (stopped_) return {};
-      LawTrial trial = judge(line.model, before, score, child.model);
+    }
+    let_best_err(tried, line.model);
+    if (stopped_) return {};
+    std::vector<Line> children;
+    std::vector<LawTrial> trials;
+    const CrossValidation before = cross_validate(setup_, line.model, kTimeBlocks, threshold_);
+    for (Tried& child : tried) {
+      LawTrial trial = judge(line.model, before, *child.score, child.model);
       trials.push_back(trial);
       if (!trial.refused.empty()) {
         line.refused.push_back(std::move(trial));
         continue;
       }
-      child.cost = cost(child.model);
-      child.accepted.push_back({.trial = std::move(trial), .alike = {}, .refused = {}});
-      children.push_back(std::move(child));
+      children.push_back({.model = std::move(child.model), .accepted = line.accepted});
+      children.back().cost = cost(children.back().model);
+      children.back().accepted.push_back({.trial = std::move(trial), .alike = {}, .refused = {}});
     }
     std::ranges::stable_sort(children, {}, &Line::cost);
+    fit_shapes(children);
+    if (stopped_) return {};
     for (Line& child : children)
       for (const LawTrial& trial : trials)
         if (!trial.term.same_law(child.accepted.back().trial.term))
@@ -188,26 +226,50 @@ class Search {
     return result;
   }
 
-  ModelFit refit(const ModelFit& model, const LawScore& score, int first_frames) {
-    std::vector<Term> terms = model.terms;
-    terms.push_back(score.term);
-    std::map<std::string, double> start = values_by_name(*model.problem, model.values);
-    const EffectDescription effect = describe_effect(score.term.effect);
-    for (size_t k = 0; k < score.term.amplitudes.size(); ++k) {
-      const auto parameter =
-          std::ranges::find(effect.parameters, score.term.amplitudes[k], &EffectParameter::name);
-      // Half of what a linear model foresees: a start on the right side, not too far.
-      start[score.term.effect + "." + parameter->name] =
-          std::clamp(parameter->neutral + 0.5 * score.amount[static_cast<Eigen::Index>(k)],
-                     parameter->lower, parameter->upper);
+  struct Tried {
+    const LawScore* score = nullptr;
+    ModelFit model;
+  };
+
+  /// Directions of their own for the models that leave least, of those that stand far from where
+  /// the line's directions were taken.
+  void let_best_err(std::vector<Tried>& tried, const ModelFit& line) const {
+    constexpr double kNear = 0.5;  ///< of the best one's fall
+    const double from = line.chi_square(threshold_);
+    double best = 0;
+    for (const Tried& child : tried)
+      if (child.model.usable) best = std::max(best, from - child.model.chi_square(threshold_));
+    for (Tried& child : tried) {
+      ModelFit& model = child.model;
+      if (!model.usable || model.parts.front().directions.cols() > 0 ||
+          from - model.chi_square(threshold_) < kNear * best)
+        continue;
+      refine_with_discretisation(model, setup_, progress_);
+      if (stopped_) return;
     }
-    ModelFit fitted =
-        fit_model(setup_, terms, start, horizons_from(first_frames, model.frames), progress_);
-    if (stopped_ || !fitted.usable || score.term.shape.empty()) return fitted;
-    terms.back().fits_shape = true;
-    ModelFit with_shape = fit_model(setup_, terms, values_by_name(*fitted.problem, fitted.values),
-                                    {model.frames}, progress_, 1);
-    return with_shape.usable && cost(with_shape) < cost(fitted) ? with_shape : fitted;
+  }
+
+  /// Shapes between those of the grid, for laws that are near the best.
+  void fit_shapes(std::vector<Line>& children) {
+    constexpr double kNear = 0.2;  ///< of the best one's fall
+    if (children.empty()) return;
+    const double reach = kNear * children.front().accepted.back().trial.fall;
+    const double best = children.front().cost;
+    for (Line& child : children) {
+      std::vector<Term> terms = child.model.terms;
+      if (terms.back().shape.empty() || child.cost > best + reach) continue;
+      terms.back().fits_shape = true;
+      ModelFit with_shape = with_terms(setup_, child.model, terms, {});
+      refine_model(with_shape, setup_, {.rounds = 1}, progress_);
+      if (stopped_) return;
+      if (!with_shape.usable || cost(with_shape) >= child.cost) continue;
+      LawTrial& trial = child.accepted.back().trial;
+      trial.fall += child.model.chi_square(threshold_) - with_shape.chi_square(threshold_);
+      trial.term = with_shape.terms.back();
+      child.model = std::move(with_shape);
+      child.cost = cost(child.model);
+    }
+    std::ranges::stable_sort(children, {}, &Line::cost);
   }
 
   LawTrial judge(const ModelFit& before, const CrossValidation& validated, const LawScore& score,
@@ -218,16 +280,18 @@ class Search {
       return trial;
     }
     trial.term = after.terms.back();
-    trial.fall = chi_square(before, threshold_) - chi_square(after, threshold_);
+    trial.fall = before.chi_square(threshold_) - after.chi_square(threshold_);
+    const double least = least_fall(score.amount.size());
+    if (trial.fall < std::max(least, 0.5 * score.fall)) {
+      trial.refused = "the fit gains less than half of what was foreseen";
+      return trial;
+    }
     const CrossValidation own = cross_validate(setup_, after, kTimeBlocks, threshold_);
     trial.cross_validated = own.mean;
     trial.without_it = validated.mean;
     trial.best_trivial = std::min(validated.constant_offset, validated.last_residual);
-    trial.clear_of_neutral = clear_of_neutral(after);
-    const double least = least_square(score.amount.size());
-    if (trial.fall < std::max(least, 0.5 * score.fall))
-      trial.refused = "the fit gains less than half of what was foreseen";
-    else if (!own.usable || own.mean >= validated.mean)
+    trial.clear_of_neutral = clear_of_neutral(after, adequacy_of(setup_, after), threshold_);
+    if (!own.usable || own.mean >= validated.mean)
       trial.refused = "frames that were left out are predicted no better";
     else if (own.mean >= trial.best_trivial)
       trial.refused = "a correction without physics does as well";
@@ -236,68 +300,14 @@ class Search {
     return trial;
   }
 
-  /// How many standard deviations the last term's amplitudes stand from neutral: the fewer of those
-  /// by the noise and by residuals that depend on each other within blocks. Several together count
-  /// as one that is as unlikely.
-  double clear_of_neutral(const ModelFit& model) const {
-    const TrajectoryObjective objective = model.objective();
-    LinearisedFit fit{.residual = model.linear.residual,
-                      .jacobian = model.linear.residual_by_coordinate,
-                      .weight = {},
-                      .prior_information = prior_cost(*model.problem, model.values).information};
-    fit.weight = huber_weights(objective, fit.residual, threshold_);
-    const Eigen::MatrixXd errs = discretisation_directions(setup_, model);
-    const Eigen::Index fitted = fit.jacobian.cols(), all = fitted + errs.cols();
-    fit.jacobian.conservativeResize(Eigen::NoChange, all);
-    fit.jacobian.rightCols(errs.cols()) = errs;
-    Eigen::MatrixXd priors = Eigen::MatrixXd::Identity(all, all);
-    priors.topLeftCorner(fitted, fitted) = fit.prior_information;
-    fit.prior_information = priors;
-
-    const Term& term = model.terms.back();
-    const EffectDescription effect = describe_effect(term.effect);
-    const ParameterSpace& space = model.problem->space;
-    std::vector<Eigen::Index> indices;
-    Eigen::VectorXd away(static_cast<Eigen::Index>(term.amplitudes.size()));
-    const Eigen::VectorXd slope = space.value_by_coordinate(model.values);
-    for (size_t k = 0; k < term.amplitudes.size(); ++k) {
-      const int p = space.index(term.effect + "." + term.amplitudes[k]);
-      indices.push_back(p);
-      const auto parameter =
-          std::ranges::find(effect.parameters, term.amplitudes[k], &EffectParameter::name);
-      away[static_cast<Eigen::Index>(k)] = (model.values[p] - parameter->neutral) / slope[p];
-    }
-    const auto squares = [&](const Eigen::MatrixXd& covariance) {
-      const Eigen::MatrixXd own = covariance(indices, indices);
-      const double square = away.dot(own.ldlt().solve(away));
-      return std::isfinite(square) && square > 0 ? square : 0;
-    };
-    const Eigen::MatrixXd weighted = fit.weight.asDiagonal() * fit.jacobian;
-    Eigen::MatrixXd information = weighted.transpose() * fit.jacobian;
-    const double scale =
-        std::max(1.0, fit.residual.cwiseAbs2().dot(fit.weight) / std::max(1.0, fit.weight.sum()));
-    information = information / scale + fit.prior_information;
-    double least = squares(information.ldlt().solve(Eigen::MatrixXd::Identity(all, all)));
-    const ObservedBlocks cut = observed_blocks(objective, fit.residual);
-    if (cut.blocks.count >= 2) {
-      const ClusterCovariance clustered = cluster_covariance(fit, cut.blocks.block);
-      if (clustered.usable) least = std::min(least, squares(clustered.covariance));
-    }
-    return 5 * std::sqrt(least / least_square(away.size()));
-  }
-
   const DiagnosisSetup& setup_;
+  DiagnosisSetup coarse_;
   const DiagnoseOptions& options_;
   std::vector<LawShapes> laws_;
   double threshold_;
   const ProgressCallback& progress_;
   const bool& stopped_;  ///< set by `progress_` once it has said so
 };
-
-Adequacy adequacy_of(const DiagnosisSetup& setup, const ModelFit& model) {
-  return judge_adequacy(model, project(setup, model, discretisation_directions(setup, model)),
-                        project(setup, model, Eigen::MatrixXd(model.linear.residual.size(), 0)));
-}
 
 std::vector<DetectionLimit> limits_of(const std::vector<LawScore>& scores, double inflation) {
   std::vector<DetectionLimit> limits;
@@ -390,57 +400,62 @@ Diagnosis diagnose(const FitInput& input, const DiagnoseOptions& options,
     return !stopped;
   };
   Diagnosis result;
-  result.base = fit(input, options.fit, watched);
-  result.stop = result.base.stop;
-  result.message = result.base.message;
-  if (!result.base.usable()) return result;
-
-  const DiagnosisSetup setup{.input = input,
-                             .options = options.fit,
-                             .columns = result.base.result.mesh_columns,
-                             .rows = result.base.result.mesh_rows};
-  const auto problem = problem_of(setup, {});
-  const Eigen::VectorXd values = values_of(*problem, result.base.values);
-  const TimeSteps steps = time_steps_of_run(problem->cloth, parameter_set(*problem, values),
-                                            result.base.result.time_step_s);
-  Line base{.model = model_at(problem, {}, values, problem->first_held_out, steps),
-            .accepted = {},
-            .refused = {}};
-  if (!base.model.usable) {
-    result.stop = FitStop::diverged;
-    result.message = "the derivatives at the optimum could not be computed";
-    return result;
-  }
-  result.before = adequacy_of(setup, base.model);
-
-  const double duration_s =
-      problem->frame_time_s[static_cast<size_t>(problem->first_held_out - 1)] -
-      problem->frame_time_s.front();
-  std::vector<LawShapes> laws = laws_to_test(input, options.fit, duration_s);
-  std::erase_if(laws, [&](const LawShapes& law) {
-    return std::ranges::find(options.without, law.front().effect) != options.without.end();
-  });
-  const double threshold =
-      options.fit.loss == Loss::huber
-          ? kHuberScales * std::max(1.0, robust_scale(base.model.linear.residual))
-          : std::numeric_limits<double>::infinity();
-  Search search(setup, options, std::move(laws), threshold, watched, stopped);
   const auto cancelled = [&] {
     result.stop = FitStop::cancelled;
     result.message = "cancelled";
     return result;
   };
+  result.base = fit(input, options.fit, watched);
+  result.stop = result.base.stop;
+  result.message = result.base.message;
+  if (!result.base.usable()) return result;
+
+  DiagnosisSetup setup{.inputs = {&input, 1},
+                       .options = options.fit,
+                       .columns = result.base.result.mesh_columns,
+                       .rows = result.base.result.mesh_rows};
+  Line base{.model = model_at(setup, {}, {result.base.values}), .accepted = {}, .refused = {}};
+  {
+    PooledPart& part = base.model.parts.front();
+    const FitProblem& own = *base.model.problems.front();
+    part.steps = time_steps_of_run(own.cloth, parameter_set(own, part.values),
+                                   result.base.result.time_step_s);
+  }
+  linearise_model(base.model);
+  if (base.model.usable) {
+    base.model = on_analysed_mesh(std::move(base.model), setup);
+    refine_with_discretisation(base.model, setup, watched);
+  }
+  if (stopped) return cancelled();
+  if (!base.model.usable) {
+    result.stop = FitStop::diverged;
+    result.message = "the derivatives at the optimum could not be computed";
+    return result;
+  }
+  const FitProblem& problem = *base.model.problems.front();
+  result.columns = setup.columns;
+  result.rows = setup.rows;
+  result.before = adequacy_of(setup, base.model);
+
+  const double duration_s = problem.frame_time_s[static_cast<size_t>(problem.first_held_out - 1)] -
+                            problem.frame_time_s.front();
+  std::vector<LawShapes> laws = laws_to_test(input, options.fit, duration_s);
+  std::erase_if(laws, [&](const LawShapes& law) {
+    return std::ranges::find(options.without, law.front().effect) != options.without.end();
+  });
+  const double threshold = options.fit.loss == Loss::huber
+                               ? kHuberScales * robust_scale(base.model.residual())
+                               : std::numeric_limits<double>::infinity();
+  Search search(setup, options, std::move(laws), threshold, watched, stopped);
 
   base.cost = search.cost(base.model);
   Shortlist list = search.shortlist(base.model);
   if (stopped) return cancelled();
-  result.score_frames = list.frames;
+  result.score_frames = frames_of_share(problem, list.share);
   result.scores = list.scores;
-  search.keep_shapes(result.scores);
   // Over few frames, where the cloth's answer to a missing force is still small.
-  const ModelFit early =
-      fit_model(setup, {}, values_by_name(*problem, values),
-                {std::max(list.frames, std::min(kLeastForForce, base.model.frames))}, watched);
+  ModelFit early = shortened(base.model, std::max(list.share, kForceShare));
+  refine_model(early, setup, {.rounds = 1}, watched);
   if (stopped) return cancelled();
   result.residual_force = residual_force(early.usable ? early : base.model);
 
@@ -453,7 +468,15 @@ Diagnosis diagnose(const FitInput& input, const DiagnoseOptions& options,
       return !line.finished && line.model.terms.size() < static_cast<size_t>(options.most_effects);
     });
     if (next == lines.end()) break;
-    if (!next->model.terms.empty()) list = search.shortlist(next->model);
+    if (!next->model.terms.empty()) {
+      refine_with_discretisation(next->model, setup, watched);
+      if (!next->model.usable) {
+        next->finished = true;
+        continue;
+      }
+      next->cost = search.cost(next->model);
+      list = search.shortlist(next->model);
+    }
     if (stopped) return cancelled();
     std::vector<Line> children = search.extend(*next, list);
     if (stopped) return cancelled();
@@ -471,9 +494,7 @@ Diagnosis diagnose(const FitInput& input, const DiagnoseOptions& options,
   result.accepted = std::move(best.accepted);
   result.refused = std::move(best.refused);
   result.after = adequacy_of(setup, best.model);
-  const Projection projection =
-      project(setup, best.model, discretisation_directions(setup, best.model));
-  const std::vector<LawScore> last = score_laws(best.model, projection, search.laws(), watched);
+  const std::vector<LawScore> last = search.roughly_scored(best.model, search.laws());
   if (stopped) return cancelled();
   result.limits = limits_of(last, std::sqrt(std::max(1.0, result.after.chi_square_per_dof)));
 
@@ -482,8 +503,8 @@ Diagnosis diagnose(const FitInput& input, const DiagnoseOptions& options,
     result.verdict =
         result.after.adequate ? DiagnosisVerdict::adequate : DiagnosisVerdict::unexplained;
   } else {
-    FitOptions again = options_with(options.fit, best.model.terms);
-    again.start = values_by_name(*best.model.problem, best.model.values);
+    FitOptions again = options_with(setup, best.model.terms, 0);
+    again.start = best.model.values().front();
     result.found = fit(with_terms(input, best.model.terms), again, watched);
     if (stopped) return cancelled();
     if (!result.found.usable()) {
@@ -500,8 +521,8 @@ Diagnosis diagnose(const FitInput& input, const DiagnoseOptions& options,
         {.blocks = kTimeBlocks, .without = options.without, .threshold = threshold}, watched);
     if (stopped) return cancelled();
     if (result.law.found()) {
-      FitOptions again = options_with(options.fit, result.law.model.terms);
-      again.start = values_by_name(*result.law.model.problem, result.law.model.values);
+      FitOptions again = options_with(setup, result.law.model.terms, 0);
+      again.start = result.law.model.values().front();
       result.with_law = fit(with_terms(input, result.law.model.terms), again, watched);
       if (stopped) return cancelled();
     }

@@ -66,6 +66,7 @@ struct Diagnosis {
   FitReport base, found;  ///< the fit of the recording as declared, and with what was accepted
   Adequacy before, after;
   std::vector<LawScore> scores;          ///< of the base model, the most telling first
+  int columns = 0, rows = 0;             ///< of the mesh that was analysed
   int score_frames = 0;                  ///< horizon of these
   std::vector<AcceptedEffect> accepted;  ///< in the order in which they were
   std::vector<LawTrial> refused;         ///< the last round's

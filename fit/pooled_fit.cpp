@@ -8,34 +8,53 @@
 #include <limits>
 
 #include "data/input_error.h"
-#include "fit/objective.h"
 #include "fit/parameterised_model.h"
 #include "fit/prior_cost.h"
+#include "fit/refine.h"
+#include "fit/uncertainty.h"
 #include "model/stability.h"
 
 namespace clothfit {
 namespace {
 
-/// One recording's part of the expansion, over the parameters of its own space.
-struct Part {
-  bool usable = false;
-  double cost = 0;
-  Eigen::VectorXd gradient;
-  Eigen::MatrixXd information;
-};
+constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
-Part expand_one(const FitProblem& problem, const TimeSteps& steps, const Eigen::VectorXd& values) {
-  const TrajectoryObjective objective(problem, problem.first_held_out, steps);
-  const Linearisation linear = objective.linearise(values);
-  Part part;
-  if (!linear.usable) return part;
-  const Eigen::MatrixXd& jacobian = linear.residual_by_coordinate;
-  const PriorCost prior = prior_cost(problem, values);
-  part.cost = 0.5 * linear.residual.squaredNorm() + prior.cost;
-  part.gradient = jacobian.transpose() * linear.residual + prior.gradient;
-  part.information = jacobian.transpose() * jacobian + prior.information;
-  part.usable = true;
-  return part;
+TrajectoryObjective objective_of(const FitProblem& problem, const PooledPart& part) {
+  return {problem, part.frames, part.steps};
+}
+
+/// Amounts of the directions that leave least of a residual under weights.
+Eigen::VectorXd amounts_of(const Eigen::MatrixXd& directions, const Eigen::VectorXd& weight,
+                           const Eigen::VectorXd& residual) {
+  if (directions.cols() == 0) return {};
+  const Eigen::MatrixXd weighted = weight.asDiagonal() * directions;
+  Eigen::MatrixXd information = weighted.transpose() * directions;
+  information.diagonal().array() += 1;
+  return -information.ldlt().solve(weighted.transpose() * residual);
+}
+
+/// Half of Huber's sum of squares, observation by observation.
+double huber_cost(const Objective& objective, const Eigen::VectorXd& residual, double threshold) {
+  if (threshold == kInfinite) return 0.5 * residual.squaredNorm();
+  double sum = 0;
+  for (const Objective::Block& block : objective.blocks()) {
+    const double length = residual.segment(block.offset, block.dimension).norm();
+    sum += length <= threshold ? length * length : threshold * (2 * length - threshold);
+  }
+  return 0.5 * sum;
+}
+
+/// Fits the amounts of a part's directions to its residual; its cost then, priors included.
+double settle(const FitProblem& problem, PooledPart& part, double threshold) {
+  const TrajectoryObjective objective = objective_of(problem, part);
+  if (part.amounts.size() != part.directions.cols())
+    part.amounts = Eigen::VectorXd::Zero(part.directions.cols());
+  if (part.directions.cols() > 0)
+    part.amounts =
+        amounts_of(part.directions, huber_weights(objective, residual_of(part), threshold),
+                   part.linear.residual);
+  return huber_cost(objective, residual_of(part), threshold) + 0.5 * part.amounts.squaredNorm() +
+         prior_cost(problem, part.values).cost;
 }
 
 /// A coordinate that a step must not change: at a bound that keeps it from a lower cost.
@@ -50,241 +69,311 @@ std::vector<bool> held_at(const Eigen::VectorXd& x, const Eigen::VectorXd& lower
   return held;
 }
 
-std::vector<TimeSteps> stable_steps(std::span<const FitProblem* const> problems,
-                                    const std::vector<Eigen::VectorXd>& values) {
-  std::vector<TimeSteps> steps;
-  for (size_t n = 0; n < problems.size(); ++n)
-    steps.push_back(stable_time_steps(problems[n]->cloth, parameter_set(*problems[n], values[n])));
-  return steps;
-}
+/// The recordings where they stand, and what is known of the derivatives there.
+class Pool {
+ public:
+  Pool(std::span<const FitProblem* const> problems, const PooledOptions& options,
+       std::vector<PooledPart> parts)
+      : problems_(problems), options_(options), parts_(std::move(parts)), exact_(parts_.size()) {}
+
+  const std::vector<PooledPart>& parts() const { return parts_; }
+  std::vector<PooledPart> release() { return std::move(parts_); }
+  std::vector<Eigen::VectorXd> values() const {
+    std::vector<Eigen::VectorXd> all;
+    for (const PooledPart& part : parts_) all.push_back(part.values);
+    return all;
+  }
+  double cost() const { return cost_; }
+  bool is_linearised() const {
+    return std::ranges::all_of(parts_, [](const PooledPart& part) { return part.linear.usable; });
+  }
+  bool is_exact() const {
+    return std::ranges::all_of(exact_, [](bool exact) { return exact; });
+  }
+
+  /// Time steps and Huber's threshold anew, and exact derivatives where there are none. False where
+  /// a recording cannot be simulated.
+  bool begin_round(bool first) {
+    for (size_t n = 0; n < parts_.size(); ++n) {
+      PooledPart& part = parts_[n];
+      if (part.frames == 0) part.frames = problems_[n]->first_held_out;
+      if (first && part.linear.usable) {
+        exact_[n] = !part.borrowed;
+        continue;
+      }
+      part.steps = stable_time_steps(problems_[n]->cloth, parameter_set(*problems_[n], part.values))
+                       .times(1 / options_.stability_margin);
+      part.linear = {};
+    }
+    if (!linearise()) return false;
+    threshold_ = kInfinite;
+    if (options_.loss == Loss::huber) threshold_ = kHuberScales * scale();
+    cost_ = total_cost(parts_);
+    return true;
+  }
+
+  /// Whether neither the time steps nor the loss would be chosen much otherwise now.
+  bool is_settled() const {
+    constexpr double kRoom = 1.05, kSameScale = 0.8;
+    for (size_t n = 0; n < parts_.size(); ++n) {
+      const TimeSteps largest =
+          stable_time_steps(problems_[n]->cloth, parameter_set(*problems_[n], parts_[n].values));
+      const bool rests = problems_[n]->start == StartKind::at_rest;
+      if (largest.run_s < kRoom * parts_[n].steps.run_s ||
+          (rests && largest.rest_s < kRoom * parts_[n].steps.rest_s))
+        return false;
+    }
+    return threshold_ == kInfinite || kHuberScales * scale() > kSameScale * threshold_;
+  }
+
+  PooledSpace::Expansion expand(const PooledSpace& space) const {
+    std::vector<Quadratic> quadratics(parts_.size());
+    tbb::parallel_for(size_t{0}, parts_.size(), [&](size_t n) {
+      quadratics[n] = quadratic_of(*problems_[n], parts_[n], threshold_);
+    });
+    return space.gather(quadratics);
+  }
+
+  /// Goes to `values` if that lowers the cost. Derivatives are kept, updated, or had anew there.
+  bool try_to_move(const std::vector<Eigen::VectorXd>& values) {
+    std::vector<PooledPart> there = parts_;
+    std::vector<char> usable(parts_.size(), 0);
+    const bool dear = options_.updated_within > 0;
+    tbb::parallel_for(size_t{0}, parts_.size(), [&](size_t n) {
+      PooledPart& part = there[n];
+      const TrajectoryObjective objective = objective_of(*problems_[n], part);
+      part.values = values[n];
+      if (dear) {
+        part.linear.residual = objective.residuals({values[n]}).front();
+        usable[n] = part.linear.residual.size() == objective.residual_count();
+      } else {
+        part.linear = objective.linearise(values[n]);
+        usable[n] = part.linear.usable;
+      }
+    });
+    if (std::ranges::find(usable, 0) != usable.end()) return false;
+    const double cost = total_cost(there);
+    if (!(cost <= cost_)) return false;
+    const std::vector<char> were_exact = exact_;
+    if (dear) carry_derivatives(there);
+    std::swap(parts_, there);
+    if (!linearise()) {
+      std::swap(parts_, there);
+      exact_ = were_exact;
+      return false;
+    }
+    cost_ = cost;
+    return true;
+  }
+
+  /// Exact derivatives where they were kept or updated.
+  bool make_exact() {
+    for (size_t n = 0; n < parts_.size(); ++n)
+      if (!exact_[n]) parts_[n].linear.usable = false;
+    return linearise();
+  }
+
+ private:
+  double scale() const {
+    double largest = 1;
+    for (const PooledPart& part : parts_)
+      largest = std::max(largest, robust_scale(residual_of(part)));
+    return largest;
+  }
+
+  double total_cost(std::vector<PooledPart>& parts) const {
+    std::vector<double> costs(parts.size());
+    tbb::parallel_for(size_t{0}, parts.size(),
+                      [&](size_t n) { costs[n] = settle(*problems_[n], parts[n], threshold_); });
+    double sum = 0;
+    for (const double cost : costs) sum += cost;
+    return sum;
+  }
+
+  /// The smallest change of each Jacobian that would have foretold the residuals `there`
+  /// [broyden1965], coordinates weighed by what they change; none where it foretold them well, and
+  /// no derivatives where it was far off.
+  void carry_derivatives(std::vector<PooledPart>& there) {
+    for (size_t n = 0; n < parts_.size(); ++n) {
+      const ParameterSpace& space = problems_[n]->space;
+      Eigen::MatrixXd& jacobian = there[n].linear.residual_by_coordinate;
+      const Eigen::VectorXd way =
+          space.coordinates(there[n].values) - space.coordinates(parts_[n].values);
+      const Eigen::VectorXd change = jacobian * way;
+      const Eigen::VectorXd missed = there[n].linear.residual - parts_[n].linear.residual - change;
+      const double off = missed.norm() / std::max(change.norm(), 1e-300);
+      if (off <= options_.kept_within) continue;
+      if (off > options_.updated_within) {
+        there[n].linear.usable = false;
+        continue;
+      }
+      const Eigen::VectorXd weighed =
+          jacobian.colwise().squaredNorm().transpose().cwiseProduct(way);
+      jacobian += missed * weighed.transpose() / way.dot(weighed);
+      exact_[n] = false;
+    }
+  }
+
+  /// Where there are no derivatives. Residuals are the same.
+  bool linearise() {
+    std::vector<char> usable(parts_.size(), 1);
+    tbb::parallel_for(size_t{0}, parts_.size(), [&](size_t n) {
+      if (parts_[n].linear.usable) return;
+      parts_[n].linear = objective_of(*problems_[n], parts_[n]).linearise(parts_[n].values);
+      usable[n] = parts_[n].linear.usable;
+      parts_[n].borrowed = false;
+      exact_[n] = true;
+    });
+    return std::ranges::find(usable, 0) == usable.end();
+  }
+
+  std::span<const FitProblem* const> problems_;
+  const PooledOptions& options_;
+  std::vector<PooledPart> parts_;
+  std::vector<char> exact_;  ///< whether the derivatives are those of where the recording stands
+  double threshold_ = kInfinite, cost_ = 0;
+};
 
 }  // namespace
 
-PooledCost::PooledCost(std::span<const FitProblem* const> problems, std::vector<TimeSteps> steps)
-    : problems_(problems), steps_(std::move(steps)), places_(problems.size()) {
-  if (problems.empty() || steps_.size() != problems.size())
-    throw InputError("pooled fit", "no recordings, or not a time step for each", "at least one");
-  const ParameterSpace& first = problems.front()->space;
-  for (const FitParameter& parameter : first.parameters) {
-    if (!is_physical(parameter.role)) continue;
-    std::vector<int> indices;
-    for (const FitProblem* problem : problems)
-      indices.push_back(problem->space.index(parameter.name));
-    if (std::ranges::find(indices, -1) != indices.end())
-      throw InputError("pooled fit", "not all recordings have the parameter " + parameter.name,
-                       "recordings of one cloth, with the same effects");
-    shared_.push_back(std::move(indices));
-  }
-  size_ = shared();
-  for (size_t n = 0; n < problems.size(); ++n) {
-    const ParameterSpace& space = problems[n]->space;
-    for (int p = 0; p < space.size(); ++p)
-      if (!is_physical(space.parameters[static_cast<size_t>(p)].role)) places_[n].own.push_back(p);
-    if (space.size() - static_cast<int>(places_[n].own.size()) != shared())
-      throw InputError("pooled fit", "a recording has parameters of the physics that others lack",
-                       "recordings of one cloth, with the same effects");
-    places_[n].first = size_;
-    size_ += static_cast<int>(places_[n].own.size());
-  }
+Eigen::VectorXd residual_of(const PooledPart& part) {
+  if (part.amounts.size() == 0) return part.linear.residual;
+  return part.linear.residual + part.directions * part.amounts;
 }
 
-Eigen::VectorXd PooledCost::coordinates(const std::vector<Eigen::VectorXd>& values) const {
-  Eigen::VectorXd x(size_);
-  for (size_t n = problems_.size(); n-- > 0;) {  // the first one's shared values stay
-    const Eigen::VectorXd own = problems_[n]->space.coordinates(values[n]);
-    for (int s = 0; s < shared(); ++s) x[s] = own[shared_[static_cast<size_t>(s)][n]];
-    x.segment(places_[n].first, static_cast<Eigen::Index>(places_[n].own.size())) =
-        own(places_[n].own);
+Quadratic quadratic_of(const FitProblem& problem, const PooledPart& part, double threshold) {
+  Quadratic result;
+  if (!part.linear.usable) return result;
+  const TrajectoryObjective objective = objective_of(problem, part);
+  const Eigen::VectorXd residual = residual_of(part);
+  const Eigen::VectorXd weight = huber_weights(objective, residual, threshold);
+  const Eigen::MatrixXd& jacobian = part.linear.residual_by_coordinate;
+  const Eigen::MatrixXd weighted = weight.asDiagonal() * jacobian;
+  const PriorCost prior = prior_cost(problem, part.values);
+  result.cost =
+      huber_cost(objective, residual, threshold) + 0.5 * part.amounts.squaredNorm() + prior.cost;
+  result.gradient = weighted.transpose() * residual + prior.gradient;
+  result.information = weighted.transpose() * jacobian + prior.information;
+  if (part.directions.cols() > 0) {
+    const Eigen::MatrixXd between = weighted.transpose() * part.directions;
+    Eigen::MatrixXd own = part.directions.transpose() * weight.asDiagonal() * part.directions;
+    own.diagonal().array() += 1;
+    const Eigen::LDLT<Eigen::MatrixXd> solver(own);
+    // Zero where the amounts are at their least, but for the weights' last change.
+    const Eigen::VectorXd pull =
+        part.directions.transpose() * weight.cwiseProduct(residual) + part.amounts;
+    result.gradient -= between * solver.solve(pull);
+    result.information -= between * solver.solve(between.transpose());
   }
-  return x;
-}
-
-std::vector<Eigen::VectorXd> PooledCost::values(const Eigen::VectorXd& coordinates) const {
-  std::vector<Eigen::VectorXd> result;
-  for (size_t n = 0; n < problems_.size(); ++n) {
-    Eigen::VectorXd own(problems_[n]->space.size());
-    for (int s = 0; s < shared(); ++s) own[shared_[static_cast<size_t>(s)][n]] = coordinates[s];
-    own(places_[n].own) =
-        coordinates.segment(places_[n].first, static_cast<Eigen::Index>(places_[n].own.size()));
-    result.push_back(problems_[n]->space.values(own));
-  }
+  result.usable = true;
   return result;
 }
 
-Eigen::VectorXd PooledCost::lower() const {
-  std::vector<Eigen::VectorXd> ends;
-  for (const FitProblem* problem : problems_) {
-    Eigen::VectorXd end(problem->space.size());
-    for (int p = 0; p < problem->space.size(); ++p)
-      end[p] = problem->space.parameters[static_cast<size_t>(p)].lower;
-    ends.push_back(end);
-  }
-  return coordinates(ends);
-}
-
-Eigen::VectorXd PooledCost::upper() const {
-  std::vector<Eigen::VectorXd> ends;
-  for (const FitProblem* problem : problems_) {
-    Eigen::VectorXd end(problem->space.size());
-    for (int p = 0; p < problem->space.size(); ++p)
-      end[p] = problem->space.parameters[static_cast<size_t>(p)].upper;
-    ends.push_back(end);
-  }
-  return coordinates(ends);
-}
-
-double PooledCost::at(const Eigen::VectorXd& coordinates) const {
-  const std::vector<Eigen::VectorXd> values_of = values(coordinates);
-  std::vector<double> costs(problems_.size(), std::numeric_limits<double>::infinity());
-  tbb::parallel_for(size_t{0}, problems_.size(), [&](size_t n) {
-    const TrajectoryObjective objective(*problems_[n], problems_[n]->first_held_out, steps_[n]);
-    const Eigen::VectorXd residual = objective.residuals({values_of[n]}).front();
-    if (residual.size() == objective.residual_count())
-      costs[n] = 0.5 * residual.squaredNorm() + prior_cost(*problems_[n], values_of[n]).cost;
-  });
-  double sum = 0;
-  for (const double cost : costs) sum += cost;
-  return sum;
-}
-
-PooledCost::Expansion PooledCost::expand(const Eigen::VectorXd& coordinates) const {
-  const std::vector<Eigen::VectorXd> values_of = values(coordinates);
-  std::vector<Part> parts(problems_.size());
-  tbb::parallel_for(size_t{0}, problems_.size(), [&](size_t n) {
-    parts[n] = expand_one(*problems_[n], steps_[n], values_of[n]);
-  });
-  Expansion result{.usable = true,
-                   .gradient = Eigen::VectorXd::Zero(size_),
-                   .shared = Eigen::MatrixXd::Zero(shared(), shared()),
-                   .own = {},
-                   .between = {}};
-  for (size_t n = 0; n < parts.size(); ++n) {
-    result.usable = result.usable && parts[n].usable;
-    if (!result.usable) return result;
-    std::vector<int> common;
-    for (const std::vector<int>& indices : shared_) common.push_back(indices[n]);
-    const std::vector<int>& own = places_[n].own;
-    result.cost += parts[n].cost;
-    result.gradient.head(shared()) += parts[n].gradient(common);
-    result.gradient.segment(places_[n].first, static_cast<Eigen::Index>(own.size())) =
-        parts[n].gradient(own);
-    result.shared += parts[n].information(common, common);
-    result.own.push_back(parts[n].information(own, own));
-    result.between.push_back(parts[n].information(own, common));
-  }
-  return result;
-}
-
-Eigen::VectorXd PooledCost::step(const Expansion& expansion, double damping,
-                                 const std::vector<bool>& held) const {
-  // A held coordinate, or one that nothing depends on, keeps a unit of its own on the diagonal.
-  const auto prepared = [&](Eigen::MatrixXd information, int first) {
-    for (Eigen::Index p = 0; p < information.rows(); ++p) {
-      information(p, p) *= 1 + damping;
-      if (!held[static_cast<size_t>(first + p)] && information(p, p) > 0) continue;
-      information.row(p).setZero();
-      information.col(p).setZero();
-      information(p, p) = 1;
-    }
-    return information;
-  };
-  Eigen::VectorXd gradient = expansion.gradient;
-  for (Eigen::Index p = 0; p < size_; ++p)
-    if (held[static_cast<size_t>(p)]) gradient[p] = 0;
-  Eigen::MatrixXd reduced = prepared(expansion.shared, 0);
-  Eigen::VectorXd right = -gradient.head(shared());
-  std::vector<Eigen::LDLT<Eigen::MatrixXd>> own;
-  std::vector<Eigen::MatrixXd> between;
-  for (size_t n = 0; n < places_.size(); ++n) {
-    own.emplace_back(prepared(expansion.own[n], places_[n].first));
-    between.push_back(expansion.between[n]);
-    for (Eigen::Index p = 0; p < between[n].rows(); ++p)
-      if (held[static_cast<size_t>(places_[n].first + p)]) between[n].row(p).setZero();
-    for (Eigen::Index s = 0; s < shared(); ++s)
-      if (held[static_cast<size_t>(s)]) between[n].col(s).setZero();
-    if (between[n].rows() == 0) continue;
-    reduced -= between[n].transpose() * own[n].solve(between[n]);
-    right += between[n].transpose() *
-             own[n].solve(gradient.segment(places_[n].first, between[n].rows()));
-  }
-  Eigen::VectorXd step(size_);
-  step.head(shared()) = reduced.ldlt().solve(right);
-  for (size_t n = 0; n < places_.size(); ++n) {
-    const Eigen::Index count = between[n].rows();
-    if (count == 0) continue;
-    step.segment(places_[n].first, count) =
-        own[n].solve(-gradient.segment(places_[n].first, count) - between[n] * step.head(shared()));
-  }
-  return step;
-}
-
-PooledFit fit_pooled(std::span<const FitProblem* const> problems,
-                     const std::map<std::string, double>& start, const PooledOptions& options,
-                     const ProgressCallback& progress) {
-  PooledFit result;
-  for (const FitProblem* problem : problems) {
-    result.values.push_back(problem->space.start());
-    for (const auto& [name, value] : start)
-      if (const int p = problem->space.index(name); p >= 0) result.values.back()[p] = value;
-  }
+PooledFit fit_pooled(std::span<const FitProblem* const> problems, std::vector<PooledPart> start,
+                     const PooledOptions& options, const ProgressCallback& progress) {
   constexpr double kLeastDamping = 1e-9, kMostDamping = 1e6;
+  const PooledSpace space(problems);
+  const Eigen::VectorXd lower = space.lower(), upper = space.upper();
+  PooledFit result;
+  {
+    std::vector<Eigen::VectorXd> values;
+    for (const PooledPart& part : start) values.push_back(part.values);
+    const Eigen::VectorXd x = space.coordinates(values);
+    const Eigen::VectorXd inside = x.cwiseMax(lower).cwiseMin(upper);
+    values = space.values(inside);
+    for (size_t n = 0; n < start.size(); ++n) {
+      if (values[n].isApprox(start[n].values, 1e-12)) continue;
+      start[n].values = values[n];
+      start[n].linear = {};
+    }
+  }
+  Pool pool(problems, options, std::move(start));
   for (int round = 0; round < options.rounds; ++round) {
-    std::vector<TimeSteps> steps = stable_steps(problems, result.values);
-    for (TimeSteps& of : steps) of = of.times(1 / options.stability_margin);
-    const PooledCost pooled(problems, steps);
-    const Eigen::VectorXd lower = pooled.lower(), upper = pooled.upper();
-    Eigen::VectorXd x = pooled.coordinates(result.values).cwiseMax(lower).cwiseMin(upper);
-    const Eigen::VectorXd began = x;
-    PooledCost::Expansion here = pooled.expand(x);
-    if (!here.usable) {
+    if (!pool.begin_round(round == 0)) {
+      result.usable = false;
       result.message = "a recording cannot be simulated from the starting values";
       return result;
     }
-    double damping = 1e-4;
+    Eigen::VectorXd x = space.coordinates(pool.values());
+    const Eigen::VectorXd began = x;
+    double damping = 1e-3;
     bool settled = false;
     while (!settled && result.iterations < options.iterations) {
       if (progress && !progress({.stage = "pooled fit",
                                  .done = static_cast<double>(result.iterations),
                                  .total = static_cast<double>(options.iterations),
-                                 .note = "cost " + std::to_string(here.cost)})) {
+                                 .unit = "iterations",
+                                 .note = "cost " + std::to_string(pool.cost())})) {
+        result.cancelled = true;
         result.usable = false;
         result.message = "cancelled";
         return result;
       }
       ++result.iterations;
+      const PooledSpace::Expansion here = pool.expand(space);
+      if (!here.usable) break;
       const Eigen::VectorXd step =
-          pooled.step(here, damping, held_at(x, lower, upper, here.gradient));
+          space.step(here, damping, held_at(x, lower, upper, here.gradient));
       const Eigen::VectorXd next = (x + step).cwiseMax(lower).cwiseMin(upper);
-      const double moved = (next - x).head(pooled.shared()).cwiseAbs().maxCoeff();
-      PooledCost::Expansion there;
-      if (step.allFinite()) there = pooled.expand(next);
-      if (!there.usable || !(there.cost <= here.cost)) {
+      const Eigen::VectorXd way = next - x;
+      const double foreseen = space.foreseen_fall(here, way);
+      const double moved = way.head(space.shared()).cwiseAbs().maxCoeff();
+      if (step.allFinite() && foreseen < options.least_fall) {
+        settled = true;
+        break;
+      }
+      const double before = pool.cost();
+      if (!step.allFinite() || !pool.try_to_move(space.values(next))) {
         // A step this short that rises is the cost's rounding.
         settled = moved < options.least_step;
+        if (!settled && !pool.is_exact()) {
+          if (!pool.make_exact()) break;
+          continue;
+        }
         damping *= 10;
         if (damping > kMostDamping) break;
         continue;
       }
       settled = moved < options.least_step;
       x = next;
-      here = std::move(there);
-      damping = std::max(kLeastDamping, 0.1 * damping);
+      const double gained = before - pool.cost();
+      // A step that keeps a quarter of its promise was too long to be trusted so soon again.
+      damping = gained < 0.25 * foreseen ? std::min(10 * damping, 1.0)
+                                         : std::max(kLeastDamping, 0.1 * damping);
     }
-    result.values = pooled.values(x);
-    result.cost = here.cost;
-    result.usable = true;
+    result.cost = pool.cost();
+    result.usable = pool.is_linearised();
+    if (!result.usable) {
+      result.message = "a recording has no derivatives";
+      return result;
+    }
     // A round that hardly moved had the time steps of where it ended.
     constexpr double kStill = 1e-4;
-    result.converged = settled && (x - began).head(pooled.shared()).cwiseAbs().maxCoeff() < kStill;
+    const bool still = (x - began).head(space.shared()).cwiseAbs().maxCoeff() < kStill;
+    result.converged = settled && (still || (options.least_fall > 0 && pool.is_settled()));
     if (result.converged || result.iterations >= options.iterations) break;
   }
   result.message = result.converged ? "converged" : "not converged";
-  const ParameterSpace& space = problems.front()->space;
-  for (int p = 0; p < space.size(); ++p)
-    if (const FitParameter& parameter = space.parameters[static_cast<size_t>(p)];
+  result.parts = pool.release();
+  const ParameterSpace& first = problems.front()->space;
+  for (int p = 0; p < first.size(); ++p)
+    if (const FitParameter& parameter = first.parameters[static_cast<size_t>(p)];
         is_physical(parameter.role))
-      result.shared[parameter.name] = result.values.front()[p];
+      result.shared[parameter.name] = result.parts.front().values[p];
   return result;
+}
+
+PooledFit fit_pooled(std::span<const FitProblem* const> problems,
+                     const std::map<std::string, double>& start, const PooledOptions& options,
+                     const ProgressCallback& progress) {
+  std::vector<PooledPart> parts;
+  for (const FitProblem* problem : problems) {
+    parts.push_back(
+        {.values = problem->space.start(), .linear = {}, .directions = {}, .amounts = {}});
+    for (const auto& [name, value] : start)
+      if (const int p = problem->space.index(name); p >= 0) parts.back().values[p] = value;
+  }
+  return fit_pooled(problems, std::move(parts), options, progress);
 }
 
 }  // namespace clothfit

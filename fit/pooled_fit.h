@@ -6,83 +6,66 @@
 #include <vector>
 
 #include "data/progress.h"
-#include "fit/problem.h"
-#include "model/relax.h"
+#include "fit/objective.h"
+#include "fit/pooled_space.h"
 
 namespace clothfit {
 
-/// Half the sum of squares of all that several recordings of one cloth leave, with their priors.
-/// Parameters of the physics are shared; what tells how each recording was placed, or began, is its
-/// own. Coordinates: the shared ones, then those of each recording in turn.
-class PooledCost {
- public:
-  /// Time steps for each problem. The problems must outlive the cost. Throws InputError unless
-  /// they are at least one and have the same parameters of the physics.
-  PooledCost(std::span<const FitProblem* const> problems, std::vector<TimeSteps> steps);
-
-  int size() const { return size_; }
-  int shared() const { return static_cast<int>(shared_.size()); }
-  Eigen::VectorXd coordinates(const std::vector<Eigen::VectorXd>& values) const;
-  /// Of each problem's parameters.
-  std::vector<Eigen::VectorXd> values(const Eigen::VectorXd& coordinates) const;
-  Eigen::VectorXd lower() const;  ///< ends of the ranges, in coordinates
-  Eigen::VectorXd upper() const;
-
-  /// Infinite where a recording cannot be simulated.
-  double at(const Eigen::VectorXd& coordinates) const;
-
-  /// To second order, as Gauss and Newton have it. No two recordings' own coordinates meet in a
-  /// residual, so the information is an arrow.
-  struct Expansion {
-    bool usable = false;
-    double cost = 0;
-    Eigen::VectorXd gradient;
-    Eigen::MatrixXd shared;                ///< information of the shared coordinates
-    std::vector<Eigen::MatrixXd> own;      ///< of each recording's own
-    std::vector<Eigen::MatrixXd> between;  ///< own x shared
-  };
-  Expansion expand(const Eigen::VectorXd& coordinates) const;
-
-  /// The step -(H + damping diag H)^-1 gradient; `held` coordinates stay. Recordings' own ones are
-  /// eliminated first, so that any number of recordings costs only their number.
-  Eigen::VectorXd step(const Expansion& expansion, double damping,
-                       const std::vector<bool>& held) const;
-
- private:
-  struct Place {
-    std::vector<int> own;  ///< parameters of the problem that are not shared
-    int first = 0;         ///< their first coordinate
-  };
-  std::span<const FitProblem* const> problems_;
-  std::vector<TimeSteps> steps_;
-  std::vector<std::vector<int>> shared_;  ///< [shared][problem]: index in its space
-  std::vector<Place> places_;
-  int size_ = 0;
+/// One recording's part of a pooled fit.
+struct PooledPart {
+  Eigen::VectorXd values;  ///< of its problem's parameters
+  int frames = 0;          ///< looked at, from the first; 0: those that are not held out
+  TimeSteps steps = 0;     ///< 0: as stability asks
+  /// There, with these steps; where it is usable a fit begins with it. In the end of a fit: the
+  /// residuals, and exact derivatives or such as served (PooledOptions::kept_within).
+  Linearisation linear;
+  bool borrowed = false;  ///< the derivatives are those of another model, until a step fails
+  /// Directions, residuals x any, in which the model may err, each by a standard normal amount:
+  /// residuals are r + directions * amount, and the amounts are fitted along.
+  Eigen::MatrixXd directions;
+  Eigen::VectorXd amounts;  ///< of the directions, as they were fitted
 };
+
+/// Residuals of a part with what its directions explain taken out.
+Eigen::VectorXd residual_of(const PooledPart& part);
 
 struct PooledOptions {
   int iterations = 60;       ///< in all
-  int rounds = 6;            ///< each with time steps chosen anew, until one hardly moves
-  double least_step = 1e-7;  ///< it ends when no shared coordinate moves further
+  int rounds = 6;            ///< each with time steps and loss chosen anew, until one hardly moves
+  double least_step = 1e-7;  ///< it ends when no shared coordinate moves further,
+  double least_fall = 0;     ///< or the next step promises no more of the cost
   double stability_margin = 1.5;
+  Loss loss = Loss::squared;
+  /// Exact derivatives are had anew, updated, or kept, as in a refinement (RefineOptions).
+  double kept_within = 0;
+  double updated_within = 0;
 };
 
 struct PooledFit {
   bool usable = false;
   bool converged = false;
+  bool cancelled = false;
   std::string message;
   std::map<std::string, double> shared;  ///< values of the parameters of the physics, by name
-  std::vector<Eigen::VectorXd> values;   ///< of each problem's parameters
-  double cost = 0;                       ///< half the sum of squares
+  std::vector<PooledPart> parts;         ///< where each recording ends
+  double cost = 0;                       ///< half the sum of squares, or Huber's, with the priors
   int iterations = 0;
 };
 
-/// The least of the pooled cost by Levenberg and Marquardt's method, from `start` (values by name;
-/// what it does not name starts where its problem has it), under the squared loss, each recording's
-/// fitted frames. Recordings are simulated side by side; the bits are the same for any number of
-/// threads. Throws InputError as PooledCost does.
+/// Several recordings of one cloth fitted together: the least of half the sum of squares of all
+/// that they leave, with their priors, by Levenberg and Marquardt's method. Parameters of the
+/// physics are shared (fit/pooled_space.h). Recordings are simulated side by side; the bits are the
+/// same for any number of threads. Throws InputError as PooledSpace does.
+PooledFit fit_pooled(std::span<const FitProblem* const> problems, std::vector<PooledPart> start,
+                     const PooledOptions& options, const ProgressCallback& progress);
+
+/// The same from `start`, values by name; what it does not name starts where its problem has it.
 PooledFit fit_pooled(std::span<const FitProblem* const> problems,
                      const std::map<std::string, double>& start, const PooledOptions& options,
                      const ProgressCallback& progress);
+
+/// One recording's cost to second order where it was linearised, over its own space's parameters,
+/// amounts of its directions eliminated. `threshold`: Huber's, infinite for plain squares.
+Quadratic quadratic_of(const FitProblem& problem, const PooledPart& part, double threshold);
 
 }  // namespace clothfit

@@ -106,6 +106,7 @@ void write_diagnosis(const Diagnosis& diagnosis, const std::string& command,
   }
   json["adequacy"] = {{"before", adequacy_json(diagnosis.before)},
                       {"after", adequacy_json(diagnosis.after)}};
+  json["analysed_mesh"] = {{"columns", diagnosis.columns}, {"rows", diagnosis.rows}};
   json["score_frames"] = diagnosis.score_frames;
   json["candidates"] = ordered_json::array();
   for (const LawScore& score : diagnosis.scores) {

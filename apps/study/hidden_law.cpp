@@ -9,7 +9,6 @@
 #include "fit/diagnosis/law_derivatives.h"
 #include "fit/draws.h"
 #include "fit/parameterised_model.h"
-#include "fit/prior_cost.h"
 #include "fit/problem.h"
 #include "model/relax.h"
 
@@ -94,22 +93,24 @@ RecordingInformation recording_information(const SyntheticScene& scene, const Fi
   FitProblem problem = make_problem(recording.input, fit, fit.mesh_columns, fit.mesh_rows);
   if (problem.start == StartKind::unknown) start_at_truth(twin, seed, problem);
   const Eigen::VectorXd values = values_of(problem, recording.truth);
-  const ParameterSet set = parameter_set(problem, values);
-  const TimeSteps stable = stable_time_steps(problem.cloth, set);
   const int frames = problem.first_held_out;
   const double duration_s =
       problem.frame_time_s[static_cast<size_t>(frames - 1)] - problem.frame_time_s.front();
-  ModelFit model = model_at(std::make_shared<const FitProblem>(std::move(problem)), {}, values,
-                            frames, stable.times(1 / kStabilityMargin));
+  const TimeSteps stable = stable_time_steps(problem.cloth, parameter_set(problem, values));
+  ModelFit model{.terms = {},
+                 .problems = {std::make_shared<const FitProblem>(std::move(problem))},
+                 .parts = {{.values = values,
+                            .frames = frames,
+                            .steps = stable.times(1 / kStabilityMargin),
+                            .linear = {},
+                            .directions = {},
+                            .amounts = {}}}};
+  linearise_model(model);
   if (!model.usable)
     throw InputError("recover", "the scene has no derivatives", "a calmer motion",
                      "shorten it with --seconds, or raise the stiffness");
   std::vector<LawShapes> laws = laws_to_test(recording.input, fit, duration_s);
-  const PriorCost prior = prior_cost(*model.problem, values);
-  const Eigen::Index residuals = model.linear.residual.size();
-  Projection projection(model.linear.residual_by_coordinate, prior.information, prior.gradient,
-                        Eigen::MatrixXd(residuals, 0), Eigen::VectorXd::Ones(residuals),
-                        model.linear.residual);
+  ModelProjection projection(model, Loss::squared);
   return {.recording = std::move(recording),
           .laws = std::move(laws),
           .model = std::move(model),
@@ -142,9 +143,9 @@ DrawnLaw draw_law(const RecordingInformation& information, const HiddenLaw& law,
     if (p.upper <= p.neutral) along = -std::abs(along);
     direction[k] = p.typical * along;
   }
-  const Eigen::MatrixXd columns = law_derivatives(information.model, {&drawn.term, 1}).front();
-  if (columns.cols() == 0) return {};
-  Eigen::VectorXd projected = information.projection.columns(columns * direction);
+  const Columns columns = law_derivatives(information.model, {&drawn.term, 1}).front();
+  if (columns.empty()) return {};
+  Eigen::VectorXd projected = information.projection.columns({columns.front() * direction});
   if (beside.cols() > 0) projected -= beside * beside.colPivHouseholderQr().solve(projected);
   const double information_along = projected.norm();  // 1 / sigma of the amount along direction
   if (!(information_along > 0)) return {};
@@ -180,14 +181,14 @@ HiddenEffect hidden_effect(const DrawnLaw& drawn) {
 std::vector<std::vector<Eigen::MatrixXd>> projected_laws(const RecordingInformation& information) {
   std::vector<Term> all;
   for (const LawShapes& law : information.laws) all.insert(all.end(), law.begin(), law.end());
-  const std::vector<Eigen::MatrixXd> derivatives = law_derivatives(information.model, all);
+  const std::vector<Columns> derivatives = law_derivatives(information.model, all);
   std::vector<std::vector<Eigen::MatrixXd>> result;
   size_t n = 0;
   for (const LawShapes& law : information.laws) {
     std::vector<Eigen::MatrixXd>& shapes = result.emplace_back();
     for (size_t k = 0; k < law.size(); ++k, ++n)
-      shapes.push_back(derivatives[n].cols() > 0 ? information.projection.columns(derivatives[n])
-                                                 : Eigen::MatrixXd());
+      shapes.push_back(derivatives[n].empty() ? Eigen::MatrixXd()
+                                              : information.projection.columns(derivatives[n]));
   }
   return result;
 }

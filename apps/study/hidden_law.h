@@ -26,7 +26,7 @@ struct RecordingInformation {
   SyntheticRecording recording;  ///< without noise, of a cloth on the fit's mesh
   std::vector<LawShapes> laws;   ///< that a diagnosis tests
   ModelFit model;
-  Projection projection;  ///< everything that the fit has free is taken out
+  ModelProjection projection;  ///< everything that the fit has free is taken out
 };
 
 /// For the release of `seed`. Throws InputError where the scene cannot be simulated or has no

@@ -6,6 +6,8 @@
 #include <numbers>
 #include <utility>
 
+#include "fit/diagnosis/law_derivatives.h"
+
 namespace clothfit {
 namespace {
 
@@ -92,11 +94,10 @@ Eigen::MatrixXd smooth_functions(const TrajectoryObjective& objective, int along
 
 }  // namespace
 
-Adequacy judge_adequacy(const ModelFit& model, const Projection& projection,
-                        const Projection& noise_alone) {
+Adequacy judge_adequacy(const ModelFit& model, const ModelProjection& projection,
+                        const ModelProjection& noise_alone) {
   Adequacy result;
   const Eigen::VectorXd& residual = projection.residual();
-  const TrajectoryObjective objective = model.objective();
   result.chi_square_per_dof =
       residual.squaredNorm() / std::max(1.0, projection.weights() - projection.taken());
   result.noise_chi_square_per_dof = noise_alone.residual().squaredNorm() /
@@ -104,26 +105,32 @@ Adequacy judge_adequacy(const ModelFit& model, const Projection& projection,
 
   double time_products = 0, time_squares = 0, time_count = 0;
   double near_products = 0, near_squares = 0, near_count = 0;
-  const std::vector<std::pair<int, int>> near = neighbours(model.problem->marker_place_m);
-  for (size_t s = 0; s < model.problem->observations.size(); ++s) {
-    const auto blocks = blocks_of(objective, static_cast<int>(s));
-    const auto add = [&](const Objective::Block& one, const Objective::Block& other,
-                         double& products, double& squares, double& count) {
-      const auto a = residual.segment(one.offset, one.dimension);
-      const auto b = residual.segment(other.offset, other.dimension);
-      products += a.dot(b);
-      squares += 0.5 * (a.squaredNorm() + b.squaredNorm());
-      count += one.dimension;
-    };
-    for (const auto& [place, block] : blocks) {
-      const auto next = blocks.find({place.first, place.second + 1});
-      if (next != blocks.end()) add(*block, *next->second, time_products, time_squares, time_count);
-    }
-    for (int frame = 0; frame < model.frames; ++frame) {
-      for (const auto& [one, other] : near) {
-        const auto a = blocks.find({one, frame}), b = blocks.find({other, frame});
-        if (a != blocks.end() && b != blocks.end())
-          add(*a->second, *b->second, near_products, near_squares, near_count);
+  for (size_t n = 0; n < model.parts.size(); ++n) {
+    const FitProblem& problem = *model.problems[n];
+    const TrajectoryObjective objective = model.objective(n);
+    const Eigen::Index first = projection.first_row(n);
+    const std::vector<std::pair<int, int>> near = neighbours(problem.marker_place_m);
+    for (size_t s = 0; s < problem.observations.size(); ++s) {
+      const auto blocks = blocks_of(objective, static_cast<int>(s));
+      const auto add = [&](const Objective::Block& one, const Objective::Block& other,
+                           double& products, double& squares, double& count) {
+        const auto a = residual.segment(first + one.offset, one.dimension);
+        const auto b = residual.segment(first + other.offset, other.dimension);
+        products += a.dot(b);
+        squares += 0.5 * (a.squaredNorm() + b.squaredNorm());
+        count += one.dimension;
+      };
+      for (const auto& [place, block] : blocks) {
+        const auto next = blocks.find({place.first, place.second + 1});
+        if (next != blocks.end())
+          add(*block, *next->second, time_products, time_squares, time_count);
+      }
+      for (int frame = 0; frame < objective.frames(); ++frame) {
+        for (const auto& [one, other] : near) {
+          const auto a = blocks.find({one, frame}), b = blocks.find({other, frame});
+          if (a != blocks.end() && b != blocks.end())
+            add(*a->second, *b->second, near_products, near_squares, near_count);
+        }
       }
     }
   }
@@ -135,16 +142,25 @@ Adequacy judge_adequacy(const ModelFit& model, const Projection& projection,
   result.neighbour_score = along.score;
 
   const double chi_square = residual.squaredNorm();
-  constexpr std::pair<int, int> kSets[] = {{1, 4}, {2, 4}, {2, 8}, {3, 8}, {3, 16}};
+  constexpr std::pair<int, int> kSets[] = {{1, 4}, {2, 4}, {2, 8}, {3, 6}};
   for (const auto& [waves, in_time_waves] : kSets) {
-    const Eigen::MatrixXd functions = smooth_functions(objective, waves, in_time_waves);
-    if (2 * functions.cols() > functions.rows()) continue;
-    const Eigen::MatrixXd left = projection.columns(functions);
-    const Eigen::MatrixXd information = left.transpose() * left;
-    const Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver(information);
-    const Eigen::VectorXd pull = left.transpose() * residual;
-    const double taken = pull.dot(solver.solve(pull));
-    const auto rank = static_cast<double>(solver.rank());
+    double taken = 0, rank = 0;
+    for (size_t n = 0; n < model.parts.size(); ++n) {
+      Columns functions;
+      for (size_t m = 0; m < model.parts.size(); ++m)
+        functions.push_back(smooth_functions(model.objective(m), waves, in_time_waves));
+      if (2 * functions[n].cols() > functions[n].rows()) continue;
+      // Each recording has its own.
+      for (size_t m = 0; m < model.parts.size(); ++m)
+        if (m != n) functions[m] = Eigen::MatrixXd::Zero(functions[m].rows(), functions[n].cols());
+      const Eigen::MatrixXd left = projection.columns(functions);
+      const Eigen::MatrixXd information = left.transpose() * left;
+      const Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver(information);
+      const Eigen::VectorXd pull = left.transpose() * residual;
+      taken += pull.dot(solver.solve(pull));
+      rank += static_cast<double>(solver.rank());
+    }
+    if (rank == 0) continue;
     const double score = (taken - rank) / std::sqrt(2 * rank);
     if (score > result.smooth_score) {
       result.smooth_score = score;

@@ -21,7 +21,7 @@ struct Adequacy {
 };
 
 /// `noise_alone`: the projection without the discretisation's directions.
-Adequacy judge_adequacy(const ModelFit& model, const Projection& projection,
-                        const Projection& noise_alone);
+Adequacy judge_adequacy(const ModelFit& model, const ModelProjection& projection,
+                        const ModelProjection& noise_alone);
 
 }  // namespace clothfit

@@ -5,11 +5,26 @@
 namespace clothfit {
 
 /// How the residuals change when the model is cut finer or coarser: directions in which it may err
-/// by about as much, of unit variance each, residuals x directions (whitened). One for the time
-/// step, carried on to step zero (the scheme is of first order), and one for the mesh, against one
-/// of twice the cells a side, or of half as many where that leaves enough, each with the parameters
-/// that suit it best (with the same ones the other mesh is often another cloth). Springs whose
-/// natural lengths are fitted are those of one mesh, which then has none.
-Eigen::MatrixXd discretisation_directions(const DiagnosisSetup& setup, const ModelFit& model);
+/// by about as much, of unit variance each, residuals x directions (whitened) of each recording.
+/// One for the time step, carried on to step zero (the scheme is of first order), and one for the
+/// mesh, against one of twice the cells a side, or of half as many where that leaves enough, fitted
+/// to the same observations (with the same parameters the other mesh is often another cloth).
+/// Springs whose natural lengths are fitted are those of one mesh, which then has none.
+std::vector<Eigen::MatrixXd> discretisation_directions(const DiagnosisSetup& setup,
+                                                       const ModelFit& model);
+
+/// The setup with the mesh that directions are taken from.
+DiagnosisSetup with_other_mesh(const DiagnosisSetup& setup, const ModelFit& model);
+
+/// The model fitted on another mesh, over growing horizons. It begins with the derivatives of the
+/// model's own mesh, which serve for most of the way.
+ModelFit fit_on_mesh(const DiagnosisSetup& other, const ModelFit& model);
+
+/// Refines a model together with the amounts by which its discretisation errs, in the directions of
+/// where it stands first. A direction that is asked for by several times what it may be is no error
+/// of that discretisation: something else is missing, by which the two meshes were led to different
+/// optima. It is left out.
+void refine_with_discretisation(ModelFit& model, const DiagnosisSetup& setup,
+                                const ProgressCallback& progress);
 
 }  // namespace clothfit

@@ -7,12 +7,12 @@
 
 #include "fit/measurement_effects/applicability.h"
 #include "fit/measurement_effects/registry.h"
+#include "model/effects/registry.h"
 
 namespace clothfit {
 namespace {
 
-/// Laws differentiated in one run: a problem that has each of them once more, at its neutral
-/// values, so that the run stays as it is.
+/// Laws differentiated in one run, each at its neutral values, so that the run stays as it is.
 struct Batch {
   FitProblem problem;
   Eigen::VectorXd values;
@@ -24,11 +24,16 @@ struct Batch {
   int amplitudes = 0;
 };
 
+/// Of a motion effect's parameter, in its typical change: small enough to be a derivative, large
+/// enough that rounding does not count.
+constexpr double kSmall = 1e-5;
+
 void add(Batch& batch, size_t index, const Term& law) {
   const EffectDescription effect = describe_effect(law.effect);
   const MeasurementEffectEntry* entry = measurement_effect_named(law.effect);
   Batch::Law added{.index = index, .coordinates = {}};
   std::vector<Binding> bindings;
+  std::vector<double> neutral;
   for (const EffectParameter& parameter : effect.parameters) {
     Binding binding{.parameter = -1, .constant = parameter.neutral};
     if (const auto shape = law.shape.find(parameter.name); shape != law.shape.end())
@@ -48,6 +53,7 @@ void add(Batch& batch, size_t index, const Term& law) {
       batch.values.conservativeResize(batch.values.size() + 1);
       batch.values[batch.values.size() - 1] = parameter.neutral;
     }
+    neutral.push_back(binding.constant);
     bindings.push_back(binding);
   }
   if (entry) {
@@ -55,18 +61,26 @@ void add(Batch& batch, size_t index, const Term& law) {
         {.effect = entry->make(), .description = effect, .parameters = std::move(bindings)});
     add_slope_weights(batch.problem);
   } else {
-    batch.problem.cloth.add_effect(law.effect, law.effect);
-    batch.problem.effects.push_back(std::move(bindings));
+    const std::shared_ptr<const Effect> made = find_effect(law.effect, law.effect).make();
+    for (size_t k = 0; k < bindings.size(); ++k) {
+      if (bindings[k].parameter < 0) continue;
+      FitProblem::EmergingTerm term{.parameter = bindings[k].parameter,
+                                    .effect = made,
+                                    .values = neutral,
+                                    .change = kSmall * effect.parameters[k].typical};
+      term.values[k] += term.change;
+      batch.problem.emerging.push_back(std::move(term));
+    }
   }
   batch.amplitudes += static_cast<int>(added.coordinates.size());
   batch.laws.push_back(std::move(added));
 }
 
-}  // namespace
-
-std::vector<Eigen::MatrixXd> law_derivatives(const ModelFit& model, std::span<const Term> laws) {
+/// Of one recording.
+std::vector<Eigen::MatrixXd> derivatives_in(const FitProblem& problem, const PooledPart& part,
+                                            std::span<const Term> laws) {
   int measured = 0;
-  for (const FitProblem::MeasurementTerm& term : model.problem->measurement)
+  for (const FitProblem::MeasurementTerm& term : problem.measurement)
     for (const Binding& binding : term.parameters) measured += binding.parameter >= 0 ? 1 : 0;
   std::vector<Batch> batches;
   // Effects of motion and of the measurement apart: only the former cost derivatives of runs.
@@ -76,11 +90,11 @@ std::vector<Eigen::MatrixXd> law_derivatives(const ModelFit& model, std::span<co
     for (size_t n = 0; n < laws.size(); ++n) {
       const MeasurementEffectEntry* entry = measurement_effect_named(laws[n].effect);
       if ((entry != nullptr) != of_measurement) continue;
-      if (entry && why_inapplicable(*entry->make(), *model.problem)) continue;
+      if (entry && why_inapplicable(*entry->make(), problem)) continue;
       const auto more = static_cast<int>(laws[n].amplitudes.size());
       if (more > most) continue;
       if (!begun || batches.back().amplitudes + more > most)
-        batches.push_back({.problem = *model.problem, .values = model.values, .laws = {}});
+        batches.push_back({.problem = problem, .values = part.values, .laws = {}});
       begun = true;
       add(batches.back(), n, laws[n]);
     }
@@ -92,7 +106,7 @@ std::vector<Eigen::MatrixXd> law_derivatives(const ModelFit& model, std::span<co
     std::vector<int> all;
     for (const Batch::Law& law : batch.laws)
       all.insert(all.end(), law.coordinates.begin(), law.coordinates.end());
-    const TrajectoryObjective objective(batch.problem, model.frames, model.steps);
+    const TrajectoryObjective objective(batch.problem, part.frames, part.steps);
     const Linearisation linear = objective.linearise_by(batch.values, all);
     if (!linear.usable) return;
     const Eigen::VectorXd slope = batch.problem.space.value_by_coordinate(batch.values);
@@ -104,6 +118,34 @@ std::vector<Eigen::MatrixXd> law_derivatives(const ModelFit& model, std::span<co
       first += count;
     }
   });
+  return result;
+}
+
+}  // namespace
+
+std::vector<Columns> law_derivatives(const ModelFit& model, std::span<const Term> laws) {
+  const size_t recordings = model.parts.size();
+  std::vector<std::vector<Eigen::MatrixXd>> of_recording(recordings);
+  tbb::parallel_for(size_t{0}, recordings, [&](size_t n) {
+    of_recording[n] = derivatives_in(*model.problems[n], model.parts[n], laws);
+  });
+  std::vector<Columns> result(laws.size());
+  for (size_t k = 0; k < laws.size(); ++k) {
+    if (std::ranges::any_of(of_recording, [&](const auto& of) { return of[k].cols() == 0; }))
+      continue;
+    const bool own = measurement_effect_named(laws[k].effect) != nullptr;
+    const Eigen::Index each = of_recording.front()[k].cols();
+    for (size_t n = 0; n < recordings; ++n) {
+      Eigen::MatrixXd& of = of_recording[n][k];
+      if (own && recordings > 1) {
+        Eigen::MatrixXd wide =
+            Eigen::MatrixXd::Zero(of.rows(), each * static_cast<Eigen::Index>(recordings));
+        wide.middleCols(each * static_cast<Eigen::Index>(n), each) = of;
+        of = std::move(wide);
+      }
+      result[k].push_back(std::move(of));
+    }
+  }
   return result;
 }
 

@@ -8,11 +8,15 @@
 
 namespace clothfit {
 
-/// Derivatives of a model's whitened residuals by the amplitudes of each law, at their neutral
-/// values and the law's shape: residuals x amplitudes, per unit of the amplitude. Without columns
-/// for a law whose effect cannot act in this model, that a predictor has no room for beside the
-/// model's own effects of the measurement, or where they could not be computed.
-std::vector<Eigen::MatrixXd> law_derivatives(const ModelFit& model, std::span<const Term> laws);
+/// Derivatives of whitened residuals: residuals x amplitudes of each recording.
+using Columns = std::vector<Eigen::MatrixXd>;
+
+/// Derivatives of a model's residuals by the amplitudes of each law, per unit of the amplitude, at
+/// their neutral values and the law's shape. Amplitudes of the measurement are each recording's
+/// own: one after the other, zero in the others' residuals. Without columns for a law whose effect
+/// cannot act in this model, that a predictor has no room for beside the model's own effects of the
+/// measurement, or where they could not be computed.
+std::vector<Columns> law_derivatives(const ModelFit& model, std::span<const Term> laws);
 
 /// The share of a vector's square that columns explain: their squared multiple correlation, of
 /// whatever both were projected to. 0 for none.

@@ -2,6 +2,7 @@
 
 #include <vector>
 
+#include "fit/diagnosis/law_derivatives.h"
 #include "fit/diagnosis/model_fit.h"
 #include "fit/diagnosis/projection.h"
 
@@ -14,17 +15,13 @@ struct LawScore {
   Eigen::VectorXd sigma;   ///< of each from the noise, all else free; infinite where unseen
   double fall = 0;         ///< of chi-square
   double share = 0;        ///< of it in all that the projected residual has above its noise
+  Columns columns;         ///< derivatives of the residuals by the amplitudes
 };
-
-/// The projection of a model: its own parameters, priors and discretisation taken out. Residuals
-/// beyond three robust scales, or three sigmas where that is more, weigh less.
-Projection project(const DiagnosisSetup& setup, const ModelFit& model,
-                   const Eigen::MatrixXd& unit_directions);
 
 /// The score test [rao1948] of each law at its neutral value: derivatives there, projected, against
 /// the projected residual; amplitudes within their ranges. In the order of `laws`; a law whose
 /// effect cannot act in this model is left out.
-std::vector<LawScore> score_laws(const ModelFit& model, const Projection& projection,
+std::vector<LawScore> score_laws(const ModelFit& model, const ModelProjection& projection,
                                  const std::vector<LawShapes>& laws,
                                  const ProgressCallback& progress);
 

@@ -1,15 +1,25 @@
 #include "fit/diagnosis/model_fit.h"
 
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+
 #include "fit/measurement_effects/measurement_effect.h"
+#include "fit/measurement_effects/registry.h"
 #include "fit/parameterised_model.h"
+#include "fit/prior_cost.h"
+#include "model/stability.h"
 
 namespace clothfit {
 namespace {
 
-/// A model that is wrong has a rough cost, on which a refinement could go on for long; what is
-/// accepted is fitted once more, to the end.
-constexpr RefineOptions kStage{
-    .iterations = 12, .least_gain = 1e-4, .trust_region_radius = 1e4, .most_spring_steps = 1e10};
+constexpr int kFewestFrames = 8;
+
+/// Derivatives serve on as long as they foretell the residuals' change this well.
+constexpr double kKeptWithin = 0.02;
+constexpr double kUpdatedWithin = 0.1;
 
 void set_neutral(const EffectDescription& effect, const std::vector<Binding>& bindings,
                  Eigen::VectorXd& values) {
@@ -17,83 +27,190 @@ void set_neutral(const EffectDescription& effect, const std::vector<Binding>& bi
     if (bindings[k].parameter >= 0) values[bindings[k].parameter] = effect.parameters[k].neutral;
 }
 
+/// Whether a parameter's name is that of an effect of the measurement.
+bool is_of_measurement(const std::string& name) {
+  const size_t dot = name.find('.');
+  return dot != std::string::npos && measurement_effect_named(name.substr(0, dot)) != nullptr;
+}
+
 }  // namespace
 
-Eigen::VectorXd values_of(const FitProblem& problem, const std::map<std::string, double>& known) {
+Eigen::VectorXd values_of(const FitProblem& problem, const NamedValues& known) {
   Eigen::VectorXd values = problem.space.start();
   for (size_t e = 0; e < problem.effects.size(); ++e)
     set_neutral(problem.cloth.effect_descriptions[e], problem.effects[e], values);
   for (const FitProblem::MeasurementTerm& term : problem.measurement)
     set_neutral(term.description, term.parameters, values);
   for (int p = 0; p < problem.space.size(); ++p) {
-    const auto found = known.find(problem.space.parameters[static_cast<size_t>(p)].name);
-    if (found != known.end()) values[p] = found->second;
+    const FitParameter& parameter = problem.space.parameters[static_cast<size_t>(p)];
+    const auto found = known.find(parameter.name);
+    if (found != known.end())
+      values[p] = std::clamp(found->second, parameter.lower, parameter.upper);
   }
   return values;
 }
 
-std::map<std::string, double> values_by_name(const FitProblem& problem,
-                                             const Eigen::VectorXd& values) {
-  std::map<std::string, double> named;
-  for (int p = 0; p < problem.space.size(); ++p)
-    named[problem.space.parameters[static_cast<size_t>(p)].name] = values[p];
+std::vector<const FitProblem*> ModelFit::problem_pointers() const {
+  std::vector<const FitProblem*> pointers;
+  for (const auto& problem : problems) pointers.push_back(problem.get());
+  return pointers;
+}
+
+TrajectoryObjective ModelFit::objective(size_t recording) const {
+  return {*problems[recording], parts[recording].frames, parts[recording].steps};
+}
+
+std::vector<NamedValues> ModelFit::values() const {
+  std::vector<NamedValues> named(problems.size());
+  for (size_t n = 0; n < problems.size(); ++n) {
+    const ParameterSpace& space = problems[n]->space;
+    for (int p = 0; p < space.size(); ++p)
+      named[n][space.parameters[static_cast<size_t>(p)].name] = parts[n].values[p];
+  }
   return named;
 }
 
-FitOptions options_with(FitOptions options, const std::vector<Term>& terms) {
+Eigen::Index ModelFit::residual_count() const {
+  Eigen::Index count = 0;
+  for (const PooledPart& part : parts) count += part.linear.residual.size();
+  return count;
+}
+
+Eigen::VectorXd ModelFit::residual() const {
+  Eigen::VectorXd all(residual_count());
+  Eigen::Index first = 0;
+  for (const PooledPart& part : parts) {
+    all.segment(first, part.linear.residual.size()) = residual_of(part);
+    first += part.linear.residual.size();
+  }
+  return all;
+}
+
+double ModelFit::chi_square(double threshold) const {
+  double sum = 0;
+  for (size_t n = 0; n < parts.size(); ++n) {
+    const Eigen::VectorXd residual = residual_of(parts[n]);
+    sum += parts[n].amounts.squaredNorm() + 2 * prior_cost(*problems[n], parts[n].values).cost;
+    const TrajectoryObjective of = objective(n);
+    for (const Objective::Block& block : of.blocks()) {
+      const double length = residual.segment(block.offset, block.dimension).norm();
+      sum += length <= threshold ? length * length : threshold * (2 * length - threshold);
+    }
+  }
+  return sum;
+}
+
+FitOptions options_with(const DiagnosisSetup& setup, const std::vector<Term>& terms,
+                        size_t recording) {
+  FitOptions options = setup.options;
   for (const Term& term : terms)
     if (term.fits_shape)
       for (const auto& [parameter, value] : term.shape)
         options.priors.push_back({.name = term.effect + "." + parameter,
                                   .mean = value,
                                   .sigma = term.shape_sigma.at(parameter)});
+  if (recording > 0)
+    std::erase_if(options.priors,
+                  [](const ParameterPrior& prior) { return !is_of_measurement(prior.name); });
   return options;
 }
 
-std::shared_ptr<const FitProblem> problem_of(const DiagnosisSetup& setup,
-                                             const std::vector<Term>& terms) {
-  return std::make_shared<const FitProblem>(make_problem(with_terms(setup.input, terms),
-                                                         options_with(setup.options, terms),
-                                                         setup.columns, setup.rows));
+std::vector<std::shared_ptr<const FitProblem>> problems_of(const DiagnosisSetup& setup,
+                                                           const std::vector<Term>& terms) {
+  std::vector<std::shared_ptr<const FitProblem>> problems;
+  for (size_t n = 0; n < setup.inputs.size(); ++n)
+    problems.push_back(std::make_shared<const FitProblem>(
+        make_problem(with_terms(setup.inputs[n], terms), options_with(setup, terms, n),
+                     setup.columns, setup.rows)));
+  return problems;
 }
 
-ModelFit model_at(std::shared_ptr<const FitProblem> problem, std::vector<Term> terms,
-                  Eigen::VectorXd values, int frames, const TimeSteps& steps) {
-  ModelFit model{.terms = std::move(terms),
-                 .problem = std::move(problem),
-                 .values = std::move(values),
-                 .frames = frames,
-                 .steps = steps,
-                 .linear = {}};
-  model.linear = model.objective().linearise(model.values);
-  model.usable = model.linear.usable;
+ModelFit model_at(const DiagnosisSetup& setup, const std::vector<Term>& terms,
+                  const std::vector<NamedValues>& values) {
+  ModelFit model{.terms = terms, .problems = problems_of(setup, terms), .parts = {}};
+  for (size_t n = 0; n < model.problems.size(); ++n) {
+    NamedValues known = values[n];
+    for (const Term& term : terms)
+      for (const auto& [parameter, value] : term.shape)
+        known.try_emplace(term.effect + "." + parameter, value);
+    const FitProblem& problem = *model.problems[n];
+    model.parts.push_back({.values = values_of(problem, known),
+                           .frames = problem.first_held_out,
+                           .linear = {},
+                           .directions = {},
+                           .amounts = {}});
+    model.parts.back().steps =
+        stable_time_steps(problem.cloth, parameter_set(problem, model.parts.back().values))
+            .times(1 / PooledOptions().stability_margin);
+  }
   return model;
 }
 
-ModelFit fit_model(const DiagnosisSetup& setup, const std::vector<Term>& terms,
-                   const std::map<std::string, double>& start, const std::vector<int>& horizons,
-                   const ProgressCallback& progress, int rounds) {
-  ModelFit model{.terms = terms, .problem = problem_of(setup, terms), .values = {}, .linear = {}};
-  std::map<std::string, double> known = start;
-  for (const Term& term : terms)
-    for (const auto& [parameter, value] : term.shape)
-      known.try_emplace(term.effect + "." + parameter, value);
-  model.values = values_of(*model.problem, known);
-  RefineOptions options = kStage;
-  options.rounds = rounds;
-  options.loss = setup.options.loss;
-  options.substep_scale = setup.options.substep_scale;
-  options.most_spring_steps *= setup.options.work;
-  for (const int frames : horizons) {
-    const RefineResult refined = refine(*model.problem, frames, model.values, options, progress);
-    model.cancelled = refined.cancelled;
-    if (refined.cancelled || !refined.usable) return model;
-    model.values = refined.values;
-    model.frames = frames;
-    model.steps = time_steps_of_run(
-        model.problem->cloth, parameter_set(*model.problem, model.values), refined.time_step_s);
+int frames_of_share(const FitProblem& problem, double share) {
+  const int all = problem.first_held_out;
+  return std::clamp(static_cast<int>(std::lround(share * all)), std::min(kFewestFrames, all), all);
+}
+
+ModelFit shortened(const ModelFit& model, double share) {
+  ModelFit result = model;
+  for (size_t n = 0; n < model.parts.size(); ++n) {
+    const PooledPart& whole = model.parts[n];
+    PooledPart& part = result.parts[n];
+    part.frames = std::min(whole.frames, frames_of_share(*model.problems[n], share));
+    const TrajectoryObjective objective = model.objective(n);
+    std::vector<int> rows;
+    for (const Objective::Block& block : objective.blocks())
+      if (block.frame < part.frames)
+        for (int c = 0; c < block.dimension; ++c) rows.push_back(block.offset + c);
+    if (whole.directions.cols() > 0) part.directions = whole.directions(rows, Eigen::all);
+    // Markers' constant offsets are those of the frames that are looked at.
+    const bool same = model.problems[n]->marker_offset_sigma_m == 0 && whole.linear.usable;
+    part.linear = {};
+    if (!same) continue;
+    part.linear.usable = true;
+    part.linear.residual = whole.linear.residual(rows);
+    part.linear.residual_by_coordinate = whole.linear.residual_by_coordinate(rows, Eigen::all);
   }
-  return model_at(model.problem, terms, model.values, model.frames, model.steps);
+  return result;
+}
+
+void refine_model(ModelFit& model, const DiagnosisSetup& setup, const StageOptions& options,
+                  const ProgressCallback& progress) {
+  const PooledOptions pooled{.iterations = options.iterations,
+                             .rounds = options.rounds,
+                             .least_fall = options.least_fall,
+                             .loss = setup.options.loss,
+                             .kept_within = kKeptWithin,
+                             .updated_within = kUpdatedWithin};
+  const std::vector<const FitProblem*> problems = model.problem_pointers();
+  PooledFit fitted = fit_pooled(problems, model.parts, pooled, progress);
+  model.cancelled = fitted.cancelled;
+  model.usable = fitted.usable;
+  if (fitted.usable) model.parts = std::move(fitted.parts);
+}
+
+void linearise_model(ModelFit& model) {
+  model.usable = true;
+  for (size_t n = 0; n < model.parts.size(); ++n) {
+    PooledPart& part = model.parts[n];
+    part.linear = model.objective(n).linearise(part.values);
+    model.usable = model.usable && part.linear.usable;
+  }
+}
+
+ModelFit with_derivatives_of(const DiagnosisSetup& other_mesh, const ModelFit& model) {
+  ModelFit result = model_at(other_mesh, model.terms, model.values());
+  for (size_t n = 0; n < result.parts.size(); ++n) {
+    result.parts[n].frames = model.parts[n].frames;
+    result.parts[n].directions = model.parts[n].directions;
+    result.parts[n].amounts = model.parts[n].amounts;
+  }
+  linearise_model(result);
+  for (size_t n = 0; result.usable && n < result.parts.size(); ++n) {
+    result.usable = result.parts[n].linear.residual.size() == model.parts[n].linear.residual.size();
+    result.parts[n].linear.residual = model.parts[n].linear.residual;
+  }
+  return result;
 }
 
 }  // namespace clothfit

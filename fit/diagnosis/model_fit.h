@@ -2,60 +2,85 @@
 
 #include <map>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "fit/diagnosis/term.h"
-#include "fit/objective.h"
-#include "fit/problem.h"
-#include "fit/refine.h"
+#include "fit/pooled_fit.h"
 
 namespace clothfit {
 
-/// A model of a recording with some effects, fitted to its first frames.
-struct ModelFit {
-  std::vector<Term> terms;
-  std::shared_ptr<const FitProblem> problem;
-  Eigen::VectorXd values;
-  int frames = 0;  ///< that it was fitted to
-  TimeSteps steps = 0;
-  Linearisation linear;  ///< there
-  bool usable = false;
-  bool cancelled = false;
+/// Parameters of one recording's problem by name.
+using NamedValues = std::map<std::string, double>;
 
-  TrajectoryObjective objective() const { return {*problem, frames, steps}; }
-};
-
-/// A problem's parameters at values known by name. Of those that are not known, amplitudes of
-/// effects are neutral and others where a fit begins.
-Eigen::VectorXd values_of(const FitProblem& problem, const std::map<std::string, double>& known);
-
-std::map<std::string, double> values_by_name(const FitProblem& problem,
-                                             const Eigen::VectorXd& values);
-
-/// What all fits of a diagnosis share.
+/// What all fits of a diagnosis share: recordings of one cloth.
 struct DiagnosisSetup {
-  const FitInput& input;
+  std::span<const FitInput> inputs;
   const FitOptions& options;
   int columns = 0, rows = 0;  ///< of the mesh
 };
 
-/// The options with the priors of the shapes that terms fit.
-FitOptions options_with(FitOptions options, const std::vector<Term>& terms);
+/// A model of the recordings with some effects, fitted to their first frames.
+struct ModelFit {
+  std::vector<Term> terms;
+  std::vector<std::shared_ptr<const FitProblem>> problems;  ///< of each recording
+  std::vector<PooledPart> parts;                            ///< where each stands, linearised
+  bool usable = false;
+  bool cancelled = false;
 
-/// The model's problem; all constants of its terms are in.
-std::shared_ptr<const FitProblem> problem_of(const DiagnosisSetup& setup,
-                                             const std::vector<Term>& terms);
+  std::vector<const FitProblem*> problem_pointers() const;
+  TrajectoryObjective objective(size_t recording) const;
+  std::vector<NamedValues> values() const;
+  Eigen::Index residual_count() const;
+  /// Of all recordings, one after the other, with what the discretisation explains taken out.
+  Eigen::VectorXd residual() const;
+  /// Twice the cost: the sum of squares, beyond `threshold` sigmas linear (Huber), and of priors.
+  double chi_square(double threshold) const;
+};
 
-/// Refines a model from values known by name over each of the horizons (frames, rising) in turn,
-/// and linearises it at the end of the last one.
-/// `rounds`: of each refinement (fit/refine.h).
-ModelFit fit_model(const DiagnosisSetup& setup, const std::vector<Term>& terms,
-                   const std::map<std::string, double>& start, const std::vector<int>& horizons,
-                   const ProgressCallback& progress, int rounds = 2);
+/// The model's problem of each recording; all constants of its terms are in.
+std::vector<std::shared_ptr<const FitProblem>> problems_of(const DiagnosisSetup& setup,
+                                                           const std::vector<Term>& terms);
 
-/// The model as it is, linearised over its first frames.
-ModelFit model_at(std::shared_ptr<const FitProblem> problem, std::vector<Term> terms,
-                  Eigen::VectorXd values, int frames, const TimeSteps& steps);
+/// Recording `recording`'s options, with the priors of the shapes that terms fit. What is known of
+/// shared parameters is told once.
+FitOptions options_with(const DiagnosisSetup& setup, const std::vector<Term>& terms,
+                        size_t recording);
+
+/// A problem's parameters at values known by name. Of those that are not known, amplitudes of
+/// effects are neutral and others where a fit begins.
+Eigen::VectorXd values_of(const FitProblem& problem, const NamedValues& known);
+
+/// The model at values known by name. Not linearised.
+ModelFit model_at(const DiagnosisSetup& setup, const std::vector<Term>& terms,
+                  const std::vector<NamedValues>& values);
+
+/// Frames of a recording that are such a share of its fitted ones; a handful at least.
+int frames_of_share(const FitProblem& problem, double share);
+
+/// The same model over that share of the frames: with what is known of the longer run, which it is
+/// the beginning of.
+ModelFit shortened(const ModelFit& model, double share);
+
+struct StageOptions {
+  int rounds = 2;
+  int iterations = 12;
+  /// A step that promises less than this of half chi-square is the last one; the default moves no
+  /// parameter by a seventh of its sigma.
+  double least_fall = 0.01;
+};
+
+/// Refines a model from where it stands: with the derivatives that it has, or anew.
+void refine_model(ModelFit& model, const DiagnosisSetup& setup, const StageOptions& options,
+                  const ProgressCallback& progress);
+
+/// Has exact derivatives where the model stands.
+void linearise_model(ModelFit& model);
+
+/// The model where it stands with the derivatives of another mesh: what they foresee hardly
+/// differs, and of a mesh of half the cells a side they cost a sixteenth. The residuals are the
+/// model's. Not usable where the other mesh does not run.
+ModelFit with_derivatives_of(const DiagnosisSetup& other_mesh, const ModelFit& model);
 
 }  // namespace clothfit

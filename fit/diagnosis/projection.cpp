@@ -3,6 +3,10 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cassert>
+#include <limits>
+
+#include "fit/prior_cost.h"
+#include "fit/uncertainty.h"
 
 namespace clothfit {
 namespace {
@@ -50,6 +54,67 @@ Eigen::MatrixXd Projection::columns(const Eigen::MatrixXd& of) const {
   for (Eigen::Index k = 0; k < left.cols(); ++k)
     if (left.col(k).squaredNorm() < kLeastLeft * before[k]) left.col(k).setZero();
   return left;
+}
+
+ModelProjection::ModelProjection(const ModelFit& model, Loss loss, bool with_directions) {
+  const std::vector<const FitProblem*> problems = model.problem_pointers();
+  const PooledSpace space(problems);
+  const double threshold = loss == Loss::huber ? kHuberScales * robust_scale(model.residual())
+                                               : std::numeric_limits<double>::infinity();
+  std::vector<Eigen::MatrixXd> shared_columns;
+  Eigen::MatrixXd prior_information = Eigen::MatrixXd::Zero(space.shared(), space.shared());
+  Eigen::VectorXd prior_gradient = Eigen::VectorXd::Zero(space.shared());
+  Eigen::Index rows = 0;
+  for (size_t n = 0; n < problems.size(); ++n) {
+    const PooledPart& part = model.parts[n];
+    const std::vector<int> common = space.shared_of(n);
+    const std::vector<int>& own = space.own_of(n);
+    const PriorCost prior = prior_cost(*problems[n], part.values);
+    const Eigen::MatrixXd& jacobian = part.linear.residual_by_coordinate;
+    const Eigen::VectorXd& residual = part.linear.residual;
+    const bool has_directions = with_directions && part.directions.cols() > 0;
+    own_.emplace_back(jacobian(Eigen::all, own), prior.information(own, own), prior.gradient(own),
+                      has_directions ? part.directions : Eigen::MatrixXd(residual.size(), 0),
+                      huber_weights(model.objective(n),
+                                    with_directions ? residual_of(part) : residual, threshold),
+                      residual);
+    first_row_.push_back(rows);
+    rows += own_.back().residual().size();
+    shared_columns.push_back(own_.back().columns(jacobian(Eigen::all, common)));
+    prior_information += prior.information(common, common);
+    prior_gradient += prior.gradient(common);
+  }
+  first_row_.push_back(rows);
+  Eigen::VectorXd residual(rows);
+  for (size_t n = 0; n < own_.size(); ++n)
+    residual.segment(first_row_[n], own_[n].residual().size()) = own_[n].residual();
+  shared_.emplace_back(stacked(shared_columns), prior_information, prior_gradient,
+                       Eigen::MatrixXd(rows, 0), Eigen::VectorXd::Ones(rows), residual);
+}
+
+Eigen::MatrixXd ModelProjection::stacked(const std::vector<Eigen::MatrixXd>& projected) const {
+  Eigen::MatrixXd all(first_row_.back(), projected.front().cols());
+  for (size_t n = 0; n < projected.size(); ++n)
+    all.middleRows(first_row_[n], projected[n].rows()) = projected[n];
+  return all;
+}
+
+Eigen::MatrixXd ModelProjection::columns(const std::vector<Eigen::MatrixXd>& of) const {
+  std::vector<Eigen::MatrixXd> projected;
+  for (size_t n = 0; n < own_.size(); ++n) projected.push_back(own_[n].columns(of[n]));
+  return shared_.front().columns(stacked(projected));
+}
+
+double ModelProjection::taken() const {
+  double sum = shared_.front().taken();
+  for (const Projection& own : own_) sum += own.taken();
+  return sum;
+}
+
+double ModelProjection::weights() const {
+  double sum = 0;
+  for (const Projection& own : own_) sum += own.weights();
+  return sum;
 }
 
 Explained explain(const Eigen::VectorXd& residual, const Eigen::MatrixXd& columns,

@@ -2,6 +2,9 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
+#include <vector>
+
+#include "fit/diagnosis/model_fit.h"
 
 namespace clothfit {
 
@@ -36,6 +39,31 @@ class Projection {
   Eigen::LDLT<Eigen::MatrixXd> information_;
   Eigen::VectorXd residual_;
   double taken_ = 0;
+};
+
+/// The projection of a model of several recordings: what is each recording's own goes first, then
+/// the shared parameters. Residuals beyond three robust scales, or three sigmas where that is more,
+/// weigh less if the loss says so.
+class ModelProjection {
+ public:
+  /// With the directions of the parts, or without any.
+  ModelProjection(const ModelFit& model, Loss loss, bool with_directions = true);
+
+  const Eigen::VectorXd& residual() const { return shared_.front().residual(); }
+  /// Of columns that belong to all recordings: residuals x columns of each.
+  Eigen::MatrixXd columns(const std::vector<Eigen::MatrixXd>& of) const;
+  /// Where a recording's residuals lie in the projected vectors.
+  Eigen::Index first_row(size_t recording) const { return first_row_[recording]; }
+
+  double taken() const;
+  double weights() const;
+
+ private:
+  Eigen::MatrixXd stacked(const std::vector<Eigen::MatrixXd>& projected) const;
+
+  std::vector<Projection> own_;
+  std::vector<Projection> shared_;  ///< one
+  std::vector<Eigen::Index> first_row_;
 };
 
 /// How well columns explain what is left of a residual: of least squares with both projected.

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <utility>
 
-#include "fit/diagnosis/discretisation.h"
+#include "fit/diagnosis/refit.h"
 #include "fit/uncertainty.h"
 #include "model/effects/force_law.h"
 #include "model/effects/tension_law.h"
@@ -20,24 +20,10 @@ namespace {
 constexpr double kShares[] = {0.3, 0.5, 0.75, 1.0};
 constexpr double kVisible = 1.2;  ///< chi-square per residual there
 constexpr size_t kHorizons = 2;
-constexpr int kFewestFrames = 8;
 
 /// Terms that are foreseen to explain less than this share of what the best one does are not
 /// fitted.
 constexpr double kWorthAFit = 0.8;
-
-/// The square of a standard normal number, and of more of them, that is as unlikely as five sigmas.
-double least_square(Eigen::Index amplitudes) {
-  return 25 + 3.6 * static_cast<double>(amplitudes - 1);
-}
-
-std::vector<int> horizons_from(int first, int frames) {
-  std::vector<int> horizons;
-  for (double at = first; at < 0.85 * frames; at *= 1.6)
-    horizons.push_back(static_cast<int>(std::lround(at)));
-  horizons.push_back(frames);
-  return horizons;
-}
 
 /// Whether frames left out are foretold better: by a tenth of what is above the noise and by two
 /// per cent of the noise itself, below which nothing counts as structure
@@ -111,45 +97,31 @@ class Pursuit {
  private:
   int terms_of_law() const { return static_cast<int>(law_.model.terms.size() - own_terms_); }
 
-  ModelFit fit(const std::vector<Term>& terms, const std::map<std::string, double>& start,
-               const std::vector<int>& horizons) {
-    ModelFit fitted = fit_model(setup_, terms, start, horizons, progress_);
-    law_.cancelled = law_.cancelled || fitted.cancelled;
-    return fitted;
-  }
-
   /// What is foreseen of each term, the most telling first, and the shortest horizon where
   /// something is missing.
-  std::vector<LawScore> shortlist(int& first_frames) {
-    std::vector<Term> terms = empirical_laws(setup_.input, setup_.options);
-    std::erase_if(terms, [&](const Term& term) {
-      return std::ranges::find(options_.without, term.effect) != options_.without.end();
-    });
+  std::vector<LawScore> shortlist(double& first_share) {
+    const std::vector<LawShapes> terms = terms_to_test();
     std::vector<LawScore> list;
     size_t horizons = 0;
-    int last = 0;
     for (const double share : kShares) {
-      const int all = law_.model.frames;
-      const int frames =
-          std::clamp(static_cast<int>(std::lround(share * all)), std::min(kFewestFrames, all), all);
-      if (frames == last) continue;
-      last = frames;
-      const ModelFit at =
-          frames == all ? law_.model
-                        : fit(law_.model.terms,
-                              values_by_name(*law_.model.problem, law_.model.values), {frames});
+      ModelFit at = law_.model;
+      if (share < 1) {
+        at = shortened(law_.model, share);
+        refine_model(at, setup_, {.rounds = 1}, progress_);
+      }
+      law_.cancelled = law_.cancelled || at.cancelled;
       if (law_.cancelled) return {};
       if (!at.usable) continue;
-      const bool visible = at.linear.residual.squaredNorm() >
-                           kVisible * static_cast<double>(at.linear.residual.size());
-      if (!visible && list.empty() && frames != all) continue;
-      const Projection projection = project(setup_, at, discretisation_directions(setup_, at));
-      std::vector<LawScore> scores = score_terms(setup_, at, projection, terms);
+      const bool visible =
+          at.residual().squaredNorm() > kVisible * static_cast<double>(at.residual_count());
+      if (!visible && list.empty() && share < 1) continue;
+      const ModelProjection projection(at, setup_.options.loss);
+      std::vector<LawScore> scores = score_laws(at, projection, terms, progress_);
       if (list.empty()) {
-        first_frames = frames;
+        first_share = share;
         list = std::move(scores);
       } else {
-        for (const LawScore& score : scores)
+        for (LawScore& score : scores)
           for (LawScore& known : list)
             if (known.term.same_law(score.term)) {
               known.share = 0.5 * (known.share + score.share);
@@ -158,24 +130,29 @@ class Pursuit {
       }
       if (++horizons == kHorizons) break;
     }
+    // What a fit over all frames starts with.
+    const ModelProjection projection(law_.model, setup_.options.loss);
+    for (LawScore& score : score_laws(law_.model, projection, terms, progress_))
+      for (LawScore& known : list)
+        if (known.term.same_law(score.term)) known.columns = std::move(score.columns);
     std::ranges::stable_sort(list, std::greater<>(), &LawScore::share);
     return list;
   }
 
-  ModelFit with(const LawScore& score, int first_frames) {
-    std::vector<Term> terms = law_.model.terms;
-    terms.push_back(score.term);
-    std::map<std::string, double> start = values_by_name(*law_.model.problem, law_.model.values);
-    const std::vector<std::string> names = score.term.parameters();
-    // Half of what a linear model foresees: a start on the right side, not too far.
-    for (size_t k = 0; k < names.size(); ++k)
-      start[names[k]] = 0.5 * score.amount[static_cast<Eigen::Index>(k)];
-    return fit(terms, start, horizons_from(first_frames, law_.model.frames));
+  std::vector<LawShapes> terms_to_test() const {
+    std::vector<LawShapes> laws;
+    for (const Term& term : empirical_laws(setup_.inputs.front(), setup_.options)) {
+      const auto is_term = [&](const Term& own) { return own.same_law(term); };
+      if (std::ranges::find(options_.without, term.effect) == options_.without.end() &&
+          std::ranges::none_of(law_.model.terms, is_term))
+        laws.push_back({term});
+    }
+    return laws;
   }
 
   bool add_term() {
-    int first_frames = 0;
-    const std::vector<LawScore> list = shortlist(first_frames);
+    double first_share = 1;
+    const std::vector<LawScore> list = shortlist(first_share);
     if (law_.trials.empty()) law_.scores = list;
     ModelFit best;
     CrossValidation best_validated = law_.after;
@@ -183,9 +160,11 @@ class Pursuit {
     int fits = 0;
     for (const LawScore& score : list) {
       if (fits == options_.fits || score.share < kWorthAFit * list.front().share) break;
-      if (score.fall < least_square(score.amount.size())) continue;
+      if (score.fall < least_fall(score.amount.size()) || score.columns.empty()) continue;
       ++fits;
-      ModelFit fitted = with(score, first_frames);
+      ModelFit fitted =
+          fit_with_law(setup_, law_.model, score, first_share, options_.threshold, progress_);
+      law_.cancelled = law_.cancelled || fitted.cancelled;
       if (law_.cancelled) return false;
       TermTrial trial{.term = score.term,
                       .foreseen_fall = score.fall,
@@ -219,8 +198,9 @@ class Pursuit {
     std::vector<Term> terms = law_.model.terms;
     const Term dropped = terms[k];
     terms.erase(terms.begin() + static_cast<std::ptrdiff_t>(k));
-    ModelFit fitted =
-        fit(terms, values_by_name(*law_.model.problem, law_.model.values), {law_.model.frames});
+    ModelFit fitted = with_terms(setup_, law_.model, terms, {});
+    refine_model(fitted, setup_, {}, progress_);
+    law_.cancelled = law_.cancelled || fitted.cancelled;
     if (law_.cancelled || !fitted.usable) return false;
     CrossValidation validated = cross_validate(setup_, fitted, options_.blocks, options_.threshold);
     if (predicts_better(law_.after, validated)) return false;
@@ -235,25 +215,26 @@ class Pursuit {
   void state_coefficients() {
     if (terms_of_law() == 0) return;
     const ModelFit& model = law_.model;
+    const Eigen::VectorXd& values = model.parts.front().values;
+    const ParameterSpace& space = model.problems.front()->space;
+    // A force is shared; what one recording says of it stands for all.
     const Uncertainty uncertainty =
-        estimate_uncertainty(model.objective(), model.values, {.loss = setup_.options.loss},
-                             model.linear.residual_by_coordinate);
+        estimate_uncertainty(model.objective(0), values, {.loss = setup_.options.loss});
     for (size_t k = own_terms_; k < model.terms.size(); ++k) {
       const Term& term = model.terms[k];
       for (const std::string& parameter : term.amplitudes) {
-        const int p = model.problem->space.index(term.effect + "." + parameter);
-        const FitParameter& range = model.problem->space.parameters[static_cast<size_t>(p)];
+        const int p = space.index(term.effect + "." + parameter);
+        const FitParameter& range = space.parameters[static_cast<size_t>(p)];
         const double least = 1e-6 * (range.upper - range.lower);
-        law_.coefficients.push_back({.effect = term.effect,
-                                     .parameter = parameter,
-                                     .unit = range.unit,
-                                     .term = term.effect == "force_law"
-                                                 ? force_law::term_text(parameter)
-                                                 : tension_law::term_text(parameter),
-                                     .value = model.values[p],
-                                     .sigma = uncertainty.usable ? uncertainty.sigma[p] : 0,
-                                     .at_bound = model.values[p] < range.lower + least ||
-                                                 model.values[p] > range.upper - least});
+        law_.coefficients.push_back(
+            {.effect = term.effect,
+             .parameter = parameter,
+             .unit = range.unit,
+             .term = term.effect == "force_law" ? force_law::term_text(parameter)
+                                                : tension_law::term_text(parameter),
+             .value = values[p],
+             .sigma = uncertainty.usable ? uncertainty.sigma[p] : 0,
+             .at_bound = values[p] < range.lower + least || values[p] > range.upper - least});
       }
     }
     law_.formula = formula_of(law_.coefficients);
@@ -267,61 +248,6 @@ class Pursuit {
 };
 
 }  // namespace
-
-std::vector<LawScore> score_terms(const DiagnosisSetup& setup, const ModelFit& model,
-                                  const Projection& projection, const std::vector<Term>& terms) {
-  std::vector<Term> all = model.terms, more;
-  for (const Term& term : terms)
-    if (std::ranges::none_of(model.terms, [&](const Term& own) { return own.same_law(term); }))
-      more.push_back(term);
-  all.insert(all.end(), more.begin(), more.end());
-  // All of them at their neutral values: the run stays as it is, only its derivatives are more.
-  const auto problem = problem_of(setup, all);
-  const ParameterSpace& space = problem->space;
-  const Eigen::VectorXd values = values_of(*problem, values_by_name(*model.problem, model.values));
-  std::vector<int> coordinates;
-  Eigen::VectorXd lower = values, upper = values;
-  for (const Term& term : more)
-    for (const std::string& name : term.parameters()) {
-      const int p = space.index(name);
-      coordinates.push_back(p);
-      lower[p] = space.parameters[static_cast<size_t>(p)].lower;
-      upper[p] = space.parameters[static_cast<size_t>(p)].upper;
-    }
-  const TrajectoryObjective objective(*problem, model.frames, model.steps);
-  const Linearisation linear = objective.linearise_by(values, coordinates);
-  if (!linear.usable) return {};
-  const Eigen::MatrixXd columns = projection.columns(linear.residual_by_coordinate);
-  const Eigen::VectorXd here = space.coordinates(values);
-  const Eigen::VectorXd down = space.coordinates(lower) - here;
-  const Eigen::VectorXd up = space.coordinates(upper) - here;
-  const Eigen::VectorXd slope = space.value_by_coordinate(values);
-  const double above =
-      projection.residual().squaredNorm() - (projection.weights() - projection.taken());
-
-  std::vector<LawScore> scores;
-  Eigen::Index first = 0;
-  for (const Term& term : more) {
-    const auto count = static_cast<Eigen::Index>(term.amplitudes.size());
-    const std::vector<int> own(coordinates.begin() + first, coordinates.begin() + first + count);
-    const Explained explained =
-        explain(projection.residual(), columns.middleCols(first, count), down(own), up(own));
-    first += count;
-    LawScore score{.term = term,
-                   .amount = explained.amount.cwiseProduct(slope(own)),
-                   .sigma = Eigen::VectorXd::Constant(count, INFINITY),
-                   .fall = explained.fall,
-                   .share = above > 0 ? explained.fall / above : 0};
-    const Eigen::LDLT<Eigen::MatrixXd> information(explained.information);
-    if (information.isPositive() && information.vectorD().minCoeff() > 0)
-      score.sigma = information.solve(Eigen::MatrixXd::Identity(count, count))
-                        .diagonal()
-                        .cwiseSqrt()
-                        .cwiseProduct(slope(own));
-    scores.push_back(std::move(score));
-  }
-  return scores;
-}
 
 ProposedLaw propose_law(const DiagnosisSetup& setup, const ModelFit& model,
                         const ProposalOptions& options, const ProgressCallback& progress) {

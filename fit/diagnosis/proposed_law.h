@@ -51,11 +51,6 @@ struct ProposedLaw {
   bool found() const { return !coefficients.empty(); }
 };
 
-/// What the derivatives foresee of each term beyond those that the model has: as score_laws(), but
-/// all at once.
-std::vector<LawScore> score_terms(const DiagnosisSetup& setup, const ModelFit& model,
-                                  const Projection& projection, const std::vector<Term>& terms);
-
 /// Proposes a law by sparse regression: orthogonal matching pursuit [pati1993] over the terms of
 /// the empirical effects, with refits. What is regressed is not a force that is read off
 /// accelerations, whose noise would drown it, but what each term does to everything observed, by

@@ -32,10 +32,9 @@ struct Motion {
   std::vector<Eigen::Matrix3Xd> position_m, velocity_m_per_s, by_s, by_t, rate_by_s, rate_by_t;
 };
 
-Motion motion_of(const ModelFit& model) {
-  const FitProblem& problem = *model.problem;
+Motion motion_of(const FitProblem& problem, const PooledPart& part) {
   const SimulateResult run =
-      run_model(problem, {model.values}, model.frames, model.steps, true).front();
+      run_model(problem, {part.values}, part.frames, part.steps, true).front();
   Motion motion;
   if (!run.usable()) return motion;
   const Mesh& mesh = problem.cloth.mesh;
@@ -45,7 +44,7 @@ Motion motion_of(const ModelFit& model) {
   };
   const Surface place = surface(SurfaceQuantity::place), by_s = surface(SurfaceQuantity::by_s),
                 by_t = surface(SurfaceQuantity::by_t);
-  for (size_t f = 0; f < static_cast<size_t>(model.frames); ++f) {
+  for (size_t f = 0; f < static_cast<size_t>(part.frames); ++f) {
     motion.position_m.push_back(place.evaluate(run.position_m[f]));
     motion.velocity_m_per_s.push_back(place.evaluate(run.velocity_m_per_s[f]));
     motion.by_s.push_back(by_s.evaluate(run.position_m[f]));
@@ -71,10 +70,11 @@ Eigen::Vector3d take_out_parabola(const std::vector<double>& time_s, Eigen::Matr
 }
 
 /// Samples of all markers whose residuals can be differentiated twice.
-std::vector<Sample> samples_of(const ModelFit& model, int set, const Motion& motion) {
-  const FitProblem& problem = *model.problem;
+std::vector<Sample> samples_of(const FitProblem& problem, const PooledPart& part, int set,
+                               const Motion& motion) {
   const Mesh& mesh = problem.cloth.mesh;
-  const TrajectoryObjective objective = model.objective();
+  const TrajectoryObjective objective(problem, part.frames, part.steps);
+  const Eigen::VectorXd residual = residual_of(part);
   std::map<int, std::vector<const Objective::Block*>> of_marker;
   for (const Objective::Block& block : objective.blocks())
     if (block.set == set) of_marker[block.marker].push_back(&block);
@@ -90,7 +90,7 @@ std::vector<Sample> samples_of(const ModelFit& model, int set, const Motion& mot
       sigma_m.push_back(rows[static_cast<size_t>(block->row)].sigma);
       // Residuals are predicted less observed, in sigmas.
       residual_m.col(static_cast<Eigen::Index>(time_s.size())) =
-          -sigma_m.back() * model.linear.residual.segment<3>(block->offset);
+          -sigma_m.back() * residual.segment<3>(block->offset);
       time_s.push_back(problem.frame_time_s[static_cast<size_t>(block->frame)]);
     }
     const Eigen::Vector3d steady_m_per_s2 = take_out_parabola(time_s, residual_m);
@@ -260,24 +260,26 @@ void average(const std::vector<Sample>& samples, int frames, ResidualForce& resu
 
 ResidualForce residual_force(const ModelFit& model) {
   ResidualForce result;
-  const std::vector<ObservationSet>& sets = model.problem->observations;
+  const FitProblem& problem = *model.problems.front();
+  const PooledPart& part = model.parts.front();
+  const std::vector<ObservationSet>& sets = problem.observations;
   const auto set = std::ranges::find(sets, 3, &ObservationSet::dimension);
   if (set == sets.end()) {
     result.why_none = "pixels say nothing of accelerations in space";
     return result;
   }
-  const Motion motion = motion_of(model);
+  const Motion motion = motion_of(problem, part);
   if (motion.position_m.empty()) {
     result.why_none = "the model's run did not end";
     return result;
   }
   const std::vector<Sample> samples =
-      samples_of(model, static_cast<int>(set - sets.begin()), motion);
+      samples_of(problem, part, static_cast<int>(set - sets.begin()), motion);
   if (samples.empty()) {
     result.why_none = "no marker was seen in ten frames";
     return result;
   }
-  average(samples, model.frames, result);
+  average(samples, part.frames, result);
   regress(samples, result);
   return result;
 }

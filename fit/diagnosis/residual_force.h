@@ -37,8 +37,8 @@ struct ResidualForce {
   std::string why_none;  ///< empty: there is one
 };
 
-/// Of a model's fitted frames. The first and the last two of each marker are left out: a natural
-/// spline is straight there.
+/// Of a model's fitted frames, of its first recording. The first and the last two of each marker
+/// are left out: a natural spline is straight there.
 ResidualForce residual_force(const ModelFit& model);
 
 }  // namespace clothfit

@@ -1,15 +1,19 @@
 // Several recordings of one cloth in one fit. What a single recording's residuals and derivatives
 // are is checked in objective_test.cpp; what a pool of misspecified fits is good for, in
-// tests/apps/misspecified_drag_test.cpp.
+// tests/apps/planted_drag_test.cpp.
 #include "fit/pooled_fit.h"
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Dense>
+#include <array>
 #include <cmath>
+#include <limits>
 #include <random>
 
 #include "data/input_error.h"
 #include "fit/parameterised_model.h"
+#include "fit/prior_cost.h"
 #include "model/stability.h"
 #include "synthetic_cloth.h"
 
@@ -46,48 +50,177 @@ void make_exact(FitProblem& problem, unsigned seed) {
     row.observed = markers[static_cast<size_t>(row.frame)].col(row.marker);
 }
 
-TEST(PooledCost, HasTheGradientThatDifferencesOfTheCostShow) {
-  // Given two recordings, one with an uncertain vertical, off the optimum
-  const FitProblem first = make_problem(synthetic_input(tiny(1)), {}, 5, 5);
-  FitInput seen = synthetic_input(tiny(2));
-  seen.cameras[0].camera_from_world->covariance = Eigen::Matrix<double, 6, 6>::Identity() * 9e-6;
-  const FitProblem second = make_problem(seen, {.observations = ObservationKind::tracks2d}, 5, 5);
-  const FitProblem* const problems[] = {&first, &second};
-  const PooledCost cost(problems, {1e-3, 1e-3});
-  ASSERT_EQ(cost.shared(), 7);
-  ASSERT_EQ(cost.size(), 7 + 6 + 8);  // each its sheet's pose; the second its vertical too
-  std::mt19937_64 generator(5);
-  std::uniform_real_distribution<double> uniform(-0.2, 0.2);
-  Eigen::VectorXd x = cost.coordinates({true_values(first), true_values(second)});
-  for (double& coordinate : x) coordinate += uniform(generator);
+constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
-  const PooledCost::Expansion expansion = cost.expand(x);
+/// Two recordings of one cloth, one with an uncertain vertical, and the costs that a fit of both
+/// adds up, at a time step of 1 ms.
+struct TwoRecordings {
+  FitProblem first = make_problem(synthetic_input(tiny(1)), {}, 5, 5);
+  FitProblem second = make_problem(seen(), {.observations = ObservationKind::tracks2d}, 5, 5);
+  std::array<const FitProblem*, 2> problems{&first, &second};
+  PooledSpace space{problems};
 
-  ASSERT_TRUE(expansion.usable);
-  EXPECT_NEAR(expansion.cost, cost.at(x), 1e-9 * expansion.cost);
-  for (int p = 0; p < cost.size(); ++p) {
-    SCOPED_TRACE(p);
-    Eigen::VectorXd above = x, below = x;
-    above[p] += 1e-4;
-    below[p] -= 1e-4;
-    const double difference = (cost.at(above) - cost.at(below)) / 2e-4;
-    // Truncation of the difference is its step's square, 1e-8, times the cost's third derivative.
-    EXPECT_NEAR(expansion.gradient[p], difference, 1e-5 * expansion.gradient.cwiseAbs().maxCoeff());
+  static FitInput seen() {
+    FitInput input = synthetic_input(tiny(2));
+    input.cameras[0].camera_from_world->covariance = Eigen::Matrix<double, 6, 6>::Identity() * 9e-6;
+    return input;
+  }
+
+  TrajectoryObjective objective(size_t n) const {
+    return {*problems[n], problems[n]->first_held_out, 1e-3};
+  }
+
+  /// Near the truth, but off the optimum.
+  Eigen::VectorXd somewhere() const {
+    std::mt19937_64 generator(5);
+    std::uniform_real_distribution<double> uniform(-0.2, 0.2);
+    Eigen::VectorXd x = space.coordinates({true_values(first), true_values(second)});
+    for (double& coordinate : x) coordinate += uniform(generator);
+    return x;
+  }
+
+  /// Half the sum of squares of what all residuals leave and of the priors, directions (of each
+  /// recording, or none) being errors by as much as lowers it most.
+  double cost_at(const Eigen::VectorXd& x, const std::vector<Eigen::MatrixXd>& directions) const {
+    const std::vector<Eigen::VectorXd> values = space.values(x);
+    double cost = 0;
+    for (size_t n = 0; n < problems.size(); ++n) {
+      const Eigen::VectorXd residual = objective(n).residuals({values[n]}).front();
+      const Eigen::VectorXd amounts = best_amounts(directions[n], residual);
+      cost += 0.5 * (residual + directions[n] * amounts).squaredNorm() +
+              0.5 * amounts.squaredNorm() + prior_cost(*problems[n], values[n]).cost;
+    }
+    return cost;
+  }
+
+  PooledSpace::Expansion expansion_at(const Eigen::VectorXd& x,
+                                      const std::vector<Eigen::MatrixXd>& directions) const {
+    const std::vector<Eigen::VectorXd> values = space.values(x);
+    std::vector<Quadratic> quadratics;
+    for (size_t n = 0; n < problems.size(); ++n) {
+      PooledPart part;
+      part.values = values[n];
+      part.frames = problems[n]->first_held_out;
+      part.steps = 1e-3;
+      part.linear = objective(n).linearise(values[n]);
+      part.directions = directions[n];
+      part.amounts = best_amounts(part.directions, part.linear.residual);
+      quadratics.push_back(quadratic_of(*problems[n], part, kInfinite));
+    }
+    return space.gather(quadratics);
+  }
+
+  static Eigen::VectorXd best_amounts(const Eigen::MatrixXd& directions,
+                                      const Eigen::VectorXd& residual) {
+    if (directions.cols() == 0) return {};
+    Eigen::MatrixXd information = directions.transpose() * directions;
+    information.diagonal().array() += 1;
+    return -information.ldlt().solve(directions.transpose() * residual);
+  }
+
+  /// `count` smooth fields of some sigmas for each recording.
+  std::vector<Eigen::MatrixXd> directions(int count) const {
+    std::vector<Eigen::MatrixXd> all;
+    for (size_t n = 0; n < problems.size(); ++n)
+      all.push_back(Eigen::MatrixXd::NullaryExpr(
+          objective(n).residual_count(), count, [&](Eigen::Index row, Eigen::Index column) {
+            return 2 * std::sin(0.01 * static_cast<double>((column + 1) * row));
+          }));
+    return all;
+  }
+};
+
+TEST(Quadratic, HasTheGradientThatDifferencesOfTheCostShow) {
+  const TwoRecordings both;
+  const PooledSpace& space = both.space;
+  ASSERT_EQ(space.shared(), 7);
+  ASSERT_EQ(space.size(), 7 + 6 + 8);  // each its sheet's pose; the second its vertical too
+  const Eigen::VectorXd x = both.somewhere();
+  for (const int count : {0, 2}) {
+    SCOPED_TRACE(testing::Message() << count << " directions");
+    const std::vector<Eigen::MatrixXd> directions = both.directions(count);
+
+    const PooledSpace::Expansion expansion = both.expansion_at(x, directions);
+
+    ASSERT_TRUE(expansion.usable);
+    EXPECT_NEAR(expansion.cost, both.cost_at(x, directions), 1e-9 * expansion.cost);
+    for (int p = 0; p < space.size(); ++p) {
+      SCOPED_TRACE(p);
+      Eigen::VectorXd above = x, below = x;
+      above[p] += 1e-4;
+      below[p] -= 1e-4;
+      const double difference =
+          (both.cost_at(above, directions) - both.cost_at(below, directions)) / 2e-4;
+      // Truncation of the difference is its step's square, 1e-8, times the cost's third derivative.
+      EXPECT_NEAR(expansion.gradient[p], difference,
+                  1e-5 * expansion.gradient.cwiseAbs().maxCoeff());
+    }
   }
 }
 
-TEST(PooledCost, StepsAsTheWholeSystemOfEquationsSays) {
+// Directions of unit variance are a covariance I + E E': with their amounts eliminated a part's
+// cost is that of generalised least squares.
+TEST(Quadratic, CountsDirectionsAsACovariance) {
+  const FitProblem problem = make_problem(synthetic_input(tiny(1)), {}, 5, 5);
+  ASSERT_TRUE(problem.priors.empty());
+  const Eigen::Index rows = TrajectoryObjective(problem, 4, 1e-3).residual_count();
+  std::mt19937_64 generator(3);
+  std::normal_distribution<double> normal;
+  const auto random = [&](Eigen::Index columns) {
+    return Eigen::MatrixXd(
+        Eigen::MatrixXd::NullaryExpr(rows, columns, [&] { return normal(generator); }));
+  };
+  const Eigen::MatrixXd jacobian = random(problem.space.size()), errs = 2 * random(3);
+  const Eigen::VectorXd residual = random(1);
+  PooledPart part;
+  part.values = true_values(problem);
+  part.frames = 4;
+  part.steps = 1e-3;
+  part.linear.residual = residual;
+  part.linear.residual_by_coordinate = jacobian;
+  part.linear.usable = true;
+  part.directions = errs;
+  part.amounts = TwoRecordings::best_amounts(errs, residual);
+
+  const Quadratic quadratic = quadratic_of(problem, part, kInfinite);
+
+  const Eigen::MatrixXd inverse =
+      (Eigen::MatrixXd::Identity(rows, rows) + errs * errs.transpose()).inverse();
+  ASSERT_TRUE(quadratic.usable);
+  EXPECT_NEAR(quadratic.cost, 0.5 * residual.dot(inverse * residual), 1e-9 * quadratic.cost);
+  const Eigen::VectorXd gradient = jacobian.transpose() * inverse * residual;
+  EXPECT_LT((quadratic.gradient - gradient).norm(), 1e-9 * gradient.norm());
+  const Eigen::MatrixXd information = jacobian.transpose() * inverse * jacobian;
+  EXPECT_LT((quadratic.information - information).norm(), 1e-9 * information.norm());
+  // Amounts that are not at their least give the same way down.
+  part.amounts.setZero();
+  EXPECT_LT((quadratic_of(problem, part, kInfinite).gradient - gradient).norm(),
+            1e-9 * gradient.norm());
+}
+
+TEST(PooledSpace, StepsAsTheWholeSystemOfEquationsSays) {
   const FitProblem first = make_problem(synthetic_input(tiny(1)), {}, 5, 5);
   const FitProblem second = make_problem(synthetic_input(tiny(2)), {}, 5, 5);
   const FitProblem* const problems[] = {&first, &second};
-  const PooledCost cost(problems, {1e-3, 1e-3});
-  const PooledCost::Expansion e =
-      cost.expand(cost.coordinates({true_values(first), true_values(second)}));
+  const PooledSpace space(problems);
+  std::vector<Quadratic> quadratics;
+  for (const FitProblem* problem : problems) {
+    const Eigen::VectorXd values = true_values(*problem);
+    const TrajectoryObjective objective(*problem, problem->first_held_out, 1e-3);
+    PooledPart part;
+    part.values = values;
+    part.frames = problem->first_held_out;
+    part.steps = 1e-3;
+    part.linear = objective.linearise(values);
+    quadratics.push_back(quadratic_of(*problem, part, kInfinite));
+  }
+  const PooledSpace::Expansion e = space.gather(quadratics);
   ASSERT_TRUE(e.usable);
-  std::vector<bool> held(static_cast<size_t>(cost.size()), false);
+  ASSERT_EQ(space.size(), 19);
+  std::vector<bool> held(19, false);
   held[2] = held[9] = true;
 
-  const Eigen::VectorXd step = cost.step(e, 0.1, held);
+  const Eigen::VectorXd step = space.step(e, 0.1, held);
 
   Eigen::MatrixXd whole = Eigen::MatrixXd::Zero(19, 19);
   whole.topLeftCorner(7, 7) = e.shared;
@@ -96,6 +229,9 @@ TEST(PooledCost, StepsAsTheWholeSystemOfEquationsSays) {
     whole.block(7 + 6 * n, 0, 6, 7) = e.between[static_cast<size_t>(n)];
     whole.block(0, 7 + 6 * n, 7, 6) = e.between[static_cast<size_t>(n)].transpose();
   }
+  const double fall = -e.gradient.dot(step) - 0.5 * step.dot(whole * step);
+  EXPECT_NEAR(space.foreseen_fall(e, step), fall, 1e-9 * fall);
+  EXPECT_GT(fall, 0);
   whole.diagonal() *= 1.1;
   std::vector<int> free;
   for (int p = 0; p < 19; ++p)
@@ -155,9 +291,9 @@ TEST(PooledFit, RefusesRecordingsOfDifferentPhysics) {
   const FitProblem* const problems[] = {&plain, &windy};
   const FitProblem* const turned[] = {&windy, &plain};
 
-  EXPECT_THROW(fit_pooled(problems, {}, {}, {}), InputError);
-  EXPECT_THROW(fit_pooled(turned, {}, {}, {}), InputError);
-  EXPECT_THROW(fit_pooled({}, {}, {}, {}), InputError);
+  EXPECT_THROW(fit_pooled(problems, truth(), {}, {}), InputError);
+  EXPECT_THROW(fit_pooled(turned, truth(), {}, {}), InputError);
+  EXPECT_THROW(fit_pooled({}, truth(), {}, {}), InputError);
 }
 
 }  // namespace

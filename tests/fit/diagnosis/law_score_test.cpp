@@ -1,46 +1,39 @@
-// The score test of laws on simulated recordings, and the judgement of what a fit leaves.
+// The score test of laws on simulated recordings, the derivatives it is made of, and the judgement
+// of what a fit leaves. Not checked here: derivatives of runs along effects that a cloth does not
+// have, one by one (tests/model/tangents_test.cpp).
 #include "fit/diagnosis/law_score.h"
 
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <random>
+#include <cmath>
+#include <span>
+#include <string>
+#include <vector>
 
 #include "fit/diagnosis/adequacy.h"
 #include "fit/diagnosis/cross_validation.h"
 #include "fit/diagnosis/discretisation.h"
-#include "fit/parameterised_model.h"
+#include "tests/fit/diagnosis/true_model.h"
 #include "tests/fit/synthetic_cloth.h"
 
 namespace clothfit {
 namespace {
 
-constexpr double kTimeStep_s = 1.0 / 60 / 150;
 const FitOptions kOptions{.loss = Loss::squared};
 
-/// The true model of a recording whose drag is not declared.
-ModelFit true_model(const DiagnosisSetup& setup, const SyntheticCloth& cloth, int frames) {
-  const auto problem = problem_of(setup, {});
-  const Eigen::VectorXd values = start_with(*problem, cloth.fabric);
-  const TimeSteps steps =
-      time_steps_of_run(problem->cloth, parameter_set(*problem, values), kTimeStep_s);
-  return model_at(problem, {}, values, frames, steps);
+DiagnosisSetup setup_of(std::span<const FitInput> inputs) {
+  return {.inputs = inputs, .options = kOptions, .columns = 9, .rows = 9};
 }
 
 TEST(LawScore, ForeseesASmallDragAndItsSigma) {
   const SyntheticCloth cloth{.drag_rate_per_s = 0.05, .noise_m = 1e-4};
   const FitInput input = synthetic_input(cloth);
-  const DiagnosisSetup setup{.input = input, .options = kOptions, .columns = 9, .rows = 9};
-  const ModelFit model = true_model(setup, cloth, 26);
+  const DiagnosisSetup setup = setup_of({&input, 1});
+  const ModelFit model = true_model(setup, cloth);
   ASSERT_TRUE(model.usable);
-  const Projection projection =
-      project(setup, model, Eigen::MatrixXd(model.linear.residual.size(), 0));
-  const Term term{.effect = "viscous_damping",
-                  .law = "",
-                  .amplitudes = {describe_effect("viscous_damping").parameters.front().name}};
+  const ModelProjection projection(model, kOptions.loss);
 
-  const std::vector<LawScore> scores = score_laws(model, projection, {{term}}, {});
+  const std::vector<LawScore> scores = score_laws(model, projection, {{drag_term()}}, {});
 
   ASSERT_EQ(scores.size(), 1u);
   EXPECT_NEAR(scores[0].amount[0], 0.05, 4 * scores[0].sigma[0]);
@@ -53,34 +46,104 @@ TEST(LawScore, ForeseesASmallDragAndItsSigma) {
 TEST(LawScore, IsThatOfNoiseWhereNothingIsHidden) {
   const SyntheticCloth cloth;
   const FitInput input = synthetic_input(cloth);
-  const DiagnosisSetup setup{.input = input, .options = kOptions, .columns = 9, .rows = 9};
-  const ModelFit model = true_model(setup, cloth, 26);
+  const DiagnosisSetup setup = setup_of({&input, 1});
+  const ModelFit model = that_may_err(setup, true_model(setup, cloth));
   ASSERT_TRUE(model.usable);
-  const Projection projection = project(setup, model, discretisation_directions(setup, model));
   std::vector<LawShapes> laws = laws_to_test(input, kOptions, 0.4);
   std::erase_if(laws, [](const LawShapes& law) { return law.size() > 1; });
 
-  for (const LawScore& score : score_laws(model, projection, laws, {}))
+  const std::vector<LawScore> scores =
+      score_laws(model, ModelProjection(model, kOptions.loss), laws, {});
+
+  EXPECT_GT(scores.size(), 5u);
+  for (const LawScore& score : scores)
     // Beyond 20 one law in 100 000 has its chi-square with one degree of freedom.
     EXPECT_LT(score.fall, 20 + 4 * static_cast<double>(score.amount.size() - 1))
         << score.term.title();
+}
+
+// Two recordings of one motion have the same derivatives, but for where noise has put the sheet: of
+// what is the cloth's they say twice as much as one.
+TEST(LawScore, SharesThePhysicsOfTwoRecordingsAndNotTheirClocks) {
+  const std::vector<FitInput> inputs{synthetic_input({.noise_m = 1e-4, .seed = 1}),
+                                     synthetic_input({.noise_m = 1e-4, .seed = 2})};
+  const SyntheticCloth cloth{.noise_m = 1e-4};
+  const Term clock{.effect = "clock_offset", .law = "", .amplitudes = {"time"}};
+  const auto scores_of = [&](std::span<const FitInput> some) {
+    const ModelFit model = true_model(setup_of(some), cloth);
+    return score_laws(model, ModelProjection(model, kOptions.loss), {{drag_term()}, {clock}}, {});
+  };
+
+  const std::vector<LawScore> one = scores_of({inputs.data(), 1}), two = scores_of(inputs);
+
+  ASSERT_EQ(one.size(), 2u);
+  ASSERT_EQ(two.size(), 2u);
+  ASSERT_EQ(two[0].amount.size(), 1);
+  EXPECT_NEAR(two[0].sigma[0], one[0].sigma[0] / std::sqrt(2.0), 0.02 * one[0].sigma[0]);
+  ASSERT_EQ(two[1].amount.size(), 2);
+  // What both clocks do alike is known as one of them alone is; what they do in opposite ways no
+  // parameter of the cloth can do, so that it is known better.
+  for (const double sigma_s : two[1].sigma) {
+    EXPECT_LT(sigma_s, 1.01 * one[1].sigma[0]);
+    EXPECT_GT(sigma_s, 0.99 * one[1].sigma[0] / std::sqrt(2.0));
+  }
+}
+
+// Two ways to one number: effects that the cloth does not have, and a fit that has them at their
+// neutral values.
+TEST(LawDerivatives, AreThoseOfAModelThatHasTheLawAtItsNeutralValue) {
+  const SyntheticCloth cloth;
+  const FitInput input = synthetic_input(cloth);
+  const DiagnosisSetup setup = setup_of({&input, 1});
+  const std::vector<Term> laws{
+      drag_term(),
+      {.effect = "wind", .law = "pressure", .amplitudes = {"q_x", "q_y", "q_z"}},
+      {.effect = "nonuniform_mass",
+       .law = "edges",
+       .amplitudes = {"hem_left", "hem_right", "hem_top", "hem_bottom"},
+       .shape = {{"hem_width", 0.02}},
+       .shape_sigma = {{"hem_width", 0.01}}},
+      {.effect = "scale", .law = "", .amplitudes = {"factor"}}};
+
+  const std::vector<Columns> columns = law_derivatives(true_model(setup, cloth), laws);
+
+  ASSERT_EQ(columns.size(), laws.size());
+  for (size_t k = 0; k < laws.size(); ++k) {
+    SCOPED_TRACE(laws[k].title());
+    ASSERT_EQ(columns[k].size(), 1u);  // recordings
+    const ModelFit with = true_model(setup, cloth, {laws[k]});
+    const PooledPart& part = with.parts.front();
+    const ParameterSpace& space = with.problems.front()->space;
+    const Eigen::VectorXd slope = space.value_by_coordinate(part.values);
+    const std::vector<std::string> names = laws[k].parameters();
+    ASSERT_EQ(columns[k].front().cols(), static_cast<Eigen::Index>(names.size()));
+    for (size_t a = 0; a < names.size(); ++a) {
+      const int p = space.index(names[a]);
+      ASSERT_GE(p, 0) << names[a];
+      const Eigen::VectorXd expected = part.linear.residual_by_coordinate.col(p) / slope[p];
+      const Eigen::VectorXd found = columns[k].front().col(static_cast<Eigen::Index>(a));
+      EXPECT_GT(expected.norm(), 0) << names[a];
+      // A law's derivative is a difference over 1e-5 of a typical change.
+      EXPECT_LT((found - expected).norm(), 1e-4 * expected.norm()) << names[a];
+    }
+  }
 }
 
 TEST(Adequacy, HoldsForATrueModelAndNotForOneThatLacksDrag) {
   for (const double drag : {0.0, 1.0}) {
     const SyntheticCloth cloth{.drag_rate_per_s = drag};
     const FitInput input = synthetic_input(cloth);
-    const DiagnosisSetup setup{.input = input, .options = kOptions, .columns = 9, .rows = 9};
-    const ModelFit model = true_model(setup, cloth, 26);
+    const DiagnosisSetup setup = setup_of({&input, 1});
+    const ModelFit model = that_may_err(setup, true_model(setup, cloth));
     ASSERT_TRUE(model.usable);
-    const Projection alone =
-        project(setup, model, Eigen::MatrixXd(model.linear.residual.size(), 0));
-    const Adequacy adequacy = judge_adequacy(
-        model, project(setup, model, discretisation_directions(setup, model)), alone);
+
+    const Adequacy adequacy = judge_adequacy(model, ModelProjection(model, kOptions.loss),
+                                             ModelProjection(model, kOptions.loss, false));
 
     EXPECT_EQ(adequacy.adequate, drag == 0) << "drag " << drag;
     if (drag == 0) {
       EXPECT_NEAR(adequacy.chi_square_per_dof, 1, 0.08);  // 3822 residuals: 3.5 of its sigmas
+      EXPECT_NEAR(adequacy.noise_chi_square_per_dof, 1, 0.08);
       EXPECT_LT(std::abs(adequacy.time_score), 4);
       EXPECT_LT(std::abs(adequacy.neighbour_score), 4);
     } else {
@@ -95,8 +158,8 @@ TEST(Adequacy, HoldsForATrueModelAndNotForOneThatLacksDrag) {
 TEST(CrossValidation, OfATrueModelIsTheNoiseAndBeatsCorrectionsWithoutPhysics) {
   const SyntheticCloth cloth;
   const FitInput input = synthetic_input(cloth);
-  const DiagnosisSetup setup{.input = input, .options = kOptions, .columns = 9, .rows = 9};
-  const ModelFit model = true_model(setup, cloth, 26);
+  const DiagnosisSetup setup = setup_of({&input, 1});
+  const ModelFit model = true_model(setup, cloth);
   ASSERT_TRUE(model.usable);
 
   const CrossValidation validated = cross_validate(setup, model, 5, 1e300);
@@ -108,21 +171,58 @@ TEST(CrossValidation, OfATrueModelIsTheNoiseAndBeatsCorrectionsWithoutPhysics) {
   EXPECT_NEAR(validated.last_residual, 2 * validated.mean, 0.3);
 }
 
+// The same of a whole recording that took no part in finding the cloth's parameters: only where its
+// sheet lay is its own.
+TEST(CrossValidation, OfATrueModelForeseesAnotherRecordingToTheNoise) {
+  const SyntheticCloth cloth;
+  const std::vector<FitInput> inputs{synthetic_input({.seed = 1}), synthetic_input({.seed = 2})};
+  const DiagnosisSetup setup = setup_of(inputs);
+  const ModelFit model = true_model(setup, cloth);
+  ASSERT_TRUE(model.usable);
+
+  const CrossValidation validated = cross_validate(setup, model, 5, 1e300, true);
+
+  ASSERT_TRUE(validated.usable);
+  ASSERT_EQ(validated.block.size(), 2u);  // one for each recording, whatever is asked for
+  for (const double recording : validated.block) EXPECT_NEAR(recording, 1, 0.1);
+  EXPECT_NEAR(validated.mean, 1, 0.07);  // 7644 residuals: 4 of its sigmas
+}
+
 TEST(Discretisation, ShowsWhatTheStepAndTheMeshAreWorth) {
   const SyntheticCloth cloth;
   const FitInput input = synthetic_input(cloth);
-  const DiagnosisSetup setup{.input = input, .options = kOptions, .columns = 9, .rows = 9};
-  const ModelFit model = true_model(setup, cloth, 26);
-  const Eigen::MatrixXd directions = discretisation_directions(setup, model);
+  const DiagnosisSetup setup = setup_of({&input, 1});
+  const ModelFit model = true_model(setup, cloth);
 
-  ASSERT_EQ(directions.cols(), 2);
+  const std::vector<Eigen::MatrixXd> directions = discretisation_directions(setup, model);
+
+  ASSERT_EQ(directions.size(), 1u);  // recordings
+  ASSERT_EQ(directions.front().rows(), model.residual_count());
+  ASSERT_EQ(directions.front().cols(), 2);
   // The truth was simulated on this mesh at about this step: its own errors are far below the
   // noise, but not nothing.
   for (int k = 0; k < 2; ++k) {
-    const double rms = directions.col(k).norm() / std::sqrt(static_cast<double>(directions.rows()));
+    const double rms = directions.front().col(k).norm() /
+                       std::sqrt(static_cast<double>(directions.front().rows()));
     EXPECT_GT(rms, 1e-4) << k;
     EXPECT_LT(rms, 20) << k;
   }
+}
+
+// Where nothing is missing the amounts are those of noise, and a fit keeps its directions.
+TEST(Discretisation, OfATrueModelIsBelieved) {
+  const SyntheticCloth cloth;
+  const FitInput input = synthetic_input(cloth);
+  const DiagnosisSetup setup = setup_of({&input, 1});
+  ModelFit model = true_model(setup, cloth);
+
+  refine_with_discretisation(model, setup, {});
+
+  ASSERT_TRUE(model.usable);
+  const PooledPart& part = model.parts.front();
+  ASSERT_EQ(part.directions.cols(), 2);
+  ASSERT_EQ(part.amounts.size(), 2);
+  EXPECT_LT(part.amounts.cwiseAbs().maxCoeff(), 3);
 }
 
 }  // namespace

@@ -5,7 +5,12 @@
 
 #include <Eigen/Dense>
 #include <limits>
+#include <memory>
 #include <random>
+#include <vector>
+
+#include "fit/prior_cost.h"
+#include "tests/fit/synthetic_cloth.h"
 
 namespace clothfit {
 namespace {
@@ -72,6 +77,120 @@ TEST(Projection, LeavesNothingOfWhatTheModelCanDoItself) {
                               random_matrix(40, 1, 9));
 
   EXPECT_EQ(projection.columns(jacobian * random_matrix(4, 2, 10)).norm(), 0);
+}
+
+/// Two small recordings of one cloth, with random numbers for what runs would have left: the
+/// second one has a vertical that is known by a prior.
+ModelFit model_of_noise(int directions) {
+  const SyntheticCloth tiny{.mesh = 5, .markers = 5, .frames = 20, .held_out_from = 20};
+  const FitInput plain = synthetic_input(tiny);
+  FitInput uncertain = plain;
+  uncertain.cameras[0].camera_from_world->covariance =
+      1e-6 * Eigen::Matrix<double, 6, 6>::Identity();
+  ModelFit model;
+  for (const FitInput& input : {plain, uncertain}) {
+    model.problems.push_back(std::make_shared<const FitProblem>(
+        make_problem(input, {.observations = ObservationKind::tracks2d}, 5, 5)));
+    const FitProblem& problem = *model.problems.back();
+    const auto seed = static_cast<unsigned>(model.problems.size());
+    const int frames = 4;
+    const Eigen::Index rows = TrajectoryObjective(problem, frames, 1e-3).residual_count();
+    PooledPart& part = model.parts.emplace_back();
+    part.values = problem.space.start();
+    part.frames = frames;
+    part.steps = 1e-3;
+    part.linear.residual = random_matrix(rows, 1, 20 + seed);
+    part.linear.residual_by_coordinate = random_matrix(rows, problem.space.size(), 30 + seed);
+    part.linear.usable = true;
+    part.directions = 2 * random_matrix(rows, directions, 40 + seed);
+    part.amounts = Eigen::VectorXd::Zero(directions);
+    // Off the prior's mean by less than its sigma, so that it pulls.
+    for (const GaussianPrior& prior : problem.priors)
+      for (const int p : prior.indices) part.values[p] += 7e-4;
+  }
+  model.usable = true;
+  return model;
+}
+
+/// The same as one matrix: shared parameters first, then each recording's own.
+Projection projection_at_once(const ModelFit& model, bool with_directions) {
+  const std::vector<const FitProblem*> problems = model.problem_pointers();
+  const PooledSpace space(problems);
+  const Eigen::Index rows = model.residual_count(), shared = space.shared();
+  Eigen::MatrixXd jacobian = Eigen::MatrixXd::Zero(rows, space.size());
+  Eigen::MatrixXd priors = Eigen::MatrixXd::Zero(space.size(), space.size());
+  Eigen::VectorXd pull = Eigen::VectorXd::Zero(space.size()), residual(rows);
+  const Eigen::Index each = with_directions ? model.parts.front().directions.cols() : 0;
+  Eigen::MatrixXd errs =
+      Eigen::MatrixXd::Zero(rows, each * static_cast<Eigen::Index>(problems.size()));
+  Eigen::Index row = 0;
+  for (size_t n = 0; n < problems.size(); ++n) {
+    const PooledPart& part = model.parts[n];
+    const Eigen::Index count = part.linear.residual.size();
+    std::vector<int> places(static_cast<size_t>(problems[n]->space.size()));
+    const std::vector<int> common = space.shared_of(n), own = space.own_of(n);
+    for (size_t k = 0; k < common.size(); ++k)
+      places[static_cast<size_t>(common[k])] = static_cast<int>(k);
+    for (size_t k = 0; k < own.size(); ++k)
+      places[static_cast<size_t>(own[k])] = space.first_own(n) + static_cast<int>(k);
+    const PriorCost prior = prior_cost(*problems[n], part.values);
+    for (size_t p = 0; p < places.size(); ++p) {
+      const auto from = static_cast<Eigen::Index>(p);
+      jacobian.col(places[p]).segment(row, count) = part.linear.residual_by_coordinate.col(from);
+      pull[places[p]] += prior.gradient[from];
+      for (size_t q = 0; q < places.size(); ++q)
+        priors(places[p], places[q]) += prior.information(from, static_cast<Eigen::Index>(q));
+    }
+    if (each > 0)
+      errs.block(row, each * static_cast<Eigen::Index>(n), count, each) = part.directions;
+    residual.segment(row, count) = part.linear.residual;
+    row += count;
+  }
+  EXPECT_GT(priors.norm(), 0);
+  EXPECT_EQ(priors.topLeftCorner(shared, shared).norm(), 0);
+  return {jacobian, priors, pull, errs, Eigen::VectorXd::Ones(rows), residual};
+}
+
+// What is each recording's own is eliminated before what they share: products of projected vectors
+// are the same.
+TEST(ModelProjection, IsThatOfAllRecordingsAtOnce) {
+  const ModelFit model = model_of_noise(2);
+  const Eigen::MatrixXd effect = random_matrix(model.residual_count(), 3, 50);
+  const Eigen::Index first = model.parts.front().linear.residual.size();
+  const std::vector<Eigen::MatrixXd> columns{effect.topRows(first),
+                                             effect.bottomRows(effect.rows() - first)};
+  for (const bool with_directions : {true, false}) {
+    SCOPED_TRACE(with_directions ? "with directions" : "without");
+    const Projection whole = projection_at_once(model, with_directions);
+    const ModelProjection parts(model, Loss::squared, with_directions);
+
+    const Eigen::MatrixXd left = parts.columns(columns), expected = whole.columns(effect);
+    const Eigen::MatrixXd information = expected.transpose() * expected;
+    EXPECT_LT((left.transpose() * left - information).norm(), 1e-8 * information.norm());
+    EXPECT_LT(
+        (left.transpose() * parts.residual() - expected.transpose() * whole.residual()).norm(),
+        1e-8 * information.norm());
+    EXPECT_NEAR(parts.residual().squaredNorm(), whole.residual().squaredNorm(),
+                1e-8 * whole.residual().squaredNorm());
+    EXPECT_EQ(parts.weights(), whole.weights());
+    // Each recording's residuals keep their places.
+    EXPECT_EQ(parts.first_row(0), 0);
+    EXPECT_GE(parts.first_row(1), first);
+    EXPECT_LT((parts.residual().head(first) - whole.residual().head(first)).norm(),
+              1e-8 * whole.residual().norm());
+  }
+}
+
+// Without priors and directions each parameter takes one number.
+TEST(ModelProjection, TakesANumberForEachParameter) {
+  ModelFit model = model_of_noise(0);
+  model.problems.back() = model.problems.front();
+  model.parts.back().values = model.parts.front().values;
+  model.parts.back().linear.residual_by_coordinate.conservativeResize(
+      Eigen::NoChange, model.problems.front()->space.size());
+
+  const std::vector<const FitProblem*> problems = model.problem_pointers();
+  EXPECT_NEAR(ModelProjection(model, Loss::squared).taken(), PooledSpace(problems).size(), 1e-8);
 }
 
 TEST(Explain, FindsTheAmountsAndTheFall) {

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <utility>
 
-#include "fit/parameterised_model.h"
+#include "fit/simulation.h"
 #include "tests/fit/hidden_effect.h"
 #include "tests/fit/synthetic_cloth.h"
 
@@ -18,13 +18,14 @@ namespace {
 struct Truth {
   FitInput input;
   FitOptions options{.loss = Loss::squared};
-  DiagnosisSetup setup{.input = input, .options = options, .columns = 9, .rows = 9};
+  DiagnosisSetup setup{.inputs = {&input, 1}, .options = options, .columns = 9, .rows = 9};
   ModelFit model;
 
   Truth(FitInput recorded, int frames) : input(std::move(recorded)) {
-    const auto problem = problem_of(setup, {});
-    const Eigen::VectorXd values = start_with(*problem, SyntheticCloth{}.fabric);
-    model = model_at(problem, {}, values, frames, TimeSteps(1.0 / 60 / 200));
+    model = model_at(setup, {}, {named(SyntheticCloth{}.fabric)});
+    model.parts.front().frames = frames;
+    model.parts.front().steps = TimeSteps(1.0 / 60 / 200);
+    linearise_model(model);
     EXPECT_TRUE(model.usable);
   }
 };

@@ -97,6 +97,10 @@ TEST(LawsToTest, TryEachCombinationOfShapesWithFrequenciesInTheDuration) {
     if (law.front().effect == "nonuniform_mass" && law.front().law == "patch") {
       EXPECT_EQ(law.size(), 18u);
     }
+    if (law.front().effect == "nonuniform_mass" && law.front().law == "edges") {
+      EXPECT_EQ(law.size(), 4u);  // widths of the hem, of all four edges at once
+      EXPECT_EQ(law.front().amplitudes.size(), 4u);
+    }
     if (law.front().effect == "gust") {
       EXPECT_EQ(law.size(), 28u);
       EXPECT_EQ(law.front().shape.at("frequency"), 1);  // half a turn in half a second

@@ -1,0 +1,78 @@
+#include "fit/diagnosis/clearance.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "fit/diagnosis/refit.h"
+#include "fit/pooled_space.h"
+
+namespace clothfit {
+namespace {
+
+/// The arrow of all recordings' information as one matrix.
+Eigen::MatrixXd dense(const PooledSpace& space, const PooledSpace::Expansion& expansion) {
+  const auto shared = static_cast<Eigen::Index>(space.shared());
+  Eigen::MatrixXd all = Eigen::MatrixXd::Zero(space.size(), space.size());
+  all.topLeftCorner(shared, shared) = expansion.shared;
+  for (size_t n = 0; n < space.recordings(); ++n) {
+    const Eigen::MatrixXd& between = expansion.between[n];
+    const auto first = static_cast<Eigen::Index>(space.first_own(n));
+    all.block(first, first, between.rows(), between.rows()) = expansion.own[n];
+    all.block(first, 0, between.rows(), shared) = between;
+    all.block(0, first, shared, between.rows()) = between.transpose();
+  }
+  return all;
+}
+
+double spread_of(double correlation) {
+  constexpr double kMost = 0.99;
+  const double rho = std::clamp(correlation, 0.0, kMost);
+  return (1 + rho) / (1 - rho);
+}
+
+}  // namespace
+
+double clear_of_neutral(const ModelFit& model, const Adequacy& structure, double threshold) {
+  const std::vector<const FitProblem*> problems = model.problem_pointers();
+  const PooledSpace pooled(problems);
+  const Term& term = model.terms.back();
+  const EffectDescription effect = describe_effect(term.effect);
+  std::vector<Eigen::Index> indices;
+  std::vector<double> away;
+  std::vector<Quadratic> quadratics;
+  for (size_t n = 0; n < problems.size(); ++n) {
+    quadratics.push_back(quadratic_of(*problems[n], model.parts[n], threshold));
+    if (!quadratics.back().usable) return 0;
+    const ParameterSpace& space = problems[n]->space;
+    const Eigen::VectorXd slope = space.value_by_coordinate(model.parts[n].values);
+    for (const std::string& name : term.amplitudes) {
+      const int p = space.index(term.effect + "." + name);
+      const std::vector<int>& own = pooled.own_of(n);
+      if (const auto found = std::ranges::find(own, p); found != own.end()) {
+        indices.push_back(pooled.first_own(n) + (found - own.begin()));
+      } else {
+        if (n > 0) continue;  // shared, and counted already
+        const std::vector<int> shared = pooled.shared_of(n);
+        indices.push_back(std::ranges::find(shared, p) - shared.begin());
+      }
+      const double neutral =
+          std::ranges::find(effect.parameters, name, &EffectParameter::name)->neutral;
+      away.push_back((model.parts[n].values[p] - neutral) / slope[p]);
+    }
+  }
+  const Eigen::Map<const Eigen::VectorXd> way(away.data(), static_cast<Eigen::Index>(away.size()));
+  Eigen::MatrixXd information = dense(pooled, pooled.gather(quadratics));
+  information.diagonal().array() += 1e-12 * std::max(1.0, information.diagonal().maxCoeff());
+  const Eigen::MatrixXd covariance =
+      information.ldlt().solve(Eigen::MatrixXd::Identity(information.rows(), information.cols()));
+  const double along = spread_of(structure.neighbour_correlation);
+  const double inflation = std::max(1.0, structure.chi_square_per_dof) *
+                           spread_of(structure.time_correlation) * along * along;
+  const Eigen::MatrixXd own = inflation * covariance(indices, indices);
+  const double square = way.dot(own.ldlt().solve(way));
+  if (!std::isfinite(square) || square < 0) return 0;
+  return 5 * std::sqrt(square / least_fall(way.size()));
+}
+
+}  // namespace clothfit

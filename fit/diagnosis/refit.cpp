@@ -1,0 +1,143 @@
+#include "fit/diagnosis/refit.h"
+
+#include <algorithm>
+
+namespace clothfit {
+namespace {
+
+/// Of the fall that was foreseen; less than that asks for another way to the optimum,
+constexpr double kKeptPromise = 0.8;
+/// unless hardly more than noise is left: chi-square per residual.
+constexpr double kHardlyMore = 1.1;
+
+/// A share of the frames over which most of what is missing has shown, and little has grown.
+constexpr double kShortHorizon = 0.4;
+
+/// A start at half of what a linear model foresees is on the right side, and not too far.
+constexpr double kCautious = 0.5;
+
+ModelFit over_growing_horizons(const DiagnosisSetup& setup, const ModelFit& model,
+                               const LawScore& score, double first_share,
+                               const ProgressCallback& progress) {
+  std::vector<Term> terms = model.terms;
+  terms.push_back(score.term);
+  std::vector<NamedValues> start = model.values();
+  const EffectDescription effect = describe_effect(score.term.effect);
+  const size_t each = score.term.amplitudes.size();
+  for (size_t n = 0; n < start.size(); ++n) {
+    for (size_t k = 0; k < each; ++k) {
+      const std::string& name = score.term.amplitudes[k];
+      const auto own = static_cast<size_t>(score.amount.size()) > each ? n * each + k : k;
+      start[n][score.term.effect + "." + name] =
+          std::ranges::find(effect.parameters, name, &EffectParameter::name)->neutral +
+          kCautious * score.amount[static_cast<Eigen::Index>(own)];
+    }
+  }
+  ModelFit fitted = model_at(setup, terms, start);
+  ModelFit whole = fitted;
+  for (const double share : shares_from(first_share)) {
+    for (size_t n = 0; n < whole.parts.size(); ++n) whole.parts[n].values = fitted.parts[n].values;
+    fitted = share < 1 ? shortened(whole, share) : whole;
+    StageOptions stage;
+    if (share < 1) {
+      stage.rounds = 1;
+      stage.least_fall = 0;
+      for (size_t n = 0; n < fitted.parts.size(); ++n)
+        stage.least_fall += kRough * fitted.objective(n).residual_count();
+    }
+    for (size_t n = 0; n < fitted.parts.size(); ++n) {
+      PooledPart& part = fitted.parts[n];
+      part.linear = {};
+      if (share < 1) continue;
+      part.directions = model.parts[n].directions;
+      part.amounts = model.parts[n].amounts;
+    }
+    refine_model(fitted, setup, stage, progress);
+    if (!fitted.usable) break;
+  }
+  return fitted;
+}
+
+}  // namespace
+
+double least_fall(Eigen::Index amplitudes) {
+  return 25 + 3.6 * static_cast<double>(amplitudes - 1);
+}
+
+std::vector<double> shares_from(double first) {
+  std::vector<double> shares;
+  for (double at = first; at < 0.85; at *= 1.6) shares.push_back(at);
+  shares.push_back(1);
+  return shares;
+}
+
+ModelFit with_terms(const DiagnosisSetup& setup, const ModelFit& model,
+                    const std::vector<Term>& terms, const Columns& columns) {
+  ModelFit result = model_at(setup, terms, model.values());
+  const std::vector<std::string> added = terms.back().parameters();
+  for (size_t n = 0; n < result.parts.size(); ++n) {
+    const PooledPart& from = model.parts[n];
+    PooledPart& part = result.parts[n];
+    part.frames = from.frames;
+    part.directions = from.directions;
+    part.amounts = from.amounts;
+    // Where a term is dropped the run is another one.
+    const std::vector<FitParameter>& before = model.problems[n]->space.parameters;
+    const bool kept_all = std::ranges::all_of(before, [&](const FitParameter& parameter) {
+      return result.problems[n]->space.index(parameter.name) >= 0;
+    });
+    if (!from.linear.usable || !kept_all) continue;
+    part.steps = from.steps;
+    const ParameterSpace& space = result.problems[n]->space;
+    const Eigen::VectorXd slope = space.value_by_coordinate(part.values);
+    Eigen::MatrixXd& jacobian = part.linear.residual_by_coordinate;
+    jacobian.resize(from.linear.residual.size(), space.size());
+    std::vector<int> unknown;
+    for (int p = 0; p < space.size(); ++p) {
+      const std::string& name = space.parameters[static_cast<size_t>(p)].name;
+      const auto known = model.problems[n]->space.index(name);
+      const auto scored = std::ranges::find(added, name);
+      if (known >= 0) {
+        jacobian.col(p) = from.linear.residual_by_coordinate.col(known);
+      } else if (!columns.empty() && scored != added.end()) {
+        // A recording's own amplitudes have columns of their own.
+        const auto count = static_cast<Eigen::Index>(added.size());
+        const Eigen::Index first =
+            columns[n].cols() > count ? static_cast<Eigen::Index>(n) * count : 0;
+        jacobian.col(p) = columns[n].col(first + (scored - added.begin())) * slope[p];
+      } else {
+        unknown.push_back(p);
+      }
+    }
+    part.linear.residual = from.linear.residual;
+    part.linear.usable = true;
+    part.borrowed = true;
+    if (unknown.empty()) continue;
+    const Linearisation rest = result.objective(n).linearise_by(part.values, unknown);
+    part.linear.usable = rest.usable;
+    if (rest.usable) jacobian(Eigen::all, unknown) = rest.residual_by_coordinate;
+  }
+  return result;
+}
+
+ModelFit fit_with_law(const DiagnosisSetup& setup, const ModelFit& model, const LawScore& score,
+                      double first_share, double threshold, const ProgressCallback& progress) {
+  if (first_share < 1) return over_growing_horizons(setup, model, score, first_share, progress);
+  std::vector<Term> terms = model.terms;
+  terms.push_back(score.term);
+  ModelFit near = with_terms(setup, model, terms, score.columns);
+  refine_model(near, setup, {}, progress);
+  if (near.cancelled) return near;
+  if (near.usable) {
+    const double left = near.chi_square(threshold);
+    const double fall = model.chi_square(threshold) - left;
+    if (fall > kKeptPromise * score.fall ||
+        left < kHardlyMore * static_cast<double>(near.residual_count()))
+      return near;
+  }
+  ModelFit far = over_growing_horizons(setup, model, score, kShortHorizon, progress);
+  if (far.cancelled || !near.usable) return far;
+  return far.usable && far.chi_square(threshold) < near.chi_square(threshold) ? far : near;
+}
+
+}  // namespace clothfit

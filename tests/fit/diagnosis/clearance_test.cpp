@@ -1,0 +1,180 @@
+// How sure it is that a law is there. Not checked here: what residuals' structure is
+// (law_score_test.cpp, Adequacy).
+#include "fit/diagnosis/clearance.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "fit/diagnosis/projection.h"
+#include "fit/diagnosis/refit.h"
+#include "tests/fit/diagnosis/true_model.h"
+#include "tests/fit/synthetic_cloth.h"
+
+namespace clothfit {
+namespace {
+
+constexpr double kInfinite = std::numeric_limits<double>::infinity();
+const FitOptions kOptions{.loss = Loss::squared};
+constexpr Adequacy kWhite{.chi_square_per_dof = 1};
+
+/// The true model of a recording with `term` as its last one, linearised.
+ModelFit model_with(const Term& term, const SyntheticCloth& cloth) {
+  const FitInput input = synthetic_input(cloth);
+  return true_model({.inputs = {&input, 1}, .options = kOptions, .columns = 9, .rows = 9}, cloth,
+                    {term});
+}
+
+const ModelFit& of_drag() {
+  static const ModelFit model = model_with(drag_term(), {.drag_rate_per_s = 0.5});
+  return model;
+}
+
+/// Where the last term's amplitudes stand in the first recording's space.
+std::vector<int> places_of(const ModelFit& model) {
+  std::vector<int> places;
+  for (const std::string& name : model.terms.back().parameters())
+    places.push_back(model.problems.front()->space.index(name));
+  return places;
+}
+
+/// Fisher's information of the amplitudes of a model of one recording, all else free, in their
+/// units: the square of their derivatives with all else projected out.
+Eigen::MatrixXd information_of_amplitudes(const ModelFit& model) {
+  const std::vector<int> amplitudes = places_of(model);
+  const FitProblem& problem = *model.problems.front();
+  EXPECT_TRUE(problem.priors.empty());
+  std::vector<int> others;
+  for (int p = 0; p < problem.space.size(); ++p)
+    if (std::ranges::find(amplitudes, p) == amplitudes.end()) others.push_back(p);
+  const auto rest = static_cast<Eigen::Index>(others.size());
+  const PooledPart& part = model.parts.front();
+  const Eigen::MatrixXd& jacobian = part.linear.residual_by_coordinate;
+  const Eigen::Index rows = jacobian.rows();
+  const Projection projection(jacobian(Eigen::all, others), Eigen::MatrixXd::Zero(rest, rest),
+                              Eigen::VectorXd::Zero(rest), Eigen::MatrixXd(rows, 0),
+                              Eigen::VectorXd::Ones(rows), part.linear.residual);
+  const Eigen::VectorXd slope = problem.space.value_by_coordinate(part.values);
+  const Eigen::MatrixXd left =
+      projection.columns(jacobian(Eigen::all, amplitudes) *
+                         Eigen::VectorXd(slope(amplitudes)).cwiseInverse().asDiagonal());
+  return left.transpose() * left;
+}
+
+/// The model as if there were another recording that shows just the same.
+ModelFit twice(const ModelFit& model) {
+  ModelFit both = model;
+  both.problems.push_back(model.problems.front());
+  both.parts.push_back(model.parts.front());
+  return both;
+}
+
+TEST(ClearOfNeutral, OfOneAmplitudeInWhiteNoiseIsItsNumberOfSigmas) {
+  const ModelFit& model = of_drag();
+  ASSERT_TRUE(model.usable);
+  const double sigma = 1 / std::sqrt(information_of_amplitudes(model)(0, 0));
+
+  const double clear = clear_of_neutral(model, kWhite, kInfinite);
+
+  EXPECT_NEAR(clear, 0.5 / sigma, 1e-4 * clear);  // what keeps the inverse finite takes a little
+  EXPECT_GT(clear, 5);
+}
+
+TEST(ClearOfNeutral, IsLessByWhatSumsOfDependentResidualsScatterMore) {
+  const ModelFit& model = of_drag();
+  ASSERT_TRUE(model.usable);
+  const double white = clear_of_neutral(model, kWhite, kInfinite);
+  const auto share = [&](double chi_square, double in_time, double along) {
+    return clear_of_neutral(model,
+                            {.chi_square_per_dof = chi_square,
+                             .time_correlation = in_time,
+                             .neighbour_correlation = along},
+                            kInfinite) /
+           white;
+  };
+
+  // The variance is (1 + rho) / (1 - rho) in time, the same each way along the cloth, and the
+  // residuals' own.
+  EXPECT_NEAR(share(1, 0.6, 0), std::sqrt(0.4 / 1.6), 1e-12);
+  EXPECT_NEAR(share(1, 0, 0.5), 0.5 / 1.5, 1e-12);
+  EXPECT_NEAR(share(4, 0, 0), 0.5, 1e-12);
+  EXPECT_NEAR(share(4, 0.6, 0.5), 0.5 * std::sqrt(0.4 / 1.6) * 0.5 / 1.5, 1e-12);
+}
+
+TEST(ClearOfNeutral, IsNoMoreThanNoiseAllows) {
+  const ModelFit& model = of_drag();
+  ASSERT_TRUE(model.usable);
+  const double white = clear_of_neutral(model, kWhite, kInfinite);
+
+  EXPECT_EQ(
+      clear_of_neutral(
+          model,
+          {.chi_square_per_dof = 0.7, .time_correlation = -0.2, .neighbour_correlation = -0.3},
+          kInfinite),
+      white);
+  // Residuals that never change leave little, but a number.
+  const double least = clear_of_neutral(
+      model, {.chi_square_per_dof = 1, .time_correlation = 1, .neighbour_correlation = 1},
+      kInfinite);
+  EXPECT_GT(least, 0);
+  EXPECT_LT(least, 1e-3 * white);
+}
+
+TEST(ClearOfNeutral, CountsSeveralAmplitudesAsOneNumberThatIsAsUnlikely) {
+  ModelFit model =
+      model_with({.effect = "wind", .law = "pressure", .amplitudes = {"q_x", "q_y", "q_z"}}, {});
+  ASSERT_TRUE(model.usable);
+  const Eigen::MatrixXd information = information_of_amplitudes(model);
+  Eigen::Vector3d pressure_pa(0.01, -0.02, 0.005);
+  pressure_pa *= std::sqrt(least_fall(3) / pressure_pa.dot(information * pressure_pa));
+  const std::vector<int> places = places_of(model);
+  for (int axis = 0; axis < 3; ++axis)
+    model.parts.front().values[places[static_cast<size_t>(axis)]] = pressure_pa[axis];
+
+  EXPECT_NEAR(clear_of_neutral(model, kWhite, kInfinite), 5, 1e-3);
+}
+
+TEST(ClearOfNeutral, GrowsWithTheRecordingsThatShareAnAmplitude) {
+  const ModelFit& model = of_drag();
+  ASSERT_TRUE(model.usable);
+
+  const double one = clear_of_neutral(model, kWhite, kInfinite);
+  EXPECT_NEAR(clear_of_neutral(twice(model), kWhite, kInfinite), std::sqrt(2.0) * one, 1e-4 * one);
+}
+
+// Two clocks that are off alike: their squares add, and count as those of two amplitudes.
+TEST(ClearOfNeutral, CountsTheAmplitudesThatEachRecordingHasOfItsOwn) {
+  ModelFit model = model_with({.effect = "clock_offset", .law = "", .amplitudes = {"time"}}, {});
+  ASSERT_TRUE(model.usable);
+  model.parts.front().values[places_of(model).front()] = 2e-3;
+
+  const double one = clear_of_neutral(model, kWhite, kInfinite);
+  EXPECT_GT(one, 0);
+  EXPECT_NEAR(clear_of_neutral(twice(model), kWhite, kInfinite),
+              5 * std::sqrt(2 * one * one / least_fall(2)), 1e-4 * one);
+}
+
+/// The chance that the sum of so many squared standard normal numbers exceeds `square`; up to four.
+double chance_beyond(int numbers, double square) {
+  const double half = 0.5 * square;
+  if (numbers % 2 == 0) return std::exp(-half) * (numbers == 2 ? 1 : 1 + half);
+  return std::erfc(std::sqrt(half)) +
+         (numbers == 1 ? 0 : 2 * std::sqrt(half / M_PI) * std::exp(-half));
+}
+
+TEST(LeastFall, IsAsUnlikelyAsFiveSigmas) {
+  const double five_sigmas = std::erfc(5 / std::sqrt(2.0));
+  for (const int amplitudes : {1, 2, 3, 4}) {
+    SCOPED_TRACE(amplitudes);
+    // A straight line in the number of amplitudes is near the truth.
+    EXPECT_LT(chance_beyond(amplitudes, least_fall(amplitudes)), 1.1 * five_sigmas);
+    EXPECT_GT(chance_beyond(amplitudes, 0.95 * least_fall(amplitudes)), five_sigmas);
+  }
+}
+
+}  // namespace
+}  // namespace clothfit
