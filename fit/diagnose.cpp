@@ -47,14 +47,29 @@ struct Line {
   ModelFit model;
   std::vector<AcceptedEffect> accepted;
   double cost = 0;
-  bool finished = false;  ///< no law more leads on from here
+  bool finished = false;       ///< no law more leads on from here
+  std::vector<LawScore> last;  ///< what its model would still show, over all frames
   std::vector<LawTrial> refused;
 };
 
-/// What a line's next law may be: scores averaged over horizons.
+/// What a line's next law may be.
 struct Shortlist {
-  std::vector<LawScore> scores;
-  double share = 1;  ///< the shortest horizon
+  double share = 1;              ///< the shortest horizon
+  std::vector<LawScore> scores;  ///< of all laws there, by the derivatives of the coarser mesh
+  /// Of the best of them by those of the model's own mesh, averaged over horizons; with columns
+  /// where all frames are one.
+  std::vector<LawScore> best;
+
+  /// All scores, those of the model's own mesh where there are any.
+  std::vector<LawScore> merged() const {
+    std::vector<LawScore> all = scores;
+    for (LawScore& score : all)
+      for (const LawScore& known : best)
+        if (known.term.same_law(score.term)) score = known;
+    for (LawScore& score : all) score.columns.clear();
+    std::ranges::stable_sort(all, std::greater<>(), &LawScore::share);
+    return all;
+  }
 };
 
 Adequacy adequacy_of(const DiagnosisSetup& setup, const ModelFit& model) {
@@ -103,7 +118,14 @@ class Search {
     }
   }
 
-  const std::vector<LawShapes>& laws() const { return laws_; }
+  std::vector<LawShapes> untested(const ModelFit& model) const {
+    std::vector<LawShapes> result;
+    for (const LawShapes& law : laws_)
+      if (std::ranges::none_of(model.terms,
+                               [&](const Term& term) { return term.same_law(law.front()); }))
+        result.push_back(law);
+    return result;
+  }
   double cost(const ModelFit& model) const { return model.chi_square(threshold_) + price(model); }
 
   /// Scores of all laws, each at its best shape, with the derivatives of a coarser mesh.
@@ -145,45 +167,40 @@ class Search {
       const ModelFit& at = shorter[k];
       if (k == 0) {
         list.scores = roughly_scored(at, untested(model));
-        for (const LawScore& score : list.scores)
-          if (laws.size() < static_cast<size_t>(2 * options_.refits)) laws.push_back({score.term});
+        if (stopped_) return {};
         for (LawScore& score : list.scores) score.columns.clear();
-        for (size_t n = 0; n < laws.size(); ++n) list.scores[n].share = 0;
+        const size_t best = std::min(list.scores.size(), static_cast<size_t>(2 * options_.refits));
+        for (size_t n = 0; n < best; ++n) {
+          laws.push_back({list.scores[n].term});
+          list.best.push_back(list.scores[n]);
+          list.best.back().share = 0;
+        }
       }
-      const std::vector<LawScore> scores =
+      std::vector<LawScore> scores =
           score_laws(at, ModelProjection(at, setup_.options.loss), laws, progress_);
       if (stopped_) return {};
-      for (const LawScore& score : scores) {
-        const auto same = std::ranges::find_if(
-            list.scores, [&](const LawScore& known) { return known.term.same_law(score.term); });
-        same->share += score.share / static_cast<double>(shorter.size());
-        if (k > 0 && score.fall <= same->fall) continue;
-        same->fall = score.fall;
-        same->amount = score.amount;
-        same->sigma = score.sigma;
+      for (LawScore& score : scores) {
+        LawScore& same = *std::ranges::find_if(
+            list.best, [&](const LawScore& known) { return known.term.same_law(score.term); });
+        same.share += score.share / static_cast<double>(shorter.size());
+        if (k > 0 && score.fall <= same.fall) continue;
+        same.fall = score.fall;
+        same.amount = score.amount;
+        same.sigma = score.sigma;
+        if (list.share == 1) same.columns = std::move(score.columns);
       }
     }
-    // What a fit over all frames starts with.
-    const std::vector<LawShapes> best = laws;
-    std::vector<LawScore> whole =
-        shorter.size() == 1 && list.share == 1
-            ? score_laws(shorter.front(), ModelProjection(shorter.front(), setup_.options.loss),
-                         best, progress_)
-            : score_laws(model, ModelProjection(model, setup_.options.loss), best, progress_);
-    if (stopped_) return {};
-    for (LawScore& score : whole)
-      for (LawScore& known : list.scores)
-        if (known.term.same_law(score.term)) known.columns = std::move(score.columns);
-    std::ranges::stable_sort(list.scores, std::greater<>(), &LawScore::share);
+    std::ranges::stable_sort(list.best, std::greater<>(), &LawScore::share);
     return list;
   }
 
   /// Lines that a law more leads to, of those on the list.
   std::vector<Line> extend(Line& line, const Shortlist& list) {
     line.finished = true;
+    if (list.share == 1) line.last = list.scores;
     std::vector<Tried> tried;
-    for (const LawScore& score : list.scores) {
-      if (score.fall < least_fall(score.amount.size()) || score.columns.empty()) continue;
+    for (const LawScore& score : list.best) {
+      if (score.fall < least_fall(score.amount.size())) continue;
       if (tried.size() == static_cast<size_t>(options_.refits)) break;
       tried.push_back(
           {.score = &score,
@@ -217,15 +234,6 @@ class Search {
   }
 
  private:
-  std::vector<LawShapes> untested(const ModelFit& model) const {
-    std::vector<LawShapes> result;
-    for (const LawShapes& law : laws_)
-      if (std::ranges::none_of(model.terms,
-                               [&](const Term& term) { return term.same_law(law.front()); }))
-        result.push_back(law);
-    return result;
-  }
-
   struct Tried {
     const LawScore* score = nullptr;
     ModelFit model;
@@ -452,7 +460,7 @@ Diagnosis diagnose(const FitInput& input, const DiagnoseOptions& options,
   Shortlist list = search.shortlist(base.model);
   if (stopped) return cancelled();
   result.score_frames = frames_of_share(problem, list.share);
-  result.scores = list.scores;
+  result.scores = list.merged();
   // Over few frames, where the cloth's answer to a missing force is still small.
   ModelFit early = shortened(base.model, std::max(list.share, kForceShare));
   refine_model(early, setup, {.rounds = 1}, watched);
@@ -494,9 +502,10 @@ Diagnosis diagnose(const FitInput& input, const DiagnoseOptions& options,
   result.accepted = std::move(best.accepted);
   result.refused = std::move(best.refused);
   result.after = adequacy_of(setup, best.model);
-  const std::vector<LawScore> last = search.roughly_scored(best.model, search.laws());
+  // Of laws that are not in the model, over all frames.
+  if (best.last.empty()) best.last = search.roughly_scored(best.model, search.untested(best.model));
   if (stopped) return cancelled();
-  result.limits = limits_of(last, std::sqrt(std::max(1.0, result.after.chi_square_per_dof)));
+  result.limits = limits_of(best.last, std::sqrt(std::max(1.0, result.after.chi_square_per_dof)));
 
   if (result.accepted.empty()) {
     result.found = result.base;

@@ -5,11 +5,6 @@
 
 #include "model/aligned_array.h"
 
-namespace ceres {
-template <typename T, int N>
-struct Jet;
-}
-
 namespace clothfit {
 
 /// Several simulations run side by side, one parameter set each: number l of every group of `count`
@@ -26,9 +21,6 @@ using FastLanes = Lanes<float, 16>;   ///< estimates and contraction allowed: fo
 using SingleLane = Lanes<double, 1>;  ///< one simulation, `exact` to the same bits
 
 inline constexpr int kLanes = ExactLanes::kCount;
-
-/// One simulation whose numbers carry their derivatives along kLanes directions.
-using DualLanes = Lanes<ceres::Jet<double, kLanes>, 1>;
 
 /// One coordinate of every vertex in every lane: lanes x vertices, lane index fastest.
 template <class L = ExactLanes>
@@ -72,21 +64,6 @@ struct LaneVectors {
     x.row(l) = values.row(0).array().template cast<Number>();
     y.row(l) = values.row(1).array().template cast<Number>();
     z.row(l) = values.row(2).array().template cast<Number>();
-  }
-};
-
-/// Values and derivatives apart, so that the kernels find each as they have it elsewhere.
-template <>
-struct LaneVectors<DualLanes> {
-  LaneVectors<SingleLane> value;
-  LaneVectors<ExactLanes> tangent;  ///< a direction in every lane
-
-  static LaneVectors zero(int vertices) {
-    return {LaneVectors<SingleLane>::zero(vertices), LaneVectors<ExactLanes>::zero(vertices)};
-  }
-  void set_zero() {
-    value.set_zero();
-    tangent.set_zero();
   }
 };
 

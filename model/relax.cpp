@@ -144,14 +144,13 @@ void settle(const HeavyAir& heavy, double time_s, std::span<const ParameterSet> 
   }
 }
 
-/// One simulation and its derivatives along at most kLanes directions.
+/// One simulation and its derivatives.
 void settle(const HeavyAir& heavy, double time_s, const ParameterSet& set,
-            std::span<const Direction> directions, TangentStepper& stepper,
-            LaneState<DualLanes>& state) {
-  state = start_of(heavy.cloth, set, directions);
-  const DualParameters parameters = DualParameters::of(heavy.cloth, set, directions);
-  const LaneVectors<DualLanes> from_m = stepper.locate(state.position_m);
-  LaneVectors<DualLanes> target_m = from_m;
+            std::span<const Direction> directions, TangentStepper& stepper, TangentState& state) {
+  state = TangentState::of(heavy.cloth, set, directions);
+  const TangentParameters parameters = TangentParameters::of(heavy.cloth, set, directions);
+  const TangentVectors from_m = stepper.locate(state);
+  TangentVectors target_m = from_m;
   for (int n = 0; n < heavy.steps; ++n) {
     for (size_t h = 0; h < heavy.cloth.held.size(); ++h) {
       if (!heavy.cloth.held[h].motion) continue;
@@ -167,14 +166,16 @@ void settle(const HeavyAir& heavy, double time_s, const ParameterSet& set,
         const auto& motion = directions[d].held_motion;
         const Eigen::Vector3d change =
             motion.empty() || !motion[h] ? Eigen::Vector3d::Zero() : motion[h](time_s);
-        const auto lane = static_cast<Eigen::Index>(d);
-        place(target_m.tangent.x, from_m.tangent.x, lane, change.x());
-        place(target_m.tangent.y, from_m.tangent.y, lane, change.y());
-        place(target_m.tangent.z, from_m.tangent.z, lane, change.z());
+        const auto lane = static_cast<Eigen::Index>(d % kLanes);
+        LaneVectors<>& to = target_m.tangent[d / kLanes];
+        const LaneVectors<>& from = from_m.tangent[d / kLanes];
+        place(to.x, from.x, lane, change.x());
+        place(to.y, from.y, lane, change.y());
+        place(to.z, from.z, lane, change.z());
       }
     }
-    slow(heavy.slowing, state.velocity_m_per_s.value);
-    slow(heavy.slowing, state.velocity_m_per_s.tangent);
+    slow(heavy.slowing, state.value.velocity_m_per_s);
+    for (LaneState<>& tangent : state.tangent) slow(heavy.slowing, tangent.velocity_m_per_s);
     stepper.step(parameters, target_m, time_s, heavy.time_step_s, state);
   }
 }
@@ -243,27 +244,26 @@ void start_at_rest_with_tangents(const Cloth& cloth, ParameterSet& set,
   tbb::parallel_for(size_t{0}, groups, [&](size_t g) {
     const size_t first = g * kLanes;
     const size_t count = std::min<size_t>(kLanes, directions.size() - first);
-    LaneState<DualLanes> state;
+    TangentState state;
     const std::span<const Direction> group = std::span(moved).subspan(first, count);
     TangentStepper stepper(heavy.cloth, group);
     settle(heavy, time_s, damped, group, stepper, state);
     for (size_t d = 0; d < count; ++d) {
       const auto lane = static_cast<int>(d);
-      directions[first + d].start_position_m = state.position_m.tangent.lane(lane);
+      directions[first + d].start_position_m = state.tangent.front().position_m.lane(lane);
       directions[first + d].start_velocity_m_per_s.resize(3, 0);
       if (directions[first + d].emerging)
         directions[first + d].emerging->start_memory = stepper.emerging_memory(d);
       directions[first + d].start_effect_memory =
           memory_of(cloth, heavy, [&](size_t k) -> Eigen::VectorXd {
-            return state.effect_memory[k].row(0).unaryExpr(
-                [&](const auto& number) { return number.v[lane]; });
+            return state.tangent.front().effect_memory[k].row(lane).matrix();
           });
     }
     if (g > 0) return;
-    set.start_position_m = state.position_m.value.lane(0);
+    set.start_position_m = state.value.position_m.lane(0);
     set.start_velocity_m_per_s.resize(3, 0);
     set.start_effect_memory = memory_of(cloth, heavy, [&](size_t k) -> Eigen::VectorXd {
-      return state.effect_memory[k].row(0).unaryExpr([](const auto& number) { return number.a; });
+      return state.value.effect_memory[k].row(0).matrix();
     });
   });
 }

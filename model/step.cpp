@@ -1,7 +1,5 @@
 #include "model/step.h"
 
-#include <ceres/jet.h>
-
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cassert>
@@ -252,7 +250,6 @@ CLOTHFIT_INSTANTIATE(ExactLanes)
 CLOTHFIT_INSTANTIATE(FastLanes)
 CLOTHFIT_INSTANTIATE(SingleLane)
 #undef CLOTHFIT_INSTANTIATE
-template struct LaneState<DualLanes>;
 template class EulerStepper<ExactLanes>;
 template class EulerStepper<FastLanes>;
 template class EulerStepper<SingleLane>;

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <ceres/jet.h>
-
 #include <array>
 #include <functional>
 #include <memory>
@@ -10,6 +8,7 @@
 #include <vector>
 
 #include "model/cloth.h"
+#include "model/effects/linearisation.h"
 #include "model/kernels/tangent_sweep.h"
 #include "model/step.h"
 
@@ -40,26 +39,36 @@ struct Direction {
   std::optional<EmergingEffect> emerging;
 };
 
-/// The parameters of one simulation and their changes along kLanes directions.
-struct DualParameters {
+/// The parameters of one simulation and their changes along directions, kLanes in each group; what
+/// is missing in the last group is zero.
+struct TangentParameters {
   LaneParameters<SingleLane> value;
-  LaneParameters<ExactLanes> tangent;
-  LaneSprings<DualLanes> springs;  ///< both, as effects see them
-  LaneVector<DualLanes> gravity_m_per_s2;
-  std::vector<EffectValues<DualLanes>> effects;
+  std::vector<LaneParameters<>> tangent;  ///< of each group
 
-  /// At most kLanes directions; missing ones are zero.
-  static DualParameters of(const Cloth& cloth, const ParameterSet& set,
-                           std::span<const Direction> directions);
+  static TangentParameters of(const Cloth& cloth, const ParameterSet& set,
+                              std::span<const Direction> directions);
 };
 
-/// Where one simulation and its derivatives along at most kLanes directions start.
-LaneState<DualLanes> start_of(const Cloth& cloth, const ParameterSet& set,
-                              std::span<const Direction> directions);
+/// Places or motions of one simulation with their changes along the directions of each group.
+struct TangentVectors {
+  LaneVectors<SingleLane> value;
+  std::vector<LaneVectors<>> tangent;
+};
 
-/// Steps one simulation together with its derivatives along kLanes directions: exact for the
-/// discrete scheme, the springs at their strain limit included, where it is smooth. The simulation
-/// itself has the bits that EulerStepper gives it. Holds scratch memory: one object per thread.
+/// One simulation and its derivatives along directions.
+struct TangentState {
+  LaneState<SingleLane> value;
+  std::vector<LaneState<>> tangent;  ///< of each group
+
+  /// Where they start; one group at least.
+  static TangentState of(const Cloth& cloth, const ParameterSet& set,
+                         std::span<const Direction> directions);
+};
+
+/// Steps one simulation together with its derivatives along any number of directions: exact for the
+/// discrete scheme, the springs at their strain limit included, where it is smooth. What effects do
+/// is linearised once for all of them. The simulation itself has the bits that EulerStepper gives
+/// it. Holds scratch memory: one object per thread.
 class TangentStepper {
  public:
   /// `cloth` must outlive the stepper. Of the directions, the effects that emerge along them.
@@ -69,24 +78,38 @@ class TangentStepper {
   Eigen::VectorXd emerging_memory(size_t direction) const;
 
   /// Where the held points are.
-  LaneVectors<DualLanes> locate(const LaneVectors<DualLanes>& position_m) const;
+  TangentVectors locate(const TangentState& state) const;
 
   /// One time step, as EulerStepper::step takes it.
-  void step(const DualParameters& parameters, const LaneVectors<DualLanes>& held_target_m,
-            double time_s, double time_step_s, LaneState<DualLanes>& state);
+  void step(const TangentParameters& parameters, const TangentVectors& held_target_m, double time_s,
+            double time_step_s, TangentState& state);
 
  private:
-  /// An effect that emerges along the direction of one lane.
+  /// An effect that emerges along the direction of one lane of a group.
   struct Emerging {
     std::shared_ptr<const Effect> effect;
-    Eigen::Index lane = 0;
+    size_t direction = 0;
     double per_change = 0;
     EffectValues<SingleLane> parameters;
     EffectMemory<SingleLane> memory;
+
+    size_t group() const { return direction / kLanes; }
+    Eigen::Index lane() const { return static_cast<Eigen::Index>(direction % kLanes); }
   };
 
-  void apply_limit(const DualParameters& parameters, double time_step_s,
-                   LaneState<DualLanes>& state);
+  void add_effect_forces(const TangentParameters& parameters, const EffectScene<SingleLane>& scene,
+                         TangentState& state);
+  void shift_supports(const TangentParameters& parameters, const EffectScene<SingleLane>& scene,
+                      TangentState& state);
+  void change_forces(const TangentParameters& parameters, const EffectScene<SingleLane>& scene,
+                     const TangentState& state);
+  /// Adds what `derivatives_` of effect `e` make of a group's tangents to those of what it acts on.
+  void add_actions(size_t e, const LaneParameters<>& parameters, const LaneState<>& state,
+                   LaneVectors<>& action) const;
+  /// The same for what also moves its memory on; `pull_n` of held points, or null.
+  void apply(size_t e, const LaneParameters<>& parameters, const LaneVectors<>* pull_n,
+             LaneVectors<>& action, LaneState<>& state);
+  void apply_limit(const TangentParameters& parameters, double time_step_s, TangentState& state);
 
   const Cloth& cloth_;
   Eigen::VectorXd inverse_mass_per_kg_;
@@ -97,10 +120,11 @@ class TangentStepper {
   TangentSweep tangent_sweep_;
   StrainLimiter<SingleLane> limiter_;
   std::vector<LimitMove> moves_;  ///< of the last step's strain limit
-  LaneVectors<DualLanes> force_n_, pull_n_, target_m_;
-  LaneVectors<SingleLane> force_before_, target_before_;  ///< what an effect found
-  std::vector<EffectMemory<SingleLane>> memory_;
+  TangentVectors force_n_, pull_n_, target_m_;
+  EffectLinearisation derivatives_;
+  std::vector<EffectMemory<>> next_memory_;  ///< of each effect
   std::vector<Emerging> emerging_;
+  LaneVectors<> changed_n_;
   LaneVectors<SingleLane> emerged_n_, emerged_target_m_;
 };
 

@@ -1,5 +1,6 @@
 #include "model/tangents.h"
 
+#include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -8,13 +9,13 @@
 namespace clothfit {
 namespace {
 
-/// One simulation and its derivatives along up to kLanes directions.
-TangentResult run_group(const Cloth& cloth, const ParameterSet& set,
+/// One simulation and its derivatives along some directions.
+TangentResult run_chunk(const Cloth& cloth, const ParameterSet& set,
                         std::span<const Direction> directions, const Schedule& schedule) {
   TangentStepper stepper(cloth, directions);
-  const DualParameters parameters = DualParameters::of(cloth, set, directions);
-  LaneState<DualLanes> state = start_of(cloth, set, directions);
-  LaneVectors<DualLanes> target_m = stepper.locate(state.position_m);
+  const TangentParameters parameters = TangentParameters::of(cloth, set, directions);
+  TangentState state = TangentState::of(cloth, set, directions);
+  TangentVectors target_m = stepper.locate(state);
   const auto aim = [&](double time_s) {
     for (size_t h = 0; h < cloth.held.size(); ++h) {
       if (!cloth.held[h].motion) continue;
@@ -27,10 +28,11 @@ TangentResult run_group(const Cloth& cloth, const ParameterSet& set,
         const auto& motion = directions[d].held_motion;
         const Eigen::Vector3d change =
             motion.empty() || !motion[h] ? Eigen::Vector3d::Zero() : motion[h](time_s);
-        const auto lane = static_cast<Eigen::Index>(d);
-        target_m.tangent.x(lane, column) = change.x();
-        target_m.tangent.y(lane, column) = change.y();
-        target_m.tangent.z(lane, column) = change.z();
+        const auto lane = static_cast<Eigen::Index>(d % kLanes);
+        LaneVectors<>& tangent = target_m.tangent[d / kLanes];
+        tangent.x(lane, column) = change.x();
+        tangent.y(lane, column) = change.y();
+        tangent.z(lane, column) = change.z();
       }
     }
   };
@@ -49,7 +51,7 @@ TangentResult run_group(const Cloth& cloth, const ParameterSet& set,
         stepper.step(parameters, target_m, from_s + n * h, h, state);
       }
     }
-    Eigen::Matrix3Xd now = state.position_m.value.lane(0);
+    Eigen::Matrix3Xd now = state.value.position_m.lane(0);
     if (result.run.usable() && left_the_scene(now, set.start_position_m, cloth.mesh)) {
       result.run.reason = StopReason::diverged;
       result.run.diverged_frame = static_cast<int>(frame);
@@ -57,7 +59,8 @@ TangentResult run_group(const Cloth& cloth, const ParameterSet& set,
     if (!result.run.usable()) now.setConstant(NAN);
     result.run.position_m.push_back(std::move(now));
     for (size_t d = 0; d < directions.size(); ++d) {
-      Eigen::Matrix3Xd tangent = state.position_m.tangent.lane(static_cast<int>(d));
+      Eigen::Matrix3Xd tangent =
+          state.tangent[d / kLanes].position_m.lane(static_cast<int>(d % kLanes));
       if (!result.run.usable()) tangent.setConstant(NAN);
       result.position_tangent[d].push_back(std::move(tangent));
     }
@@ -66,12 +69,22 @@ TangentResult run_group(const Cloth& cloth, const ParameterSet& set,
       if (!result.run.usable()) values.setConstant(NAN);
       return values;
     };
-    result.run.velocity_m_per_s.push_back(kept(state.velocity_m_per_s.value.lane(0)));
+    result.run.velocity_m_per_s.push_back(kept(state.value.velocity_m_per_s.lane(0)));
     for (size_t d = 0; d < directions.size(); ++d)
       result.velocity_tangent[d].push_back(
-          kept(state.velocity_m_per_s.tangent.lane(static_cast<int>(d))));
+          kept(state.tangent[d / kLanes].velocity_m_per_s.lane(static_cast<int>(d % kLanes))));
   }
   return result;
+}
+
+/// Directions that share a run: as many as spread over the threads, within what stays near the
+/// processor.
+size_t directions_at_once(size_t directions) {
+  constexpr size_t kMostGroups = 8;
+  const size_t groups = (directions + kLanes - 1) / kLanes;
+  const auto threads =
+      tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
+  return kLanes * std::clamp<size_t>((groups + threads - 1) / threads, 1, kMostGroups);
 }
 
 }  // namespace
@@ -79,18 +92,19 @@ TangentResult run_group(const Cloth& cloth, const ParameterSet& set,
 TangentResult simulate_with_tangents(const Cloth& cloth, const ParameterSet& parameters,
                                      std::span<const Direction> directions,
                                      const Schedule& schedule) {
-  const size_t groups = std::max<size_t>(1, (directions.size() + kLanes - 1) / kLanes);
-  std::vector<TangentResult> results(groups);
-  tbb::parallel_for(size_t{0}, groups, [&](size_t g) {
-    const size_t first = g * kLanes;
-    results[g] = run_group(
-        cloth, parameters,
-        directions.subspan(first, std::min<size_t>(kLanes, directions.size() - first)), schedule);
+  const size_t chunk = directions_at_once(directions.size());
+  const size_t chunks = std::max<size_t>(1, (directions.size() + chunk - 1) / chunk);
+  std::vector<TangentResult> results(chunks);
+  tbb::parallel_for(size_t{0}, chunks, [&](size_t c) {
+    const size_t first = c * chunk;
+    results[c] =
+        run_chunk(cloth, parameters,
+                  directions.subspan(first, std::min(chunk, directions.size() - first)), schedule);
   });
   TangentResult result = std::move(results.front());
-  for (size_t g = 1; g < groups; ++g) {
-    std::ranges::move(results[g].position_tangent, std::back_inserter(result.position_tangent));
-    std::ranges::move(results[g].velocity_tangent, std::back_inserter(result.velocity_tangent));
+  for (size_t c = 1; c < chunks; ++c) {
+    std::ranges::move(results[c].position_tangent, std::back_inserter(result.position_tangent));
+    std::ranges::move(results[c].velocity_tangent, std::back_inserter(result.velocity_tangent));
   }
   return result;
 }

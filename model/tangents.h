@@ -18,7 +18,8 @@ struct TangentResult {
 
 /// Simulates one parameter set together with the derivatives of its positions along every
 /// direction, by forward differentiation of each step: exact for the discrete scheme wherever it is
-/// smooth. Groups of kLanes directions run in parallel. The bits of a result do not depend on the
+/// smooth. Directions that share a run share its cost and what effects
+/// are linearised for; such groups run in parallel. The bits of a result do not depend on the
 /// other directions or on the number of threads; `run` has the bits that simulate() gives.
 TangentResult simulate_with_tangents(const Cloth& cloth, const ParameterSet& parameters,
                                      std::span<const Direction> directions,

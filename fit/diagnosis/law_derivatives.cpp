@@ -76,6 +76,10 @@ void add(Batch& batch, size_t index, const Term& law) {
   batch.laws.push_back(std::move(added));
 }
 
+/// Amplitudes of motion effects that share a run: the simulation and what its effects are
+/// linearised for are paid once.
+constexpr int kMotionAmplitudes = 8 * kLanes;
+
 /// Of one recording.
 std::vector<Eigen::MatrixXd> derivatives_in(const FitProblem& problem, const PooledPart& part,
                                             std::span<const Term> laws) {
@@ -85,7 +89,7 @@ std::vector<Eigen::MatrixXd> derivatives_in(const FitProblem& problem, const Poo
   std::vector<Batch> batches;
   // Effects of motion and of the measurement apart: only the former cost derivatives of runs.
   for (const bool of_measurement : {false, true}) {
-    const int most = of_measurement ? kMeasurementParameters - measured : kLanes;
+    const int most = of_measurement ? kMeasurementParameters - measured : kMotionAmplitudes;
     bool begun = false;
     for (size_t n = 0; n < laws.size(); ++n) {
       const MeasurementEffectEntry* entry = measurement_effect_named(laws[n].effect);

@@ -84,8 +84,8 @@ using EffectValues = std::vector<LaneValue<L>>;
 template <class L = ExactLanes>
 using EffectMemory = LaneArray<L>;
 
-/// What an effect does to simulations in lanes of kind L (with DualLanes: to their derivatives
-/// too). Each does some of three things; what it does not do, it leaves as it is.
+/// What an effect does to simulations in lanes of kind L. Each does some of three things; what it
+/// does not do, it leaves as it is.
 template <class L>
 class LaneEffect {
  public:
@@ -125,7 +125,7 @@ class EffectInLanes : public LaneEffect<L>... {
 };
 
 /// One physical effect beyond springs, dampers along them, and gravity.
-class Effect : public EffectInLanes<ExactLanes, FastLanes, SingleLane, DualLanes> {
+class Effect : public EffectInLanes<ExactLanes, FastLanes, SingleLane> {
  public:
   /// Whether `change_force` and `shift_supports` do anything.
   virtual bool changes_force() const { return false; }

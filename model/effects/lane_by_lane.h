@@ -1,9 +1,6 @@
 #pragma once
 
-#include <ceres/jet.h>
-
 #include <array>
-#include <type_traits>
 
 #include "model/effects/law_effect.h"
 #include "model/effects/linearisation.h"
@@ -11,19 +8,15 @@
 
 namespace clothfit {
 
-/// The vectors of one simulation among those in lanes: in double precision, or dual.
+/// The vectors of one simulation among those in lanes, in double precision.
 template <class L>
 struct OneLane {
-  using Real = std::conditional_t<std::is_same_v<L, DualLanes>, RealOf<L>, double>;
   const LaneVectors<L>& vectors;
   int lane;
 
-  Vector3<Real> operator()(int k) const {
-    if constexpr (std::is_same_v<L, DualLanes>)
-      return vector_at<L>(vectors, k);
-    else
-      return {static_cast<double>(vectors.x(lane, k)), static_cast<double>(vectors.y(lane, k)),
-              static_cast<double>(vectors.z(lane, k))};
+  Vector3<double> operator()(int k) const {
+    return {static_cast<double>(vectors.x(lane, k)), static_cast<double>(vectors.y(lane, k)),
+            static_cast<double>(vectors.z(lane, k))};
   }
 };
 
@@ -68,14 +61,10 @@ class LaneByLaneEffect final : public LawEffect<LaneByLaneEffect<Law>, Law> {
     for (int l = 0; l < L::kCount; ++l)
       Law::forces(scene.cloth, OneLane<L>{scene.position_m, l},
                   OneLane<L>{scene.velocity_m_per_s, l}, parameters_of<L>(parameters, l),
-                  [&](int k, const Vector3<typename OneLane<L>::Real>& f) {
-                    if constexpr (std::is_same_v<L, DualLanes>) {
-                      add_at<L>(force_n, k, f);
-                    } else {
-                      force_n.x(l, k) += static_cast<Number>(f.x);
-                      force_n.y(l, k) += static_cast<Number>(f.y);
-                      force_n.z(l, k) += static_cast<Number>(f.z);
-                    }
+                  [&](int k, const Vector3<double>& f) {
+                    force_n.x(l, k) += static_cast<Number>(f.x);
+                    force_n.y(l, k) += static_cast<Number>(f.y);
+                    force_n.z(l, k) += static_cast<Number>(f.z);
                   });
   }
 
@@ -90,9 +79,8 @@ class LaneByLaneEffect final : public LawEffect<LaneByLaneEffect<Law>, Law> {
  private:
   template <class L>
   static auto parameters_of(const EffectValues<L>& values, int lane) {
-    using Real = typename OneLane<L>::Real;
-    std::array<Real, Law::kParameters> p;
-    for (size_t n = 0; n < p.size(); ++n) p[n] = static_cast<Real>(values[n][lane]);
+    std::array<double, Law::kParameters> p;
+    for (size_t n = 0; n < p.size(); ++n) p[n] = static_cast<double>(values[n][lane]);
     return p;
   }
 };

@@ -39,7 +39,7 @@ class AdapterInLanes<Adapter, L, More...> : public AdapterInLanes<Adapter, More.
 /// functions cannot be templates over the kind of lanes; an adapter writes the templates, each of
 /// which hides the one below, that does nothing.
 template <class Adapter, class Law>
-class LawEffect : public AdapterInLanes<Adapter, ExactLanes, FastLanes, SingleLane, DualLanes> {
+class LawEffect : public AdapterInLanes<Adapter, ExactLanes, FastLanes, SingleLane> {
  public:
   /// LaneEffect::add_force
   template <class L>

@@ -17,10 +17,9 @@ struct ParameterNumber {
   static constexpr int own(int parameter) { return 3 * kSpringTypes + 3 + parameter; }
 };
 
-/// The derivatives of what an effect does to one simulation, as lists of small blocks that
-/// the adjoint multiplies by. `on` names what is acted on: a
-/// vertex where forces are, a held point where the supports are. Several blocks in the same place
-/// add up.
+/// The derivatives of what an effect does to one simulation, as lists of small blocks that tangents
+/// and the adjoint multiply by. `on` names what is acted on: a vertex where forces are, a held point
+/// where the supports are. Several blocks in the same place add up.
 struct EffectLinearisation {
   struct ByMotion {
     int on, of;  ///< of: vertex

@@ -143,12 +143,7 @@ Dual sine_of_turns(const Dual& turns) {
 
 template <class L>
 Vector3<RealOf<L>> vector_at(const LaneVectors<L>& vectors, int k) {
-  if constexpr (std::is_same_v<L, DualLanes>) {
-    const auto& [value, tangent] = vectors;
-    return {{value.x(0, k), tangent.x.col(k).matrix()},
-            {value.y(0, k), tangent.y.col(k).matrix()},
-            {value.z(0, k), tangent.z.col(k).matrix()}};
-  } else if constexpr (L::kCount == 1)
+  if constexpr (L::kCount == 1)
     return {vectors.x(0, k), vectors.y(0, k), vectors.z(0, k)};
   else
     return {LaneValue<L>(vectors.x.col(k)), LaneValue<L>(vectors.y.col(k)),
@@ -157,12 +152,7 @@ Vector3<RealOf<L>> vector_at(const LaneVectors<L>& vectors, int k) {
 
 template <class L>
 void set_at(LaneVectors<L>& vectors, int k, const Vector3<RealOf<L>>& value) {
-  if constexpr (std::is_same_v<L, DualLanes>) {
-    set_at<SingleLane>(vectors.value, k, {value.x.a, value.y.a, value.z.a});
-    vectors.tangent.x.col(k) = value.x.v.array();
-    vectors.tangent.y.col(k) = value.y.v.array();
-    vectors.tangent.z.col(k) = value.z.v.array();
-  } else if constexpr (L::kCount == 1) {
+  if constexpr (L::kCount == 1) {
     vectors.x(0, k) = value.x;
     vectors.y(0, k) = value.y;
     vectors.z(0, k) = value.z;

@@ -90,10 +90,9 @@ long allocations_in_ten_steps(StrainLimitMode mode) {
 long allocations_in_ten_steps_with_tangents() {
   const Busy busy(StrainLimitMode::off);
   TangentStepper stepper(busy.cloth);
-  const DualParameters parameters = DualParameters::of(busy.cloth, busy.set, {});
-  LaneState<DualLanes> state = LaneState<DualLanes>::of(busy.cloth);
-  state.position_m.value.set_lane(0, busy.set.start_position_m);
-  const LaneVectors<DualLanes> target = stepper.locate(state.position_m);
+  const TangentParameters parameters = TangentParameters::of(busy.cloth, busy.set, {});
+  TangentState state = TangentState::of(busy.cloth, busy.set, {});
+  const TangentVectors target = stepper.locate(state);
   stepper.step(parameters, target, 0, 1e-4, state);
 
   const long before = allocations;
