@@ -1,6 +1,15 @@
 #include "model/effects/nonuniform_mass.h"
 
-#include "model/effects/vertex_law.h"
+#include <ceres/jet.h>
+
+#include <algorithm>
+#include <array>
+#include <vector>
+
+#include "model/cloth.h"
+#include "model/effects/law_effect.h"
+#include "model/effects/linearisation.h"
+#include "model/effects/number.h"
 
 namespace clothfit::nonuniform_mass {
 namespace {
@@ -53,36 +62,63 @@ struct BandShares {
   }
 };
 
+/// The mass at a vertex over its stated mass.
+template <class Real>
+Real relative_mass(const Mesh& mesh, int i, int j, const Parameters<Real>& p) {
+  const Real one(1.0);
+  const double s = static_cast<double>(j) / (mesh.columns - 1);
+  const double t = static_cast<double>(i) / (mesh.rows - 1);
+  const BandShares<Real> across(s * mesh.width_m, mesh.width_m, mesh.spacing_s_m(), p[hem_width]);
+  const BandShares<Real> down(t * mesh.height_m, mesh.height_m, mesh.spacing_t_m(), p[hem_width]);
+  const Real all_round = one - (one - across.at_either) * (one - down.at_either);
+  const Real in_hem = p[hem] * all_round + p[hem_left] * across.at_begin +
+                      p[hem_right] * across.at_end + p[hem_top] * down.at_begin +
+                      p[hem_bottom] * down.at_end;
+
+  const Real right_m = Real(mesh.width_m) * (Real(s) - p[patch_s]);
+  const Real down_m = Real(mesh.height_m) * (Real(t) - p[patch_t]);
+  const Real radius_m = p[patch_radius];
+  const Real inside = one - (right_m * right_m + down_m * down_m) / (radius_m * radius_m);
+  const Real bump = select(inside > Real(0.0), inside * inside * inside, Real(0.0));
+
+  return (one + in_hem) * (one + p[gradient_s] * Real(s - 0.5)) *
+         (one + p[gradient_t] * Real(t - 0.5)) * (one + p[patch] * bump);
+}
+
+/// Stated over relative mass of every vertex.
+template <class Real>
+void inverse_ratios(const Mesh& mesh, const Parameters<Real>& p, std::vector<Real>& ratios) {
+  ratios.clear();
+  for (int i = 0; i < mesh.rows; ++i)
+    for (int j = 0; j < mesh.columns; ++j)
+      ratios.push_back(Real(1.0) / relative_mass(mesh, i, j, p));
+}
+
+/// What was computed last, as long as neither the mesh nor the parameters are others: from step to
+/// step they are the same.
+template <class Real>
+class Remembered {
+ public:
+  template <class Dual>
+  const std::vector<Real>& at(const Mesh& mesh, const Parameters<double>& p, const Dual& dual) {
+    const std::array<double, 4> sheet = {mesh.width_m, mesh.height_m,
+                                         static_cast<double>(mesh.columns),
+                                         static_cast<double>(mesh.rows)};
+    if (ratios_.empty() || p != parameters_ || sheet != sheet_) {
+      inverse_ratios<Real>(mesh, dual(p), ratios_);
+      parameters_ = p;
+      sheet_ = sheet;
+    }
+    return ratios_;
+  }
+
+ private:
+  Parameters<double> parameters_{};
+  std::array<double, 4> sheet_{};
+  std::vector<Real> ratios_;
+};
+
 struct Law {
-  static constexpr int kParameters = kCount;
-
-  /// The mass at a vertex over its stated mass.
-  template <class Real>
-  static Real relative_mass(const Mesh& mesh, double s, double t, const Parameters<Real>& p) {
-    const Real one(1.0);
-    const BandShares<Real> across(s * mesh.width_m, mesh.width_m, mesh.spacing_s_m(), p[hem_width]);
-    const BandShares<Real> down(t * mesh.height_m, mesh.height_m, mesh.spacing_t_m(), p[hem_width]);
-    const Real all_round = one - (one - across.at_either) * (one - down.at_either);
-    const Real in_hem = p[hem] * all_round + p[hem_left] * across.at_begin +
-                        p[hem_right] * across.at_end + p[hem_top] * down.at_begin +
-                        p[hem_bottom] * down.at_end;
-
-    const Real right_m = Real(mesh.width_m) * (Real(s) - p[patch_s]);
-    const Real down_m = Real(mesh.height_m) * (Real(t) - p[patch_t]);
-    const Real radius_m = p[patch_radius];
-    const Real inside = one - (right_m * right_m + down_m * down_m) / (radius_m * radius_m);
-    const Real bump = select(inside > Real(0.0), inside * inside * inside, Real(0.0));
-
-    return (one + in_hem) * (one + p[gradient_s] * Real(s - 0.5)) *
-           (one + p[gradient_t] * Real(t - 0.5)) * (one + p[patch] * bump);
-  }
-
-  template <class Real>
-  static Vector3<Real> change(const VertexSight<Real>& at, const Vector3<Real>& force_n,
-                              const Parameters<Real>& p) {
-    return Real(1.0) / relative_mass(*at.mesh, at.s, at.t, p) * force_n;
-  }
-
   static EffectRates rates(const Cloth& cloth, const SpringParameters&,
                            const std::vector<double>& parameters) {
     Parameters<double> p;
@@ -90,9 +126,60 @@ struct Law {
     double lightest = 1;
     for (int i = 0; i < cloth.mesh.rows; ++i)
       for (int j = 0; j < cloth.mesh.columns; ++j)
-        lightest = std::min(lightest, relative_mass(cloth.mesh, j / (cloth.mesh.columns - 1.0),
-                                                    i / (cloth.mesh.rows - 1.0), p));
+        lightest = std::min(lightest, relative_mass(cloth.mesh, i, j, p));
     return {.acceleration_ratio = 1 / lightest};
+  }
+};
+
+class NonuniformMass final : public LawEffect<NonuniformMass, Law> {
+ public:
+  bool changes_force() const override { return true; }
+
+  template <class L>
+  static void change(const EffectScene<L>& scene, const EffectValues<L>& parameters,
+                     LaneVectors<L>& force_n) {
+    const Mesh& mesh = scene.cloth.mesh;
+    const auto p = reals_of<L, kCount>(parameters);
+    if constexpr (L::kCount == 1) {
+      thread_local Remembered<double> remembered;
+      const std::vector<double>& ratios =
+          remembered.at(mesh, p, [](const Parameters<double>& same) { return same; });
+      for (int k = 0; k < mesh.vertex_count(); ++k)
+        set_at<L>(force_n, k, ratios[static_cast<size_t>(k)] * vector_at<L>(force_n, k));
+    } else {
+      for (int i = 0; i < mesh.rows; ++i)
+        for (int j = 0; j < mesh.columns; ++j) {
+          const int k = mesh.vertex(i, j);
+          set_at<L>(force_n, k,
+                    RealOf<L>(1.0) / relative_mass(mesh, i, j, p) * vector_at<L>(force_n, k));
+        }
+    }
+  }
+
+  void linearise_change(const EffectScene<SingleLane>& scene,
+                        const EffectValues<SingleLane>& parameters,
+                        const LaneVectors<SingleLane>& force_n,
+                        EffectLinearisation& derivatives) const override {
+    using Dual = ceres::Jet<double, kCount>;
+    thread_local Remembered<Dual> remembered;
+    const std::vector<Dual>& ratios =
+        remembered.at(scene.cloth.mesh, reals_of<SingleLane, kCount>(parameters),
+                      [](const Parameters<double>& p) {
+                        Parameters<Dual> dual;
+                        for (size_t n = 0; n < kCount; ++n)
+                          dual[n] = Dual(p[n], static_cast<int>(n));
+                        return dual;
+                      });
+    for (int k = 0; k < scene.cloth.mesh.vertex_count(); ++k) {
+      const Dual& ratio = ratios[static_cast<size_t>(k)];
+      derivatives.by_force.push_back({k, ratio.a * Eigen::Matrix3d::Identity()});
+      const Vector3<double> force = vector_at<SingleLane>(force_n, k);
+      for (int n = 0; n < kCount; ++n)
+        if (ratio.v[n] != 0)
+          derivatives.by_parameter.push_back(
+              {k, ParameterNumber::own(n),
+               ratio.v[n] * Eigen::Vector3d(force.x, force.y, force.z)});
+    }
   }
 };
 
@@ -189,7 +276,7 @@ EffectDescription describe() {
 }
 
 std::unique_ptr<Effect> make() {
-  return std::make_unique<InertiaLawEffect<Law>>();
+  return std::make_unique<NonuniformMass>();
 }
 
 }  // namespace clothfit::nonuniform_mass
