@@ -18,8 +18,8 @@ struct ParameterNumber {
 };
 
 /// The derivatives of what an effect does to one simulation, as lists of small blocks that tangents
-/// and the adjoint multiply by. `on` names what is acted on: a vertex where forces are, a held point
-/// where the supports are. Several blocks in the same place add up.
+/// and the adjoint multiply by. `on` names what is acted on: a vertex where forces are, a held
+/// point where the supports are. Several blocks in the same place add up.
 struct EffectLinearisation {
   struct ByMotion {
     int on, of;  ///< of: vertex
