@@ -274,6 +274,12 @@ PooledFit fit_pooled(std::span<const FitProblem* const> problems, std::vector<Po
   constexpr double kLeastDamping = 1e-9, kMostDamping = 1e6;
   const PooledSpace space(problems);
   const Eigen::VectorXd lower = space.lower(), upper = space.upper();
+  /// How far the coordinates have moved by which it is judged whether a fit still moves.
+  const auto looked_at = [&](const Eigen::VectorXd& way) {
+    const int first = options.own_only ? space.shared() : 0;
+    const int count = options.own_only ? space.size() - first : space.shared();
+    return count > 0 ? way.segment(first, count).cwiseAbs().maxCoeff() : 0.0;
+  };
   PooledFit result;
   {
     std::vector<Eigen::VectorXd> values;
@@ -288,6 +294,7 @@ PooledFit fit_pooled(std::span<const FitProblem* const> problems, std::vector<Po
     }
   }
   Pool pool(problems, options, std::move(start));
+  int refusals = 0;
   for (int round = 0; round < options.rounds; ++round) {
     if (!pool.begin_round(round == 0)) {
       result.usable = false;
@@ -298,7 +305,10 @@ PooledFit fit_pooled(std::span<const FitProblem* const> problems, std::vector<Po
     const Eigen::VectorXd began = x;
     double damping = 1e-3;
     bool settled = false;
-    while (!settled && result.iterations < options.iterations) {
+    // A step that is refused costs a run, one that is taken ten of them.
+    constexpr int kRefusals = 4;
+    while (!settled && result.iterations < options.iterations &&
+           refusals < kRefusals * options.iterations) {
       if (progress && !progress({.stage = "pooled fit",
                                  .done = static_cast<double>(result.iterations),
                                  .total = static_cast<double>(options.iterations),
@@ -309,21 +319,22 @@ PooledFit fit_pooled(std::span<const FitProblem* const> problems, std::vector<Po
         result.message = "cancelled";
         return result;
       }
-      ++result.iterations;
       const PooledSpace::Expansion here = pool.expand(space);
       if (!here.usable) break;
-      const Eigen::VectorXd step =
-          space.step(here, damping, held_at(x, lower, upper, here.gradient));
+      std::vector<bool> held = held_at(x, lower, upper, here.gradient);
+      if (options.own_only) std::fill_n(held.begin(), space.shared(), true);
+      const Eigen::VectorXd step = space.step(here, damping, held);
       const Eigen::VectorXd next = (x + step).cwiseMax(lower).cwiseMin(upper);
       const Eigen::VectorXd way = next - x;
       const double foreseen = space.foreseen_fall(here, way);
-      const double moved = way.head(space.shared()).cwiseAbs().maxCoeff();
+      const double moved = looked_at(way);
       if (step.allFinite() && foreseen < options.least_fall) {
         settled = true;
         break;
       }
       const double before = pool.cost();
       if (!step.allFinite() || !pool.try_to_move(space.values(next))) {
+        ++refusals;
         // A step this short that rises is the cost's rounding.
         settled = moved < options.least_step;
         if (!settled && !pool.is_exact()) {
@@ -334,6 +345,7 @@ PooledFit fit_pooled(std::span<const FitProblem* const> problems, std::vector<Po
         if (damping > kMostDamping) break;
         continue;
       }
+      ++result.iterations;
       settled = moved < options.least_step;
       x = next;
       const double gained = before - pool.cost();
@@ -349,7 +361,7 @@ PooledFit fit_pooled(std::span<const FitProblem* const> problems, std::vector<Po
     }
     // A round that hardly moved had the time steps of where it ended.
     constexpr double kStill = 1e-4;
-    const bool still = (x - began).head(space.shared()).cwiseAbs().maxCoeff() < kStill;
+    const bool still = looked_at(x - began) < kStill;
     result.converged = settled && (still || (options.least_fall > 0 && pool.is_settled()));
     if (result.converged || result.iterations >= options.iterations) break;
   }

@@ -30,7 +30,7 @@ struct PooledPart {
 Eigen::VectorXd residual_of(const PooledPart& part);
 
 struct PooledOptions {
-  int iterations = 60;       ///< in all
+  int iterations = 60;       ///< in all, without steps that were refused
   int rounds = 6;            ///< each with time steps and loss chosen anew, until one hardly moves
   double least_step = 1e-7;  ///< it ends when no shared coordinate moves further,
   double least_fall = 0;     ///< or the next step promises no more of the cost
@@ -39,6 +39,7 @@ struct PooledOptions {
   /// Exact derivatives are had anew, updated, or kept, as in a refinement (RefineOptions).
   double kept_within = 0;
   double updated_within = 0;
+  bool own_only = false;  ///< shared parameters stay where they are
 };
 
 struct PooledFit {

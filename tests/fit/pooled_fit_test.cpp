@@ -267,6 +267,24 @@ TEST(PooledFit, RecoversTheTruthFromTwoRecordingsWithoutNoise) {
   }
 }
 
+TEST(PooledFit, OfTheRecordingsOwnAloneLeavesThePhysicsWhereItIs) {
+  FitProblem problem = make_problem(synthetic_input(tiny(1)), {}, 5, 5);
+  make_exact(problem, 1);
+  ASSERT_FALSE(problem.sheet_motion.empty());
+  const FitProblem* const problems[] = {&problem};
+
+  const PooledFit found = fit_pooled(problems, truth(), {.own_only = true}, {});
+
+  ASSERT_TRUE(found.usable);
+  EXPECT_TRUE(found.converged) << found.message;
+  for (const auto& [name, value] : truth())
+    EXPECT_NEAR(found.shared.at(name), value, 1e-12 * value);
+  std::mt19937_64 generator(1);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  for (const Binding& binding : problem.sheet_motion)
+    EXPECT_NEAR(found.parts.front().values[binding.parameter], 2e-3 * uniform(generator), 1e-6);
+}
+
 TEST(PooledFit, LiesBetweenTheFitsOfItsRecordingsAlone) {
   const FitProblem first = make_problem(synthetic_input(tiny(3)), {}, 5, 5);
   const FitProblem second = make_problem(synthetic_input(tiny(4)), {}, 5, 5);
