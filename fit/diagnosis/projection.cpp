@@ -23,13 +23,24 @@ Projection::Projection(const Eigen::MatrixXd& jacobian, const Eigen::MatrixXd& p
     : root_weight_(weight.cwiseSqrt()) {
   const Eigen::Index rows = jacobian.rows(), fitted = jacobian.cols(),
                      units = unit_directions.cols();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> prior(prior_information);
-  const Eigen::VectorXd root = prior.eigenvalues().cwiseMax(0).cwiseSqrt();
+  if (fitted + units == 0) {
+    moved_.resize(rows, 0);
+    residual_ = root_weight_.cwiseProduct(residual);
+    return;
+  }
+  Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> prior;
+  Eigen::VectorXd root(0), pull(0);
+  if (fitted > 0) {
+    prior.compute(prior_information);
+    root = prior.eigenvalues().cwiseMax(0).cwiseSqrt();
+    pull = prior.eigenvectors().transpose() * prior_gradient;
+  }
 
   moved_ = Eigen::MatrixXd::Zero(rows + fitted + units, fitted + units);
   moved_.topLeftCorner(rows, fitted) = root_weight_.asDiagonal() * jacobian;
   moved_.topRightCorner(rows, units) = root_weight_.asDiagonal() * unit_directions;
-  moved_.block(rows, 0, fitted, fitted) = root.asDiagonal() * prior.eigenvectors().transpose();
+  if (fitted > 0)
+    moved_.block(rows, 0, fitted, fitted) = root.asDiagonal() * prior.eigenvectors().transpose();
   moved_.bottomRightCorner(units, units).setIdentity();
   Eigen::MatrixXd information = moved_.transpose() * moved_;
   // A coordinate that data and priors say nothing of stays where it is.
@@ -40,7 +51,6 @@ Projection::Projection(const Eigen::MatrixXd& jacobian, const Eigen::MatrixXd& p
 
   residual_ = Eigen::VectorXd::Zero(moved_.rows());
   residual_.head(rows) = root_weight_.cwiseProduct(residual);
-  const Eigen::VectorXd pull = prior.eigenvectors().transpose() * prior_gradient;
   for (Eigen::Index p = 0; p < fitted; ++p)
     if (root[p] > 0) residual_[rows + p] = pull[p] / root[p];
   residual_ -= moved_ * information_.solve(moved_.transpose() * residual_);
@@ -49,6 +59,7 @@ Projection::Projection(const Eigen::MatrixXd& jacobian, const Eigen::MatrixXd& p
 Eigen::MatrixXd Projection::columns(const Eigen::MatrixXd& of) const {
   Eigen::MatrixXd left = Eigen::MatrixXd::Zero(moved_.rows(), of.cols());
   left.topRows(of.rows()) = root_weight_.asDiagonal() * of;
+  if (moved_.cols() == 0) return left;
   const Eigen::VectorXd before = left.colwise().squaredNorm();
   left -= moved_ * information_.solve(moved_.transpose() * left);
   for (Eigen::Index k = 0; k < left.cols(); ++k)

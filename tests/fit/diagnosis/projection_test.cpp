@@ -45,6 +45,29 @@ TEST(Projection, LeavesTheResidualsOfLeastSquares) {
   EXPECT_NEAR(projection.weights(), weight.sum(), 1e-12 * weight.sum());
 }
 
+TEST(Projection, LeavesAllWhereNothingIsFitted) {
+  const Eigen::VectorXd residual = random_matrix(20, 1, 8);
+  const Eigen::VectorXd weight = random_matrix(20, 1, 9).cwiseAbs2();
+  const Projection projection(Eigen::MatrixXd(20, 0), Eigen::MatrixXd(0, 0), Eigen::VectorXd(0),
+                              Eigen::MatrixXd(20, 0), weight, residual);
+
+  const Eigen::VectorXd whitened = weight.cwiseSqrt().cwiseProduct(residual);
+  EXPECT_EQ(projection.residual(), whitened);
+  EXPECT_EQ(projection.columns(residual).col(0), whitened);
+  EXPECT_EQ(projection.taken(), 0);
+}
+
+TEST(Projection, TakesOutDirectionsWhereNothingElseIsFitted) {
+  const Eigen::VectorXd residual = random_matrix(20, 1, 10), direction = random_matrix(20, 1, 11);
+  const Projection projection(Eigen::MatrixXd(20, 0), Eigen::MatrixXd(0, 0), Eigen::VectorXd(0),
+                              direction, Eigen::VectorXd::Ones(20), residual);
+
+  const Eigen::MatrixXd covariance =
+      Eigen::MatrixXd::Identity(20, 20) + direction * direction.transpose();
+  EXPECT_NEAR(projection.residual().squaredNorm(), residual.dot(covariance.inverse() * residual),
+              1e-9 * residual.squaredNorm());
+}
+
 // Directions of unit variance are a covariance I + E E': amounts found with them are those of
 // generalised least squares.
 TEST(Projection, CountsUnitDirectionsAsACovariance) {
