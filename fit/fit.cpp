@@ -172,6 +172,72 @@ FitReport stopped(FitReport report, FitStop stop, const std::string& message) {
   return report;
 }
 
+/// A report with what a recording's problem says before anything is fitted.
+FitReport report_of(const FitInput& input, const FitProblem& problem, const FitOptions& options) {
+  FitReport report;
+  FitResult& result = report.result;
+  result.recording = input.recording.name;
+  result.seed = options.seed;
+  result.mesh_columns = problem.cloth.mesh.columns;
+  result.mesh_rows = problem.cloth.mesh.rows;
+  result.parameter_set = to_string(problem.spring_set);
+  result.integrator = "euler";
+  result.start = to_string(problem.start);
+  result.observations_rejected = problem.rejected;
+  return report;
+}
+
+/// As stability asks where nothing was fitted.
+double own_time_step_s(const FitProblem& problem, const FitOptions& options,
+                       const Eigen::VectorXd& values) {
+  const RefineOptions defaults;
+  return stable_time_step_s(problem.cloth, parameter_set(problem, values)) /
+         (defaults.stability_margin * options.substep_scale);
+}
+
+/// Runs the model on through all frames and fills in what it leaves of them.
+void run_on(const FitInput& input, const FitProblem& problem, const FitOptions& options,
+            const Eigen::VectorXd& values, const Uncertainty& uncertainty,
+            const FurtherLooks& looks, FitReport& report) {
+  FitResult& result = report.result;
+  if (!problem.drive_correction.points.empty())
+    report.stages.push_back(drive_line(problem, values));
+  Predictor predictor(problem, values);
+  const SimulateResult run =
+      std::move(run_model(problem, {values}, problem.frames(),
+                          time_steps_of_run(problem.cloth, parameter_set(problem, values),
+                                            result.time_step_s),
+                          predictor.needs_velocities())
+                    .front());
+  if (!run.usable()) {
+    report.stop = FitStop::diverged;
+    report.message = "the model diverged when it was run on through all frames";
+    return;
+  }
+  double longest_frame_s = 0;
+  for (size_t f = 1; f < problem.frame_time_s.size(); ++f)
+    longest_frame_s =
+        std::max(longest_frame_s, problem.frame_time_s[f] - problem.frame_time_s[f - 1]);
+  result.substeps = static_cast<int>(std::ceil(longest_frame_s / result.time_step_s - 1e-9));
+  for (int p = 0; p < problem.space.size(); ++p)
+    report.values[problem.space.parameters[static_cast<size_t>(p)].name] = values[p];
+  fill_parameters(problem, options, values, uncertainty, looks, result);
+  const std::vector<Eigen::Matrix3Xd> fitted_frames(
+      run.position_m.begin(), run.position_m.begin() + problem.first_held_out);
+  explain_by_strain_limit(
+      problem, values,
+      springs_on_limit(problem.cloth, parameter_set(problem, values).springs, fitted_frames),
+      result.parameters);
+  report.model = describe_model(problem, input.recording, values);
+  report.model.time_step_s = result.time_step_s;
+  const MarkerRun markers = marker_run(problem, run);
+  predictor.offset_markers(
+      marker_offsets(problem, input.recording.markers, options, predictor, markers, report));
+  fill_residuals(problem, predictor, markers, report);
+  for (const ObservationSet& set : problem.observations)
+    result.observations_used += static_cast<int>(set.rows.size());
+}
+
 }  // namespace
 
 void FitOptions::validate() const {
@@ -229,21 +295,9 @@ FitReport fit(const FitInput& input, const FitOptions& options, const ProgressCa
 
   const auto [columns, rows] = mesh_of(input.recording.cloth, options);
   const FitProblem problem = make_problem(input, options, columns, rows);
-  FitReport report;
+  FitReport report = report_of(input, problem, options);
   FitResult& result = report.result;
-  result.recording = input.recording.name;
-  result.seed = options.seed;
-  result.mesh_columns = problem.cloth.mesh.columns;
-  result.mesh_rows = problem.cloth.mesh.rows;
-  result.parameter_set = to_string(problem.spring_set);
-  result.integrator = "euler";
-  result.start = to_string(problem.start);
-  result.observations_rejected = problem.rejected;
-
   Eigen::VectorXd values = problem.space.start();
-  const auto steps_at = [&](const Eigen::VectorXd& at) {
-    return time_steps_of_run(problem.cloth, parameter_set(problem, at), result.time_step_s);
-  };
   Uncertainty uncertainty;
   FurtherLooks looks;
   if (!options.forecast) {
@@ -256,7 +310,9 @@ FitReport fit(const FitInput& input, const FitOptions& options, const ProgressCa
     result.time_step_s = refined.time_step_s;
     report.stop = refined.converged ? FitStop::converged : FitStop::reached_limit;
     report.message = refined.message;
-    const TrajectoryObjective objective(problem, problem.first_held_out, steps_at(values));
+    const TrajectoryObjective objective(
+        problem, problem.first_held_out,
+        time_steps_of_run(problem.cloth, parameter_set(problem, values), result.time_step_s));
     uncertainty = estimate_uncertainty(
         objective, values,
         {.loss = options.loss, .bootstrap = options.bootstrap, .seed = options.seed},
@@ -270,8 +326,6 @@ FitReport fit(const FitInput& input, const FitOptions& options, const ProgressCa
     fill_correlation(problem.space, uncertainty, report);
     result.basins = basins_of(problem.space, std::move(candidates), values, uncertainty);
     add_uncertainty(problem, values, uncertainty, report);
-    if (!problem.drive_correction.points.empty())
-      report.stages.push_back(drive_line(problem, values));
     bool cancelled = false;
     const ProgressCallback watched = [&](const Progress& now) {
       cancelled = cancelled || (progress && !progress(now));
@@ -280,42 +334,41 @@ FitReport fit(const FitInput& input, const FitOptions& options, const ProgressCa
     looks = look_further(input, objective, options, values, uncertainty, watched, report);
     if (cancelled) return stopped(std::move(report), FitStop::cancelled, "cancelled");
   } else {
-    const RefineOptions defaults;
-    result.time_step_s = stable_time_step_s(problem.cloth, parameter_set(problem, values)) /
-                         (defaults.stability_margin * options.substep_scale);
+    result.time_step_s = own_time_step_s(problem, options, values);
     report.stages.push_back("forecast: nothing fitted");
   }
-
-  Predictor predictor(problem, values);
-  const SimulateResult run = std::move(
-      run_model(problem, {values}, problem.frames(), steps_at(values), predictor.needs_velocities())
-          .front());
-  if (!run.usable())
-    return stopped(std::move(report), FitStop::diverged,
-                   "the model diverged when it was run on through all frames");
-  double longest_frame_s = 0;
-  for (size_t f = 1; f < problem.frame_time_s.size(); ++f)
-    longest_frame_s =
-        std::max(longest_frame_s, problem.frame_time_s[f] - problem.frame_time_s[f - 1]);
-  result.substeps = static_cast<int>(std::ceil(longest_frame_s / result.time_step_s - 1e-9));
-  for (int p = 0; p < problem.space.size(); ++p)
-    report.values[problem.space.parameters[static_cast<size_t>(p)].name] = values[p];
-  fill_parameters(problem, options, values, uncertainty, looks, result);
-  const std::vector<Eigen::Matrix3Xd> fitted_frames(
-      run.position_m.begin(), run.position_m.begin() + problem.first_held_out);
-  explain_by_strain_limit(
-      problem, values,
-      springs_on_limit(problem.cloth, parameter_set(problem, values).springs, fitted_frames),
-      result.parameters);
-  report.model = describe_model(problem, input.recording, values);
-  report.model.time_step_s = result.time_step_s;
-  const MarkerRun markers = marker_run(problem, run);
-  predictor.offset_markers(
-      marker_offsets(problem, input.recording.markers, options, predictor, markers, report));
-  fill_residuals(problem, predictor, markers, report);
-  for (const ObservationSet& set : problem.observations)
-    result.observations_used += static_cast<int>(set.rows.size());
+  run_on(input, problem, options, values, uncertainty, looks, report);
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+  return report;
+}
+
+FitReport report_at(const FitInput& input, const FitOptions& options,
+                    const KnownParameters& known) {
+  options.validate();
+  const auto [columns, rows] = mesh_of(input.recording.cloth, options);
+  const FitProblem problem = make_problem(input, options, columns, rows);
+  const int count = problem.space.size();
+  Eigen::VectorXd values = problem.space.start();
+  Uncertainty uncertainty{.sigma = Eigen::VectorXd::Zero(count),
+                          .lower = values,
+                          .upper = values,
+                          .correlation = Eigen::MatrixXd::Identity(count, count),
+                          .roughness = Eigen::VectorXd::Ones(count)};
+  for (int p = 0; p < count; ++p) {
+    const FitParameter& parameter = problem.space.parameters[static_cast<size_t>(p)];
+    if (const auto value = known.values.find(parameter.name); value != known.values.end())
+      values[p] = std::clamp(value->second, parameter.lower, parameter.upper);
+    if (const auto sigma = known.sigma.find(parameter.name); sigma != known.sigma.end())
+      uncertainty.sigma[p] = sigma->second;
+    constexpr double kOfNormal = 1.645;  // half the interval of kIntervalLevel
+    const double half = kOfNormal * uncertainty.sigma[p];
+    uncertainty.lower[p] = std::max(parameter.lower, values[p] - half);
+    uncertainty.upper[p] = std::min(parameter.upper, values[p] + half);
+  }
+  FitReport report = report_of(input, problem, options);
+  report.stages.push_back("nothing fitted: the values are those of a fit of several recordings");
+  report.result.time_step_s = own_time_step_s(problem, options, values);
+  run_on(input, problem, options, values, uncertainty, {}, report);
   return report;
 }
 

@@ -154,4 +154,14 @@ struct FitReport {
 /// for a recording that cannot be fitted as it stands.
 FitReport fit(const FitInput& input, const FitOptions& options, const ProgressCallback& progress);
 
+/// Parameters that a fit of several recordings found, by name.
+struct KnownParameters {
+  std::map<std::string, double> values;  ///< others stand where a fit would begin
+  std::map<std::string, double> sigma;   ///< 0 where nothing is known
+};
+
+/// What a model with known parameters leaves of a recording; nothing is fitted. Throws InputError
+/// as fit() does.
+FitReport report_at(const FitInput& input, const FitOptions& options, const KnownParameters& known);
+
 }  // namespace clothfit
