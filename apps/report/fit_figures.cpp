@@ -42,6 +42,18 @@ struct MeanSquare {
   double rms() const { return std::sqrt(sum / count); }
 };
 
+/// Of each marker, over the fitted and over the held-out frames.
+struct MarkerErrors {
+  std::map<int, MeanSquare> fitted, held_out;
+};
+
+MarkerErrors marker_errors(const FitReport::Residuals& residuals) {
+  MarkerErrors errors;
+  for (const FitReport::Residuals::Row& row : residuals.rows)
+    (row.held_out ? errors.held_out : errors.fitted)[row.marker].add(row.predicted - row.observed);
+  return errors;
+}
+
 /// First frame of the residuals that is held out; nothing when none is.
 std::optional<int> first_held_out(const FitReport::Residuals& residuals) {
   std::optional<int> first;
@@ -145,14 +157,21 @@ std::string residual_over_time_svg(const FitReport::Residuals& residuals,
   return line_plot(plot);
 }
 
-std::string residual_map_svg(const FitReport::Residuals& residuals, const Recording& recording) {
+double largest_marker_rms(const FitReport::Residuals& residuals) {
+  const MarkerErrors errors = marker_errors(residuals);
+  double largest = 0;
+  for (const auto* by_marker : {&errors.fitted, &errors.held_out})
+    for (const auto& [marker, mean_square] : *by_marker)
+      largest = std::max(largest, mean_square.rms());
+  return largest * shown_unit(residuals.unit).factor;
+}
+
+std::string residual_map_svg(const FitReport::Residuals& residuals, const Recording& recording,
+                             double largest) {
   const ShownUnit unit = shown_unit(residuals.unit);
-  std::map<int, MeanSquare> fitted;
-  std::map<int, MeanSquare> held_out;
-  for (const FitReport::Residuals::Row& row : residuals.rows) {
-    (row.held_out ? held_out : fitted)[row.marker].add(row.predicted - row.observed);
-  }
+  const auto [fitted, held_out] = marker_errors(residuals);
   ClothMaps maps;
+  maps.largest = largest;
   maps.title = "Residual over the cloth, " + kind_title(residuals.kind, residuals.unit);
   maps.width_m = recording.cloth.width_m;
   maps.height_m = recording.cloth.height_m;

@@ -15,8 +15,13 @@ namespace clothfit {
 std::string residual_over_time_svg(const FitReport::Residuals& residuals,
                                    const ObservationErrors& errors, const Recording& recording);
 
-/// rms residual of each marker over the flat cloth: fitted frames, held-out frames.
-std::string residual_map_svg(const FitReport::Residuals& residuals, const Recording& recording);
+/// rms residual of each marker over the flat cloth: fitted frames, held-out frames. Colours end at
+/// `largest`, in the shown unit; at the largest value where it is 0.
+std::string residual_map_svg(const FitReport::Residuals& residuals, const Recording& recording,
+                             double largest = 0);
+
+/// The largest value of such a map, in the shown unit.
+double largest_marker_rms(const FitReport::Residuals& residuals);
 
 /// Observed and predicted places in one frame, on its picture where there is one.
 std::string observed_and_predicted_svg(const FitReport::Residuals& residuals,

@@ -215,12 +215,12 @@ std::string cloth_maps(const ClothMaps& maps) {
   const double panel_width = scale * maps.width_m;
   const double panel_height = scale * maps.height_m;
 
-  double highest = 0;
+  double highest = maps.largest;
   double spacing_m = std::numeric_limits<double>::infinity();
   for (const ClothMap& map : maps.maps) {
     spacing_m = std::min(spacing_m, usual_spacing(map.values));
     for (const ClothValue& value : map.values) {
-      if (std::isfinite(value.value)) highest = std::max(highest, value.value);
+      if (std::isfinite(value.value) && maps.largest == 0) highest = std::max(highest, value.value);
     }
   }
   if (highest == 0) highest = 1;

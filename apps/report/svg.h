@@ -68,14 +68,15 @@ struct ClothMap {
   std::vector<ClothValue> values;
 };
 
-/// Maps of one quantity over the cloth, side by side, with one colour scale from 0 to the largest
-/// value and a labelled bar.
+/// Maps of one quantity over the cloth, side by side, with one colour scale from 0 and a labelled
+/// bar.
 struct ClothMaps {
   std::string title;
   std::string description;
   double width_m = 0;
   double height_m = 0;
   std::string value_label;  ///< "rms residual (px)"
+  double largest = 0;       ///< where the colours end; 0: at the largest value
   std::vector<ClothMap> maps;
 };
 std::string cloth_maps(const ClothMaps& maps);
