@@ -1,6 +1,11 @@
 #include <fmt/format.h>
 
+#include <cmath>
+#include <limits>
 #include <memory>
+#include <optional>
+#include <span>
+#include <vector>
 
 #include "apps/csv_table.h"
 #include "apps/exit_code.h"
@@ -15,6 +20,8 @@
 #include "apps/text_table.h"
 #include "apps/verb.h"
 #include "apps/version.h"
+#include "data/input_error.h"
+#include "data/number_text.h"
 #include "data/output_folder.h"
 #include "data/text_file.h"
 #include "fit/diagnose.h"
@@ -25,20 +32,34 @@ namespace {
 namespace fs = std::filesystem;
 
 struct DiagnoseFlags {
-  fs::path recording;
+  std::vector<fs::path> recordings, held_out;
   fs::path out;
   std::string observations = "automatic";
   std::string mesh;
   std::string loss = "huber";
+  std::vector<std::string> priors;
+  std::string plant = "10";
   DiagnoseOptions options;
 };
+
+/// How many laws are planted.
+int parse_plant(const std::string& text) {
+  if (text == "all") return std::numeric_limits<int>::max();
+  const std::optional<double> count = parse_number(text);
+  if (!count || *count < 0 || *count > 1000 || *count != std::floor(*count))
+    throw InputError("--plant", "'" + text + "' is no number of laws", "0 to 1000, or all");
+  return static_cast<int>(*count);
+}
 
 /// What diagnosis.json keeps of the command line: the options that shape the result.
 std::string command_text(const DiagnoseFlags& flags) {
   const DiagnoseOptions defaults;
-  std::string text = "clothfit diagnose " + flags.recording.string();
+  std::string text = "clothfit diagnose";
+  for (const fs::path& recording : flags.recordings) text += " " + recording.string();
+  for (const fs::path& recording : flags.held_out) text += " --held-out " + recording.string();
   for (const std::string& effect : flags.options.fit.effects) text += " --effect " + effect;
   for (const std::string& effect : flags.options.without) text += " --without " + effect;
+  for (const std::string& prior : flags.priors) text += " --prior " + prior;
   if (flags.observations != "automatic") text += " --observations " + flags.observations;
   if (!flags.mesh.empty()) text += " --mesh " + flags.mesh;
   if (flags.loss != "huber") text += " --loss " + flags.loss;
@@ -47,32 +68,37 @@ std::string command_text(const DiagnoseFlags& flags) {
   };
   add("--seed", flags.options.fit.seed, defaults.fit.seed);
   add("--start-nodes", flags.options.fit.start_nodes, defaults.fit.start_nodes);
+  add("--marker-offsets", flags.options.fit.marker_offset_sigma_m,
+      defaults.fit.marker_offset_sigma_m);
+  add("--drive-knots", flags.options.fit.drive_knots, defaults.fit.drive_knots);
   add("--work", flags.options.fit.work, defaults.fit.work);
   add("--lines", flags.options.lines, defaults.lines);
   add("--refits", flags.options.refits, defaults.refits);
   add("--most-effects", flags.options.most_effects, defaults.most_effects);
+  if (flags.plant != "10") text += " --plant " + flags.plant;
   return text;
 }
 
-void write_results(const Diagnosis& diagnosis, const Recording& recording,
+void write_results(const Diagnosis& diagnosis, std::span<const Recording> recordings,
                    const std::string& command, const fs::path& folder) {
   write_diagnosis(diagnosis, command, folder / "diagnosis.json");
-  write_fit_result(diagnosis.found.result, folder / "fit.json");
-  write_model(diagnosis.found.model, folder);
+  write_fit_result(diagnosis.found().result, folder / "fit.json");
+  write_model(diagnosis.found().model, folder);
   const auto csv = [&](const Table& table, const char* name) {
     write_csv_table(table.header, table.rows, folder / name);
   };
   csv(candidate_table(diagnosis), "candidates.csv");
   csv(trial_table(diagnosis), "trials.csv");
   csv(limit_table(diagnosis), "limits.csv");
+  if (!diagnosis.plants.empty()) csv(plant_table(diagnosis), "planted.csv");
   if (!diagnosis.residual_force.markers.empty())
-    csv(residual_force_table(diagnosis.residual_force, recording), "residual_force.csv");
-  if (diagnosis.law.found() && diagnosis.with_law.usable()) {
+    csv(residual_force_table(diagnosis.residual_force, recordings.front()), "residual_force.csv");
+  if (diagnosis.law.found() && diagnosis.with_law().usable()) {
     fs::create_directories(folder / "law");
-    write_fit_result(diagnosis.with_law.result, folder / "law" / "fit.json");
-    write_model(diagnosis.with_law.model, folder / "law");
+    write_fit_result(diagnosis.with_law().result, folder / "law" / "fit.json");
+    write_model(diagnosis.with_law().model, folder / "law");
   }
-  write_text(diagnosis_page_html(diagnosis, recording, command), folder / "report.html");
+  write_text(diagnosis_page_html(diagnosis, recordings, command), folder / "report.html");
 }
 
 void print_result(const Diagnosis& diagnosis, const fs::path& folder) {
@@ -82,7 +108,7 @@ void print_result(const Diagnosis& diagnosis, const fs::path& folder) {
   fmt::print("\n{}\n\n", diagnosis_sentence(diagnosis));
   for (const AcceptedEffect& accepted : diagnosis.accepted)
     fmt::print("{}: {}\n", accepted.trial.term.title(),
-               found_text(accepted.trial.term, diagnosis.found.result));
+               found_text(accepted.trial.term, diagnosis.found().result));
   if (!diagnosis.accepted.empty()) fmt::print("\n");
   print(before_after_table(diagnosis));
   if (diagnosis.law.found()) {
@@ -90,6 +116,10 @@ void print_result(const Diagnosis& diagnosis, const fs::path& folder) {
     print(law_error_table(diagnosis));
   }
   print(short_candidate_table(diagnosis));
+  if (!diagnosis.plants.empty()) {
+    fmt::print("Planted on twins of the recording:\n");
+    print(plant_table(diagnosis));
+  }
   fmt::print("Report: {}\n", shown_path(folder / "report.html"));
 }
 
@@ -100,27 +130,42 @@ int run_diagnose(DiagnoseFlags flags) {
     fit.mesh_columns = mesh->columns;
     fit.mesh_rows = mesh->rows;
   }
+  for (const std::string& prior : flags.priors) fit.priors.push_back(parse_prior(prior));
+  flags.options.plants = parse_plant(flags.plant);
+  flags.options.reinject = true;
   fit.loss = flags.loss == "squared" ? Loss::squared : Loss::huber;
   flags.options.validate();
   const std::string command = command_text(flags);
-  const Recording given = read_recording(recording_folder(flags.recording));
+  std::vector<Recording> recordings;
+  for (const auto* folders : {&flags.recordings, &flags.held_out})
+    for (const fs::path& folder : *folders)
+      recordings.push_back(read_recording(recording_folder(folder)));
 
-  OutputFolder out(out_folder(flags.out, given.name + ".diagnosis"));
-  Recording recording;
+  OutputFolder out(out_folder(flags.out, recordings.front().name + ".diagnosis"));
   Diagnosis diagnosis;
   {
     ProgressLine line;
     const ProgressCallback progress = watch(line);
-    recording = complete_recording(given, fit.observations, {}, out.path() / "steps", progress);
-    diagnosis = diagnose(read_fit_input(recording, fit.observations), flags.options, progress);
+    std::vector<FitInput> inputs;
+    for (Recording& recording : recordings) {
+      const fs::path steps = out.path() / "steps";
+      recording =
+          complete_recording(recording, fit.observations, {},
+                             recordings.size() > 1 ? steps / recording.name : steps, progress);
+      inputs.push_back(read_fit_input(recording, fit.observations));
+    }
+    const std::span<const FitInput> all(inputs);
+    diagnosis = diagnose(all.first(flags.recordings.size()), all.subspan(flags.recordings.size()),
+                         flags.options, progress);
   }
   if (diagnosis.stop == FitStop::cancelled || interrupted()) throw Cancelled();
   if (!diagnosis.usable()) throw NoResult("no diagnosis: " + diagnosis.message);
-  diagnosis.base.result.version = diagnosis.found.result.version =
-      diagnosis.with_law.result.version = program_version();
-  diagnosis.base.result.command = diagnosis.found.result.command =
-      diagnosis.with_law.result.command = command;
-  write_results(diagnosis, recording, command, out.path());
+  for (DiagnosedRecording& recording : diagnosis.recordings)
+    for (FitReport* report : {&recording.before, &recording.after, &recording.with_law}) {
+      report->result.version = program_version();
+      report->result.command = command;
+    }
+  write_results(diagnosis, recordings, command, out.path());
   if (interrupted()) throw Cancelled();
   out.publish();
   print_result(diagnosis, out.final_path());
@@ -134,14 +179,19 @@ void add_diagnose_verb(CLI::App& program, VerbAction& action) {
   DiagnoseOptions& options = flags->options;
   CLI::App* verb = program.add_subcommand(
       "diagnose", "Find out what the model of a recording lacks, with the error before and after");
-  verb->add_option("recording", flags->recording, "Folder of the recording")
+  verb->add_option("recordings", flags->recordings,
+                   "Folder of the recording, or of several of one cloth")
       ->required()
+      ->type_name("RECORDING");
+  verb->add_option("--held-out", flags->held_out,
+                   "Further recordings of the cloth, which nothing sees until the end")
       ->type_name("RECORDING");
   verb->add_option("--effect", options.fit.effects,
                    "Effect that is known to act, fitted from the beginning; may be repeated")
       ->type_name("NAME");
   verb->add_option("--without", options.without, "Effect not to test; may be repeated")
       ->type_name("NAME");
+  add_prior_option(*verb, flags->priors);
   verb->add_option("--observations", flags->observations,
                    "What to look at: 3D tracks where there are any, unless told otherwise")
       ->check(CLI::IsMember({"automatic", "tracks3d", "tracks2d"}))
@@ -159,6 +209,13 @@ void add_diagnose_verb(CLI::App& program, VerbAction& action) {
                    "What large residuals weigh: less than others, or as much")
       ->check(CLI::IsMember({"huber", "squared"}))
       ->capture_default_str();
+  verb->add_option("--marker-offsets", options.fit.marker_offset_sigma_m,
+                   "Standard deviation of constants by which markers lie elsewhere than stated, "
+                   "such as 10mm")
+      ->transform(length_in_metres());
+  verb->add_option("--drive-knots", options.fit.drive_knots,
+                   "Knots by which tracked held points are corrected; 0: not at all")
+      ->capture_default_str();
   verb->add_option("--work", options.fit.work,
                    "Times as much work as refinement is allowed before it ends unconverged")
       ->capture_default_str();
@@ -168,13 +225,18 @@ void add_diagnose_verb(CLI::App& program, VerbAction& action) {
       ->capture_default_str();
   verb->add_option("--most-effects", options.most_effects, "Effects to add, at most")
       ->capture_default_str();
+  verb->add_option("--plant", flags->plant,
+                   "Laws that are planted on twins of the recording at 1.6 times their limit, to "
+                   "see whether they are named: a number, or all")
+      ->capture_default_str();
   verb->add_option("--threads", options.fit.threads, "Threads; 0 for as many as the machine has")
       ->capture_default_str();
   add_out_option(*verb, flags->out, "NAME.diagnosis");
   verb->footer(
       "Examples:\n"
       "  clothfit diagnose data/recordings/swing_breeze\n"
-      "  clothfit diagnose data/recordings/tags_onecam --without self_contact");
+      "  clothfit diagnose data/recordings/tags_onecam --without self_contact\n"
+      "  clothfit diagnose MONDAY TUESDAY --held-out WEDNESDAY THURSDAY");
   verb->callback([flags, &action] { action = [flags] { return run_diagnose(*flags); }; });
 }
 

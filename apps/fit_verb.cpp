@@ -43,19 +43,6 @@ struct FitFlags {
   std::vector<std::string> priors;
 };
 
-ParameterPrior parse_prior(const std::string& text) {
-  const size_t equals = text.find('='), comma = text.find(',');
-  if (equals < comma && comma < text.size()) {
-    const auto mean = parse_number(text.substr(equals + 1, comma - equals - 1));
-    const auto sigma = parse_number(text.substr(comma + 1));
-    if (mean && sigma && *sigma > 0)
-      return {.name = text.substr(0, equals), .mean = *mean, .sigma = *sigma};
-  }
-  throw InputError("--prior", "'" + text + "' is not a prior",
-                   "PARAMETER=MEAN,SIGMA without spaces, SIGMA more than 0, such as "
-                   "clock_offset.time=0,0.002");
-}
-
 /// The parameter set that is asked for, or that of the earlier fit which `flag` names.
 SpringSet chosen_springs(const std::string& asked, const char* flag, const FitResult* earlier) {
   const std::optional<SpringSet> wanted = spring_set_named(asked);
@@ -202,11 +189,7 @@ void add_fit_verb(CLI::App& program, VerbAction& action) {
                    "Effect to fit beside those the recording declares, of motion or of the "
                    "measurement; may be repeated")
       ->type_name("NAME");
-  verb->add_option(
-          "--prior", flags->priors,
-          "What is known of a parameter from elsewhere, its mean and standard deviation in "
-          "its unit: clock_offset.time=0,0.002; may be repeated")
-      ->type_name("PARAMETER=MEAN,SIGMA");
+  add_prior_option(*verb, flags->priors);
   verb->add_option("--observations", flags->observations,
                    "What to fit to: 3D tracks where there are any, unless told otherwise")
       ->check(CLI::IsMember({"automatic", "tracks3d", "tracks2d"}))

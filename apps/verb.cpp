@@ -1,5 +1,7 @@
 #include "apps/verb.h"
 
+#include "data/input_error.h"
+#include "data/number_text.h"
 #include "fit/fit.h"
 
 namespace clothfit {
@@ -9,6 +11,26 @@ namespace fs = std::filesystem;
 void add_out_option(CLI::App& verb, std::filesystem::path& out, const std::string& default_name) {
   verb.add_option("--out", out, "Folder for the results (default: " + default_name + ")")
       ->type_name("DIR");
+}
+
+void add_prior_option(CLI::App& verb, std::vector<std::string>& priors) {
+  verb.add_option("--prior", priors,
+                  "What is known of a parameter from elsewhere, its mean and standard deviation in "
+                  "its unit: clock_offset.time=0,0.002; may be repeated")
+      ->type_name("PARAMETER=MEAN,SIGMA");
+}
+
+ParameterPrior parse_prior(const std::string& text) {
+  const size_t equals = text.find('='), comma = text.find(',');
+  if (equals < comma && comma < text.size()) {
+    const auto mean = parse_number(text.substr(equals + 1, comma - equals - 1));
+    const auto sigma = parse_number(text.substr(comma + 1));
+    if (mean && sigma && *sigma > 0)
+      return {.name = text.substr(0, equals), .mean = *mean, .sigma = *sigma};
+  }
+  throw InputError("--prior", "'" + text + "' is not a prior",
+                   "PARAMETER=MEAN,SIGMA without spaces, SIGMA more than 0, such as "
+                   "clock_offset.time=0,0.002");
 }
 
 CLI::AsNumberWithUnit length_in_metres() {

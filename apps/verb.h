@@ -8,6 +8,7 @@
 namespace clothfit {
 
 enum class ObservationKind;
+struct ParameterPrior;
 
 /// What the chosen verb does; returns an exit code.
 using VerbAction = std::function<int()>;
@@ -33,6 +34,12 @@ ObservationKind parse_observations(const std::string& text);
 
 /// Binds --out, whose default is `default_name` in the current directory.
 void add_out_option(CLI::App& verb, std::filesystem::path& out, const std::string& default_name);
+
+/// Binds --prior; each text is for parse_prior.
+void add_prior_option(CLI::App& verb, std::vector<std::string>& priors);
+
+/// PARAMETER=MEAN,SIGMA. Throws InputError.
+ParameterPrior parse_prior(const std::string& text);
 
 /// Turns a length such as 10mm, 1cm, 0.01m or 0.01 into metres.
 CLI::AsNumberWithUnit length_in_metres();

@@ -1,14 +1,15 @@
 #pragma once
 
+#include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "fit/diagnosis/adequacy.h"
-#include "fit/diagnosis/cross_validation.h"
-#include "fit/diagnosis/law_score.h"
+#include "fit/diagnosis/planting.h"
 #include "fit/diagnosis/proposed_law.h"
 #include "fit/diagnosis/residual_force.h"
-#include "fit/diagnosis/term.h"
+#include "fit/diagnosis/search.h"
 #include "fit/fit.h"
 
 namespace clothfit {
@@ -20,6 +21,10 @@ struct DiagnoseOptions {
   int lines = 3;   ///< of search that are followed side by side
   int refits = 6;  ///< laws of each line that are fitted in one round
   int most_effects = 4;
+  /// Laws whose detection limits are confirmed by planting them on twins of the recordings, one of
+  /// each effect, those first that are seen best.
+  int plants = 0;
+  bool reinject = false;  ///< whether what was found is simulated and searched again
   void validate() const;  ///< throws InputError
 };
 
@@ -31,58 +36,62 @@ enum class DiagnosisVerdict {
 };
 std::string to_string(DiagnosisVerdict verdict);
 
-/// What is said of a law with which a model was fitted again.
-struct LawTrial {
-  Term term;
-  double foreseen_fall = 0;                    ///< of chi-square, by the score
-  double fall = 0;                             ///< by the fit
-  double cross_validated = 0, without_it = 0;  ///< chi-square per observation left out
-  double best_trivial = 0;                     ///< the same of the model without it, mended
-  double clear_of_neutral = 0;                 ///< standard deviations, clustered
-  std::string refused;                         ///< why it is not accepted; empty: it is
-};
-
-/// One effect that was accepted, with what speaks for it.
-struct AcceptedEffect {
-  LawTrial trial;
-  std::vector<Term> alike;        ///< laws that this recording cannot tell from it
-  std::vector<LawTrial> refused;  ///< other laws that were fitted in its place
-};
-
 /// What a law would have to amount to for this recording to show it.
 struct DetectionLimit {
   Term term;  ///< at the shape it was seen best
   std::vector<std::string> parameter;
   std::vector<std::string> unit;
-  Eigen::VectorXd limit;  ///< five standard deviations of each amplitude beyond neutral
+  /// Of each amplitude beyond neutral: where it stands five standard deviations clear and is worth
+  /// a name (fit/diagnosis/search.h).
+  Eigen::VectorXd limit;
   Eigen::VectorXd found;  ///< what the score foresees
   double fall = 0;        ///< of chi-square, foreseen
+};
+
+/// One recording with the model as declared, with what was accepted, and with the proposed law
+/// where there is one.
+struct DiagnosedRecording {
+  bool held_out = false;  ///< as a whole: it took part in no fit and no decision
+  FitReport before, after, with_law;
 };
 
 struct Diagnosis {
   FitStop stop = FitStop::converged;
   std::string message;
   DiagnosisVerdict verdict = DiagnosisVerdict::adequate;
-  FitReport base, found;  ///< the fit of the recording as declared, and with what was accepted
+  /// Those that were fitted, then those held out. Of one fitted recording they are its fits; of
+  /// several, reports of the fit of all (report_at).
+  std::vector<DiagnosedRecording> recordings;
   Adequacy before, after;
   std::vector<LawScore> scores;          ///< of the base model, the most telling first
   int columns = 0, rows = 0;             ///< of the mesh that was analysed
-  int score_frames = 0;                  ///< horizon of these
+  int score_frames = 0;                  ///< horizon of these, of the first recording
   std::vector<AcceptedEffect> accepted;  ///< in the order in which they were
   std::vector<LawTrial> refused;         ///< the last round's
   std::vector<DetectionLimit> limits;
+  std::vector<PlantOutcome> plants;  ///< of some of them
+  /// What a search finds on twins simulated with what was accepted: nothing, if all is well.
+  std::optional<PlantOutcome> reinjected;
   ResidualForce residual_force;  ///< of the model as declared, over its first frames
   ProposedLaw law;               ///< for what is left, where that has structure
-  FitReport with_law;            ///< the fit with it, where there is one
   double seconds = 0;
   bool usable() const { return stop != FitStop::cancelled && stop != FitStop::diverged; }
+  /// The first recording's. There is one.
+  const FitReport& base() const { return recordings.front().before; }
+  const FitReport& found() const { return recordings.front().after; }
+  const FitReport& with_law() const { return recordings.front().with_law; }
 };
 
-/// Which effect does a fitted model lack? Fits the recording as it is declared, looks for structure
-/// in what is left, tests every registered law, adds what explains it, one after the other, and
-/// judges the outcome on frames held out, which take part in no decision
-/// (docs/theory/diagnosis.md). Throws InputError for a recording that cannot be fitted as it
-/// stands.
+/// Which effect does a fitted model lack? Fits recordings of one cloth as they are declared, looks
+/// for structure in what is left, tests every registered law, adds what explains it, one after the
+/// other, and judges the outcome on frames and recordings held out, which take part in no decision
+/// (docs/theory/diagnosis.md). Parameters of the physics are those of all recordings; where each
+/// was placed, measured, or began is its own, and that alone is fitted of a recording held out.
+/// Throws InputError for recordings that cannot be fitted as they stand, or not together.
+Diagnosis diagnose(std::span<const FitInput> fitted, std::span<const FitInput> held_out,
+                   const DiagnoseOptions& options, const ProgressCallback& progress);
+
+/// Of one recording.
 Diagnosis diagnose(const FitInput& input, const DiagnoseOptions& options,
                    const ProgressCallback& progress);
 

@@ -6,6 +6,7 @@
 
 #include "apps/json_file.h"
 #include "apps/report/diagnosis_law.h"
+#include "apps/report/diagnosis_tables.h"
 #include "apps/version.h"
 
 namespace clothfit {
@@ -17,6 +18,12 @@ ordered_json term_json(const Term& term) {
   ordered_json json{{"effect", term.effect}, {"law", term.law}};
   if (!term.shape.empty()) json["shape"] = term.shape;
   return json;
+}
+
+std::vector<std::string> titles(const std::vector<Term>& terms) {
+  std::vector<std::string> all;
+  for (const Term& term : terms) all.push_back(term.title());
+  return all;
 }
 
 ordered_json trial_json(const LawTrial& trial) {
@@ -66,10 +73,17 @@ ordered_json adequacy_json(const Adequacy& of) {
 
 void write_diagnosis(const Diagnosis& diagnosis, const std::string& command,
                      const std::filesystem::path& file) {
+  const auto names = [&](bool held_out) {
+    ordered_json list = ordered_json::array();
+    for (const DiagnosedRecording& recording : diagnosis.recordings)
+      if (recording.held_out == held_out) list.push_back(recording.before.result.recording);
+    return list;
+  };
   ordered_json json{{"format", "clothfit-diagnosis/1"},
                     {"version", program_version()},
                     {"command", command},
-                    {"recordings", {diagnosis.base.result.recording}},
+                    {"recordings", names(false)},
+                    {"held_out_recordings", names(true)},
                     {"verdict", to_string(diagnosis.verdict)},
                     {"seconds", diagnosis.seconds}};
   json["accepted"] = ordered_json::array();
@@ -80,7 +94,7 @@ void write_diagnosis(const Diagnosis& diagnosis, const std::string& command,
     for (const Term& term : accepted.alike)
       if (std::ranges::find(alike, term.effect) == alike.end()) alike.push_back(term.effect);
     one["class"] = alike;
-    one["parameters"] = found_json(accepted.trial.term, diagnosis.found);
+    one["parameters"] = found_json(accepted.trial.term, diagnosis.found());
     one["instead"] = ordered_json::array();
     for (const LawTrial& trial : accepted.refused) one["instead"].push_back(trial_json(trial));
     json["accepted"].push_back(std::move(one));
@@ -88,20 +102,18 @@ void write_diagnosis(const Diagnosis& diagnosis, const std::string& command,
   json["refused"] = ordered_json::array();
   for (const LawTrial& trial : diagnosis.refused) json["refused"].push_back(trial_json(trial));
   json["errors"] = ordered_json::array();
-  for (const ObservationErrors& before : diagnosis.base.result.errors) {
-    const auto after =
-        std::ranges::find(diagnosis.found.result.errors, before.kind, &ObservationErrors::kind);
-    if (after == diagnosis.found.result.errors.end()) continue;
-    json["errors"].push_back({{"kind", before.kind},
-                              {"unit", before.unit},
-                              {"noise", before.noise},
-                              {"fitted_before", before.fitted.rms},
+  for (const auto& [recording, before, after] : errors_before_after(diagnosis)) {
+    json["errors"].push_back({{"recording", recording->before.result.recording},
+                              {"kind", before->kind},
+                              {"unit", before->unit},
+                              {"noise", before->noise},
+                              {"fitted_before", before->fitted.rms},
                               {"fitted_after", after->fitted.rms},
-                              {"held_out_before", before.held_out.rms},
+                              {"held_out_before", before->held_out.rms},
                               {"held_out_after", after->held_out.rms},
-                              {"fitted_before_distance", before.fitted.rms_distance},
+                              {"fitted_before_distance", before->fitted.rms_distance},
                               {"fitted_after_distance", after->fitted.rms_distance},
-                              {"held_out_before_distance", before.held_out.rms_distance},
+                              {"held_out_before_distance", before->held_out.rms_distance},
                               {"held_out_after_distance", after->held_out.rms_distance}});
   }
   json["adequacy"] = {{"before", adequacy_json(diagnosis.before)},
@@ -129,6 +141,18 @@ void write_diagnosis(const Diagnosis& diagnosis, const std::string& command,
       one["unit"] = limit.unit[static_cast<size_t>(k)];
       json["detection_limits"].push_back(std::move(one));
     }
+  json["planted"] = ordered_json::array();
+  for (const PlantOutcome& outcome : diagnosis.plants) {
+    ordered_json one = term_json(outcome.plant.term);
+    one["parameter"] = outcome.plant.parameter;
+    one["beyond_neutral"] = outcome.plant.beyond_neutral;
+    one["named"] = outcome.named();
+    one["found"] = titles(outcome.found);
+    json["planted"].push_back(std::move(one));
+  }
+  json["reinjected"] = nullptr;
+  if (diagnosis.reinjected && diagnosis.reinjected->ran)
+    json["reinjected"] = {{"found", titles(diagnosis.reinjected->found)}};
   json["residual_force"] = residual_force_json(diagnosis.residual_force);
   json["proposed_law"] = proposed_law_json(diagnosis);
   write_json(json, file);

@@ -29,16 +29,22 @@ std::vector<ResidualForce::Regression> most_telling_first(const ResidualForce& f
   return sorted;
 }
 
-/// Errors of the model with what was accepted, and of that with the law too, by kind of
-/// observation, where frames are held out.
-std::vector<std::pair<const ObservationErrors*, const ObservationErrors*>> errors_with_law(
-    const Diagnosis& diagnosis) {
-  std::vector<std::pair<const ObservationErrors*, const ObservationErrors*>> result;
+/// Errors of the model with what was accepted, and of that with the law too, of each recording and
+/// kind of observation, where frames are held out.
+struct ErrorsWithLaw {
+  const DiagnosedRecording* recording = nullptr;
+  const ObservationErrors* before = nullptr;
+  const ObservationErrors* after = nullptr;
+};
+
+std::vector<ErrorsWithLaw> errors_with_law(const Diagnosis& diagnosis) {
+  std::vector<ErrorsWithLaw> result;
   if (!diagnosis.law.found()) return result;
-  for (const ObservationErrors& before : diagnosis.found.result.errors)
-    for (const ObservationErrors& after : diagnosis.with_law.result.errors)
-      if (before.kind == after.kind && before.held_out.count > 0)
-        result.emplace_back(&before, &after);
+  for (const DiagnosedRecording& recording : diagnosis.recordings)
+    for (const ObservationErrors& before : recording.after.result.errors)
+      for (const ObservationErrors& after : recording.with_law.result.errors)
+        if (before.kind == after.kind && before.held_out.count > 0)
+          result.push_back({.recording = &recording, .before = &before, .after = &after});
   return result;
 }
 
@@ -75,11 +81,15 @@ Table law_table(const ProposedLaw& law) {
 
 Table law_error_table(const Diagnosis& diagnosis) {
   Table table{{"observations", "held out, without the law", "with it", "noise"}, {}};
-  for (const auto& [before, after] : errors_with_law(diagnosis)) {
+  const bool several = diagnosis.recordings.size() > 1;
+  if (several) table.header.insert(table.header.begin(), "recording");
+  for (const auto& [recording, before, after] : errors_with_law(diagnosis)) {
     const double factor = shown_unit(before->unit).factor;
     table.rows.push_back(
         {kind_title(before->kind, before->unit), significant(before->held_out.rms * factor, 3),
          significant(after->held_out.rms * factor, 3), significant(before->noise * factor, 3)});
+    if (several)
+      table.rows.back().insert(table.rows.back().begin(), recording->before.result.recording);
   }
   return table;
 }
@@ -219,8 +229,9 @@ ordered_json proposed_law_json(const Diagnosis& diagnosis) {
   json["cross_validated"] = law.after.mean;
   json["cross_validated_before"] = law.before.mean;
   json["held_out"] = ordered_json::array();
-  for (const auto& [before, after] : errors_with_law(diagnosis))
-    json["held_out"].push_back({{"kind", before->kind},
+  for (const auto& [recording, before, after] : errors_with_law(diagnosis))
+    json["held_out"].push_back({{"recording", recording->before.result.recording},
+                                {"kind", before->kind},
                                 {"unit", before->unit},
                                 {"noise", before->noise},
                                 {"before", before->held_out.rms},

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "apps/report/diagnosis_law.h"
 #include "apps/report/diagnosis_tables.h"
@@ -14,6 +15,14 @@
 namespace clothfit {
 namespace {
 
+/// The first recording's name, and how many more were fitted.
+std::string names_text(const Diagnosis& diagnosis) {
+  const auto fitted =
+      std::ranges::count(diagnosis.recordings, false, &DiagnosedRecording::held_out);
+  return diagnosis.base().result.recording +
+         (fitted > 1 ? fmt::format(" and {} more", fitted - 1) : "");
+}
+
 std::string effects_text(const Diagnosis& diagnosis) {
   std::string text;
   for (const AcceptedEffect& accepted : diagnosis.accepted)
@@ -22,9 +31,11 @@ std::string effects_text(const Diagnosis& diagnosis) {
 }
 
 std::string verdict_text(const Diagnosis& diagnosis) {
+  const bool several = diagnosis.recordings.size() > 1;
   switch (diagnosis.verdict) {
     case DiagnosisVerdict::adequate:
-      return "The model explains this recording: nothing is missing that it could show.";
+      return fmt::format("The model explains {}: nothing is missing that {} could show.",
+                         several ? "these recordings" : "this recording", several ? "they" : "it");
     case DiagnosisVerdict::explained:
       return "The model lacked " + effects_text(diagnosis) +
              ". With that, what is left looks like noise.";
@@ -37,25 +48,49 @@ std::string verdict_text(const Diagnosis& diagnosis) {
   return "";
 }
 
-const ObservationErrors* errors_of(const FitReport& report, const std::string& kind) {
-  const auto found = std::ranges::find(report.result.errors, kind, &ObservationErrors::kind);
-  return found != report.result.errors.end() ? &*found : nullptr;
-}
+/// Root mean square over recordings of one kind of observation, each number as often as it was
+/// observed.
+struct Mean {
+  std::string kind, unit;
+  double before = 0, after = 0, noise = 0;  ///< sums of squares
+  int count = 0, recordings = 0;
+  double rms(double sum) const { return std::sqrt(sum / std::max(1, count)); }
+};
 
 std::string before_after_text(const Diagnosis& diagnosis) {
+  const std::vector<ErrorsBeforeAfter> all = errors_before_after(diagnosis);
+  // Whole recordings held out say more than frames, and frames more than what was fitted.
+  const bool whole = std::ranges::any_of(
+      all, [](const ErrorsBeforeAfter& one) { return one.recording->held_out; });
+  const bool frames = std::ranges::any_of(
+      all, [](const ErrorsBeforeAfter& one) { return one.before->held_out.count > 0; });
+  std::vector<Mean> means;
+  for (const auto& [recording, before, after] : all) {
+    if (whole && !recording->held_out) continue;
+    const ErrorSummary& one = frames ? before->held_out : before->fitted;
+    const ErrorSummary& other = frames ? after->held_out : after->fitted;
+    auto mean = std::ranges::find(means, before->kind, &Mean::kind);
+    if (mean == means.end())
+      mean = means.insert(means.end(), {.kind = before->kind, .unit = before->unit});
+    mean->before += one.count * one.rms * one.rms;
+    mean->after += other.count * other.rms * other.rms;
+    mean->noise += one.count * before->noise * before->noise;
+    mean->count += one.count;
+    ++mean->recordings;
+  }
   std::string text;
-  for (const ObservationErrors& before : diagnosis.base.result.errors) {
-    const ObservationErrors* after = errors_of(diagnosis.found, before.kind);
-    if (after == nullptr) continue;
-    const ShownUnit unit = shown_unit(before.unit);
-    const bool judged = before.held_out.count > 0;
-    const double one = judged ? before.held_out.rms : before.fitted.rms;
-    const double other = judged ? after->held_out.rms : after->fitted.rms;
-    text += fmt::format("{}{}: {} {} before, {} after, noise {}", text.empty() ? "" : "; ",
-                        kind_title(before.kind, before.unit), significant(one * unit.factor, 3),
-                        judged ? "on frames that no decision has seen" : "on the fitted frames",
-                        significant(other * unit.factor, 3),
-                        significant(before.noise * unit.factor, 3));
+  for (const Mean& mean : means) {
+    const ShownUnit unit = shown_unit(mean.unit);
+    const auto shown = [&](double sum) { return significant(mean.rms(sum) * unit.factor, 3); };
+    const std::string where =
+        whole    ? fmt::format("on {} that no fit and no decision has seen",
+                            mean.recordings == 1 ? "a recording"
+                                                    : fmt::format("{} recordings", mean.recordings))
+           : frames ? "on frames that no decision has seen"
+                 : "on the fitted frames";
+    text += fmt::format("{}{}: {} {} before {}, {} after, noise {}", text.empty() ? "" : "; ",
+                        kind_title(mean.kind, mean.unit), shown(mean.before), unit.name, where,
+                        shown(mean.after), shown(mean.noise));
   }
   return text + ".";
 }
@@ -67,7 +102,7 @@ std::string what_was_missing(const Diagnosis& diagnosis) {
     content += fmt::format("<h3>{}</h3>\n", escape_xml(trial.term.title()));
     content += paragraph(describe_effect(trial.term.effect).summary + ".");
     content += fmt::format("<p class=\"found\"><strong>{}</strong></p>\n",
-                           escape_xml(found_text(trial.term, diagnosis.found.result)));
+                           escape_xml(found_text(trial.term, diagnosis.found().result)));
     content += paragraph(fmt::format(
         "Chi-square falls by {}, of {} that the derivatives foresaw. Blocks of time that were left "
         "out in turn are predicted with a chi-square of {} per number, {} without it, {} with the "
@@ -90,26 +125,61 @@ std::string side_by_side(const std::string& before, const std::string& after) {
   return "<div class=\"pair\">" + figure(before, "Before.") + figure(after, "After.") + "</div>\n";
 }
 
-std::string maps(const Diagnosis& diagnosis, const Recording& recording) {
+std::string maps_of(const DiagnosedRecording& of, bool changed, const Recording& recording) {
   std::string content;
-  const bool changed = !diagnosis.accepted.empty();
-  for (const FitReport::Residuals& before : diagnosis.base.residuals) {
+  for (size_t k = 0; k < of.before.residuals.size(); ++k) {
+    const FitReport::Residuals& before = of.before.residuals[k];
     const auto after =
-        std::ranges::find(diagnosis.found.residuals, before.kind, &FitReport::Residuals::kind);
-    const ObservationErrors* errors = errors_of(diagnosis.base, before.kind);
-    const ObservationErrors* errors_after = errors_of(diagnosis.found, before.kind);
-    if (after == diagnosis.found.residuals.end() || !errors || !errors_after) continue;
-    content += fmt::format("<h3>{}</h3>\n", escape_xml(kind_title(before.kind, before.unit)));
+        std::ranges::find(of.after.residuals, before.kind, &FitReport::Residuals::kind);
+    if (after == of.after.residuals.end()) continue;
+    const ObservationErrors& errors = of.before.result.errors[k];
+    const ObservationErrors& errors_after =
+        of.after.result.errors[static_cast<size_t>(after - of.after.residuals.begin())];
+    content += fmt::format("<h4>{}</h4>\n", escape_xml(kind_title(before.kind, before.unit)));
     if (!changed) {
-      content += figure(residual_over_time_svg(before, *errors, recording), "In each frame.");
+      content += figure(residual_over_time_svg(before, errors, recording), "In each frame.");
       content += figure(residual_map_svg(before, recording), "Of each marker over the cloth.");
       continue;
     }
-    content += side_by_side(residual_over_time_svg(before, *errors, recording),
-                            residual_over_time_svg(*after, *errors_after, recording));
-    content +=
-        side_by_side(residual_map_svg(before, recording), residual_map_svg(*after, recording));
+    content += side_by_side(residual_over_time_svg(before, errors, recording),
+                            residual_over_time_svg(*after, errors_after, recording));
+    const double largest = std::max(largest_marker_rms(before), largest_marker_rms(*after));
+    content += side_by_side(residual_map_svg(before, recording, largest),
+                            residual_map_svg(*after, recording, largest));
   }
+  return content;
+}
+
+/// Of one recording open, of several each behind its name.
+std::string maps(const Diagnosis& diagnosis, std::span<const Recording> recordings) {
+  const bool changed = !diagnosis.accepted.empty();
+  if (recordings.size() == 1)
+    return maps_of(diagnosis.recordings.front(), changed, recordings.front());
+  std::string content;
+  for (size_t n = 0; n < recordings.size(); ++n)
+    content += fmt::format("<details><summary>{}{}</summary>\n{}</details>\n",
+                           escape_xml(recordings[n].name),
+                           diagnosis.recordings[n].held_out ? " (held out)" : "",
+                           maps_of(diagnosis.recordings[n], changed, recordings[n]));
+  return content;
+}
+
+/// Searches of twins: of what was accepted, and of planted amplitudes.
+std::string planted(const Diagnosis& diagnosis) {
+  std::string content;
+  if (diagnosis.reinjected && diagnosis.reinjected->ran)
+    content += paragraph(
+        diagnosis.reinjected->found.empty()
+            ? "A twin of the recording, simulated with what was accepted and its own noise, was "
+              "diagnosed in the same way: nothing more is found there, as it should be."
+            : "A twin of the recording, simulated with what was accepted and its own noise, was "
+              "diagnosed in the same way, and " +
+                  diagnosis.reinjected->found.front().title() +
+                  " is found there, which it does not have: trust no small effect here.");
+  if (!diagnosis.plants.empty())
+    content += html_table(plant_table(diagnosis),
+                          "Planted on twins of the recording, at 1.6 times its limit, and searched "
+                          "for: one amplitude of each effect, those first that are seen best.");
   return content;
 }
 
@@ -128,8 +198,10 @@ std::string words() {
          "and each is predicted by a fit of the others.</dd>\n"
          "<dt>mended without physics</dt><dd>The best of: a constant offset for every marker; the "
          "last residual, held. An effect that does not beat them has learnt nothing.</dd>\n"
-         "<dt>would have been seen from</dt><dd>Five standard deviations. A smaller amplitude may "
-         "be there, and this recording does not show it.</dd>\n"
+         "<dt>would have been seen from</dt><dd>Five standard deviations, or as many as it takes "
+         "to "
+         "be worth a name. A smaller amplitude may be there, and this recording does not show "
+         "it.</dd>\n"
          "<dt>held out</dt><dd>Frames that no fit and no decision has seen; both models are "
          "compared with them once.</dd>\n"
          "</dl>\n";
@@ -141,12 +213,13 @@ std::string diagnosis_sentence(const Diagnosis& diagnosis) {
   return verdict_text(diagnosis);
 }
 
-std::string diagnosis_page_html(const Diagnosis& diagnosis, const Recording& recording,
+std::string diagnosis_page_html(const Diagnosis& diagnosis, std::span<const Recording> recordings,
                                 const std::string& command) {
+  const Recording& recording = recordings.front();
   std::string body = fmt::format(
       "<h1>Diagnosis of “{}”</h1>\n<p class=\"meta\">clothfit {} · {} s</p>\n"
       "<div class=\"verdict\"><strong>{}</strong>\n<p>{}</p></div>\n",
-      escape_xml(diagnosis.base.result.recording), escape_xml(program_version()),
+      escape_xml(names_text(diagnosis)), escape_xml(program_version()),
       significant(diagnosis.seconds, 3), escape_xml(verdict_text(diagnosis)),
       escape_xml(before_after_text(diagnosis)));
   body += section("What was missing", what_was_missing(diagnosis));
@@ -154,7 +227,7 @@ std::string diagnosis_page_html(const Diagnosis& diagnosis, const Recording& rec
                   wide(html_table(before_after_table(diagnosis),
                                   "Root mean square of one coordinate's residual. The last three "
                                   "columns are guesses that need no model.")));
-  body += section("Where and when it is off", maps(diagnosis, recording));
+  body += section("Where and when it is off", maps(diagnosis, recordings));
   body +=
       section("Which force is missing", residual_force_html(diagnosis.residual_force, recording));
   body += section("Does what is left look like noise?",
@@ -174,15 +247,17 @@ std::string diagnosis_page_html(const Diagnosis& diagnosis, const Recording& rec
   body += section(
       "What would have been seen",
       wide(html_table(limit_table(diagnosis),
-                      "In the last model: amplitudes that would stand five sigma clear. Limits are "
-                      "linear, from the derivatives; the estimate is the score's, not a fit's.")));
+                      "In the last model: amplitudes that would stand five sigma clear and take "
+                      "enough of what is left to be accepted. Limits are linear, from the "
+                      "derivatives; the estimate is the score's, not a fit's.")) +
+          planted(diagnosis));
   body += section("What the words mean", words());
   body += section("Do it again", fmt::format("<pre>{}</pre>\n<p>Numbers stand in diagnosis.json, "
                                              "candidates.csv, trials.csv and limits.csv beside "
                                              "this page; the model with what was accepted in "
                                              "fit.json and model.yaml.</p>\n",
                                              escape_xml(command)));
-  return html_page("clothfit: diagnosis of " + diagnosis.base.result.recording, body);
+  return html_page("clothfit: diagnosis of " + names_text(diagnosis), body);
 }
 
 }  // namespace clothfit

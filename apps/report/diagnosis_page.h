@@ -1,5 +1,6 @@
 #pragma once
 
+#include <span>
 #include <string>
 
 #include "data/recording.h"
@@ -11,8 +12,9 @@ namespace clothfit {
 std::string diagnosis_sentence(const Diagnosis& diagnosis);
 
 /// The page: what was missing, how we know, errors before and after with maps side by side, what
-/// was refused, what would have been seen. `command` as diagnosis.json keeps it.
-std::string diagnosis_page_html(const Diagnosis& diagnosis, const Recording& recording,
+/// was refused, what would have been seen. `recordings` as the diagnosis has them. `command` as
+/// diagnosis.json keeps it.
+std::string diagnosis_page_html(const Diagnosis& diagnosis, std::span<const Recording> recordings,
                                 const std::string& command);
 
 }  // namespace clothfit

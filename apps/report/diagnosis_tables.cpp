@@ -87,23 +87,59 @@ Table limit_table(const Diagnosis& diagnosis) {
   return table;
 }
 
+std::string outcome_text(const PlantOutcome& outcome) {
+  if (!outcome.ran) return outcome.why_not;
+  if (outcome.found.empty()) return "not found";
+  if (!outcome.named()) return outcome.found.front().title() + " instead";
+  return outcome.found.size() > 1 ? "named, with others that do the same here" : "named";
+}
+
+Table plant_table(const Diagnosis& diagnosis) {
+  Table table{{"law", "parameter", "planted, beyond neutral", "unit", "outcome", "at"}, {}};
+  for (const PlantOutcome& outcome : diagnosis.plants) {
+    const Plant& plant = outcome.plant;
+    const EffectDescription effect = describe_effect(plant.term.effect);
+    const auto parameter =
+        std::ranges::find(effect.parameters, plant.parameter, &EffectParameter::name);
+    table.rows.push_back({plant.term.title(), plant.parameter, significant(plant.beyond_neutral, 3),
+                          parameter->unit, outcome_text(outcome), shape_text(plant.term)});
+  }
+  return table;
+}
+
+std::vector<ErrorsBeforeAfter> errors_before_after(const Diagnosis& diagnosis) {
+  std::vector<ErrorsBeforeAfter> result;
+  for (const DiagnosedRecording& recording : diagnosis.recordings)
+    for (const ObservationErrors& before : recording.before.result.errors) {
+      const std::vector<ObservationErrors>& found = recording.after.result.errors;
+      const auto after = std::ranges::find(found, before.kind, &ObservationErrors::kind);
+      if (after != found.end())
+        result.push_back({.recording = &recording, .before = &before, .after = &*after});
+    }
+  return result;
+}
+
 Table before_after_table(const Diagnosis& diagnosis) {
   Table table{{"observations", "fitted, before", "fitted, after", "held out, before",
                "held out, after", "noise", "stays as in frame 0", "moves on", "moves rigidly"},
               {}};
-  for (const ObservationErrors& before : diagnosis.base.result.errors) {
-    const auto after =
-        std::ranges::find(diagnosis.found.result.errors, before.kind, &ObservationErrors::kind);
-    if (after == diagnosis.found.result.errors.end()) continue;
-    const double factor = shown_unit(before.unit).factor;
-    const bool judged = before.held_out.count > 0;
+  const bool several = diagnosis.recordings.size() > 1;
+  if (several) table.header.insert(table.header.begin(), "recording");
+  for (const auto& [recording, before, after] : errors_before_after(diagnosis)) {
+    const double factor = shown_unit(before->unit).factor;
+    const bool judged = before->held_out.count > 0;
     const auto shown = [&](double value) { return significant(value * factor, 3); };
     const auto held = [&](double value) { return judged ? shown(value) : std::string("-"); };
-    table.rows.push_back({kind_title(before.kind, before.unit), shown(before.fitted.rms),
-                          shown(after->fitted.rms), held(before.held_out.rms),
-                          held(after->held_out.rms), shown(before.noise),
-                          held(before.trivial.first_frame), held(before.trivial.last_velocity),
-                          held(before.trivial.rigid)});
+    table.rows.push_back({kind_title(before->kind, before->unit), shown(before->fitted.rms),
+                          shown(after->fitted.rms), held(before->held_out.rms),
+                          held(after->held_out.rms), shown(before->noise),
+                          held(before->trivial.first_frame), held(before->trivial.last_velocity),
+                          held(before->trivial.rigid)});
+    std::vector<std::string>& row = table.rows.back();
+    if (recording->held_out) row[1] = row[2] = "-";
+    if (several)
+      row.insert(row.begin(),
+                 recording->before.result.recording + (recording->held_out ? " (held out)" : ""));
   }
   return table;
 }

@@ -14,11 +14,26 @@ Table short_candidate_table(const Diagnosis& diagnosis);
 /// Laws with which the model was fitted again, accepted and refused, and why.
 Table trial_table(const Diagnosis& diagnosis);
 
-/// Five standard deviations of every amplitude, and what the score foresees of it.
+/// From where on every amplitude would have been seen, and what the score foresees of it.
 Table limit_table(const Diagnosis& diagnosis);
 
-/// One row per kind of observation: fitted and held-out error of the model as declared and as it
-/// was found, in mm or px, beside the noise and the trivial predictors.
+/// Amplitudes that were planted on twins of the recordings, and what was found there.
+Table plant_table(const Diagnosis& diagnosis);
+
+/// "named", "not found", or what was found instead.
+std::string outcome_text(const PlantOutcome& outcome);
+
+/// Errors of one kind of observation of one recording, with the model as declared and as it was
+/// found.
+struct ErrorsBeforeAfter {
+  const DiagnosedRecording* recording = nullptr;
+  const ObservationErrors* before = nullptr;
+  const ObservationErrors* after = nullptr;
+};
+std::vector<ErrorsBeforeAfter> errors_before_after(const Diagnosis& diagnosis);
+
+/// One row for each of these: fitted and held-out error in mm or px, beside the noise and the
+/// trivial predictors.
 Table before_after_table(const Diagnosis& diagnosis);
 
 /// The tests of step 1, before and after.

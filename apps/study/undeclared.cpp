@@ -300,19 +300,19 @@ UndeclaredTrial undeclared_once(const UndeclaredOptions& options, int index, std
     trial.accepted_effects.push_back(accepted.trial.term.effect);
   }
   name_hidden(trial);
-  trial.before = held_out_rms(diagnosis.base);
-  trial.after = held_out_rms(diagnosis.found);
-  trial.before_fitted = fitted_rms(diagnosis.base);
-  trial.after_fitted = fitted_rms(diagnosis.found);
-  trial.noise = diagnosis.base.result.errors.front().noise;
+  trial.before = held_out_rms(diagnosis.base());
+  trial.after = held_out_rms(diagnosis.found());
+  trial.before_fitted = fitted_rms(diagnosis.base());
+  trial.after_fitted = fitted_rms(diagnosis.found());
+  trial.noise = diagnosis.base().result.errors.front().noise;
   for (size_t n = 0; n < laws.size(); ++n) {
     const bool same_law =
         std::ranges::find(trial.accepted, setting->laws[n].term.title()) != trial.accepted.end();
-    if (same_law) compare_amplitudes(setting->laws[n], diagnosis.found.result, trial.hidden[n]);
+    if (same_law) compare_amplitudes(setting->laws[n], diagnosis.found().result, trial.hidden[n]);
   }
   if (!laws.empty())
     trial.with_truth =
-        error_with_truth(recording.input, own, setting->laws, diagnosis.base, recording.truth);
+        error_with_truth(recording.input, own, setting->laws, diagnosis.base(), recording.truth);
   return trial;
 }
 

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "fit/diagnosis/law_derivatives.h"
+#include "fit/diagnosis/projection.h"
 
 namespace clothfit {
 namespace {
@@ -94,8 +95,9 @@ Eigen::MatrixXd smooth_functions(const TrajectoryObjective& objective, int along
 
 }  // namespace
 
-Adequacy judge_adequacy(const ModelFit& model, const ModelProjection& projection,
-                        const ModelProjection& noise_alone) {
+Adequacy judge_adequacy(const ModelFit& model, Loss loss) {
+  const ModelProjection projection(model, loss);
+  const ModelProjection noise_alone(model, loss, false);
   Adequacy result;
   const Eigen::VectorXd& residual = projection.residual();
   result.chi_square_per_dof =

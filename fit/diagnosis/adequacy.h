@@ -1,7 +1,6 @@
 #pragma once
 
 #include "fit/diagnosis/model_fit.h"
-#include "fit/diagnosis/projection.h"
 
 namespace clothfit {
 
@@ -20,8 +19,7 @@ struct Adequacy {
   bool adequate = false;
 };
 
-/// `noise_alone`: the projection without the discretisation's directions.
-Adequacy judge_adequacy(const ModelFit& model, const ModelProjection& projection,
-                        const ModelProjection& noise_alone);
+/// Of a linearised model. `loss`: whether large residuals count less (Huber).
+Adequacy judge_adequacy(const ModelFit& model, Loss loss);
 
 }  // namespace clothfit

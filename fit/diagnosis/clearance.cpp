@@ -31,6 +31,31 @@ double spread_of(double correlation) {
   return (1 + rho) / (1 - rho);
 }
 
+/// By how much structure in the residuals makes variances larger than independent ones would be.
+double inflation(const Adequacy& structure) {
+  const double along = spread_of(structure.neighbour_correlation);
+  return std::max(1.0, structure.chi_square_per_dof) * spread_of(structure.time_correlation) *
+         along * along;
+}
+
+/// Of the coordinates.
+Eigen::MatrixXd covariance(const PooledSpace& space, const std::vector<Quadratic>& quadratics) {
+  Eigen::MatrixXd information = dense(space, space.gather(quadratics));
+  information.diagonal().array() += 1e-12 * std::max(1.0, information.diagonal().maxCoeff());
+  return information.ldlt().solve(
+      Eigen::MatrixXd::Identity(information.rows(), information.cols()));
+}
+
+/// Empty where a recording has no derivatives.
+std::vector<Quadratic> quadratics_of(const ModelFit& model, double threshold) {
+  std::vector<Quadratic> quadratics;
+  for (size_t n = 0; n < model.parts.size(); ++n) {
+    quadratics.push_back(quadratic_of(*model.problems[n], model.parts[n], threshold));
+    if (!quadratics.back().usable) return {};
+  }
+  return quadratics;
+}
+
 }  // namespace
 
 double clear_of_neutral(const ModelFit& model, const Adequacy& structure, double threshold) {
@@ -40,10 +65,9 @@ double clear_of_neutral(const ModelFit& model, const Adequacy& structure, double
   const EffectDescription effect = describe_effect(term.effect);
   std::vector<Eigen::Index> indices;
   std::vector<double> away;
-  std::vector<Quadratic> quadratics;
+  const std::vector<Quadratic> quadratics = quadratics_of(model, threshold);
+  if (quadratics.empty()) return 0;
   for (size_t n = 0; n < problems.size(); ++n) {
-    quadratics.push_back(quadratic_of(*problems[n], model.parts[n], threshold));
-    if (!quadratics.back().usable) return 0;
     const ParameterSpace& space = problems[n]->space;
     const Eigen::VectorXd slope = space.value_by_coordinate(model.parts[n].values);
     for (const std::string& name : term.amplitudes) {
@@ -62,17 +86,35 @@ double clear_of_neutral(const ModelFit& model, const Adequacy& structure, double
     }
   }
   const Eigen::Map<const Eigen::VectorXd> way(away.data(), static_cast<Eigen::Index>(away.size()));
-  Eigen::MatrixXd information = dense(pooled, pooled.gather(quadratics));
-  information.diagonal().array() += 1e-12 * std::max(1.0, information.diagonal().maxCoeff());
-  const Eigen::MatrixXd covariance =
-      information.ldlt().solve(Eigen::MatrixXd::Identity(information.rows(), information.cols()));
-  const double along = spread_of(structure.neighbour_correlation);
-  const double inflation = std::max(1.0, structure.chi_square_per_dof) *
-                           spread_of(structure.time_correlation) * along * along;
-  const Eigen::MatrixXd own = inflation * covariance(indices, indices);
+  const Eigen::MatrixXd own =
+      (inflation(structure) * covariance(pooled, quadratics))(indices, indices);
   const double square = way.dot(own.ldlt().solve(way));
   if (!std::isfinite(square) || square < 0) return 0;
   return 5 * std::sqrt(square / least_fall(way.size()));
+}
+
+std::vector<NamedValues> sigma_of(const ModelFit& model, const Adequacy& structure,
+                                  double threshold) {
+  const std::vector<const FitProblem*> problems = model.problem_pointers();
+  const PooledSpace pooled(problems);
+  const std::vector<Quadratic> quadratics = quadratics_of(model, threshold);
+  std::vector<NamedValues> result(problems.size());
+  if (quadratics.empty()) return result;
+  const Eigen::VectorXd variance = inflation(structure) * covariance(pooled, quadratics).diagonal();
+  for (size_t n = 0; n < problems.size(); ++n) {
+    const ParameterSpace& space = problems[n]->space;
+    const Eigen::VectorXd slope = space.value_by_coordinate(model.parts[n].values);
+    const auto add = [&](int p, Eigen::Index coordinate) {
+      result[n][space.parameters[static_cast<size_t>(p)].name] =
+          slope[p] * std::sqrt(std::max(0.0, variance[coordinate]));
+    };
+    const std::vector<int> shared = pooled.shared_of(n);
+    for (size_t k = 0; k < shared.size(); ++k) add(shared[k], static_cast<Eigen::Index>(k));
+    const std::vector<int>& own = pooled.own_of(n);
+    for (size_t k = 0; k < own.size(); ++k)
+      add(own[k], pooled.first_own(n) + static_cast<Eigen::Index>(k));
+  }
+  return result;
 }
 
 }  // namespace clothfit

@@ -13,4 +13,9 @@ namespace clothfit {
 /// correlation of neighbours. `threshold` is Huber's.
 double clear_of_neutral(const ModelFit& model, const Adequacy& structure, double threshold);
 
+/// Standard deviations of each recording's parameters in their units, by name, with errors of that
+/// structure.
+std::vector<NamedValues> sigma_of(const ModelFit& model, const Adequacy& structure,
+                                  double threshold);
+
 }  // namespace clothfit

@@ -20,7 +20,8 @@ DiagnosisSetup with_other_mesh(const DiagnosisSetup& setup, const ModelFit& mode
   return other;
 }
 
-ModelFit fit_on_mesh(const DiagnosisSetup& other, const ModelFit& model) {
+ModelFit fit_on_mesh(const DiagnosisSetup& other, const ModelFit& model,
+                     const ProgressCallback& progress, bool own_only) {
   constexpr double kFirst = 0.28;
   ModelFit fitted;
   for (const double share : shares_from(kFirst)) {
@@ -28,6 +29,7 @@ ModelFit fit_on_mesh(const DiagnosisSetup& other, const ModelFit& model) {
     fitted = model_at(other, model.terms, fitted.parts.empty() ? model.values() : fitted.values());
     StageOptions stage;
     stage.rounds = 1;
+    stage.own_only = own_only;
     if (share < 1) stage.least_fall = 0;
     for (size_t n = 0; n < fitted.parts.size(); ++n) {
       PooledPart& part = fitted.parts[n];
@@ -41,7 +43,7 @@ ModelFit fit_on_mesh(const DiagnosisSetup& other, const ModelFit& model) {
       }
       if (share < 1) stage.least_fall += kRough * objective.residual_count();
     }
-    refine_model(fitted, other, stage, {});
+    refine_model(fitted, other, stage, progress);
     if (!fitted.usable) break;
   }
   return fitted;

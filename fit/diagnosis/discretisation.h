@@ -17,8 +17,10 @@ std::vector<Eigen::MatrixXd> discretisation_directions(const DiagnosisSetup& set
 DiagnosisSetup with_other_mesh(const DiagnosisSetup& setup, const ModelFit& model);
 
 /// The model fitted on another mesh, over growing horizons. It begins with the derivatives of the
-/// model's own mesh, which serve for most of the way.
-ModelFit fit_on_mesh(const DiagnosisSetup& other, const ModelFit& model);
+/// model's own mesh, where there are any, which serve for most of the way. `own_only`: what is
+/// shared by recordings stays.
+ModelFit fit_on_mesh(const DiagnosisSetup& other, const ModelFit& model,
+                     const ProgressCallback& progress = {}, bool own_only = false);
 
 /// Refines a model together with the amounts by which its discretisation errs, in the directions of
 /// where it stands first. A direction that is asked for by several times what it may be is no error

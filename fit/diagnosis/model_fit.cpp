@@ -181,7 +181,8 @@ void refine_model(ModelFit& model, const DiagnosisSetup& setup, const StageOptio
                              .least_fall = options.least_fall,
                              .loss = setup.options.loss,
                              .kept_within = kKeptWithin,
-                             .updated_within = kUpdatedWithin};
+                             .updated_within = kUpdatedWithin,
+                             .own_only = options.own_only};
   const std::vector<const FitProblem*> problems = model.problem_pointers();
   PooledFit fitted = fit_pooled(problems, model.parts, pooled, progress);
   model.cancelled = fitted.cancelled;

@@ -69,6 +69,7 @@ struct StageOptions {
   /// A step that promises less than this of half chi-square is the last one; the default moves no
   /// parameter by a seventh of its sigma.
   double least_fall = 0.01;
+  bool own_only = false;  ///< what is shared by recordings stays
 };
 
 /// Refines a model from where it stands: with the derivatives that it has, or anew.

@@ -97,9 +97,9 @@ class Pursuit {
  private:
   int terms_of_law() const { return static_cast<int>(law_.model.terms.size() - own_terms_); }
 
-  /// What is foreseen of each term, the most telling first, and the shortest horizon where
-  /// something is missing.
-  std::vector<LawScore> shortlist(double& first_share) {
+  /// What is foreseen of each term, the most telling first; the shortest horizon where something is
+  /// missing, and the model fitted over that.
+  std::vector<LawScore> shortlist(double& first_share, ModelFit& early) {
     const std::vector<LawShapes> terms = terms_to_test();
     std::vector<LawScore> list;
     size_t horizons = 0;
@@ -119,6 +119,7 @@ class Pursuit {
       std::vector<LawScore> scores = score_laws(at, projection, terms, progress_);
       if (list.empty()) {
         first_share = share;
+        early = std::move(at);
         list = std::move(scores);
       } else {
         for (LawScore& score : scores)
@@ -152,27 +153,32 @@ class Pursuit {
 
   bool add_term() {
     double first_share = 1;
-    const std::vector<LawScore> list = shortlist(first_share);
+    ModelFit early;
+    const std::vector<LawScore> list = shortlist(first_share, early);
     if (law_.trials.empty()) law_.scores = list;
     ModelFit best;
     CrossValidation best_validated = law_.after;
     size_t best_trial = 0;
-    int fits = 0;
+    std::vector<const LawScore*> worth_a_fit;
     for (const LawScore& score : list) {
-      if (fits == options_.fits || score.share < kWorthAFit * list.front().share) break;
-      if (score.fall < least_fall(score.amount.size()) || score.columns.empty()) continue;
-      ++fits;
-      ModelFit fitted =
-          fit_with_law(setup_, law_.model, score, first_share, options_.threshold, progress_);
+      if (std::ssize(worth_a_fit) == options_.fits || score.share < kWorthAFit * list.front().share)
+        break;
+      if (score.fall >= least_fall(score.amount.size()) && !score.columns.empty())
+        worth_a_fit.push_back(&score);
+    }
+    std::vector<ModelFit> models = fit_with_laws(setup_, law_.model, early, worth_a_fit,
+                                                 first_share, options_.threshold, progress_);
+    for (size_t k = 0; k < models.size(); ++k) {
+      ModelFit& fitted = models[k];
       law_.cancelled = law_.cancelled || fitted.cancelled;
       if (law_.cancelled) return false;
-      TermTrial trial{.term = score.term,
-                      .foreseen_fall = score.fall,
+      TermTrial trial{.term = worth_a_fit[k]->term,
+                      .foreseen_fall = worth_a_fit[k]->fall,
                       .without_it = law_.after.mean,
                       .refused = {}};
       CrossValidation validated;
       if (!fitted.usable) {
-        trial.refused = "no fit with it worked out";
+        trial.refused = "others leave far less over the first frames, or no fit worked out";
       } else {
         validated = cross_validate(setup_, fitted, options_.blocks, options_.threshold);
         trial.cross_validated = validated.mean;

@@ -1,6 +1,8 @@
 #include "fit/diagnosis/refit.h"
 
 #include <algorithm>
+#include <limits>
+#include <numeric>
 
 namespace clothfit {
 namespace {
@@ -16,9 +18,8 @@ constexpr double kShortHorizon = 0.4;
 /// A start at half of what a linear model foresees is on the right side, and not too far.
 constexpr double kCautious = 0.5;
 
-ModelFit over_growing_horizons(const DiagnosisSetup& setup, const ModelFit& model,
-                               const LawScore& score, double first_share,
-                               const ProgressCallback& progress) {
+/// The model with a law more at a share of what its score foresees. Not linearised.
+ModelFit cautious_start(const DiagnosisSetup& setup, const ModelFit& model, const LawScore& score) {
   std::vector<Term> terms = model.terms;
   terms.push_back(score.term);
   std::vector<NamedValues> start = model.values();
@@ -33,29 +34,80 @@ ModelFit over_growing_horizons(const DiagnosisSetup& setup, const ModelFit& mode
           kCautious * score.amount[static_cast<Eigen::Index>(own)];
     }
   }
-  ModelFit fitted = model_at(setup, terms, start);
-  ModelFit whole = fitted;
+  return model_at(setup, terms, start);
+}
+
+/// Moves a model, whose frames are all, to its optimum over a share of them; the model over these.
+/// Over all of them its own discretisation may err as `from` does.
+ModelFit refined_over(const DiagnosisSetup& setup, ModelFit& whole, const ModelFit& from,
+                      double share, const ProgressCallback& progress) {
+  ModelFit fitted = share < 1 ? shortened(whole, share) : whole;
+  StageOptions stage;
+  if (share < 1) {
+    stage.rounds = 1;
+    stage.least_fall = 0;
+    for (size_t n = 0; n < fitted.parts.size(); ++n)
+      stage.least_fall += kRough * fitted.objective(n).residual_count();
+  }
+  for (size_t n = 0; n < fitted.parts.size(); ++n) {
+    PooledPart& part = fitted.parts[n];
+    part.linear = {};
+    if (share < 1) continue;
+    part.directions = from.parts[n].directions;
+    part.amounts = from.parts[n].amounts;
+  }
+  refine_model(fitted, setup, stage, progress);
+  for (size_t n = 0; fitted.usable && n < whole.parts.size(); ++n)
+    whole.parts[n].values = fitted.parts[n].values;
+  return fitted;
+}
+
+std::vector<ModelFit> race(const DiagnosisSetup& setup, const ModelFit& model,
+                           const ModelFit& early, const std::vector<const LawScore*>& scores,
+                           double first_share, double threshold, const ProgressCallback& progress) {
+  // What is left above the noise: times the best one's, or times a share of the noise.
+  constexpr double kFarMore = 10, kOfNoise = 0.2;
+  std::vector<ModelFit> whole, fitted(scores.size());
+  for (const LawScore* score : scores) whole.push_back(cautious_start(setup, early, *score));
+  std::vector<size_t> running(scores.size());
+  std::iota(running.begin(), running.end(), size_t{0});
   for (const double share : shares_from(first_share)) {
-    for (size_t n = 0; n < whole.parts.size(); ++n) whole.parts[n].values = fitted.parts[n].values;
-    fitted = share < 1 ? shortened(whole, share) : whole;
-    StageOptions stage;
-    if (share < 1) {
-      stage.rounds = 1;
-      stage.least_fall = 0;
-      for (size_t n = 0; n < fitted.parts.size(); ++n)
-        stage.least_fall += kRough * fitted.objective(n).residual_count();
+    double least = std::numeric_limits<double>::infinity();
+    for (const size_t k : running) {
+      fitted[k] = refined_over(setup, whole[k], model, share, progress);
+      if (fitted[k].cancelled) return fitted;
+      if (fitted[k].usable) least = std::min(least, fitted[k].chi_square(threshold));
     }
-    for (size_t n = 0; n < fitted.parts.size(); ++n) {
-      PooledPart& part = fitted.parts[n];
-      part.linear = {};
-      if (share < 1) continue;
-      part.directions = model.parts[n].directions;
-      part.amounts = model.parts[n].amounts;
-    }
-    refine_model(fitted, setup, stage, progress);
-    if (!fitted.usable) break;
+    if (share == 1) break;
+    std::erase_if(running, [&](size_t k) {
+      const auto count = static_cast<double>(fitted[k].residual_count());
+      const double above = fitted[k].chi_square(threshold) - count;
+      const bool falls_out =
+          !fitted[k].usable || above > kFarMore * std::max(least - count, kOfNoise * count);
+      if (falls_out) fitted[k].usable = false;
+      return falls_out;
+    });
   }
   return fitted;
+}
+
+ModelFit fit_from_near(const DiagnosisSetup& setup, const ModelFit& model, const LawScore& score,
+                       double threshold, const ProgressCallback& progress) {
+  std::vector<Term> terms = model.terms;
+  terms.push_back(score.term);
+  ModelFit near = with_terms(setup, model, terms, score.columns);
+  refine_model(near, setup, {}, progress);
+  if (near.cancelled) return near;
+  if (near.usable) {
+    const double left = near.chi_square(threshold);
+    const double fall = model.chi_square(threshold) - left;
+    if (fall > kKeptPromise * score.fall ||
+        left < kHardlyMore * static_cast<double>(near.residual_count()))
+      return near;
+  }
+  ModelFit far = race(setup, model, model, {&score}, kShortHorizon, threshold, progress).front();
+  if (far.cancelled || !near.usable) return far;
+  return far.usable && far.chi_square(threshold) < near.chi_square(threshold) ? far : near;
 }
 
 }  // namespace
@@ -120,24 +172,18 @@ ModelFit with_terms(const DiagnosisSetup& setup, const ModelFit& model,
   return result;
 }
 
-ModelFit fit_with_law(const DiagnosisSetup& setup, const ModelFit& model, const LawScore& score,
-                      double first_share, double threshold, const ProgressCallback& progress) {
-  if (first_share < 1) return over_growing_horizons(setup, model, score, first_share, progress);
-  std::vector<Term> terms = model.terms;
-  terms.push_back(score.term);
-  ModelFit near = with_terms(setup, model, terms, score.columns);
-  refine_model(near, setup, {}, progress);
-  if (near.cancelled) return near;
-  if (near.usable) {
-    const double left = near.chi_square(threshold);
-    const double fall = model.chi_square(threshold) - left;
-    if (fall > kKeptPromise * score.fall ||
-        left < kHardlyMore * static_cast<double>(near.residual_count()))
-      return near;
+std::vector<ModelFit> fit_with_laws(const DiagnosisSetup& setup, const ModelFit& model,
+                                    const ModelFit& early,
+                                    const std::vector<const LawScore*>& scores, double first_share,
+                                    double threshold, const ProgressCallback& progress) {
+  if (first_share < 1) return race(setup, model, early, scores, first_share, threshold, progress);
+  std::vector<ModelFit> fitted;
+  for (const LawScore* score : scores) {
+    fitted.push_back(fit_from_near(setup, model, *score, threshold, progress));
+    if (fitted.back().cancelled) break;
   }
-  ModelFit far = over_growing_horizons(setup, model, score, kShortHorizon, progress);
-  if (far.cancelled || !near.usable) return far;
-  return far.usable && far.chi_square(threshold) < near.chi_square(threshold) ? far : near;
+  fitted.resize(scores.size());
+  return fitted;
 }
 
 }  // namespace clothfit

@@ -24,11 +24,15 @@ std::vector<double> shares_from(double first);
 ModelFit with_terms(const DiagnosisSetup& setup, const ModelFit& model,
                     const std::vector<Term>& terms, const Columns& columns);
 
-/// The model with a law more, fitted: from where it stands, along the derivatives of the score, and
-/// where that does not bring what was foreseen, over horizons that grow from `first_share` on,
-/// which a large effect needs; the better of the two. `threshold`: of chi-square's squares, in
-/// sigmas.
-ModelFit fit_with_law(const DiagnosisSetup& setup, const ModelFit& model, const LawScore& score,
-                      double first_share, double threshold, const ProgressCallback& progress);
+/// Of each law, the model with it, fitted: where the first share is 1, from where the model stands,
+/// along the derivatives of the score; where that does not bring what was foreseen, and else, over
+/// horizons that grow from `first_share` on, which a large effect needs: from where `early` stands,
+/// the model fitted over the first of them and not biased as much. Side by side then: after
+/// each horizon those fall out, and are not usable, that leave far more than the best one; over few
+/// frames the wrong laws show first. `threshold`: of chi-square's squares, in sigmas.
+std::vector<ModelFit> fit_with_laws(const DiagnosisSetup& setup, const ModelFit& model,
+                                    const ModelFit& early,
+                                    const std::vector<const LawScore*>& scores, double first_share,
+                                    double threshold, const ProgressCallback& progress);
 
 }  // namespace clothfit

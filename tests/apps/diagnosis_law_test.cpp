@@ -37,8 +37,9 @@ Diagnosis with_law() {
                              .held_out = {.rms = held_out, .count = 100},
                              .noise = 5e-4};
   };
-  diagnosis.found.result.errors = {errors(4e-3)};
-  diagnosis.with_law.result.errors = {errors(1e-3)};
+  diagnosis.recordings.resize(1);
+  diagnosis.recordings.front().after.result.errors = {errors(4e-3)};
+  diagnosis.recordings.front().with_law.result.errors = {errors(1e-3)};
   return diagnosis;
 }
 

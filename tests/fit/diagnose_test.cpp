@@ -27,11 +27,11 @@ TEST(Diagnose, NamesAHiddenDragAndItsAmount) {
   EXPECT_EQ(diagnosis.accepted.front().trial.term.effect, "viscous_damping");
   EXPECT_EQ(diagnosis.verdict, DiagnosisVerdict::explained);
   EXPECT_FALSE(diagnosis.before.adequate);
-  ASSERT_EQ(diagnosis.found.result.effects.size(), 1u);
-  const ParameterEstimate& rate = diagnosis.found.result.effects.front().parameters.front();
+  ASSERT_EQ(diagnosis.found().result.effects.size(), 1u);
+  const ParameterEstimate& rate = diagnosis.found().result.effects.front().parameters.front();
   EXPECT_NEAR(rate.value, 1.2, 4 * rate.sigma);
-  const ObservationErrors& before = diagnosis.base.result.errors.front();
-  const ObservationErrors& after = diagnosis.found.result.errors.front();
+  const ObservationErrors& before = diagnosis.base().result.errors.front();
+  const ObservationErrors& after = diagnosis.found().result.errors.front();
   EXPECT_GT(before.held_out.rms, 2 * before.noise);
   EXPECT_LT(after.held_out.rms, 1.1 * after.noise);
 }
@@ -58,6 +58,40 @@ TEST(Diagnose, DoesNotNameWhatItWasNotToTest) {
 
   for (const LawScore& score : diagnosis.scores) EXPECT_NE(score.term.effect, "viscous_damping");
   EXPECT_NE(diagnosis.verdict, DiagnosisVerdict::adequate);
+}
+
+TEST(Diagnose, FitsTwoRecordingsTogetherAndJudgesAThird) {
+  const SyntheticCloth cloth{.drag_rate_per_s = 1.2};
+  std::vector<FitInput> fitted;
+  for (const unsigned seed : {1U, 2U}) {
+    SyntheticCloth own = cloth;
+    own.seed = seed;
+    fitted.push_back(synthetic_input(own));
+  }
+  SyntheticCloth other = cloth;
+  other.seed = 3;
+  const FitInput unseen = synthetic_input(other);
+  DiagnoseOptions options = quick();
+  options.refits = 2;
+  const Diagnosis diagnosis = diagnose(fitted, {&unseen, 1}, options, {});
+
+  ASSERT_TRUE(diagnosis.usable()) << diagnosis.message;
+  ASSERT_EQ(diagnosis.accepted.size(), 1u);
+  EXPECT_EQ(diagnosis.accepted.front().trial.term.effect, "viscous_damping");
+  ASSERT_EQ(diagnosis.recordings.size(), 3u);
+  EXPECT_TRUE(diagnosis.recordings.back().held_out);
+  const auto rate = [&](size_t n) {
+    return diagnosis.recordings[n].after.result.effects.front().parameters.front();
+  };
+  EXPECT_EQ(rate(0).value, rate(1).value);
+  EXPECT_EQ(rate(0).value, rate(2).value);
+  EXPECT_NEAR(rate(0).value, 1.2, 4 * rate(0).sigma);
+  for (const DiagnosedRecording& recording : diagnosis.recordings) {
+    const ObservationErrors& before = recording.before.result.errors.front();
+    const ObservationErrors& after = recording.after.result.errors.front();
+    EXPECT_GT(before.held_out.rms, 2 * before.noise) << recording.before.result.recording;
+    EXPECT_LT(after.held_out.rms, 1.1 * after.noise) << recording.before.result.recording;
+  }
 }
 
 TEST(Diagnose, EndsSoonWhenItIsToldTo) {

@@ -137,8 +137,7 @@ TEST(Adequacy, HoldsForATrueModelAndNotForOneThatLacksDrag) {
     const ModelFit model = that_may_err(setup, true_model(setup, cloth));
     ASSERT_TRUE(model.usable);
 
-    const Adequacy adequacy = judge_adequacy(model, ModelProjection(model, kOptions.loss),
-                                             ModelProjection(model, kOptions.loss, false));
+    const Adequacy adequacy = judge_adequacy(model, kOptions.loss);
 
     EXPECT_EQ(adequacy.adequate, drag == 0) << "drag " << drag;
     if (drag == 0) {

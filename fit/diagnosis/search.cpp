@@ -1,0 +1,430 @@
+#include "fit/diagnosis/search.h"
+
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+
+#include "fit/diagnosis/adequacy.h"
+#include "fit/diagnosis/clearance.h"
+#include "fit/diagnosis/discretisation.h"
+#include "fit/diagnosis/refit.h"
+
+namespace clothfit {
+namespace {
+
+/// Horizons at which laws are scored, as shares of the fitted frames. Where a hidden effect is
+/// large the fit over all frames is biased, and the score with it: the shortest horizon at which
+/// something is missing says best what.
+constexpr double kScoreShares[] = {0.28, 0.4, 0.56, 0.75, 1.0};
+constexpr double kVisible = 1.2;  ///< chi-square per residual there
+/// A fit that leaves less than this over all frames is not biased by much.
+constexpr double kHardlyBiased = 3;
+constexpr size_t kScoreHorizons = 3;
+
+/// What a model must gain for each number more (Bayesian information criterion).
+double price(const ModelFit& model) {
+  double amplitudes = 0;
+  for (const Term& term : model.terms)
+    amplitudes +=
+        static_cast<double>(term.amplitudes.size() + (term.fits_shape ? term.shape.size() : 0));
+  return amplitudes * std::log(static_cast<double>(model.residual_count()));
+}
+
+/// A line of the search: a model, and what was said of the laws that led to it.
+struct Line {
+  ModelFit model;
+  std::vector<AcceptedEffect> accepted;
+  double cost = 0;
+  bool finished = false;       ///< no law more leads on from here
+  std::vector<LawScore> last;  ///< what its model would still show, over all frames
+  std::vector<LawTrial> refused;
+};
+
+/// What a line's next law may be.
+struct Shortlist {
+  double share = 1;              ///< the shortest horizon
+  ModelFit early;                ///< the model fitted over that
+  std::vector<LawScore> scores;  ///< of all laws there, by the derivatives of the coarser mesh
+  /// Of the best of them by those of the model's own mesh, averaged over horizons; with columns
+  /// where all frames are one.
+  std::vector<LawScore> best;
+
+  /// All scores, those of the model's own mesh where there are any.
+  std::vector<LawScore> merged() const {
+    std::vector<LawScore> all = scores;
+    for (LawScore& score : all)
+      for (const LawScore& known : best)
+        if (known.term.same_law(score.term)) score = known;
+    for (LawScore& score : all) score.columns.clear();
+    std::ranges::stable_sort(all, std::greater<>(), &LawScore::share);
+    return all;
+  }
+};
+
+/// Laws that this recording cannot tell from the one accepted last: fitted in its place they leave
+/// hardly more.
+std::vector<Term> alike(const std::vector<Line>& children, const Line& best) {
+  constexpr double kTold = 25;
+  std::vector<Term> result;
+  for (const Line& child : children)
+    if (&child != &best && child.cost - best.cost < kTold)
+      result.push_back(child.accepted.back().trial.term);
+  return result;
+}
+
+/// The same laws in another order are the same line.
+void drop_repeated(std::vector<Line>& lines) {
+  const auto has = [](const ModelFit& model, const Term& term) {
+    return std::ranges::any_of(model.terms, [&](const Term& own) { return own.same_law(term); });
+  };
+  for (size_t n = 1; n < lines.size();) {
+    const bool repeated = std::any_of(
+        lines.begin(), lines.begin() + static_cast<std::ptrdiff_t>(n), [&](const Line& known) {
+          return known.model.terms.size() == lines[n].model.terms.size() &&
+                 std::ranges::all_of(known.model.terms,
+                                     [&](const Term& term) { return has(lines[n].model, term); });
+        });
+    if (repeated)
+      lines.erase(lines.begin() + static_cast<std::ptrdiff_t>(n));
+    else
+      ++n;
+  }
+}
+
+class Search {
+ public:
+  Search(const DiagnosisSetup& setup, const SearchOptions& options,
+         const ProgressCallback& progress)
+      : setup_(setup),
+        coarse_(setup),
+        options_(options),
+        threshold_(options.threshold),
+        progress_([this, &progress](const Progress& now) {
+          stopped_ = stopped_ || (progress && !progress(now));
+          return !stopped_;
+        }) {
+    // Twice as coarse; a start in motion has corrections on nodes of its own.
+    constexpr int kSmallest = 9;
+    const auto half = [&](int count) {
+      return std::min(count, std::max({kSmallest, setup.options.start_nodes + 1, (count + 1) / 2}));
+    };
+    if (setup.options.spring_set == SpringSet::fabric) {
+      coarse_.columns = half(setup.columns);
+      coarse_.rows = half(setup.rows);
+    }
+  }
+
+  /// Always the best line is led on, until nothing leads on from it, or from as many as are
+  /// followed.
+  LawSearch run(ModelFit base) {
+    LawSearch result;
+    const auto cancelled = [&] {
+      result.cancelled = true;
+      return result;
+    };
+    std::vector<Line> lines;
+    lines.push_back({.model = std::move(base), .accepted = {}, .refused = {}});
+    lines.front().cost = cost(lines.front().model);
+    Shortlist list = shortlist(lines.front().model);
+    if (stopped_) return cancelled();
+    result.first = list.merged();
+    result.first_share = list.share;
+    for (;;) {
+      const auto next = std::ranges::find_if(lines, [&](const Line& line) {
+        return !line.finished && line.model.terms.size() < options_.most_effects;
+      });
+      if (next == lines.end()) break;
+      if (!next->accepted.empty()) {
+        refine_with_discretisation(next->model, setup_, progress_);
+        if (stopped_) return cancelled();
+        if (!next->model.usable) {
+          next->finished = true;
+          continue;
+        }
+        next->cost = cost(next->model);
+        list = shortlist(next->model);
+        if (stopped_) return cancelled();
+      }
+      std::vector<Line> children = extend(*next, list);
+      if (stopped_) return cancelled();
+      for (Line& child : children) child.accepted.back().alike = alike(children, child);
+      const bool is_end = children.empty() && next == lines.begin();
+      if (is_end && judge_adequacy(lines.front().model, setup_.options.loss).adequate) break;
+      std::ranges::move(children, std::back_inserter(lines));
+      std::ranges::stable_sort(lines, {}, &Line::cost);
+      drop_repeated(lines);
+      if (lines.size() > static_cast<size_t>(options_.lines))
+        lines.erase(lines.begin() + options_.lines, lines.end());
+    }
+    Line& best = lines.front();
+    prune(best);
+    if (stopped_) return cancelled();
+    // Of laws that are not in the model, over all frames.
+    if (best.last.empty()) best.last = roughly_scored(best.model, untested(best.model));
+    if (stopped_) return cancelled();
+    result.model = std::move(best.model);
+    result.accepted = std::move(best.accepted);
+    result.refused = std::move(best.refused);
+    result.last = std::move(best.last);
+    return result;
+  }
+
+ private:
+  std::vector<LawShapes> untested(const ModelFit& model) const {
+    std::vector<LawShapes> result;
+    for (const LawShapes& law : options_.laws)
+      if (std::ranges::none_of(model.terms,
+                               [&](const Term& term) { return term.same_law(law.front()); }))
+        result.push_back(law);
+    return result;
+  }
+  double cost(const ModelFit& model) const { return model.chi_square(threshold_) + price(model); }
+
+  /// Scores of all laws, each at its best shape, with the derivatives of a coarser mesh.
+  std::vector<LawScore> roughly_scored(const ModelFit& model,
+                                       const std::vector<LawShapes>& laws) const {
+    ModelFit rough = with_derivatives_of(coarse_, model);
+    const ModelFit& by = rough.usable ? rough : model;
+    std::vector<LawScore> scores =
+        score_laws(by, ModelProjection(by, setup_.options.loss), laws, progress_);
+    std::ranges::stable_sort(scores, std::greater<>(), &LawScore::share);
+    return scores;
+  }
+
+  Shortlist shortlist(const ModelFit& model) {
+    std::vector<ModelFit> shorter;
+    const bool biased = model.residual().squaredNorm() >
+                        kHardlyBiased * static_cast<double>(model.residual_count());
+    Shortlist list;
+    for (const double share : kScoreShares) {
+      if (share < 1 && !biased) continue;
+      ModelFit fitted = model;
+      if (share < 1) {
+        fitted = shortened(model, share);
+        refine_model(fitted, setup_, {.rounds = 1}, progress_);
+        if (stopped_) return {};
+        if (fitted.usable) refine_with_discretisation(fitted, setup_, progress_);
+      }
+      if (stopped_) return {};
+      if (!fitted.usable) continue;
+      const bool visible =
+          fitted.residual().squaredNorm() > kVisible * static_cast<double>(fitted.residual_count());
+      if (!visible && shorter.empty() && share < 1) continue;
+      if (shorter.empty()) list.share = share;
+      shorter.push_back(std::move(fitted));
+      if (shorter.size() == kScoreHorizons) break;
+    }
+    std::vector<LawShapes> laws;
+    for (size_t k = 0; k < shorter.size(); ++k) {
+      const ModelFit& at = shorter[k];
+      if (k == 0) {
+        list.scores = roughly_scored(at, untested(model));
+        if (stopped_) return {};
+        for (LawScore& score : list.scores) score.columns.clear();
+        const size_t best = std::min(list.scores.size(), static_cast<size_t>(2 * options_.refits));
+        for (size_t n = 0; n < best; ++n) {
+          laws.push_back({list.scores[n].term});
+          list.best.push_back(list.scores[n]);
+          list.best.back().share = 0;
+        }
+      }
+      std::vector<LawScore> scores =
+          score_laws(at, ModelProjection(at, setup_.options.loss), laws, progress_);
+      if (stopped_) return {};
+      for (LawScore& score : scores) {
+        LawScore& same = *std::ranges::find_if(
+            list.best, [&](const LawScore& known) { return known.term.same_law(score.term); });
+        same.share += score.share / static_cast<double>(shorter.size());
+        if (k > 0 && score.fall <= same.fall) continue;
+        same.fall = score.fall;
+        same.amount = score.amount;
+        same.sigma = score.sigma;
+        if (list.share == 1) same.columns = std::move(score.columns);
+      }
+    }
+    std::ranges::stable_sort(list.best, std::greater<>(), &LawScore::share);
+    if (!shorter.empty()) list.early = std::move(shorter.front());
+    return list;
+  }
+
+  /// Lines that a law more leads to, of those on the list.
+  std::vector<Line> extend(Line& line, const Shortlist& list) {
+    line.finished = true;
+    if (list.share == 1) line.last = list.scores;
+    std::vector<const LawScore*> scores;
+    const double worth = worth_naming(line.model, threshold_);
+    for (const LawScore& score : list.best) {
+      if (score.fall < least_fall(score.amount.size())) continue;
+      // Where little is left over all frames, a fit gains about what was foreseen.
+      constexpr double kMoreThanForeseen = 1.25;
+      if (list.share == 1 && kMoreThanForeseen * score.fall < worth) continue;
+      if (scores.size() == static_cast<size_t>(options_.refits)) break;
+      scores.push_back(&score);
+    }
+    std::vector<ModelFit> fitted =
+        fit_with_laws(setup_, line.model, list.early, scores, list.share, threshold_, progress_);
+    if (stopped_) return {};
+    std::vector<Tried> tried;
+    for (size_t k = 0; k < scores.size(); ++k)
+      tried.push_back({.score = scores[k], .model = std::move(fitted[k])});
+    let_best_err(tried, line.model);
+    if (stopped_) return {};
+    std::vector<Line> children;
+    std::vector<LawTrial> trials;
+    CrossValidation before;
+    if (!tried.empty()) before = validated(line.model);
+    for (Tried& child : tried) {
+      LawTrial trial = judge(line.model, before, *child.score, child.model);
+      trials.push_back(trial);
+      if (!trial.refused.empty()) {
+        line.refused.push_back(std::move(trial));
+        continue;
+      }
+      children.push_back({.model = std::move(child.model), .accepted = line.accepted});
+      children.back().cost = cost(children.back().model);
+      children.back().accepted.push_back({.trial = std::move(trial), .alike = {}, .refused = {}});
+    }
+    std::ranges::stable_sort(children, {}, &Line::cost);
+    fit_shapes(children);
+    if (stopped_) return {};
+    for (Line& child : children)
+      for (const LawTrial& trial : trials)
+        if (!trial.term.same_law(child.accepted.back().trial.term))
+          child.accepted.back().refused.push_back(trial);
+    return children;
+  }
+
+  struct Tried {
+    const LawScore* score = nullptr;
+    ModelFit model;
+  };
+
+  /// Drops laws that those accepted after them make needless: the model without one fits as well,
+  /// by what counts as a gain.
+  void prune(Line& line) const {
+    const size_t given = line.model.terms.size() - line.accepted.size();
+    for (size_t k = 0; k + 1 < line.accepted.size();) {
+      std::vector<Term> terms = line.model.terms;
+      terms.erase(terms.begin() + static_cast<std::ptrdiff_t>(given + k));
+      ModelFit without = with_terms(setup_, line.model, terms, {});
+      refine_model(without, setup_, {}, progress_);
+      if (stopped_) return;
+      LawTrial trial = line.accepted[k].trial;
+      const double rise = without.chi_square(threshold_) - line.model.chi_square(threshold_);
+      const double least = least_fall(static_cast<Eigen::Index>(trial.term.amplitudes.size()));
+      if (!without.usable || rise >= std::max(least, worth_naming(without, threshold_))) {
+        ++k;
+        continue;
+      }
+      trial.refused = "those accepted after it make it needless";
+      line.refused.push_back(std::move(trial));
+      line.accepted.erase(line.accepted.begin() + static_cast<std::ptrdiff_t>(k));
+      line.model = std::move(without);
+      line.last.clear();
+    }
+  }
+
+  /// Directions of their own for the models that leave least, of those that stand far from where
+  /// the line's directions were taken.
+  void let_best_err(std::vector<Tried>& tried, const ModelFit& line) const {
+    constexpr double kNear = 0.5;  ///< of the best one's fall
+    const double from = line.chi_square(threshold_);
+    double best = 0;
+    for (const Tried& child : tried)
+      if (child.model.usable) best = std::max(best, from - child.model.chi_square(threshold_));
+    for (Tried& child : tried) {
+      ModelFit& model = child.model;
+      if (!model.usable || model.parts.front().directions.cols() > 0 ||
+          from - model.chi_square(threshold_) < kNear * best)
+        continue;
+      refine_with_discretisation(model, setup_, progress_);
+      if (stopped_) return;
+    }
+  }
+
+  /// Shapes between those of the grid, for laws that are near the best.
+  void fit_shapes(std::vector<Line>& children) {
+    constexpr double kNear = 0.2;  ///< of the best one's fall
+    if (children.empty()) return;
+    const double reach = kNear * children.front().accepted.back().trial.fall;
+    const double best = children.front().cost;
+    for (Line& child : children) {
+      std::vector<Term> terms = child.model.terms;
+      if (terms.back().shape.empty() || child.cost > best + reach) continue;
+      terms.back().fits_shape = true;
+      ModelFit with_shape = with_terms(setup_, child.model, terms, {});
+      refine_model(with_shape, setup_, {.rounds = 1}, progress_);
+      if (stopped_) return;
+      if (!with_shape.usable || cost(with_shape) >= child.cost) continue;
+      LawTrial& trial = child.accepted.back().trial;
+      trial.fall += child.model.chi_square(threshold_) - with_shape.chi_square(threshold_);
+      trial.term = with_shape.terms.back();
+      child.model = std::move(with_shape);
+      child.cost = cost(child.model);
+    }
+    std::ranges::stable_sort(children, {}, &Line::cost);
+  }
+
+  CrossValidation validated(const ModelFit& model) const {
+    // A recording left out says most where there are enough others.
+    constexpr size_t kEnough = 3;
+    return cross_validate(setup_, model, kTimeBlocks, threshold_, model.parts.size() >= kEnough);
+  }
+
+  LawTrial judge(const ModelFit& before, const CrossValidation& without, const LawScore& score,
+                 const ModelFit& after) const {
+    LawTrial trial{.term = score.term, .foreseen_fall = score.fall, .refused = {}};
+    if (!after.usable) {
+      trial.refused = "others leave far less over the first frames, or no fit worked out";
+      return trial;
+    }
+    trial.term = after.terms.back();
+    trial.fall = before.chi_square(threshold_) - after.chi_square(threshold_);
+    const double least = least_fall(score.amount.size());
+    if (trial.fall < std::max(least, 0.5 * score.fall)) {
+      trial.refused = "the fit gains less than half of what was foreseen";
+      return trial;
+    }
+    if (trial.fall < worth_naming(before, threshold_)) {
+      trial.refused = "it takes too little of what is above the noise";
+      return trial;
+    }
+    const CrossValidation own = validated(after);
+    trial.cross_validated = own.mean;
+    trial.without_it = without.mean;
+    trial.best_trivial = std::min(without.constant_offset, without.last_residual);
+    trial.clear_of_neutral =
+        clear_of_neutral(after, judge_adequacy(after, setup_.options.loss), threshold_);
+    if (!own.usable || own.mean >= without.mean)
+      trial.refused = "frames that were left out are predicted no better";
+    else if (own.mean >= trial.best_trivial)
+      trial.refused = "a correction without physics does as well";
+    else if (trial.clear_of_neutral < 5)
+      trial.refused = "not clear of its neutral value";
+    return trial;
+  }
+
+  const DiagnosisSetup& setup_;
+  DiagnosisSetup coarse_;
+  const SearchOptions& options_;
+  double threshold_;
+  bool stopped_ = false;  ///< set by `progress_` once it has said so
+  ProgressCallback progress_;
+};
+
+}  // namespace
+
+double worth_naming(const ModelFit& model, double threshold) {
+  constexpr double kNoiseKnown = 0.005, kOfExcess = 1.0 / 3, kOfAll = 0.05;
+  const auto count = static_cast<double>(model.residual_count());
+  const double all = model.chi_square(threshold);
+  const double surely_above = std::max(0.0, all - count - 2 * std::sqrt(2 * count));
+  return std::max(kNoiseKnown * count, std::min(kOfExcess * surely_above, kOfAll * all));
+}
+
+LawSearch search_laws(const DiagnosisSetup& setup, ModelFit base, const SearchOptions& options,
+                      const ProgressCallback& progress) {
+  return Search(setup, options, progress).run(std::move(base));
+}
+
+}  // namespace clothfit

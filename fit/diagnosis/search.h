@@ -1,0 +1,65 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "fit/diagnosis/cross_validation.h"
+#include "fit/diagnosis/law_score.h"
+#include "fit/diagnosis/model_fit.h"
+
+namespace clothfit {
+
+/// What is said of a law with which a model was fitted again.
+struct LawTrial {
+  Term term;
+  double foreseen_fall = 0;                    ///< of chi-square, by the score
+  double fall = 0;                             ///< by the fit
+  double cross_validated = 0, without_it = 0;  ///< chi-square per observation left out
+  double best_trivial = 0;                     ///< the same of the model without it, mended
+  double clear_of_neutral = 0;                 ///< standard deviations, clustered
+  std::string refused;                         ///< why it is not accepted; empty: it is
+};
+
+/// One effect that was accepted, with what speaks for it.
+struct AcceptedEffect {
+  LawTrial trial;
+  std::vector<Term> alike;        ///< laws that these recordings cannot tell from it
+  std::vector<LawTrial> refused;  ///< other laws that were fitted in its place
+};
+
+struct SearchOptions {
+  std::vector<LawShapes> laws;  ///< to test
+  int lines = 3;                ///< that are followed side by side
+  int refits = 6;               ///< laws of each line that are fitted in one round
+  size_t most_effects = 4;
+  /// Residuals beyond it count less (Huber), in sigmas; infinite for squares.
+  double threshold = 1e300;
+};
+
+/// Of the cross-validation, where one recording is fitted.
+inline constexpr int kTimeBlocks = 5;
+
+/// What a law must take of a model's chi-square to be worth a name, however sure it is. Noise is
+/// known to half a per cent at best. And a model whose own numerics err leaves structure that many
+/// laws follow a little: what is missing takes a third of all that is surely above the noise, or,
+/// where much is missing that no single law explains, a twentieth of all that is left.
+double worth_naming(const ModelFit& model, double threshold);
+
+struct LawSearch {
+  bool cancelled = false;
+  ModelFit model;                        ///< the best line's
+  std::vector<AcceptedEffect> accepted;  ///< in the order in which they were
+  std::vector<LawTrial> refused;         ///< the last round's
+  std::vector<LawScore> first;           ///< scores in the model that the search began with
+  double first_share = 1;                ///< of the frames, where they were had
+  std::vector<LawScore> last;            ///< what laws that are not in it would still explain
+};
+
+/// Adds laws to a model, one after the other: each round scores all of them, fits the model again
+/// with the best, and keeps what predicts observations left out. Several lines are followed, always
+/// the one that is best; a line costs what its model leaves, and a price for each number more
+/// (Bayesian information criterion). `base` is linearised and has its directions.
+LawSearch search_laws(const DiagnosisSetup& setup, ModelFit base, const SearchOptions& options,
+                      const ProgressCallback& progress);
+
+}  // namespace clothfit

@@ -1,0 +1,66 @@
+// Searches of twins, on which a law is planted or none.
+#include "fit/diagnosis/planting.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "tests/fit/diagnosis/true_model.h"
+
+namespace clothfit {
+namespace {
+
+const FitOptions kOptions = [] {
+  FitOptions options;
+  options.loss = Loss::squared;
+  return options;
+}();
+
+/// A few laws of the air and of gravity.
+SearchOptions few_laws(const FitInput& input) {
+  SearchOptions options{.laws = {},
+                        .lines = 1,
+                        .refits = 2,
+                        .most_effects = 2,
+                        .threshold = std::numeric_limits<double>::infinity()};
+  for (const LawShapes& law : laws_to_test(input, kOptions, 0.5)) {
+    const std::string& effect = law.front().effect;
+    if (effect == "viscous_damping" || effect == "gravity_tilt" || effect == "wind")
+      options.laws.push_back(law);
+  }
+  return options;
+}
+
+TEST(Planting, FindsThePlantedDragOnATwinAndNothingOnATwinWithoutIt) {
+  const SyntheticCloth cloth{};
+  const FitInput input = synthetic_input(cloth);
+  const DiagnosisSetup setup{.inputs = {&input, 1}, .options = kOptions, .columns = 9, .rows = 9};
+  const ModelFit model = true_model(setup, cloth);
+  const Plant drag{.term = drag_term(), .parameter = "rate", .beyond_neutral = 0.8};
+
+  const PlantOutcome planted = search_twins(setup, model, drag, few_laws(input), 5, {});
+  ASSERT_TRUE(planted.ran) << planted.why_not;
+  EXPECT_TRUE(planted.named());
+
+  const PlantOutcome nothing = search_twins(setup, model, {}, few_laws(input), 6, {});
+  ASSERT_TRUE(nothing.ran) << nothing.why_not;
+  EXPECT_TRUE(nothing.found.empty()) << nothing.found.front().title();
+}
+
+// A model that has the drag itself is the truth of a twin with drag: nothing is missing there.
+TEST(Planting, FindsNothingOnATwinOfWhatTheModelHas) {
+  const SyntheticCloth cloth{.drag_rate_per_s = 1};
+  const FitInput input = synthetic_input(cloth);
+  const DiagnosisSetup setup{.inputs = {&input, 1}, .options = kOptions, .columns = 9, .rows = 9};
+  const ModelFit model = true_model(setup, cloth, {drag_term()});
+
+  SearchOptions options = few_laws(input);
+  std::erase_if(options.laws,
+                [](const LawShapes& law) { return law.front().effect == "viscous_damping"; });
+  const PlantOutcome outcome = search_twins(setup, model, {}, options, 7, {});
+  ASSERT_TRUE(outcome.ran) << outcome.why_not;
+  EXPECT_TRUE(outcome.found.empty()) << outcome.found.front().title();
+}
+
+}  // namespace
+}  // namespace clothfit
