@@ -140,6 +140,8 @@ void print_result(const FitReport& report, const fs::path& folder) {
   const Table errors = short_error_table(report.result);
   fmt::print("\n{}\n", text_table(parameters.header, parameters.rows));
   fmt::print("Errors (rms per coordinate):\n\n{}\n", text_table(errors.header, errors.rows));
+  const Table clouds = cloud_table(report.result);
+  if (!clouds.rows.empty()) fmt::print("{}\n", text_table(clouds.header, clouds.rows));
   fmt::print("{}.\n\nReport: {}\n", summarise(report).verdict, shown_path(folder / "report.html"));
 }
 

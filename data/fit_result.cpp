@@ -65,6 +65,10 @@ Json to_json(const ObservationErrors& errors) {
             {"rigid", finite(errors.trivial.rigid)}}}};
 }
 
+Json to_json(const CloudErrors::Summary& clouds) {
+  return {{"chamfer_m2", finite(clouds.chamfer_m2)}, {"frames", clouds.frames}};
+}
+
 Json to_json(const Basin& basin) {
   Json parameters = Json::object();
   for (const auto& [name, value] : basin.parameters) parameters[name] = finite(value);
@@ -197,6 +201,10 @@ ObservationErrors read_errors(const JsonValue& json) {
   return errors;
 }
 
+CloudErrors::Summary read_cloud_errors(const JsonValue& json) {
+  return {.chamfer_m2 = json.at("chamfer_m2").number(), .frames = json.at("frames").count()};
+}
+
 Eigen::Vector3d read_vector(const JsonValue& json) {
   const std::vector<JsonValue> numbers = json.items();
   if (numbers.size() != 3) json.refuse("is no vector", "three numbers");
@@ -281,6 +289,10 @@ void write_fit_result(const FitResult& result, const std::filesystem::path& file
   if (!result.marker_offsets.empty())
     json["marker_offsets"] = {{"sigma_m", finite(result.marker_offset_sigma_m)},
                               {"offset_m", offsets}};
+  if (result.clouds)
+    json["clouds"] = {{"fitted", to_json(result.clouds->fitted)},
+                      {"held_out", to_json(result.clouds->held_out)},
+                      {"all", to_json(result.clouds->all)}};
   // A recording's name may hold bytes that are no UTF-8; JSON may not.
   write_text(json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n", file);
 }
@@ -329,6 +341,12 @@ FitResult read_fit_result(const std::filesystem::path& file) {
     for (const JsonValue& kind : errors.items()) result.errors.push_back(read_errors(kind));
   } else {
     result.errors.push_back(read_errors(errors));
+  }
+  if (json.has("clouds")) {
+    const JsonValue clouds = json.at("clouds");
+    result.clouds = CloudErrors{.fitted = read_cloud_errors(clouds.at("fitted")),
+                                .held_out = read_cloud_errors(clouds.at("held_out")),
+                                .all = read_cloud_errors(clouds.at("all"))};
   }
   const JsonValue observations = json.at("observations");
   result.observations_used = observations.at("used").count();

@@ -74,6 +74,16 @@ struct ObservationErrors {
   TrivialErrors trivial;
 };
 
+/// How far the model's surface is from measured clouds (fit/cloud_errors.h).
+struct CloudErrors {
+  /// Chamfer distance, the mean over frames that have a cloud.
+  struct Summary {
+    double chamfer_m2 = 0;
+    int frames = 0;
+  };
+  Summary fitted, held_out, all;
+};
+
 /// A constant by which a marker was seen beside the place that the model gives it.
 struct MarkerOffset {
   std::string marker;
@@ -101,6 +111,7 @@ struct FitResult {
   std::vector<MarkerOffset> marker_offsets;
   std::vector<Basin> basins;  ///< best first; empty without a search
   std::vector<ObservationErrors> errors;
+  std::optional<CloudErrors> clouds;  ///< where the recording has any
   int observations_used = 0;
   std::map<std::string, int> observations_rejected;  ///< reason -> count
 };

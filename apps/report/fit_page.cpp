@@ -27,9 +27,16 @@ std::string heading(const FitReport& report) {
 }
 
 std::string errors_section(const FitReport& report) {
-  return html_table(short_error_table(report.result),
-                    "Root mean square of one coordinate's residual. The last three columns are "
-                    "guesses that need no model, judged on the held-out frames like the model.");
+  std::string section =
+      html_table(short_error_table(report.result),
+                 "Root mean square of one coordinate's residual. The last three columns are "
+                 "guesses that need no model, judged on the held-out frames like the model.");
+  const Table clouds = cloud_table(report.result);
+  if (!clouds.rows.empty())
+    section += html_table(clouds,
+                          "Mean squared distance from each measured point to the nearest of the "
+                          "model's surface, there and back. Clouds took no part in the fit.");
+  return section;
 }
 
 std::string figures_of(const FitReport& report, const Recording& recording,

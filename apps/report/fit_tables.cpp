@@ -163,6 +163,17 @@ Table short_error_table(const FitResult& result) {
   return table;
 }
 
+Table cloud_table(const FitResult& result) {
+  Table table{{"measured clouds", "fitted frames", "held-out frames", "all frames"}, {}};
+  if (!result.clouds) return table;
+  const auto shown = [](const CloudErrors::Summary& of) {
+    return of.frames > 0 ? significant(of.chamfer_m2 * 1e4, 3) : std::string("-");
+  };
+  table.rows.push_back({"Chamfer distance (1e-4 m²)", shown(result.clouds->fitted),
+                        shown(result.clouds->held_out), shown(result.clouds->all)});
+  return table;
+}
+
 Table residual_table(const FitReport& report, const Recording& recording) {
   Table table{{"kind", "frame", "marker", "held_out", "observed_1", "observed_2", "observed_3",
                "predicted_1", "predicted_2", "predicted_3", "sigma"},

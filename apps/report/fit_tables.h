@@ -28,6 +28,8 @@ Table basin_table(const FitResult& result);
 Table error_table(const FitResult& result);
 /// The same for people: 3D errors in mm.
 Table short_error_table(const FitResult& result);
+/// Chamfer distances from measured clouds; no rows where there are none.
+Table cloud_table(const FitResult& result);
 
 /// One row per observation: observed, predicted, sigma (CSV).
 Table residual_table(const FitReport& report, const Recording& recording);

@@ -49,6 +49,7 @@ FitInput twin_of(FitInput recording, const FitReport& truth, std::uint64_t seed)
              });
     }
   }
+  recording.clouds.clear();
   return recording;
 }
 

@@ -35,6 +35,7 @@ FitResult sample_result() {
   result.effects = {{"wind", {{"q_x", "Pa", 0.25, 0.01, ParameterState::fitted, ""}}}};
   result.nuisance = {{"tilt_x", "rad", 1e-4, 1e-5, ParameterState::fitted, ""}};
   result.errors = {{"front", "px", {0.3, 0.42, 1000}, {0.5, 0.7, 400}, 0.29, {21, 30, 25}}};
+  result.clouds = CloudErrors{.fitted = {1e-5, 35}, .held_out = {1.0 / 3, 15}, .all = {0.1, 50}};
   result.marker_offset_sigma_m = 0.01;
   result.marker_offsets = {{"m7", {1e-3, -2e-3, 1.0 / 3}}, {"m2", {0, 0, 0.1}}};
   result.basins = {
@@ -50,6 +51,11 @@ void expect_same(const std::optional<Interval>& a, const std::optional<Interval>
   if (!a) return;
   EXPECT_EQ(a->lower, b->lower);
   EXPECT_EQ(a->upper, b->upper);
+}
+
+void expect_same(const CloudErrors::Summary& a, const CloudErrors::Summary& b) {
+  EXPECT_EQ(a.chamfer_m2, b.chamfer_m2);
+  EXPECT_EQ(a.frames, b.frames);
 }
 
 void expect_same(const std::vector<ParameterEstimate>& a, const std::vector<ParameterEstimate>& b) {
@@ -105,6 +111,12 @@ void expect_same(const FitResult& a, const FitResult& b) {
     EXPECT_EQ(a.errors[i].trivial.last_velocity, b.errors[i].trivial.last_velocity);
     EXPECT_EQ(a.errors[i].trivial.rigid, b.errors[i].trivial.rigid);
   }
+  ASSERT_EQ(a.clouds.has_value(), b.clouds.has_value());
+  if (a.clouds) {
+    expect_same(a.clouds->fitted, b.clouds->fitted);
+    expect_same(a.clouds->held_out, b.clouds->held_out);
+    expect_same(a.clouds->all, b.clouds->all);
+  }
   EXPECT_EQ(a.marker_offset_sigma_m, b.marker_offset_sigma_m);
   ASSERT_EQ(a.marker_offsets.size(), b.marker_offsets.size());
   for (std::size_t i = 0; i < a.marker_offsets.size(); ++i) {
@@ -133,6 +145,7 @@ TEST(FitJson, ReadsBackToTheLastBit) {
   two_kinds.errors.push_back({"side", "px", {0.4, 0.6, 10}, {}, 0.3, {}});
   FitResult no_kind = one_kind;
   no_kind.errors.clear();
+  no_kind.clouds.reset();
   for (const FitResult& result : {one_kind, two_kinds, no_kind}) {
     SCOPED_TRACE(result.errors.size());
 
@@ -150,9 +163,10 @@ TEST(FitJson, HasTheKeysOfTheFormat) {
 
   std::vector<std::string> keys;
   for (const auto& [key, value] : json.items()) keys.push_back(key);
-  EXPECT_THAT(keys, testing::ElementsAre("format", "recording", "version", "command", "seed",
-                                         "seconds", "model", "parameters", "effects", "nuisance",
-                                         "basins", "errors", "observations", "marker_offsets"));
+  EXPECT_THAT(keys,
+              testing::ElementsAre("format", "recording", "version", "command", "seed", "seconds",
+                                   "model", "parameters", "effects", "nuisance", "basins", "errors",
+                                   "observations", "marker_offsets", "clouds"));
   EXPECT_EQ(json["format"], "clothfit-fit/1");
   EXPECT_EQ(json["model"]["mesh"]["rows"], 9);
   EXPECT_EQ(json["model"]["time_step_s"], 1.0 / 480);
