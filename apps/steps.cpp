@@ -8,6 +8,7 @@
 #include "apps/track_step.h"
 #include "data/camera_parameters.h"
 #include "data/input_error.h"
+#include "fit/held_tracks.h"
 
 namespace clothfit {
 namespace {
@@ -71,9 +72,27 @@ Recording complete_recording(const Recording& recording, ObservationKind kind,
   return complete;
 }
 
+namespace {
+
+/// Turned from the axes of the camera that saw them into the world's.
+PointClouds read_clouds_in_world(const Recording& recording, const Clouds& clouds) {
+  const CameraEntry* camera = recording.find_camera(clouds.camera);
+  if (camera == nullptr || !camera->file) return {};
+  const std::optional<CameraPose> pose = read_camera(*camera->file).camera_from_world;
+  if (!pose) return {};
+  PointClouds result = read_point_clouds(clouds.folder);
+  for (auto& [frame, points_m] : result)
+    points_m =
+        pose->rotation.conjugate().toRotationMatrix() * (points_m.colwise() - pose->translation_m);
+  return result;
+}
+
+}  // namespace
+
 FitInput read_fit_input(const Recording& recording, ObservationKind kind) {
   FitInput input;
   input.recording = recording;
+  if (recording.clouds) input.clouds = read_clouds_in_world(recording, *recording.clouds);
   if (resolve_observations(recording, kind) == ObservationKind::tracks3d) {
     if (!recording.tracks3d) {
       throw InputError(yaml_of(recording), "has no 3D tracks", "observations: {tracks3d: FILE}",
@@ -103,6 +122,7 @@ FitInput read_fit_input(const Recording& recording, ObservationKind kind) {
     input.tracks2d[name] = read_tracks2d(file, recording.markers);
     input.cameras.push_back(std::move(parameters));
   }
+  if (follows_markers(recording)) input.held_tracks = held_tracks_from_pixels(input);
   return input;
 }
 

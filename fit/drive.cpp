@@ -1,20 +1,13 @@
 #include "fit/drive.h"
 
-#include <cmath>
 #include <memory>
 
 #include "data/input_error.h"
+#include "fit/held_tracks.h"
 #include "fit/smoothing_spline.h"
 
 namespace clothfit {
 namespace {
-
-/// A marker this close to a held point is that point: both are written in decimals.
-constexpr double kSamePlaceM = 1e-6;
-
-std::string place_text(const Eigen::Vector2d& at_m) {
-  return "(" + std::to_string(at_m.x()) + ", " + std::to_string(at_m.y()) + ")";
-}
 
 std::function<Eigen::Vector3d(double)> follow(std::shared_ptr<const SmoothingSpline> spline) {
   return [spline](double time_s) { return Eigen::Vector3d(spline->position(time_s)); };
@@ -60,18 +53,6 @@ TrackedPoint smooth_track(const Recording& recording, int marker, const Tracks3d
   return point;
 }
 
-int marker_at(const Recording& recording, const Eigen::Vector2d& at_m) {
-  const auto& markers = recording.markers.markers;
-  for (size_t m = 0; m < markers.size(); ++m)
-    if (std::hypot(markers[m].s_m - at_m.x(), markers[m].t_m - at_m.y()) < kSamePlaceM)
-      return static_cast<int>(m);
-  throw InputError(
-      (recording.folder / "recording.yaml").string(),
-      "no marker lies at the held point " + place_text(at_m) + ", whose motion is tracked",
-      "a marker at its (s, t) in the markers file",
-      "use motion: fixed or path, or name a place that carries a marker");
-}
-
 void hold_edge(const HeldPoint& edge, const Mesh& mesh, std::vector<HeldVertexWeights>& held) {
   const bool along_s = edge.edge == ClothEdge::top || edge.edge == ClothEdge::bottom;
   const int count = along_s ? mesh.columns : mesh.rows;
@@ -98,6 +79,7 @@ void hold(const HeldPoint& point, const HeldPath* path, const Mesh& mesh,
 Drive make_drive(const Recording& recording, const Mesh& mesh, const Tracks3d& tracks,
                  const std::vector<double>& frame_time_s) {
   Drive drive;
+  drive.driving_markers = driving_markers(recording);
   for (const HeldPoint& point : recording.held) {
     if (point.motion == HeldMotion::path) {
       const HeldPath path = read_held_path(*point.file);
@@ -106,11 +88,10 @@ Drive make_drive(const Recording& recording, const Mesh& mesh, const Tracks3d& t
     }
     hold(point, nullptr, mesh, drive.held);
     if (point.motion == HeldMotion::tracked) {
-      const int marker = marker_at(recording, point.at_m);
+      const int marker = drive.driving_markers[drive.tracked.size()];
       TrackedPoint tracked = smooth_track(recording, marker, tracks, frame_time_s);
       tracked.held = static_cast<int>(drive.held.size()) - 1;
       drive.held.back().motion = follow(tracked.path);
-      drive.driving_markers.push_back(marker);
       drive.tracked.push_back(std::move(tracked));
     }
   }

@@ -31,9 +31,9 @@ void hold(const HeldPoint& point, const HeldPath* path, const Mesh& mesh,
           std::vector<HeldVertexWeights>& held);
 
 /// Held points with their motion: `fixed` ones stay where the start shape has them, `path` ones
-/// follow their file, `tracked` ones a smoothing spline through their marker's 3D track (held-out
-/// frames included: the drive is an input, not a prediction). Throws InputError for a tracked point
-/// without a marker or without a 3D track.
+/// follow their file, `tracked` ones a smoothing spline through their marker's track in space
+/// (held-out frames included: the drive is an input, not a prediction). Throws InputError for a
+/// tracked point without a marker or without such a track.
 Drive make_drive(const Recording& recording, const Mesh& mesh, const Tracks3d& tracks,
                  const std::vector<double>& frame_time_s);
 

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "data/input_error.h"
+#include "fit/cloud_errors.h"
 #include "fit/identify.h"
 #include "fit/marker_offsets.h"
 #include "fit/parameter_estimates.h"
@@ -114,28 +115,26 @@ std::pair<int, int> mesh_of(const ClothDescription& cloth, const FitOptions& opt
   return mesh;
 }
 
-/// Constants that predictions of the markers get, 3 x markers, with their part of the report: what
-/// the fitted frames ask for, or what the earlier fit of a forecast found for markers of such
-/// names. None where there are none.
+/// Constants that predictions of the markers get, 3 x markers, with their part of the report: those
+/// known of markers of such names, or else what the fitted frames ask for. None where there are
+/// none.
 Eigen::Matrix3Xd marker_offsets(const FitProblem& problem, const MarkerSet& markers,
-                                const FitOptions& options, const Predictor& predictor,
+                                const std::vector<MarkerOffset>& known, const Predictor& predictor,
                                 const MarkerRun& run, FitReport& report) {
-  const std::vector<MarkerOffset> known =
-      options.forecast ? options.forecast->marker_offsets : std::vector<MarkerOffset>();
   const auto count = static_cast<Eigen::Index>(markers.markers.size());
   Eigen::Matrix3Xd offset_m;
-  if (problem.marker_offset_sigma_m > 0) {
+  if (!known.empty()) {
+    offset_m = Eigen::Matrix3Xd::Zero(3, count);
+    for (const MarkerOffset& offset : known)
+      if (const auto found = markers.index.find(offset.marker); found != markers.index.end())
+        offset_m.col(found->second) = offset.offset_m;
+  } else if (problem.marker_offset_sigma_m > 0) {
     const ObservationSet& set = problem.observations.front();
     std::vector<Eigen::Matrix3Xd> predicted = run.position_m;
     for (const Observation& row : set.rows)
       predicted[static_cast<size_t>(row.frame)].col(row.marker) = *predictor.predict(0, row, run);
     offset_m =
         estimate_offsets(set, predicted, problem.first_held_out, problem.marker_offset_sigma_m);
-  } else if (!known.empty()) {
-    offset_m = Eigen::Matrix3Xd::Zero(3, count);
-    for (const MarkerOffset& offset : known)
-      if (const auto found = markers.index.find(offset.marker); found != markers.index.end())
-        offset_m.col(found->second) = offset.offset_m;
   } else {
     return {};
   }
@@ -143,10 +142,10 @@ Eigen::Matrix3Xd marker_offsets(const FitProblem& problem, const MarkerSet& mark
   const double most_m = offset_m.colwise().norm().maxCoeff(&furthest);
   report.stages.push_back(
       fmt::format("offsets of markers{}: {:.2g} mm rms, at most {:.2g} mm (marker {})",
-                  options.forecast ? " of the earlier fit" : "",
+                  known.empty() ? "" : " of an earlier fit",
                   1e3 * std::sqrt(offset_m.squaredNorm() / static_cast<double>(count)),
                   1e3 * most_m, markers.markers[static_cast<size_t>(furthest)].name));
-  report.result.marker_offset_sigma_m = problem.marker_offset_sigma_m;
+  report.result.marker_offset_sigma_m = known.empty() ? problem.marker_offset_sigma_m : 0;
   for (Eigen::Index m = 0; m < count; ++m)
     if (!offset_m.col(m).isZero(0))
       report.result.marker_offsets.push_back(
@@ -198,7 +197,8 @@ double own_time_step_s(const FitProblem& problem, const FitOptions& options,
 /// Runs the model on through all frames and fills in what it leaves of them.
 void run_on(const FitInput& input, const FitProblem& problem, const FitOptions& options,
             const Eigen::VectorXd& values, const Uncertainty& uncertainty,
-            const FurtherLooks& looks, FitReport& report) {
+            const std::vector<MarkerOffset>& known_offsets, const FurtherLooks& looks,
+            FitReport& report) {
   FitResult& result = report.result;
   if (!problem.drive_correction.points.empty())
     report.stages.push_back(drive_line(problem, values));
@@ -232,8 +232,11 @@ void run_on(const FitInput& input, const FitProblem& problem, const FitOptions& 
   report.model.time_step_s = result.time_step_s;
   const MarkerRun markers = marker_run(problem, run);
   predictor.offset_markers(
-      marker_offsets(problem, input.recording.markers, options, predictor, markers, report));
+      marker_offsets(problem, input.recording.markers, known_offsets, predictor, markers, report));
   fill_residuals(problem, predictor, markers, report);
+  if (!input.clouds.empty())
+    result.clouds =
+        cloud_errors(input.clouds, problem.cloth.mesh, run.position_m, problem.first_held_out);
   for (const ObservationSet& set : problem.observations)
     result.observations_used += static_cast<int>(set.rows.size());
 }
@@ -337,7 +340,9 @@ FitReport fit(const FitInput& input, const FitOptions& options, const ProgressCa
     result.time_step_s = own_time_step_s(problem, options, values);
     report.stages.push_back("forecast: nothing fitted");
   }
-  run_on(input, problem, options, values, uncertainty, looks, report);
+  run_on(input, problem, options, values, uncertainty,
+         options.forecast ? options.forecast->marker_offsets : std::vector<MarkerOffset>(), looks,
+         report);
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
   return report;
 }
@@ -368,7 +373,7 @@ FitReport report_at(const FitInput& input, const FitOptions& options,
   FitReport report = report_of(input, problem, options);
   report.stages.push_back("nothing fitted: the values are those of a fit of several recordings");
   report.result.time_step_s = own_time_step_s(problem, options, values);
-  run_on(input, problem, options, values, uncertainty, {}, report);
+  run_on(input, problem, options, values, uncertainty, known.marker_offsets, {}, report);
   return report;
 }
 

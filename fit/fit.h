@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "data/camera_parameters.h"
+#include "data/clouds.h"
 #include "data/fit_result.h"
 #include "data/model_description.h"
 #include "data/progress.h"
@@ -23,6 +24,9 @@ struct FitInput {
   Tracks3d tracks3d;                         ///< empty when there are none
   std::map<std::string, Tracks2d> tracks2d;  ///< camera name -> its tracks
   std::vector<CameraParameters> cameras;     ///< those of tracks2d, with poses
+  /// Of markers that held points follow, where there are no 3D tracks (fit/held_tracks.h).
+  Tracks3d held_tracks;
+  PointClouds clouds;  ///< world; errors are judged by them, nothing is fitted
 };
 
 /// What large residuals weigh: as all others, or less (Huber).
@@ -154,10 +158,12 @@ struct FitReport {
 /// for a recording that cannot be fitted as it stands.
 FitReport fit(const FitInput& input, const FitOptions& options, const ProgressCallback& progress);
 
-/// Parameters that a fit of several recordings found, by name.
+/// What a fit of several recordings found: parameters by name, and where markers are seen.
 struct KnownParameters {
   std::map<std::string, double> values;  ///< others stand where a fit would begin
   std::map<std::string, double> sigma;   ///< 0 where nothing is known
+  /// By the markers' names, in place of what this recording asks for (fit/marker_offsets.h).
+  std::vector<MarkerOffset> marker_offsets = {};
 };
 
 /// What a model with known parameters leaves of a recording; nothing is fitted. Throws InputError

@@ -99,6 +99,13 @@ ObservationSet observations_2d(const Tracks2d& tracks, const CameraParameters& c
   return set;
 }
 
+Eigen::Matrix2Xd marker_places(const MarkerSet& markers) {
+  Eigen::Matrix2Xd places(2, static_cast<Eigen::Index>(markers.markers.size()));
+  for (size_t m = 0; m < markers.markers.size(); ++m)
+    places.col(static_cast<Eigen::Index>(m)) << markers.markers[m].s_m, markers.markers[m].t_m;
+  return places;
+}
+
 std::vector<Eigen::MatrixXd> marker_tracks(const ObservationSet& set, int marker_count,
                                            int frames) {
   std::vector<Eigen::MatrixXd> tracks(

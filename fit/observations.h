@@ -53,6 +53,9 @@ ObservationSet observations_2d(const Tracks2d& tracks, const CameraParameters& c
                                const std::vector<int>& excluded,
                                std::map<std::string, int>& rejected);
 
+/// (s, t) of every marker, 2 x markers, m.
+Eigen::Matrix2Xd marker_places(const MarkerSet& markers);
+
 /// The set as a matrix per marker, coordinates x frames, NaN where it was not observed.
 std::vector<Eigen::MatrixXd> marker_tracks(const ObservationSet& set, int marker_count, int frames);
 

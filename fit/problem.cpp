@@ -50,13 +50,6 @@ bool use_3d(const FitInput& input, const FitOptions& options) {
   return options.observations == ObservationKind::tracks3d;
 }
 
-Eigen::Matrix2Xd marker_places(const MarkerSet& markers) {
-  Eigen::Matrix2Xd places(2, static_cast<Eigen::Index>(markers.markers.size()));
-  for (size_t m = 0; m < markers.markers.size(); ++m)
-    places.col(static_cast<Eigen::Index>(m)) << markers.markers[m].s_m, markers.markers[m].t_m;
-  return places;
-}
-
 void add_observations(const FitInput& input, const FitOptions& options, FitProblem& problem) {
   const Recording& recording = input.recording;
   const auto markers = static_cast<int>(recording.markers.markers.size());
@@ -414,7 +407,9 @@ FitProblem make_problem(const FitInput& input, const FitOptions& options, int me
   const Mesh mesh{mesh_columns, mesh_rows, recording.cloth.width_m, recording.cloth.height_m};
   add_masses(recording, mesh, problem);
   problem.cloth.obstacle = make_obstacle(recording.obstacle);
-  Drive drive = make_drive(recording, mesh, input.tracks3d, problem.frame_time_s);
+  Drive drive =
+      make_drive(recording, mesh, input.tracks3d.empty() ? input.held_tracks : input.tracks3d,
+                 problem.frame_time_s);
   problem.cloth.held = std::move(drive.held);
   problem.driving_markers = std::move(drive.driving_markers);
   add_observations(input, options, problem);
