@@ -4,6 +4,7 @@
 #include <limits>
 #include <memory>
 #include <optional>
+#include <set>
 #include <span>
 #include <vector>
 
@@ -49,6 +50,22 @@ int parse_plant(const std::string& text) {
   if (!count || *count < 0 || *count > 1000 || *count != std::floor(*count))
     throw InputError("--plant", "'" + text + "' is no number of laws", "0 to 1000, or all");
   return static_cast<int>(*count);
+}
+
+/// Those to fit, then those held out. Throws InputError also where one is named twice: a recording
+/// that was fitted judges nothing.
+std::vector<Recording> read_recordings(const DiagnoseFlags& flags) {
+  std::vector<Recording> recordings;
+  std::set<fs::path> seen;
+  for (const auto* folders : {&flags.recordings, &flags.held_out})
+    for (const fs::path& typed : *folders) {
+      const fs::path folder = recording_folder(typed);
+      if (!seen.insert(fs::weakly_canonical(folder)).second)
+        throw InputError(typed.string(), "is named twice",
+                         "each recording once, to be fitted or held out");
+      recordings.push_back(read_recording(folder));
+    }
+  return recordings;
 }
 
 /// What diagnosis.json keeps of the command line: the options that shape the result.
@@ -136,10 +153,7 @@ int run_diagnose(DiagnoseFlags flags) {
   fit.loss = flags.loss == "squared" ? Loss::squared : Loss::huber;
   flags.options.validate();
   const std::string command = command_text(flags);
-  std::vector<Recording> recordings;
-  for (const auto* folders : {&flags.recordings, &flags.held_out})
-    for (const fs::path& folder : *folders)
-      recordings.push_back(read_recording(recording_folder(folder)));
+  std::vector<Recording> recordings = read_recordings(flags);
 
   OutputFolder out(out_folder(flags.out, recordings.front().name + ".diagnosis"));
   Diagnosis diagnosis;
@@ -149,9 +163,9 @@ int run_diagnose(DiagnoseFlags flags) {
     std::vector<FitInput> inputs;
     for (Recording& recording : recordings) {
       const fs::path steps = out.path() / "steps";
-      recording =
-          complete_recording(recording, fit.observations, {},
-                             recordings.size() > 1 ? steps / recording.name : steps, progress);
+      recording = complete_recording(
+          recording, fit.observations, {},
+          recordings.size() > 1 ? steps / std::to_string(inputs.size()) : steps, progress);
       inputs.push_back(read_fit_input(recording, fit.observations));
     }
     const std::span<const FitInput> all(inputs);

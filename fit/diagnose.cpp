@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <map>
 
 #include "data/input_error.h"
 #include "fit/diagnosis/clearance.h"
@@ -127,6 +128,15 @@ class Run {
 
  private:
   using Report = FitReport DiagnosedRecording::*;
+
+  /// Of a report on the mesh that was fitted, whatever a recording suggests itself.
+  static FitOptions options_on(const DiagnosisSetup& setup, const std::vector<Term>& terms,
+                               size_t recording) {
+    FitOptions options = options_with(setup, terms, recording);
+    options.mesh_columns = setup.columns;
+    options.mesh_rows = setup.rows;
+    return options;
+  }
 
   void diagnose_all() {
     FitReport first = fit(fitted_.front(), options_.fit, progress_);
@@ -255,7 +265,7 @@ class Run {
         sigma_of(model, judge_adequacy(model, options_.fit.loss), threshold(model));
     for (size_t n = 0; n < fitted_.size(); ++n)
       result_.recordings[n].*report =
-          report_at(with_terms(fitted_[n], model.terms), options_with(setup, model.terms, n),
+          report_at(with_terms(fitted_[n], model.terms), options_on(setup, model.terms, n),
                     {.values = values[n], .sigma = sigma[n]});
   }
 
@@ -263,14 +273,15 @@ class Run {
   bool report_held_out(const DiagnosisSetup& setup, const ModelFit& model, Report report) {
     for (size_t n = 0; n < held_out_.size(); ++n) {
       FitReport& own = result_.recordings[fitted_.size() + n].*report;
-      own = report_unseen(setup, model, held_out_[n]);
+      own = report_unseen(setup, model, held_out_[n], report);
       if (cancelled_) return false;
       if (!own.usable()) return give_up(own.stop, held_out_[n].recording.name + ": " + own.message);
     }
     return true;
   }
 
-  FitReport report_unseen(const DiagnosisSetup& setup, const ModelFit& model, FitInput unseen) {
+  FitReport report_unseen(const DiagnosisSetup& setup, const ModelFit& model, FitInput unseen,
+                          Report report) {
     DiagnosisSetup alone = setup;
     alone.inputs = {&unseen, 1};
     NamedValues shared;
@@ -293,8 +304,23 @@ class Run {
       }
       shared = own.values().front();
     }
-    return report_at(with_terms(unseen, model.terms), options_with(setup, model.terms, 0),
-                     {.values = shared, .sigma = {}});
+    return report_at(with_terms(unseen, model.terms), options_on(setup, model.terms, 0),
+                     {.values = shared, .sigma = {}, .marker_offsets = mean_offsets(report)});
+  }
+
+  /// Of the markers in the recordings that were fitted.
+  std::vector<MarkerOffset> mean_offsets(Report report) const {
+    std::map<std::string, std::vector<Eigen::Vector3d>> seen;
+    for (size_t n = 0; n < fitted_.size(); ++n)
+      for (const MarkerOffset& offset : (result_.recordings[n].*report).result.marker_offsets)
+        seen[offset.marker].push_back(offset.offset_m);
+    std::vector<MarkerOffset> mean;
+    for (const auto& [marker, offsets] : seen) {
+      mean.push_back({.marker = marker, .offset_m = Eigen::Vector3d::Zero()});
+      for (const Eigen::Vector3d& offset_m : offsets)
+        mean.back().offset_m += offset_m / static_cast<double>(offsets.size());
+    }
+    return mean;
   }
 
   /// Residuals beyond it count less, in sigmas.
@@ -355,6 +381,14 @@ Diagnosis diagnose(std::span<const FitInput> fitted, std::span<const FitInput> h
                    const DiagnoseOptions& options, const ProgressCallback& progress) {
   options.validate();
   if (fitted.empty()) throw InputError("diagnose", "no recording is given", "one or more to fit");
+  const ClothDescription& cloth = fitted.front().recording.cloth;
+  for (const auto& recordings : {fitted, held_out})
+    for (const FitInput& input : recordings)
+      if (input.recording.cloth.width_m != cloth.width_m ||
+          input.recording.cloth.height_m != cloth.height_m)
+        throw InputError(input.recording.name,
+                         "its cloth has another size than that of " + fitted.front().recording.name,
+                         "recordings of one cloth");
   const tbb::global_control threads(
       tbb::global_control::max_allowed_parallelism,
       options.fit.threads > 0

@@ -20,7 +20,7 @@ struct Plant {
 struct PlantOutcome {
   Plant plant;
   bool ran = false;
-  std::vector<Term> found;  ///< beyond what the truth was said to have; the first one's class first
+  std::vector<Term> found;  ///< the first law accepted, then those that cannot be told from it
   std::string why_not;      ///< where it did not run
   /// Whether the planted effect, or one that cannot be told from it, was the first to be found.
   bool named() const;

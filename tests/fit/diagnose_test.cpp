@@ -101,6 +101,14 @@ TEST(Diagnose, EndsSoonWhenItIsToldTo) {
   EXPECT_EQ(diagnosis.stop, FitStop::cancelled);
 }
 
+TEST(Diagnose, RefusesRecordingsOfTwoCloths) {
+  std::vector<FitInput> inputs{synthetic_input({}), synthetic_input({})};
+  inputs[1].recording.cloth.width_m *= 1.1;
+  EXPECT_THROW(diagnose(inputs, {}, quick(), {}), InputError);
+  EXPECT_THROW(diagnose({&inputs[0], 1}, {&inputs[1], 1}, quick(), {}), InputError);
+  EXPECT_THROW(diagnose({}, {&inputs[1], 1}, quick(), {}), InputError);
+}
+
 TEST(Diagnose, RefusesOptionsThatMakeNoSense) {
   DiagnoseOptions options = quick();
   options.lines = 0;
