@@ -65,6 +65,7 @@ ordered_json adequacy_json(const Adequacy& of) {
           {"noise_chi_square_per_dof", of.noise_chi_square_per_dof},
           {"time_correlation", of.time_correlation},
           {"neighbour_correlation", of.neighbour_correlation},
+          {"discretisation_square", of.discretisation_square},
           {"smooth_share", of.smooth_share},
           {"smooth_score", of.smooth_score}};
 }

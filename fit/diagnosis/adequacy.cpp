@@ -16,6 +16,12 @@ namespace {
 constexpr double kSure = 5;
 /// and larger than this share of the noise's own square, is one.
 constexpr double kLarge = 0.02;
+/// Chi-square per degree of freedom that may be left beyond 1.
+constexpr double kLeft = 0.2;
+
+/// Directions in which the discretisation errs are estimates. Of the error's own square they may
+/// leave so much: smooth structure of a tenth of its size, and all in all a third.
+constexpr double kErrorSmooth = 0.01, kErrorLeft = 0.1;
 
 /// Mean product of pairs of residuals over their mean square, with its standard score.
 struct Correlation {
@@ -169,8 +175,15 @@ Adequacy judge_adequacy(const ModelFit& model, Loss loss) {
       result.smooth_share = (taken - rank) / chi_square;
     }
   }
-  const bool structured = result.smooth_score > kSure && result.smooth_share > kLarge;
-  result.adequate = !structured && result.chi_square_per_dof < 1.2;
+  double square = 0;
+  for (const PooledPart& part : model.parts) square += part.directions.squaredNorm();
+  result.discretisation_square = square / static_cast<double>(model.residual_count());
+  const bool structured = result.smooth_score > kSure &&
+                          result.smooth_share * result.chi_square_per_dof >
+                              std::max(kLarge, kErrorSmooth * result.discretisation_square);
+  result.adequate =
+      !structured &&
+      result.chi_square_per_dof < 1 + std::max(kLeft, kErrorLeft * result.discretisation_square);
   return result;
 }
 

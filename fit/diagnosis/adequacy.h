@@ -16,6 +16,9 @@ struct Adequacy {
   /// sets of such functions that were tried the most telling.
   double smooth_share = 0;  ///< of chi-square
   double smooth_score = 0;
+  /// What the model is thought to err by through its mesh and time step: the mean square, in units
+  /// of the noise's. What cannot be told from it is no structure.
+  double discretisation_square = 0;
   bool adequate = false;
 };
 

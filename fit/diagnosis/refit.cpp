@@ -62,6 +62,16 @@ ModelFit refined_over(const DiagnosisSetup& setup, ModelFit& whole, const ModelF
   return fitted;
 }
 
+/// From where the model stands, over all frames.
+ModelFit fit_from_here(const DiagnosisSetup& setup, const ModelFit& model, const LawScore& score,
+                       const ProgressCallback& progress) {
+  std::vector<Term> terms = model.terms;
+  terms.push_back(score.term);
+  ModelFit fitted = with_terms(setup, model, terms, score.columns);
+  refine_model(fitted, setup, {}, progress);
+  return fitted;
+}
+
 std::vector<ModelFit> race(const DiagnosisSetup& setup, const ModelFit& model,
                            const ModelFit& early, const std::vector<const LawScore*>& scores,
                            double first_share, double threshold, const ProgressCallback& progress) {
@@ -93,10 +103,7 @@ std::vector<ModelFit> race(const DiagnosisSetup& setup, const ModelFit& model,
 
 ModelFit fit_from_near(const DiagnosisSetup& setup, const ModelFit& model, const LawScore& score,
                        double threshold, const ProgressCallback& progress) {
-  std::vector<Term> terms = model.terms;
-  terms.push_back(score.term);
-  ModelFit near = with_terms(setup, model, terms, score.columns);
-  refine_model(near, setup, {}, progress);
+  ModelFit near = fit_from_here(setup, model, score, progress);
   if (near.cancelled) return near;
   if (near.usable) {
     const double left = near.chi_square(threshold);
@@ -176,8 +183,18 @@ std::vector<ModelFit> fit_with_laws(const DiagnosisSetup& setup, const ModelFit&
                                     const ModelFit& early,
                                     const std::vector<const LawScore*>& scores, double first_share,
                                     double threshold, const ProgressCallback& progress) {
-  if (first_share < 1) return race(setup, model, early, scores, first_share, threshold, progress);
   std::vector<ModelFit> fitted;
+  if (first_share < 1) {
+    fitted = race(setup, model, early, scores, first_share, threshold, progress);
+    // Growing horizons can lead astray where no single law brings the model near the cloth.
+    const double without = model.chi_square(threshold);
+    for (size_t k = 0; k < fitted.size(); ++k) {
+      if (fitted[k].cancelled) return fitted;
+      if (!fitted[k].usable || fitted[k].chi_square(threshold) < without) continue;
+      fitted[k] = fit_from_here(setup, model, *scores[k], progress);
+    }
+    return fitted;
+  }
   for (const LawScore* score : scores) {
     fitted.push_back(fit_from_near(setup, model, *score, threshold, progress));
     if (fitted.back().cancelled) break;

@@ -29,7 +29,8 @@ ModelFit with_terms(const DiagnosisSetup& setup, const ModelFit& model,
 /// horizons that grow from `first_share` on, which a large effect needs: from where `early` stands,
 /// the model fitted over the first of them and not biased as much. Side by side then: after
 /// each horizon those fall out, and are not usable, that leave far more than the best one; over few
-/// frames the wrong laws show first. `threshold`: of chi-square's squares, in sigmas.
+/// frames the wrong laws show first. One that ends above the model without it is fitted from where
+/// that stands. `threshold`: of chi-square's squares, in sigmas.
 std::vector<ModelFit> fit_with_laws(const DiagnosisSetup& setup, const ModelFit& model,
                                     const ModelFit& early,
                                     const std::vector<const LawScore*>& scores, double first_share,

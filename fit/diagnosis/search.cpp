@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <tuple>
 
 #include "fit/diagnosis/adequacy.h"
 #include "fit/diagnosis/clearance.h"
@@ -415,11 +414,12 @@ class Search {
 }  // namespace
 
 double worth_naming(const ModelFit& model, double threshold) {
-  constexpr double kNoiseKnown = 0.005, kOfExcess = 1.0 / 3, kOfAll = 0.05;
+  constexpr double kNoiseKnown = 0.005, kOfExcess = 1.0 / 3, kOfAll = 0.05, kOfNoise = 0.25;
   const auto count = static_cast<double>(model.residual_count());
   const double all = model.chi_square(threshold);
   const double surely_above = std::max(0.0, all - count - 2 * std::sqrt(2 * count));
-  return std::max(kNoiseKnown * count, std::min(kOfExcess * surely_above, kOfAll * all));
+  const double of_much = std::max(kOfAll * all, kOfNoise * count);
+  return std::max(kNoiseKnown * count, std::min(kOfExcess * surely_above, of_much));
 }
 
 LawSearch search_laws(const DiagnosisSetup& setup, ModelFit base, const SearchOptions& options,
