@@ -4,35 +4,18 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
-#include <fstream>
-#include <nlohmann/json.hpp>
 
-#include "data/recording.h"
 #include "fit/fit.h"
+#include "tests/fit/whole_recording.h"
 
 namespace clothfit {
 namespace {
 
 namespace fs = std::filesystem;
 
-const fs::path kSource = CLOTHFIT_SOURCE_DIR;
-
-FitInput read_input(const fs::path& folder) {
-  FitInput input{.recording = read_recording(folder)};
-  const Recording& recording = input.recording;
-  if (recording.tracks3d) input.tracks3d = read_tracks3d(*recording.tracks3d, recording.markers);
-  for (const auto& [camera, file] : recording.tracks2d) {
-    input.tracks2d[camera] = read_tracks2d(file, recording.markers);
-    input.cameras.push_back(read_camera(*recording.find_camera(camera)->file));
-  }
-  return input;
-}
-
 double true_stiffness(const std::string& recording, const std::string& types) {
-  std::ifstream file(kSource / "tests" / "fixtures" / "truth" / recording / "truth.json");
-  return nlohmann::json::parse(file).at("springs").at(types).at("k");
+  return bundled_truth(recording).at("springs").at(types).at("k");
 }
 
 /// Whether fabric parameters are within `share` of what was simulated, with a sigma of 5 % at most.
@@ -56,13 +39,8 @@ const ObservationErrors& only_errors(const FitReport& report) {
   return report.result.errors.front();
 }
 
-fs::path further_data() {
-  const char* data = std::getenv("CLOTHFIT_DATA");
-  return data != nullptr ? fs::path(data) : fs::path();
-}
-
 TEST(Recordings, SwingPlainFrom3dTracks) {
-  const FitReport report = fit(read_input(kSource / "data/recordings/swing_plain"), {}, {});
+  const FitReport report = fit(bundled_recording("swing_plain"), {}, {});
 
   ASSERT_TRUE(report.usable()) << report.message;
   expect_true_fabric(report.result, "swing_plain", 0.1);
@@ -78,12 +56,12 @@ TEST(Recordings, SwingPlainForecastsTheSameClothReleasedOtherwise) {
   const fs::path other = further_data() / "recordings" / "swing_plain_b";
   if (further_data().empty() || !fs::exists(other))
     GTEST_SKIP() << "CLOTHFIT_DATA names no folder with recordings/swing_plain_b";
-  const FitReport report = fit(read_input(kSource / "data/recordings/swing_plain"), {}, {});
+  const FitReport report = fit(bundled_recording("swing_plain"), {}, {});
   ASSERT_TRUE(report.usable()) << report.message;
 
   FitOptions options;
   options.forecast = report.result;
-  const FitReport forecast = fit(read_input(other), options, {});
+  const FitReport forecast = fit(whole_recording(other), options, {});
 
   ASSERT_TRUE(forecast.usable()) << forecast.message;
   EXPECT_LT(only_errors(forecast).held_out.rms, 0.62e-3);
@@ -94,7 +72,7 @@ TEST(Recordings, SwingPlainFromOneCamera) {
   FitOptions options;
   options.observations = ObservationKind::tracks2d;
 
-  const FitReport report = fit(read_input(kSource / "data/recordings/swing_plain"), options, {});
+  const FitReport report = fit(bundled_recording("swing_plain"), options, {});
 
   ASSERT_TRUE(report.usable()) << report.message;
   expect_true_fabric(report.result, "swing_plain", 0.1);
@@ -104,13 +82,11 @@ TEST(Recordings, SwingPlainFromOneCamera) {
 
 TEST(Recordings, AWindThatWasNotDeclaredIsFoundWhenAskedFor) {
   // Given the windy recording and the true pressure, 0.25 Pa in a level direction
-  std::ifstream file(kSource / "tests/fixtures/truth/swing_breeze/truth.json");
-  const nlohmann::json truth = nlohmann::json::parse(file).at("hidden_effects").at(0);
+  const nlohmann::json truth = bundled_truth("swing_breeze").at("hidden_effects").at(0);
   const auto direction = truth.at("direction").get<std::vector<double>>();
   const double pressure = truth.at("pressure_pa");
 
-  const FitReport report =
-      fit(read_input(kSource / "data/recordings/swing_breeze"), {.effects = {"wind"}}, {});
+  const FitReport report = fit(bundled_recording("swing_breeze"), {.effects = {"wind"}}, {});
 
   ASSERT_TRUE(report.usable()) << report.message;
   ASSERT_EQ(report.result.effects.size(), 1u);
@@ -127,7 +103,7 @@ TEST(Recordings, AWindThatWasNotDeclaredIsFoundWhenAskedFor) {
 TEST(Recordings, AHiddenWindLeavesAnErrorThatThePlainModelCannotHide) {
   // Given a recording whose cloth is also blown at, undeclared; mesh and search kept small
   const FitReport report = fit(
-      read_input(kSource / "data/recordings/swing_breeze"),
+      bundled_recording("swing_breeze"),
       {.mesh_columns = 9, .mesh_rows = 9, .population = 40, .generations = 10, .refine_best = 1},
       {});
 
@@ -141,7 +117,7 @@ TEST(Recordings, RealClothOnARobotArmIsFittedWithNumbersWhateverTheyAre) {
   const fs::path folder = further_data() / "real/iri-robot-cloth/s0623_n7_traj8_1";
   if (further_data().empty() || !fs::exists(folder))
     GTEST_SKIP() << "CLOTHFIT_DATA names no folder with real/iri-robot-cloth";
-  const FitInput input = read_input(folder);
+  const FitInput input = whole_recording(folder);
 
   const FitReport report = fit(input,
                                {.effects = {"viscous_damping"},

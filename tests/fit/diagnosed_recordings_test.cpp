@@ -1,0 +1,83 @@
+// Diagnoses of whole recordings that another simulator made, against what was simulated: two hide
+// an effect that they do not declare, one hides none.
+#include <gtest/gtest.h>
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "fit/diagnose.h"
+#include "tests/fit/whole_recording.h"
+
+namespace clothfit {
+namespace {
+
+double found_value(const FitResult& result, const std::string& effect, const std::string& name) {
+  for (const EffectEstimate& of : result.effects)
+    for (const ParameterEstimate& parameter : of.parameters)
+      if (of.name == effect && parameter.name == name) return parameter.value;
+  ADD_FAILURE() << "the model has no " << effect << "." << name;
+  return 0;
+}
+
+/// What nonuniform_mass (hem) puts on the bottom edge of a cloth whose vertices weigh the same: the
+/// share of what a vertex carries that lies in the hem, times the factor (docs/effects).
+double added_mass_kg(const FitResult& result, double mass_kg, double height_m) {
+  const double factor = found_value(result, "nonuniform_mass", "hem_bottom");
+  const double spacing_m = height_m / (result.mesh_rows - 1);
+  const double width = found_value(result, "nonuniform_mass", "hem_width") / spacing_m;
+  EXPECT_LT(width, 1) << "the hem reaches beyond one cell";
+  const double last_row = 2 * width - width * width, row_above = width * width / 2;
+  return mass_kg / result.mesh_rows * factor * (last_row + row_above);
+}
+
+/// Whether what is left on frames that took no part is the noise.
+void expect_only_noise(const FitReport& report) {
+  ASSERT_EQ(report.result.errors.size(), 1u);
+  const ObservationErrors& errors = report.result.errors.front();
+  EXPECT_LT(errors.held_out.rms, 1.1 * errors.noise);
+}
+
+TEST(DiagnosedRecordings, SwingPlainLacksNothing) {
+  const Diagnosis diagnosis = diagnose(bundled_recording("swing_plain"), {}, {});
+
+  ASSERT_TRUE(diagnosis.usable()) << diagnosis.message;
+  EXPECT_EQ(diagnosis.verdict, DiagnosisVerdict::adequate);
+  EXPECT_TRUE(diagnosis.accepted.empty());
+  EXPECT_GT(diagnosis.limits.size(), 20u);
+}
+
+TEST(DiagnosedRecordings, SwingBreezeLacksItsWind) {
+  const nlohmann::json hidden = bundled_truth("swing_breeze").at("hidden_effects").at(0);
+  const auto direction = hidden.at("direction").get<std::vector<double>>();
+  const Eigen::Vector3d truth =
+      hidden.at("pressure_pa").get<double>() * Eigen::Map<const Eigen::Vector3d>(direction.data());
+
+  const Diagnosis diagnosis = diagnose(bundled_recording("swing_breeze"), {}, {});
+
+  ASSERT_TRUE(diagnosis.usable()) << diagnosis.message;
+  EXPECT_EQ(diagnosis.verdict, DiagnosisVerdict::explained);
+  ASSERT_EQ(diagnosis.accepted.size(), 1u);
+  EXPECT_EQ(diagnosis.accepted.front().trial.term.effect, "wind");
+  const FitResult& result = diagnosis.found().result;
+  const Eigen::Vector3d wind(found_value(result, "wind", "q_x"), found_value(result, "wind", "q_y"),
+                             found_value(result, "wind", "q_z"));
+  EXPECT_LT((wind - truth).norm(), 0.05 * truth.norm());
+  expect_only_noise(diagnosis.found());
+}
+
+TEST(DiagnosedRecordings, SwingHemLacksTheMassOfItsHem) {
+  const double truth_kg = bundled_truth("swing_hem").at("hidden_effects").at(0).at("added_mass_kg");
+
+  const Diagnosis diagnosis = diagnose(bundled_recording("swing_hem"), {}, {});
+
+  ASSERT_TRUE(diagnosis.usable()) << diagnosis.message;
+  ASSERT_FALSE(diagnosis.accepted.empty());
+  EXPECT_EQ(diagnosis.accepted.front().trial.term.effect, "nonuniform_mass");
+  const FitResult& result = diagnosis.found().result;
+  EXPECT_NEAR(added_mass_kg(result, 0.0347, 0.4), truth_kg, 0.1 * truth_kg);
+  const ObservationErrors& errors = result.errors.front();
+  EXPECT_LT(errors.held_out.rms, 1.2 * errors.noise);
+}
+
+}  // namespace
+}  // namespace clothfit
