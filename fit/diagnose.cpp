@@ -129,7 +129,7 @@ class Run {
  private:
   using Report = FitReport DiagnosedRecording::*;
 
-  /// Of a report on the mesh that was fitted, whatever a recording suggests itself.
+  /// Of a report on the mesh that was analysed, whatever a recording suggests itself.
   static FitOptions options_on(const DiagnosisSetup& setup, const std::vector<Term>& terms,
                                size_t recording) {
     FitOptions options = options_with(setup, terms, recording);
@@ -149,18 +149,16 @@ class Run {
                                   .rows = first.result.mesh_rows};
     ModelFit base = base_model(declared, first);
     if (!usable(base, "the derivatives at the optimum could not be computed")) return;
-    if (fitted_.size() == 1)
-      result_.recordings.front().before = std::move(first);
-    else
-      report_fitted(declared, base, &DiagnosedRecording::before);
-    if (!report_held_out(declared, base, &DiagnosedRecording::before)) return;
-
     DiagnosisSetup setup = declared;
     base = on_analysed_mesh(std::move(base), setup);
     refine_with_discretisation(base, setup, progress_);
     if (!usable(base, "the fit went astray where it was to be refined")) return;
     result_.columns = setup.columns;
     result_.rows = setup.rows;
+    if (!report_model(setup, base, &DiagnosedRecording::before)) return;
+    // Its own fit says more of how sure it is.
+    if (fitted_.size() == 1 && setup.columns == declared.columns && setup.rows == declared.rows)
+      result_.recordings.front().before = std::move(first);
     result_.before = judge_adequacy(base, options_.fit.loss);
 
     const SearchOptions search{.laws = laws(*base.problems.front()),
@@ -189,7 +187,7 @@ class Run {
       for (DiagnosedRecording& recording : result_.recordings) recording.after = recording.before;
       result_.verdict = adequate ? DiagnosisVerdict::adequate : DiagnosisVerdict::unexplained;
     } else {
-      if (!report_model(declared, found.model, &DiagnosedRecording::after)) return;
+      if (!report_model(setup, found.model, &DiagnosedRecording::after)) return;
       result_.verdict = adequate ? DiagnosisVerdict::explained : DiagnosisVerdict::partly_explained;
     }
     search_all_twins(setup, found.model, search);
@@ -199,7 +197,7 @@ class Run {
         {.blocks = kTimeBlocks, .without = options_.without, .threshold = search.threshold},
         progress_);
     if (cancelled_ || !result_.law.found()) return;
-    report_model(declared, result_.law.model, &DiagnosedRecording::with_law);
+    report_model(setup, result_.law.model, &DiagnosedRecording::with_law);
   }
 
   /// Fitted to all recordings, linearised. `first`: a fit of the first of them alone.
@@ -239,24 +237,15 @@ class Run {
                                             progress_));
   }
 
-  /// Fits what a search found on the mesh that the recordings declare, and reports it.
-  bool report_model(const DiagnosisSetup& declared, const ModelFit& model, Report report) {
-    if (fitted_.size() == 1) {
-      FitOptions again = options_with(declared, model.terms, 0);
-      again.start = model.values().front();
-      FitReport& own = result_.recordings.front().*report;
-      own = fit(with_terms(fitted_.front(), model.terms), again, progress_);
-      if (cancelled_) return false;
+  /// What a model leaves of all recordings. False where it does not run, or nobody waits for it.
+  bool report_model(const DiagnosisSetup& setup, const ModelFit& model, Report report) {
+    report_fitted(setup, model, report);
+    for (size_t n = 0; n < fitted_.size(); ++n) {
+      const FitReport& own = result_.recordings[n].*report;
       if (!own.usable())
         return give_up(own.stop, "with " + title(model.terms) + ": " + own.message);
-      return held_out_.empty() ||
-             report_held_out(declared, model_at(declared, model.terms, {own.values}), report);
     }
-    const ModelFit own =
-        fit_on_mesh(declared, model_at(declared, model.terms, model.values()), progress_);
-    if (!usable(own, "with " + title(model.terms) + ": no fit worked out")) return false;
-    report_fitted(declared, own, report);
-    return report_held_out(declared, own, report);
+    return report_held_out(setup, model, report);
   }
 
   void report_fitted(const DiagnosisSetup& setup, const ModelFit& model, Report report) {

@@ -371,7 +371,7 @@ FitReport report_at(const FitInput& input, const FitOptions& options,
     uncertainty.upper[p] = std::min(parameter.upper, values[p] + half);
   }
   FitReport report = report_of(input, problem, options);
-  report.stages.push_back("nothing fitted: the values are those of a fit of several recordings");
+  report.stages.push_back("nothing fitted here: the values come from a fit elsewhere");
   report.result.time_step_s = own_time_step_s(problem, options, values);
   run_on(input, problem, options, values, uncertainty, known.marker_offsets, {}, report);
   return report;

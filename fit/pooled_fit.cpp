@@ -203,7 +203,7 @@ class Pool {
       const Eigen::VectorXd missed = there[n].linear.residual - parts_[n].linear.residual - change;
       const double off = missed.norm() / std::max(change.norm(), 1e-300);
       if (off <= options_.kept_within) continue;
-      if (off > options_.updated_within) {
+      if (off > options_.updated_within && !options_.rough) {
         there[n].linear.usable = false;
         continue;
       }
@@ -272,6 +272,7 @@ Quadratic quadratic_of(const FitProblem& problem, const PooledPart& part, double
 PooledFit fit_pooled(std::span<const FitProblem* const> problems, std::vector<PooledPart> start,
                      const PooledOptions& options, const ProgressCallback& progress) {
   constexpr double kLeastDamping = 1e-9, kMostDamping = 1e6;
+  constexpr int kRoughRefusals = 3;
   const PooledSpace space(problems);
   const Eigen::VectorXd lower = space.lower(), upper = space.upper();
   /// How far the coordinates have moved by which it is judged whether a fit still moves.
@@ -337,7 +338,8 @@ PooledFit fit_pooled(std::span<const FitProblem* const> problems, std::vector<Po
         ++refusals;
         // A step this short that rises is the cost's rounding.
         settled = moved < options.least_step;
-        if (!settled && !pool.is_exact()) {
+        if (options.rough && refusals == kRoughRefusals) break;
+        if (!settled && !pool.is_exact() && !options.rough) {
           if (!pool.make_exact()) break;
           continue;
         }
@@ -363,7 +365,7 @@ PooledFit fit_pooled(std::span<const FitProblem* const> problems, std::vector<Po
     constexpr double kStill = 1e-4;
     const bool still = looked_at(x - began) < kStill;
     result.converged = settled && (still || (options.least_fall > 0 && pool.is_settled()));
-    if (result.converged || result.iterations >= options.iterations) break;
+    if (result.converged || options.rough || result.iterations >= options.iterations) break;
   }
   result.message = result.converged ? "converged" : "not converged";
   result.parts = pool.release();

@@ -40,6 +40,9 @@ struct PooledOptions {
   double kept_within = 0;
   double updated_within = 0;
   bool own_only = false;  ///< shared parameters stay where they are
+  /// Derivatives that a fit begins with are updated and never had anew: near the optimum for the
+  /// price of some runs. One round.
+  bool rough = false;
 };
 
 struct PooledFit {

@@ -125,12 +125,15 @@ double fitted_rms(const FitReport& report) {
   return report.result.errors.empty() ? kNone : report.result.errors.front().fitted.rms;
 }
 
-/// Held-out error of a fit that is told the hidden laws and their shapes, from the truth.
+/// Held-out error of a fit that is told the hidden laws and their shapes, from the truth, on the
+/// mesh that was analysed.
 double error_with_truth(const FitInput& input, const UndeclaredOptions& options,
-                        const std::vector<DrawnLaw>& laws, const FitReport& base,
+                        const std::vector<DrawnLaw>& laws, const Diagnosis& diagnosis,
                         const std::map<std::string, double>& truth) {
   FitOptions told = options.diagnosis.fit;
-  told.start = base.values;
+  told.mesh_columns = diagnosis.columns;
+  told.mesh_rows = diagnosis.rows;
+  told.start = diagnosis.base().values;
   for (auto& [name, value] : *told.start)
     if (const auto known = truth.find(name); known != truth.end()) value = known->second;
   std::vector<Term> terms;
@@ -312,7 +315,7 @@ UndeclaredTrial undeclared_once(const UndeclaredOptions& options, int index, std
   }
   if (!laws.empty())
     trial.with_truth =
-        error_with_truth(recording.input, own, setting->laws, diagnosis.base(), recording.truth);
+        error_with_truth(recording.input, own, setting->laws, diagnosis, recording.truth);
   return trial;
 }
 

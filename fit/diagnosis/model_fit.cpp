@@ -182,7 +182,8 @@ void refine_model(ModelFit& model, const DiagnosisSetup& setup, const StageOptio
                              .loss = setup.options.loss,
                              .kept_within = kKeptWithin,
                              .updated_within = kUpdatedWithin,
-                             .own_only = options.own_only};
+                             .own_only = options.own_only,
+                             .rough = options.rough};
   const std::vector<const FitProblem*> problems = model.problem_pointers();
   PooledFit fitted = fit_pooled(problems, model.parts, pooled, progress);
   model.cancelled = fitted.cancelled;

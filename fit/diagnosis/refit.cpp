@@ -64,11 +64,11 @@ ModelFit refined_over(const DiagnosisSetup& setup, ModelFit& whole, const ModelF
 
 /// From where the model stands, over all frames.
 ModelFit fit_from_here(const DiagnosisSetup& setup, const ModelFit& model, const LawScore& score,
-                       const ProgressCallback& progress) {
+                       const StageOptions& stage, const ProgressCallback& progress) {
   std::vector<Term> terms = model.terms;
   terms.push_back(score.term);
   ModelFit fitted = with_terms(setup, model, terms, score.columns);
-  refine_model(fitted, setup, {}, progress);
+  refine_model(fitted, setup, stage, progress);
   return fitted;
 }
 
@@ -101,9 +101,11 @@ std::vector<ModelFit> race(const DiagnosisSetup& setup, const ModelFit& model,
   return fitted;
 }
 
-ModelFit fit_from_near(const DiagnosisSetup& setup, const ModelFit& model, const LawScore& score,
-                       double threshold, const ProgressCallback& progress) {
-  ModelFit near = fit_from_here(setup, model, score, progress);
+/// From where a rough fit stands; where that does not bring what was foreseen, over growing
+/// horizons.
+ModelFit fit_from_rough(const DiagnosisSetup& setup, const ModelFit& model, const LawScore& score,
+                        ModelFit near, double threshold, const ProgressCallback& progress) {
+  refine_model(near, setup, {}, progress);
   if (near.cancelled) return near;
   if (near.usable) {
     const double left = near.chi_square(threshold);
@@ -115,6 +117,32 @@ ModelFit fit_from_near(const DiagnosisSetup& setup, const ModelFit& model, const
   ModelFit far = race(setup, model, model, {&score}, kShortHorizon, threshold, progress).front();
   if (far.cancelled || !near.usable) return far;
   return far.usable && far.chi_square(threshold) < near.chi_square(threshold) ? far : near;
+}
+
+/// All laws roughly, from where the model stands along the derivatives of the score; then, exactly,
+/// those that gain half as much as the best one, or were foreseen to and do not.
+std::vector<ModelFit> fit_near(const DiagnosisSetup& setup, const ModelFit& model,
+                               const std::vector<const LawScore*>& scores, double threshold,
+                               const ProgressCallback& progress) {
+  constexpr double kOfBest = 0.5;
+  const double without = model.chi_square(threshold);
+  std::vector<ModelFit> fitted;
+  std::vector<double> fall;
+  for (const LawScore* score : scores) {
+    fitted.push_back(fit_from_here(setup, model, *score, {.rounds = 1, .rough = true}, progress));
+    if (fitted.back().cancelled) break;
+    fall.push_back(fitted.back().usable ? without - fitted.back().chi_square(threshold) : 0);
+  }
+  fitted.resize(scores.size());
+  if (fall.size() < scores.size() || fall.empty()) return fitted;
+  const double enough = kOfBest * *std::ranges::max_element(fall);
+  for (size_t k = 0; k < scores.size(); ++k) {
+    const bool broken = fall[k] < kKeptPromise * scores[k]->fall && scores[k]->fall > enough;
+    if (fall[k] < enough && !broken) continue;
+    fitted[k] = fit_from_rough(setup, model, *scores[k], std::move(fitted[k]), threshold, progress);
+    if (fitted[k].cancelled) break;
+  }
+  return fitted;
 }
 
 }  // namespace
@@ -183,23 +211,16 @@ std::vector<ModelFit> fit_with_laws(const DiagnosisSetup& setup, const ModelFit&
                                     const ModelFit& early,
                                     const std::vector<const LawScore*>& scores, double first_share,
                                     double threshold, const ProgressCallback& progress) {
-  std::vector<ModelFit> fitted;
-  if (first_share < 1) {
-    fitted = race(setup, model, early, scores, first_share, threshold, progress);
-    // Growing horizons can lead astray where no single law brings the model near the cloth.
-    const double without = model.chi_square(threshold);
-    for (size_t k = 0; k < fitted.size(); ++k) {
-      if (fitted[k].cancelled) return fitted;
-      if (!fitted[k].usable || fitted[k].chi_square(threshold) < without) continue;
-      fitted[k] = fit_from_here(setup, model, *scores[k], progress);
-    }
-    return fitted;
+  if (first_share == 1) return fit_near(setup, model, scores, threshold, progress);
+  std::vector<ModelFit> fitted =
+      race(setup, model, early, scores, first_share, threshold, progress);
+  // Growing horizons can lead astray where no single law brings the model near the cloth.
+  const double without = model.chi_square(threshold);
+  for (size_t k = 0; k < fitted.size(); ++k) {
+    if (fitted[k].cancelled) return fitted;
+    if (!fitted[k].usable || fitted[k].chi_square(threshold) < without) continue;
+    fitted[k] = fit_from_here(setup, model, *scores[k], {}, progress);
   }
-  for (const LawScore* score : scores) {
-    fitted.push_back(fit_from_near(setup, model, *score, threshold, progress));
-    if (fitted.back().cancelled) break;
-  }
-  fitted.resize(scores.size());
   return fitted;
 }
 
