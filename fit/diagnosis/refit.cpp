@@ -120,7 +120,7 @@ ModelFit fit_from_rough(const DiagnosisSetup& setup, const ModelFit& model, cons
 }
 
 /// All laws roughly, from where the model stands along the derivatives of the score; then, exactly,
-/// those that gain half as much as the best one, or were foreseen to and do not.
+/// those that gain half as much as the best one, or less than was foreseen.
 std::vector<ModelFit> fit_near(const DiagnosisSetup& setup, const ModelFit& model,
                                const std::vector<const LawScore*>& scores, double threshold,
                                const ProgressCallback& progress) {
@@ -137,8 +137,7 @@ std::vector<ModelFit> fit_near(const DiagnosisSetup& setup, const ModelFit& mode
   if (fall.size() < scores.size() || fall.empty()) return fitted;
   const double enough = kOfBest * *std::ranges::max_element(fall);
   for (size_t k = 0; k < scores.size(); ++k) {
-    const bool broken = fall[k] < kKeptPromise * scores[k]->fall && scores[k]->fall > enough;
-    if (fall[k] < enough && !broken) continue;
+    if (fall[k] < enough && fall[k] > kKeptPromise * scores[k]->fall) continue;
     fitted[k] = fit_from_rough(setup, model, *scores[k], std::move(fitted[k]), threshold, progress);
     if (fitted[k].cancelled) break;
   }
