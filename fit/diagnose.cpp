@@ -12,6 +12,7 @@
 #include "fit/diagnosis/clearance.h"
 #include "fit/diagnosis/discretisation.h"
 #include "fit/draws.h"
+#include "fit/held_tracks.h"
 #include "fit/measurement_effects/registry.h"
 #include "fit/parameterised_model.h"
 #include "fit/uncertainty.h"
@@ -155,10 +156,12 @@ class Run {
     if (!usable(base, "the fit went astray where it was to be refined")) return;
     result_.columns = setup.columns;
     result_.rows = setup.rows;
-    if (!report_model(setup, base, &DiagnosedRecording::before)) return;
-    // Its own fit says more of how sure it is.
+    // A fit of its own says more of how sure it is.
     if (fitted_.size() == 1 && setup.columns == declared.columns && setup.rows == declared.rows)
       result_.recordings.front().before = std::move(first);
+    else if (!report_fitted(setup, base, &DiagnosedRecording::before))
+      return;
+    if (!report_held_out(setup, base, &DiagnosedRecording::before)) return;
     result_.before = judge_adequacy(base, options_.fit.loss);
 
     const SearchOptions search{.laws = laws(*base.problems.front()),
@@ -239,23 +242,21 @@ class Run {
 
   /// What a model leaves of all recordings. False where it does not run, or nobody waits for it.
   bool report_model(const DiagnosisSetup& setup, const ModelFit& model, Report report) {
-    report_fitted(setup, model, report);
-    for (size_t n = 0; n < fitted_.size(); ++n) {
-      const FitReport& own = result_.recordings[n].*report;
-      if (!own.usable())
-        return give_up(own.stop, "with " + title(model.terms) + ": " + own.message);
-    }
-    return report_held_out(setup, model, report);
+    return report_fitted(setup, model, report) && report_held_out(setup, model, report);
   }
 
-  void report_fitted(const DiagnosisSetup& setup, const ModelFit& model, Report report) {
+  bool report_fitted(const DiagnosisSetup& setup, const ModelFit& model, Report report) {
     const std::vector<NamedValues> values = model.values();
     const std::vector<NamedValues> sigma =
         sigma_of(model, judge_adequacy(model, options_.fit.loss), threshold(model));
-    for (size_t n = 0; n < fitted_.size(); ++n)
-      result_.recordings[n].*report =
-          report_at(with_terms(fitted_[n], model.terms), options_on(setup, model.terms, n),
-                    {.values = values[n], .sigma = sigma[n]});
+    for (size_t n = 0; n < fitted_.size(); ++n) {
+      FitReport& own = result_.recordings[n].*report;
+      own = report_at(with_terms(fitted_[n], model.terms), options_on(setup, model.terms, n),
+                      {.values = values[n], .sigma = sigma[n]});
+      if (!own.usable())
+        return give_up(own.stop, "with " + title(model.terms) + ": " + own.message);
+    }
+    return true;
   }
 
   /// What the model leaves of recordings that it has not seen.
@@ -274,6 +275,7 @@ class Run {
     DiagnosisSetup alone = setup;
     alone.inputs = {&unseen, 1};
     NamedValues shared;
+    std::vector<MarkerOffset> offsets;
     const ParameterSpace& space = model.problems.front()->space;
     for (int p = 0; p < space.size(); ++p) {
       const FitParameter& parameter = space.parameters[static_cast<size_t>(p)];
@@ -283,6 +285,8 @@ class Run {
     if (PooledSpace(own.problem_pointers()).own_of(0).empty()) {
       // Nothing is fitted: all frames but those that a recording must have are held out.
       unseen.recording.held_out_from_frame = kLeastFitted;
+      if (!unseen.held_tracks.empty()) unseen.held_tracks = held_tracks_from_pixels(unseen);
+      offsets = mean_offsets(report);
     } else {
       own = fit_on_mesh(alone, own, progress_, true);
       if (!own.usable) {
@@ -294,10 +298,10 @@ class Run {
       shared = own.values().front();
     }
     return report_at(with_terms(unseen, model.terms), options_on(setup, model.terms, 0),
-                     {.values = shared, .sigma = {}, .marker_offsets = mean_offsets(report)});
+                     {.values = shared, .sigma = {}, .marker_offsets = offsets});
   }
 
-  /// Of the markers in the recordings that were fitted.
+  /// Of the markers in the recordings that were fitted, whose world is that of those held out.
   std::vector<MarkerOffset> mean_offsets(Report report) const {
     std::map<std::string, std::vector<Eigen::Vector3d>> seen;
     for (size_t n = 0; n < fitted_.size(); ++n)

@@ -59,8 +59,8 @@ struct Diagnosis {
   FitStop stop = FitStop::converged;
   std::string message;
   DiagnosisVerdict verdict = DiagnosisVerdict::adequate;
-  /// Those that were fitted, then those held out. Of one fitted recording they are its fits; of
-  /// several, reports of the fit of all (report_at).
+  /// Those that were fitted, then those held out: reports of the fit of all on the mesh that was
+  /// analysed (report_at). Of a single recording on its own mesh `before` is its own fit.
   std::vector<DiagnosedRecording> recordings;
   Adequacy before, after;
   std::vector<LawScore> scores;          ///< of the base model, the most telling first

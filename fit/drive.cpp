@@ -40,8 +40,8 @@ TrackedPoint smooth_track(const Recording& recording, int marker, const Tracks3d
   if (places.size() < 3)
     throw InputError((recording.folder / "recording.yaml").string(),
                      "held point with motion: tracked has only " + std::to_string(places.size()) +
-                         " 3D positions of its marker " + name,
-                     "at least 3 rows of that marker in tracks3d",
+                         " positions of its marker " + name,
+                     "at least 3 frames that show it",
                      "use motion: fixed or path, or track the held point");
   Eigen::MatrixXd samples(3, static_cast<Eigen::Index>(places.size()));
   for (size_t n = 0; n < places.size(); ++n) samples.col(static_cast<Eigen::Index>(n)) = places[n];

@@ -102,11 +102,12 @@ void add_uncertainty(const FitProblem& problem, const Eigen::VectorXd& values,
                                       uncertainty.chi_square_per_dof, blocks));
 }
 
-/// Columns and rows. Natural lengths that come from an earlier fit are those of its mesh.
+/// Columns and rows: as asked for, or of the earlier fit of a forecast, whose parameters are those
+/// of the cloth on its mesh, or as the recording suggests. Natural lengths are of one mesh alone.
 std::pair<int, int> mesh_of(const ClothDescription& cloth, const FitOptions& options) {
   std::pair<int, int> suggested{cloth.mesh_columns, cloth.mesh_rows};
   const bool of_one_mesh = options.forecast && options.spring_set != SpringSet::fabric;
-  if (of_one_mesh) suggested = {options.forecast->mesh_columns, options.forecast->mesh_rows};
+  if (options.forecast) suggested = {options.forecast->mesh_columns, options.forecast->mesh_rows};
   const std::pair<int, int> mesh{options.mesh_columns > 0 ? options.mesh_columns : suggested.first,
                                  options.mesh_rows > 0 ? options.mesh_rows : suggested.second};
   if (of_one_mesh && mesh != suggested)

@@ -158,7 +158,7 @@ struct FitReport {
 /// for a recording that cannot be fitted as it stands.
 FitReport fit(const FitInput& input, const FitOptions& options, const ProgressCallback& progress);
 
-/// What a fit of several recordings found: parameters by name, and where markers are seen.
+/// What a fit elsewhere found: parameters by name, and where markers are seen.
 struct KnownParameters {
   std::map<std::string, double> values;  ///< others stand where a fit would begin
   std::map<std::string, double> sigma;   ///< 0 where nothing is known

@@ -6,6 +6,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "calib/projection.h"
 #include "data/input_error.h"
@@ -128,6 +129,8 @@ Tracks3d held_tracks_from_pixels(const FitInput& input) {
       tracks.push_back({.frame = f, .marker = markers[k], .position_m = at_m});
     }
   }
+  std::ranges::stable_sort(tracks, {},
+                           [](const Position3d& row) { return std::pair(row.frame, row.marker); });
   return tracks;
 }
 

@@ -192,7 +192,7 @@ class Pool {
 
   /// The smallest change of each Jacobian that would have foretold the residuals `there`
   /// [broyden1965], coordinates weighed by what they change; none where it foretold them well, and
-  /// no derivatives where it was far off.
+  /// no derivatives where it was far off, unless a rough fit goes on with them.
   void carry_derivatives(std::vector<PooledPart>& there) {
     for (size_t n = 0; n < parts_.size(); ++n) {
       const ParameterSpace& space = problems_[n]->space;

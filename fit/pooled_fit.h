@@ -41,7 +41,7 @@ struct PooledOptions {
   double updated_within = 0;
   bool own_only = false;  ///< shared parameters stay where they are
   /// Derivatives that a fit begins with are updated and never had anew: near the optimum for the
-  /// price of some runs. One round.
+  /// price of some runs. One round; `updated_within` must be more than 0.
   bool rough = false;
 };
 

@@ -37,6 +37,9 @@ def main() -> int:
     from_frame = int(sys.argv[3])
     simulated = tracks(simulation / "tracks3d.csv", simulation / "markers.csv")
     true = tracks(recording / "truth_tracks3d.csv.gz", recording / "markers.csv")
+    if not simulated.keys() & true.keys():
+        print("no marker of the recording lies on a vertex of the simulation", file=sys.stderr)
+        return 1
     for title, judged in (("before", False), ("from there", True)):
         squares = [
             math.dist(simulated[key], place) ** 2

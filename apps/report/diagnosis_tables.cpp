@@ -154,6 +154,8 @@ Table adequacy_table(const Diagnosis& diagnosis) {
   add("chi-square per degree of freedom", before.chi_square_per_dof, after.chi_square_per_dof, "1");
   add("the same, mesh and time step taken as exact", before.noise_chi_square_per_dof,
       after.noise_chi_square_per_dof, "1");
+  add("what mesh and time step are thought to err by, mean square; a tenth of it may be left",
+      before.discretisation_square, after.discretisation_square, "");
   add("correlation with the next frame", before.time_correlation, after.time_correlation, "0");
   add("correlation with the neighbouring marker", before.neighbour_correlation,
       after.neighbour_correlation, "0");

@@ -188,6 +188,7 @@ void refine_model(ModelFit& model, const DiagnosisSetup& setup, const StageOptio
   PooledFit fitted = fit_pooled(problems, model.parts, pooled, progress);
   model.cancelled = fitted.cancelled;
   model.usable = fitted.usable;
+  model.rough = options.rough;
   if (fitted.usable) model.parts = std::move(fitted.parts);
 }
 

@@ -28,6 +28,7 @@ struct ModelFit {
   std::vector<PooledPart> parts;                            ///< where each stands, linearised
   bool usable = false;
   bool cancelled = false;
+  bool rough = false;  ///< as StageOptions::rough left it
 
   std::vector<const FitProblem*> problem_pointers() const;
   TrajectoryObjective objective(size_t recording) const;

@@ -195,6 +195,12 @@ class Pursuit {
       best_trial = law_.trials.size() - 1;
     }
     if (!best.usable) return false;
+    if (best.rough) {
+      refine_model(best, setup_, {}, progress_);
+      law_.cancelled = best.cancelled;
+      if (!best.usable) return false;
+      best_validated = cross_validate(setup_, best, options_.blocks, options_.threshold);
+    }
     law_.model = std::move(best);
     law_.after = std::move(best_validated);
     return true;

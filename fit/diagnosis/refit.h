@@ -25,9 +25,10 @@ ModelFit with_terms(const DiagnosisSetup& setup, const ModelFit& model,
                     const std::vector<Term>& terms, const Columns& columns);
 
 /// Of each law, the model with it, fitted: where the first share is 1, from where the model stands,
-/// along the derivatives of the score; where that does not bring what was foreseen, and else, over
-/// horizons that grow from `first_share` on, which a large effect needs: from where `early` stands,
-/// the model fitted over the first of them and not biased as much. Side by side then: after
+/// along the derivatives of the score; roughly (ModelFit::rough) where it gains what was foreseen
+/// and less than half as much as the best. Where that does not bring what was foreseen, and else,
+/// over horizons that grow from `first_share` on, which a large effect needs: from where `early`
+/// stands, the model fitted over the first of them and not biased as much. Side by side then: after
 /// each horizon those fall out, and are not usable, that leave far more than the best one; over few
 /// frames the wrong laws show first. One that ends above the model without it is fitted from where
 /// that stands. `threshold`: of chi-square's squares, in sigmas.

@@ -274,6 +274,11 @@ class Search {
     if (!tried.empty()) before = validated(line.model);
     for (Tried& child : tried) {
       LawTrial trial = judge(line.model, before, *child.score, child.model);
+      if (trial.refused.empty() && child.model.rough) {
+        refine_model(child.model, setup_, {}, progress_);
+        if (stopped_) return {};
+        trial = judge(line.model, before, *child.score, child.model);
+      }
       trials.push_back(trial);
       if (!trial.refused.empty()) {
         line.refused.push_back(std::move(trial));

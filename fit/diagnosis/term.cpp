@@ -4,6 +4,8 @@
 #include <cmath>
 
 #include "data/input_error.h"
+#include "fit/held_tracks.h"
+#include "fit/held_tracks.h"
 #include "fit/measurement_effects/registry.h"
 #include "model/effects/registry.h"
 
@@ -63,11 +65,6 @@ std::vector<std::string> present_effects(const FitInput& input, const FitOptions
   std::vector<std::string> present = options.effects;
   for (const DeclaredEffect& effect : input.recording.declared) present.push_back(effect.name);
   return present;
-}
-
-bool has_tracked_point(const Recording& recording) {
-  return std::ranges::any_of(
-      recording.held, [](const HeldPoint& point) { return point.motion == HeldMotion::tracked; });
 }
 
 }  // namespace
@@ -144,7 +141,7 @@ std::vector<LawShapes> laws_to_test(const FitInput& input, const FitOptions& opt
   std::vector<std::string> names;
   for (const EffectEntry& entry : effect_registry())
     if (!is_empirical(entry.name)) names.emplace_back(entry.name);
-  if (!has_tracked_point(input.recording))
+  if (!follows_markers(input.recording))
     for (const MeasurementEffectEntry& entry : measurement_effect_registry())
       names.emplace_back(entry.name);
 

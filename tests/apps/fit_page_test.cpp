@@ -206,6 +206,19 @@ TEST(FitTables, LeaveHeldOutErrorsOpenWhereNothingWasHeldOut) {
   EXPECT_EQ(error_table(sample.report.result).rows[0][5], "");
 }
 
+TEST(FitTables, ShowCloudsWhereThereAreAny) {
+  test::SampleFit sample = test::sample_fit(2);
+  EXPECT_TRUE(cloud_table(sample.report.result).rows.empty());
+  sample.report.result.clouds =
+      CloudErrors{.fitted = {0.5e-4, 35}, .held_out = {}, .all = {0.5e-4, 35}};
+
+  const Table clouds = cloud_table(sample.report.result);
+
+  ASSERT_EQ(clouds.rows.size(), 1u);
+  EXPECT_EQ(clouds.rows[0][1], "0.500");
+  EXPECT_EQ(clouds.rows[0][2], "-");
+}
+
 TEST(DataUri, EncodesBase64WithPadding) {
   EXPECT_EQ(data_uri("text/plain", ""), "data:text/plain;base64,");
   EXPECT_EQ(data_uri("text/plain", "M"), "data:text/plain;base64,TQ==");

@@ -110,7 +110,7 @@ TEST(Drive, RefusesATrackedPointThatNobodyTracked) {
   EXPECT_THAT(refusal(recording_with({.at_m = {0.2, 0.0}, .motion = HeldMotion::tracked}), {}),
               HasSubstr("no marker lies at the held point"));
   EXPECT_THAT(refusal(recording_with({.motion = HeldMotion::tracked}), {}),
-              HasSubstr("has only 0 3D positions of its marker corner"));
+              HasSubstr("has only 0 positions of its marker corner"));
 }
 
 }  // namespace

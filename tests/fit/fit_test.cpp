@@ -116,6 +116,34 @@ TEST(Fit, ForecastsAnotherReleaseWithoutFittingIt) {
   EXPECT_LT(forecast.result.errors.at(0).held_out.rms, 1.5 * 5e-4);
 }
 
+TEST(Fit, ForecastsOnTheMeshThatWasFitted) {
+  FitOptions options;
+  options.forecast = FitResult{.mesh_columns = 7, .mesh_rows = 5};
+  for (const auto& [name, value] : named(SyntheticCloth().fabric))
+    options.forecast->parameters.push_back({.name = name, .value = value});
+
+  const FitReport forecast = fit(synthetic_input({}), options, {});
+
+  EXPECT_EQ(forecast.result.mesh_columns, 7);
+  EXPECT_EQ(forecast.result.mesh_rows, 5);
+}
+
+// What is known of a recording from elsewhere is looked at as it is.
+TEST(Fit, ReportsKnownParametersWithKnownOffsetsOfMarkers) {
+  const FitInput input = synthetic_input({});
+  FitOptions options;
+  options.marker_offset_sigma_m = 0.01;
+  KnownParameters known{.values = named(SyntheticCloth().fabric), .sigma = {}};
+  const auto held_out = [&] {
+    return report_at(input, options, known).result.errors.front().held_out.rms;
+  };
+  EXPECT_LT(held_out(), 1.2 * 5e-4);
+  for (const auto& marker : input.recording.markers.markers)
+    known.marker_offsets.push_back({.marker = marker.name, .offset_m = {0, 0, 0.01}});
+
+  EXPECT_NEAR(held_out(), 0.01 / std::sqrt(3), 3e-4);
+}
+
 TEST(Fit, TellsWhatItCannotKnowOfAClothThatWasNotWeighed) {
   FitInput input = synthetic_input({.mesh = 5, .markers = 5, .frames = 16, .held_out_from = 12});
   input.recording.cloth.mass_kg.reset();

@@ -285,6 +285,25 @@ TEST(PooledFit, OfTheRecordingsOwnAloneLeavesThePhysicsWhereItIs) {
     EXPECT_NEAR(found.parts.front().values[binding.parameter], 2e-3 * uniform(generator), 1e-6);
 }
 
+TEST(PooledFit, GoesRoughlyTheWholeWayWithTheDerivativesThatItBeginsWith) {
+  FitProblem problem = make_problem(synthetic_input(tiny(1)), {}, 5, 5);
+  make_exact(problem, 1);
+  const FitProblem* const problems[] = {&problem};
+  PooledPart part;
+  part.values = 1.05 * true_values(problem);
+  part.frames = problem.first_held_out;
+  part.steps = stable_time_steps(problem.cloth, parameter_set(problem, part.values)).times(0.5);
+  part.linear = TrajectoryObjective(problem, part.frames, part.steps).linearise(part.values);
+  part.borrowed = true;
+  const double start = 0.5 * part.linear.residual.squaredNorm();
+
+  const PooledFit found = fit_pooled(problems, {part}, {.updated_within = 0.1, .rough = true}, {});
+
+  ASSERT_TRUE(found.usable);
+  EXPECT_LT(found.cost, 1e-3 * start);
+  EXPECT_TRUE(found.parts.front().borrowed) << "derivatives were had anew";
+}
+
 TEST(PooledFit, LiesBetweenTheFitsOfItsRecordingsAlone) {
   const FitProblem first = make_problem(synthetic_input(tiny(3)), {}, 5, 5);
   const FitProblem second = make_problem(synthetic_input(tiny(4)), {}, 5, 5);

@@ -152,6 +152,26 @@ TEST(Adequacy, HoldsForATrueModelAndNotForOneThatLacksDrag) {
   }
 }
 
+// The same structure is none where mesh and time step are thought to err by far more.
+TEST(Adequacy, TakesLittleBesideTheDiscretisationsErrorForNoStructure) {
+  const SyntheticCloth cloth{.drag_rate_per_s = 0.06};
+  const FitInput input = synthetic_input(cloth);
+  const DiagnosisSetup setup = setup_of({&input, 1});
+  ModelFit model = true_model(setup, cloth);
+  ASSERT_TRUE(model.usable);
+  ASSERT_FALSE(judge_adequacy(model, kOptions.loss).adequate);
+
+  // A direction that looks like nothing else: of mean square 40, its sign alternating.
+  Eigen::MatrixXd& directions = model.parts.front().directions;
+  directions = Eigen::MatrixXd::Constant(model.residual_count(), 1, std::sqrt(40.0));
+  for (Eigen::Index n = 0; n < directions.rows(); n += 2) directions(n, 0) *= -1;
+  model.parts.front().amounts = Eigen::VectorXd::Zero(1);
+
+  const Adequacy adequacy = judge_adequacy(model, kOptions.loss);
+  EXPECT_NEAR(adequacy.discretisation_square, 40, 1e-9);
+  EXPECT_TRUE(adequacy.adequate);
+}
+
 // A model that is true foresees left-out frames to the noise; constants of markers, which nothing
 // asks for, and a last residual, which is noise, do worse.
 TEST(CrossValidation, OfATrueModelIsTheNoiseAndBeatsCorrectionsWithoutPhysics) {
