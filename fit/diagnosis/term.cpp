@@ -5,7 +5,6 @@
 
 #include "data/input_error.h"
 #include "fit/held_tracks.h"
-#include "fit/held_tracks.h"
 #include "fit/measurement_effects/registry.h"
 #include "model/effects/registry.h"
 
