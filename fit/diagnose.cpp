@@ -42,16 +42,25 @@ ModelFit on_analysed_mesh(ModelFit own, DiagnosisSetup& setup) {
   return finer;
 }
 
-/// `least`: sigmas from which on an amplitude would be accepted.
+/// `least`: sigmas from which on an amplitude would be accepted. Of amplitudes that each recording
+/// has for itself, those of the recording that sees them best.
 std::vector<DetectionLimit> limits_of(const std::vector<LawScore>& scores, double least) {
   std::vector<DetectionLimit> limits;
   for (const LawScore& score : scores) {
     DetectionLimit limit{.term = score.term,
                          .parameter = score.term.amplitudes,
                          .unit = {},
-                         .limit = least * score.sigma,
-                         .found = score.amount,
+                         .limit = {},
+                         .found = {},
                          .fall = score.fall};
+    const auto each = static_cast<Eigen::Index>(score.term.amplitudes.size());
+    limit.limit = least * score.sigma.head(each);
+    limit.found = score.amount.head(each);
+    for (Eigen::Index k = each; k < score.sigma.size(); ++k) {
+      if (!(least * score.sigma[k] < limit.limit[k % each])) continue;
+      limit.limit[k % each] = least * score.sigma[k];
+      limit.found[k % each] = score.amount[k];
+    }
     const EffectDescription effect = describe_effect(score.term.effect);
     for (const std::string& name : limit.parameter)
       limit.unit.push_back(

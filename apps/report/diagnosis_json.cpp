@@ -128,7 +128,7 @@ void write_diagnosis(const Diagnosis& diagnosis, const std::string& command,
     one["predicted_fall"] = score.fall;
     one["parameters"] = ordered_json::array();
     for (Eigen::Index k = 0; k < score.amount.size(); ++k)
-      one["parameters"].push_back({{"name", score.term.amplitudes[static_cast<size_t>(k)]},
+      one["parameters"].push_back({{"name", score.amount_name(k)},
                                    {"beyond_neutral", score.amount[k]},
                                    {"sigma", score.sigma[k]}});
     json["candidates"].push_back(std::move(one));

@@ -24,8 +24,7 @@ std::string shape_text(const Term& term) {
 std::string amounts_text(const LawScore& score) {
   std::string text;
   for (Eigen::Index k = 0; k < score.amount.size(); ++k)
-    text += fmt::format("{}{} {}", text.empty() ? "" : ", ",
-                        score.term.amplitudes[static_cast<size_t>(k)],
+    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", score.amount_name(k),
                         value_text(score.amount[k], score.sigma[k]));
   return text;
 }
@@ -37,8 +36,7 @@ Table candidate_table(const Diagnosis& diagnosis) {
   for (const LawScore& score : diagnosis.scores)
     for (Eigen::Index k = 0; k < score.amount.size(); ++k)
       table.rows.push_back({score.term.effect, score.term.law, shape_text(score.term),
-                            exact_text(score.share), exact_text(score.fall),
-                            score.term.amplitudes[static_cast<size_t>(k)],
+                            exact_text(score.share), exact_text(score.fall), score.amount_name(k),
                             exact_text(score.amount[k]), exact_text(score.sigma[k])});
   return table;
 }

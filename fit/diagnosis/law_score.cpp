@@ -46,6 +46,12 @@ LawScore judge(const Term& term, const ModelProjection& projection, Columns colu
 
 }  // namespace
 
+std::string LawScore::amount_name(Eigen::Index k) const {
+  const auto each = static_cast<Eigen::Index>(term.amplitudes.size());
+  const std::string& name = term.amplitudes[static_cast<size_t>(k % each)];
+  return amount.size() > each ? name + " (recording " + std::to_string(k / each + 1) + ")" : name;
+}
+
 std::vector<LawScore> score_laws(const ModelFit& model, const ModelProjection& projection,
                                  const std::vector<LawShapes>& laws,
                                  const ProgressCallback& progress) {

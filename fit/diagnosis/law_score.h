@@ -1,5 +1,6 @@
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "fit/diagnosis/law_derivatives.h"
@@ -16,6 +17,8 @@ struct LawScore {
   double fall = 0;         ///< of chi-square
   double share = 0;        ///< of it in all that the projected residual has above its noise
   Columns columns;         ///< derivatives of the residuals by the amplitudes
+  /// Of amount `k`: the amplitude, and whose it is where each recording has its own.
+  std::string amount_name(Eigen::Index k) const;
 };
 
 /// The score test [rao1948] of each law at its neutral value: derivatives there, projected, against
