@@ -312,6 +312,22 @@ class Run {
       add(by.position_m, block.of, block.by_position.transpose() * by_on);
       add(by.velocity_m_per_s, block.of, block.by_velocity.transpose() * by_on);
     }
+    by_tension_.clear();
+    for (const EffectLinearisation::BySpring& spring : derivatives_.by_spring) {
+      const Eigen::Vector3d by_pull = at(by_action, spring.a) - at(by_action, spring.b);
+      const double by_tension = spring.direction.dot(by_pull);
+      by_tension_.push_back(by_tension);
+      const Eigen::Vector3d by_along =
+          spring.tension_ratio_n_per_m * by_pull + by_tension * spring.w_n_per_m;
+      const Eigen::Vector3d by_rate = spring.damping_ns_per_m * by_tension * spring.direction;
+      add(by.position_m, spring.b, by_along);
+      add(by.position_m, spring.a, -by_along);
+      add(by.velocity_m_per_s, spring.b, by_rate);
+      add(by.velocity_m_per_s, spring.a, -by_rate);
+    }
+    for (const EffectLinearisation::TensionByParameter& of : derivatives_.tension_by_parameter)
+      add_by_parameter(e, of.parameter,
+                       of.derivative * by_tension_[static_cast<size_t>(of.spring)]);
     for (const EffectLinearisation::ByParameter& column : derivatives_.by_parameter)
       add_by_parameter(e, column.parameter, column.derivative.dot(at(by_action, column.on)));
     for (const EffectLinearisation::ByMass& column : derivatives_.by_mass)
@@ -323,6 +339,8 @@ class Run {
     by_memory.setZero();
     for (const EffectLinearisation::ByMemory& column : derivatives_.by_memory)
       by_memory(0, column.number) += column.derivative.dot(at(by_action, column.on));
+    for (const EffectLinearisation::TensionByMemory& of : derivatives_.tension_by_memory)
+      by_memory(0, of.number) += of.derivative * by_tension_[static_cast<size_t>(of.spring)];
     for (const EffectLinearisation::MemoryByMemory& entry : derivatives_.memory_by_memory)
       by_memory(0, entry.of) += entry.derivative * by_next(0, entry.number);
     for (const EffectLinearisation::MemoryByMotion& row : derivatives_.memory_by_motion) {
@@ -354,6 +372,7 @@ class Run {
   Vectors start_target_m_, target_m_;
   std::vector<Vectors> force_n_;
   EffectLinearisation derivatives_;
+  std::vector<double> by_tension_;  ///< of each of its springs
 
   LaneState<SingleLane> by_state_;
   Vectors by_force_, by_target_, by_start_target_;

@@ -54,17 +54,9 @@ std::span<const Direction> group_of(std::span<const Direction> directions, size_
   return directions.subspan(first, std::min<size_t>(kLanes, directions.size() - first));
 }
 
-/// action += derivative * vector, the derivative 3 x 3, in every lane.
-void add_product(const Eigen::Matrix3d& derivative, const LaneVectors<>& vectors, int of, int on,
-                 LaneVectors<>& action) {
-  const auto x = vectors.x.col(of), y = vectors.y.col(of), z = vectors.z.col(of);
-  const Eigen::Matrix3d& d = derivative;
-  action.x.col(on) += d(0, 0) * x + d(0, 1) * y + d(0, 2) * z;
-  action.y.col(on) += d(1, 0) * x + d(1, 1) * y + d(1, 2) * z;
-  action.z.col(on) += d(2, 0) * x + d(2, 1) * y + d(2, 2) * z;
-}
-
-void add_product(const Eigen::Vector3d& derivative, const LaneValue<>& change, int on,
+/// action += derivative * change in every lane.
+template <class Change>
+void add_product(const Eigen::Vector3d& derivative, const Change& change, int on,
                  LaneVectors<>& action) {
   action.x.col(on) += derivative.x() * change;
   action.y.col(on) += derivative.y() * change;
@@ -89,6 +81,17 @@ const LaneValue<>& parameter_change(const LaneParameters<>& tangent, size_t effe
   if (number == ParameterNumber::gravity(1)) return tangent.gravity_m_per_s2.y;
   if (number == ParameterNumber::gravity(2)) return tangent.gravity_m_per_s2.z;
   return tangent.effects[effect][static_cast<size_t>(number - ParameterNumber::own(0))];
+}
+
+/// By parameter numbers, whether anything changes along the directions.
+void find_changing(const TangentParameters& parameters, size_t effect,
+                   std::vector<bool>& changing) {
+  const auto own = static_cast<int>(parameters.value.effects[effect].size());
+  changing.assign(static_cast<size_t>(ParameterNumber::own(own)), false);
+  for (int number = 0; number < ParameterNumber::own(own); ++number)
+    for (const LaneParameters<>& tangent : parameters.tangent)
+      if ((parameter_change(tangent, effect, number) != 0).any())
+        changing[static_cast<size_t>(number)] = true;
 }
 
 /// Adds a share of the difference of two fields to the derivatives along the direction of one lane.
@@ -244,6 +247,7 @@ void TangentStepper::add_effect_forces(const TangentParameters& parameters,
     const Effect& effect = *cloth_.effects[e];
     EffectMemory<SingleLane>& memory = state.value.effect_memory[e];
     derivatives_.clear();
+    find_changing(parameters, e, derivatives_.looked_at);
     effect.linearise_force(scene, parameters.value.effects[e], memory, derivatives_);
     for (size_t g = 0; g < state.tangent.size(); ++g)
       apply(e, parameters.tangent[g], nullptr, force_n_.tangent[g], state.tangent[g]);
@@ -271,6 +275,7 @@ void TangentStepper::shift_supports(const TangentParameters& parameters,
     if (!effect.shifts_supports()) continue;
     EffectMemory<SingleLane>& memory = state.value.effect_memory[e];
     derivatives_.clear();
+    find_changing(parameters, e, derivatives_.looked_at);
     effect.linearise_supports(scene, parameters.value.effects[e], pull_n_.value, memory,
                               derivatives_);
     for (size_t g = 0; g < state.tangent.size(); ++g)
@@ -295,12 +300,12 @@ void TangentStepper::change_forces(const TangentParameters& parameters,
     const Effect& effect = *cloth_.effects[e];
     if (!effect.changes_force()) continue;
     derivatives_.clear();
+    find_changing(parameters, e, derivatives_.looked_at);
     effect.linearise_change(scene, parameters.value.effects[e], force_n_.value, derivatives_);
     for (size_t g = 0; g < state.tangent.size(); ++g) {
       LaneVectors<>& tangent = force_n_.tangent[g];
       changed_n_.set_zero();
-      for (const EffectLinearisation::ByForce& block : derivatives_.by_force)
-        add_product(block.derivative, tangent, block.on, block.on, changed_n_);
+      add_products(derivatives_.by_force, tangent, changed_n_);
       add_actions(e, parameters.tangent[g], state.tangent[g], changed_n_);
       tangent = changed_n_;
     }
@@ -316,26 +321,30 @@ void TangentStepper::change_forces(const TangentParameters& parameters,
 }
 
 void TangentStepper::add_actions(size_t e, const LaneParameters<>& parameters,
-                                 const LaneState<>& state, LaneVectors<>& action) const {
-  for (const EffectLinearisation::ByMotion& block : derivatives_.by_motion) {
-    add_product(block.by_position, state.position_m, block.of, block.on, action);
-    if (!block.by_velocity.isZero(0))
-      add_product(block.by_velocity, state.velocity_m_per_s, block.of, block.on, action);
-  }
+                                 const LaneState<>& state, LaneVectors<>& action) {
+  add_products(derivatives_.by_motion, state.position_m, state.velocity_m_per_s, action);
   for (const EffectLinearisation::ByParameter& column : derivatives_.by_parameter)
     add_product(column.derivative, parameter_change(parameters, e, column.parameter), column.on,
                 action);
+  const EffectMemory<>& memory = state.effect_memory[e];
   for (const EffectLinearisation::ByMemory& column : derivatives_.by_memory)
-    add_product(column.derivative, LaneValue<>(state.effect_memory[e].col(column.number)),
-                column.on, action);
+    add_product(column.derivative, memory.col(column.number), column.on, action);
+  if (derivatives_.by_spring.empty()) return;
+  const auto springs = static_cast<Eigen::Index>(derivatives_.by_spring.size());
+  if (tension_n_.cols() != springs) tension_n_ = LaneArray<>(kLanes, springs);
+  tension_n_.setZero();
+  for (const EffectLinearisation::TensionByParameter& of : derivatives_.tension_by_parameter)
+    tension_n_.col(of.spring) += of.derivative * parameter_change(parameters, e, of.parameter);
+  for (const EffectLinearisation::TensionByMemory& of : derivatives_.tension_by_memory)
+    tension_n_.col(of.spring) += of.derivative * memory.col(of.number);
+  add_products(derivatives_.by_spring, tension_n_, state.position_m, state.velocity_m_per_s,
+               action);
 }
 
 void TangentStepper::apply(size_t e, const LaneParameters<>& parameters,
                            const LaneVectors<>* pull_n, LaneVectors<>& action, LaneState<>& state) {
   add_actions(e, parameters, state, action);
-  if (pull_n != nullptr)
-    for (const EffectLinearisation::ByForce& block : derivatives_.by_force)
-      add_product(block.derivative, *pull_n, block.on, block.on, action);
+  if (pull_n != nullptr) add_products(derivatives_.by_force, *pull_n, action);
 
   if (derivatives_.memory_by_memory.empty() && derivatives_.by_memory.empty()) return;
   EffectMemory<>& memory = state.effect_memory[e];

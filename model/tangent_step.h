@@ -105,7 +105,7 @@ class TangentStepper {
                      const TangentState& state);
   /// Adds what `derivatives_` of effect `e` make of a group's tangents to those of what it acts on.
   void add_actions(size_t e, const LaneParameters<>& parameters, const LaneState<>& state,
-                   LaneVectors<>& action) const;
+                   LaneVectors<>& action);
   /// The same for what also moves its memory on; `pull_n` of held points, or null.
   void apply(size_t e, const LaneParameters<>& parameters, const LaneVectors<>* pull_n,
              LaneVectors<>& action, LaneState<>& state);
@@ -125,6 +125,7 @@ class TangentStepper {
   std::vector<EffectMemory<>> next_memory_;  ///< of each effect
   std::vector<Emerging> emerging_;
   LaneVectors<> changed_n_;
+  LaneArray<> tension_n_;  ///< changes of what one effect's springs pull with
   LaneVectors<SingleLane> emerged_n_, emerged_target_m_;
 };
 

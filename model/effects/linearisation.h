@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "model/kernels/block_products.h"
 #include "model/mesh.h"
 
 namespace clothfit {
@@ -21,9 +22,17 @@ struct ParameterNumber {
 /// and the adjoint multiply by. `on` names what is acted on: a vertex where forces are, a held
 /// point where the supports are. Several blocks in the same place add up.
 struct EffectLinearisation {
-  struct ByMotion {
-    int on, of;  ///< of: vertex
-    Eigen::Matrix3d by_position, by_velocity;
+  using ByMotion = MotionBlock;
+  using BySpring = SpringJacobian;
+  /// What the tension of spring `spring` of `by_spring` changes by with a parameter, with a number
+  /// that is remembered.
+  struct TensionByParameter {
+    int spring, parameter;  ///< a ParameterNumber
+    double derivative;
+  };
+  struct TensionByMemory {
+    int spring, number;
+    double derivative;
   };
   struct ByParameter {
     int on, parameter;  ///< a ParameterNumber
@@ -34,16 +43,16 @@ struct EffectLinearisation {
     Eigen::Vector3d derivative;
   };
   /// By the force on the same vertex, or the pull on the same held point.
-  struct ByForce {
-    int on;
-    Eigen::Matrix3d derivative;
-  };
+  using ByForce = ForceBlock;
   /// By the mass of the same vertex (1/kg times what is acted on).
   struct ByMass {
     int on;
     Eigen::Vector3d derivative;
   };
   std::vector<ByMotion> by_motion;
+  std::vector<BySpring> by_spring;
+  std::vector<TensionByParameter> tension_by_parameter;
+  std::vector<TensionByMemory> tension_by_memory;
   std::vector<ByParameter> by_parameter;
   std::vector<ByMemory> by_memory;
   std::vector<ByForce> by_force;
@@ -71,8 +80,18 @@ struct EffectLinearisation {
   std::vector<MemoryByMemory> memory_by_memory;
   std::vector<MemoryByForce> memory_by_force;
 
+  /// Whose derivatives are looked at, by parameter numbers; others may be left out. Empty: all.
+  std::vector<bool> looked_at;
+
+  bool asks_for(int parameter) const {
+    return looked_at.empty() || looked_at[static_cast<size_t>(parameter)];
+  }
+
   void clear() {
     by_motion.clear();
+    by_spring.clear();
+    tension_by_parameter.clear();
+    tension_by_memory.clear();
     by_parameter.clear();
     by_memory.clear();
     by_force.clear();

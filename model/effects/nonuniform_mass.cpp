@@ -10,6 +10,7 @@
 #include "model/effects/law_effect.h"
 #include "model/effects/linearisation.h"
 #include "model/effects/number.h"
+#include "model/effects/remembered.h"
 
 namespace clothfit::nonuniform_mass {
 namespace {
@@ -87,36 +88,13 @@ Real relative_mass(const Mesh& mesh, int i, int j, const Parameters<Real>& p) {
 
 /// Stated over relative mass of every vertex.
 template <class Real>
-void inverse_ratios(const Mesh& mesh, const Parameters<Real>& p, std::vector<Real>& ratios) {
-  ratios.clear();
+std::vector<Real> inverse_ratios(const Mesh& mesh, const Parameters<Real>& p) {
+  std::vector<Real> ratios;
   for (int i = 0; i < mesh.rows; ++i)
     for (int j = 0; j < mesh.columns; ++j)
       ratios.push_back(Real(1.0) / relative_mass(mesh, i, j, p));
+  return ratios;
 }
-
-/// What was computed last, as long as neither the mesh nor the parameters are others: from step to
-/// step they are the same.
-template <class Real>
-class Remembered {
- public:
-  template <class Dual>
-  const std::vector<Real>& at(const Mesh& mesh, const Parameters<double>& p, const Dual& dual) {
-    const std::array<double, 4> sheet = {mesh.width_m, mesh.height_m,
-                                         static_cast<double>(mesh.columns),
-                                         static_cast<double>(mesh.rows)};
-    if (ratios_.empty() || p != parameters_ || sheet != sheet_) {
-      inverse_ratios<Real>(mesh, dual(p), ratios_);
-      parameters_ = p;
-      sheet_ = sheet;
-    }
-    return ratios_;
-  }
-
- private:
-  Parameters<double> parameters_{};
-  std::array<double, 4> sheet_{};
-  std::vector<Real> ratios_;
-};
 
 struct Law {
   static EffectRates rates(const Cloth& cloth, const SpringParameters&,
@@ -141,9 +119,10 @@ class NonuniformMass final : public LawEffect<NonuniformMass, Law> {
     const Mesh& mesh = scene.cloth.mesh;
     const auto p = reals_of<L, kCount>(parameters);
     if constexpr (L::kCount == 1) {
-      thread_local Remembered<double> remembered;
+      constexpr size_t kKept = 64;  // shapes that are scored together
+      thread_local Remembered<double, kCount, kKept> remembered;
       const std::vector<double>& ratios =
-          remembered.at(mesh, p, [](const Parameters<double>& same) { return same; });
+          remembered.at(mesh, p, [&] { return inverse_ratios<double>(mesh, p); });
       for (int k = 0; k < mesh.vertex_count(); ++k)
         set_at<L>(force_n, k, ratios[static_cast<size_t>(k)] * vector_at<L>(force_n, k));
     } else {
@@ -161,21 +140,20 @@ class NonuniformMass final : public LawEffect<NonuniformMass, Law> {
                         const LaneVectors<SingleLane>& force_n,
                         EffectLinearisation& derivatives) const override {
     using Dual = ceres::Jet<double, kCount>;
-    thread_local Remembered<Dual> remembered;
-    const std::vector<Dual>& ratios =
-        remembered.at(scene.cloth.mesh, reals_of<SingleLane, kCount>(parameters),
-                      [](const Parameters<double>& p) {
-                        Parameters<Dual> dual;
-                        for (size_t n = 0; n < kCount; ++n)
-                          dual[n] = Dual(p[n], static_cast<int>(n));
-                        return dual;
-                      });
-    for (int k = 0; k < scene.cloth.mesh.vertex_count(); ++k) {
+    thread_local Remembered<Dual, kCount, 1> remembered;
+    const Mesh& mesh = scene.cloth.mesh;
+    const auto p = reals_of<SingleLane, kCount>(parameters);
+    const std::vector<Dual>& ratios = remembered.at(mesh, p, [&] {
+      Parameters<Dual> dual;
+      for (size_t n = 0; n < kCount; ++n) dual[n] = Dual(p[n], static_cast<int>(n));
+      return inverse_ratios<Dual>(mesh, dual);
+    });
+    for (int k = 0; k < mesh.vertex_count(); ++k) {
       const Dual& ratio = ratios[static_cast<size_t>(k)];
       derivatives.by_force.push_back({k, ratio.a * Eigen::Matrix3d::Identity()});
       const Vector3<double> force = vector_at<SingleLane>(force_n, k);
       for (int n = 0; n < kCount; ++n)
-        if (ratio.v[n] != 0)
+        if (ratio.v[n] != 0 && derivatives.asks_for(ParameterNumber::own(n)))
           derivatives.by_parameter.push_back(
               {k, ParameterNumber::own(n),
                ratio.v[n] * Eigen::Vector3d(force.x, force.y, force.z)});

@@ -41,11 +41,15 @@ struct Law {
   static constexpr int kParameters = 8, kMemory = 0;
 
   template <class Real>
-  static Real tension(const SpringSight<Real>& at, const std::array<Real, 8>& p,
+  static Real of_place(double s, double t, const std::array<Real, 8>& p) {
+    return factor(s, t, p);
+  }
+
+  template <class Real>
+  static Real tension(const SpringSight<Real>& at, const std::array<Real, 8>&,
                       std::array<Real, 0>&) {
-    return (factor(at.s, at.t, p) - Real(1.0)) *
-           (at.stiffness_n_per_m * (at.length_m - at.natural_length_m) +
-            at.damping_ns_per_m * at.stretching_m_per_s);
+    return (at.of_place - Real(1.0)) * (at.stiffness_n_per_m * (at.length_m - at.natural_length_m) +
+                                        at.damping_ns_per_m * at.stretching_m_per_s);
   }
 
   static EffectRates rates(const Cloth& cloth, const SpringParameters& springs,

@@ -8,6 +8,7 @@
 #include "model/effects/law_effect.h"
 #include "model/effects/linearisation.h"
 #include "model/effects/number.h"
+#include "model/effects/remembered.h"
 
 namespace clothfit {
 
@@ -17,7 +18,7 @@ struct SpringSight {
   Real length_m, stretching_m_per_s;  ///< l and dl/dt
   Real natural_length_m, stiffness_n_per_m, damping_ns_per_m;
   SpringType type = structural_t;
-  double s = 0, t = 0;  ///< its middle's place on the cloth, shares of its width and height
+  Real of_place;  ///< Law::of_place at its middle, where the law has that
   double time_step_s = 0;
 };
 
@@ -52,9 +53,6 @@ void for_springs(const EffectScene<L>& scene, const Visit& visit) {
       const Vector3<Real> u = direction(along);
       sight.length_m = dot(u, along);  // 0 where there is no direction, its derivatives too
       sight.stretching_m_per_s = dot(u, rate);
-      const auto [place_s, place_t] = middle_of(cloth.mesh, spring);
-      sight.s = place_s;
-      sight.t = place_t;
       visit(number++, spring, rate, u, sight);
     }
   }
@@ -64,6 +62,9 @@ void for_springs(const EffectScene<L>& scene, const Visit& visit) {
 ///   static constexpr int kParameters, kMemory;   // kMemory numbers are remembered per spring
 ///   template <class Real> static Real tension(const SpringSight<Real>&,
 ///       const std::array<Real, kParameters>&, std::array<Real, kMemory>& memory);  // N
+///   // may have, of a spring whose middle is at (s, t), shares of the cloth's width and height:
+///   template <class Real> static Real of_place(double s, double t,
+///                                              const std::array<Real, kParameters>&);
 ///   static EffectRates rates(const Cloth&, const SpringParameters&, const std::vector<double>&);
 /// Lanes, tangents and the adjoint follow from these.
 template <class Law>
@@ -79,8 +80,22 @@ class SpringLawEffect final : public LawEffect<SpringLawEffect<Law>, Law> {
                                    EffectMemory<L>& memory, LaneVectors<L>& force_n) {
     using Real = RealOf<L>;
     const auto p = reals_of<L, Law::kParameters>(parameters);
+    const std::vector<Real>* places = nullptr;
+    if constexpr (kHasPlaces && L::kCount == 1) {
+      constexpr size_t kKept = 64;  // shapes that are scored together
+      thread_local Remembered<double, Law::kParameters, kKept> remembered;
+      places = &remembered.at(scene.cloth.mesh, p, [&] { return places_of(scene.cloth, p); });
+    }
     for_springs<L>(scene, [&](int number, const Spring& spring, const Vector3<Real>&,
-                              const Vector3<Real>& u, const SpringSight<Real>& sight) {
+                              const Vector3<Real>& u, SpringSight<Real>& sight) {
+      if constexpr (kHasPlaces) {
+        if constexpr (L::kCount == 1) {
+          sight.of_place = (*places)[static_cast<size_t>(number)];
+        } else {
+          const auto [s, t] = middle_of(scene.cloth.mesh, spring);
+          sight.of_place = Law::of_place(s, t, p);
+        }
+      }
       std::array<Real, Law::kMemory> remembered;
       for (int m = 0; m < Law::kMemory; ++m)
         remembered[static_cast<size_t>(m)] =
@@ -103,75 +118,92 @@ class SpringLawEffect final : public LawEffect<SpringLawEffect<Law>, Law> {
     std::array<Dual, Law::kParameters> p;
     for (int n = 0; n < Law::kParameters; ++n)
       p[static_cast<size_t>(n)] = Dual(parameters[static_cast<size_t>(n)][0], kOwn + n);
-    for_springs<SingleLane>(
-        scene, [&](int number, const Spring& spring, const Vector3<double>& rate_m_per_s,
-                   const Vector3<double>& direction, const SpringSight<double>& sight) {
-          SpringSight<Dual> at;
-          at.length_m = Dual(sight.length_m, 0);
-          at.stretching_m_per_s = Dual(sight.stretching_m_per_s, 1);
-          at.natural_length_m = Dual(sight.natural_length_m, 2);
-          at.stiffness_n_per_m = Dual(sight.stiffness_n_per_m, 3);
-          at.damping_ns_per_m = Dual(sight.damping_ns_per_m, 4);
-          at.type = sight.type;
-          at.s = sight.s;
-          at.t = sight.t;
-          at.time_step_s = sight.time_step_s;
-          std::array<Dual, Law::kMemory> remembered;
-          const int first = number * Law::kMemory;
-          for (int m = 0; m < Law::kMemory; ++m)
-            remembered[static_cast<size_t>(m)] = Dual(memory(0, first + m), kMemory + m);
-          const Dual tension = Law::tension(at, p, remembered);
+    const std::vector<Dual>* places = nullptr;
+    if constexpr (kHasPlaces) {
+      thread_local Remembered<Dual, Law::kParameters, 1> remembered;
+      places = &remembered.at(scene.cloth.mesh, reals_of<SingleLane, Law::kParameters>(parameters),
+                              [&] { return places_of(scene.cloth, p); });
+    }
+    for_springs<SingleLane>(scene, [&](int number, const Spring& spring,
+                                       const Vector3<double>& rate_m_per_s,
+                                       const Vector3<double>& direction,
+                                       const SpringSight<double>& sight) {
+      SpringSight<Dual> at;
+      at.length_m = Dual(sight.length_m, 0);
+      at.stretching_m_per_s = Dual(sight.stretching_m_per_s, 1);
+      at.natural_length_m = Dual(sight.natural_length_m, 2);
+      at.stiffness_n_per_m = Dual(sight.stiffness_n_per_m, 3);
+      at.damping_ns_per_m = Dual(sight.damping_ns_per_m, 4);
+      at.type = sight.type;
+      if constexpr (kHasPlaces) at.of_place = (*places)[static_cast<size_t>(number)];
+      at.time_step_s = sight.time_step_s;
+      std::array<Dual, Law::kMemory> remembered;
+      const int first = number * Law::kMemory;
+      for (int m = 0; m < Law::kMemory; ++m)
+        remembered[static_cast<size_t>(m)] = Dual(memory(0, first + m), kMemory + m);
+      const Dual tension = Law::tension(at, p, remembered);
 
-          // dl = u . dL,  d(dl/dt) = u . dV + (V - u (u . V)) . dL / l,  du = (dL - u u . dL) / l
-          const Eigen::Vector3d u(direction.x, direction.y, direction.z);
-          const Eigen::Vector3d rate(rate_m_per_s.x, rate_m_per_s.y, rate_m_per_s.z);
-          const double inverse_length = sight.length_m > 0 ? 1 / sight.length_m : 0;
-          const Eigen::RowVector3d turning =
-              ((rate - u * u.dot(rate)) * inverse_length).transpose();
-          const Eigen::RowVector3d along = u.transpose();
-          const auto by_position = [&](const Dual& of) -> Eigen::RowVector3d {
-            return of.v[0] * along + of.v[1] * turning;
-          };
-          const Eigen::Matrix3d force_by_position =
-              u * by_position(tension) +
-              tension.a * inverse_length * (Eigen::Matrix3d::Identity() - u * along);
-          const Eigen::Matrix3d force_by_velocity = tension.v[1] * u * along;
-          const int a = spring.a, b = spring.b;
-          derivatives.by_motion.push_back({a, b, force_by_position, force_by_velocity});
-          derivatives.by_motion.push_back({a, a, -force_by_position, -force_by_velocity});
-          derivatives.by_motion.push_back({b, a, force_by_position, force_by_velocity});
-          derivatives.by_motion.push_back({b, b, -force_by_position, -force_by_velocity});
+      // dl = u . dL,  d(dl/dt) = u . dV + (V - u (u . V)) . dL / l,  du = (dL - u u . dL) / l
+      const Eigen::Vector3d u(direction.x, direction.y, direction.z);
+      const Eigen::Vector3d rate(rate_m_per_s.x, rate_m_per_s.y, rate_m_per_s.z);
+      const double inverse_length = sight.length_m > 0 ? 1 / sight.length_m : 0;
+      const Eigen::Vector3d turning = (rate - u * u.dot(rate)) * inverse_length;
+      const auto by_position = [&](const Dual& of) -> Eigen::Vector3d {
+        return of.v[0] * u + of.v[1] * turning;
+      };
+      const double ratio = tension.a * inverse_length;
+      const int a = spring.a, b = spring.b;
+      const auto here = static_cast<int>(derivatives.by_spring.size());
+      derivatives.by_spring.push_back({.a = a,
+                                       .b = b,
+                                       .direction = u,
+                                       .w_n_per_m = by_position(tension) - ratio * u,
+                                       .tension_ratio_n_per_m = ratio,
+                                       .damping_ns_per_m = tension.v[1]});
 
-          const int type = sight.type;
-          const auto parameter_number = [&](int n) {
-            return n == 0   ? ParameterNumber::natural_length(type)
-                   : n == 1 ? ParameterNumber::stiffness(type)
-                   : n == 2 ? ParameterNumber::damping(type)
-                            : ParameterNumber::own(n - 3);
-          };
-          for (int n = 0; n < 3 + Law::kParameters; ++n) {
-            const double by_parameter = tension.v[2 + n];
-            if (by_parameter == 0) continue;
-            derivatives.by_parameter.push_back({a, parameter_number(n), by_parameter * u});
-            derivatives.by_parameter.push_back({b, parameter_number(n), -by_parameter * u});
-          }
-          for (int m = 0; m < Law::kMemory; ++m) {
-            const double by_memory = tension.v[kMemory + m];
-            derivatives.by_memory.push_back({a, first + m, by_memory * u});
-            derivatives.by_memory.push_back({b, first + m, -by_memory * u});
-            const Dual& next = remembered[static_cast<size_t>(m)];
-            derivatives.memory_by_motion.push_back(
-                {first + m, b, by_position(next), next.v[1] * along});
-            derivatives.memory_by_motion.push_back(
-                {first + m, a, -by_position(next), -next.v[1] * along});
-            for (int n = 0; n < 3 + Law::kParameters; ++n)
-              if (next.v[2 + n] != 0)
-                derivatives.memory_by_parameter.push_back(
-                    {first + m, parameter_number(n), next.v[2 + n]});
-            for (int of = 0; of < Law::kMemory; ++of)
-              derivatives.memory_by_memory.push_back({first + m, first + of, next.v[kMemory + of]});
-          }
-        });
+      const int type = sight.type;
+      const auto parameter_number = [&](int n) {
+        return n == 0   ? ParameterNumber::natural_length(type)
+               : n == 1 ? ParameterNumber::stiffness(type)
+               : n == 2 ? ParameterNumber::damping(type)
+                        : ParameterNumber::own(n - 3);
+      };
+      for (int n = 0; n < 3 + Law::kParameters; ++n)
+        if (tension.v[2 + n] != 0 && derivatives.asks_for(parameter_number(n)))
+          derivatives.tension_by_parameter.push_back({here, parameter_number(n), tension.v[2 + n]});
+      for (int m = 0; m < Law::kMemory; ++m) {
+        derivatives.tension_by_memory.push_back({here, first + m, tension.v[kMemory + m]});
+        const Dual& next = remembered[static_cast<size_t>(m)];
+        derivatives.memory_by_motion.push_back(
+            {first + m, b, by_position(next).transpose(), next.v[1] * u.transpose()});
+        derivatives.memory_by_motion.push_back(
+            {first + m, a, -by_position(next).transpose(), -next.v[1] * u.transpose()});
+        for (int n = 0; n < 3 + Law::kParameters; ++n)
+          if (next.v[2 + n] != 0 && derivatives.asks_for(parameter_number(n)))
+            derivatives.memory_by_parameter.push_back(
+                {first + m, parameter_number(n), next.v[2 + n]});
+        for (int of = 0; of < Law::kMemory; ++of)
+          derivatives.memory_by_memory.push_back({first + m, first + of, next.v[kMemory + of]});
+      }
+    });
+  }
+
+ private:
+  static constexpr bool kHasPlaces = requires(const std::array<double, Law::kParameters>& p) {
+    Law::of_place(0.0, 0.0, p);
+  };
+
+  /// Law::of_place of every spring.
+  template <class Real>
+  static std::vector<Real> places_of(const Cloth& cloth,
+                                     const std::array<Real, Law::kParameters>& p) {
+    std::vector<Real> places;
+    for (const auto& of_type : cloth.springs)
+      for (const Spring& spring : of_type) {
+        const auto [s, t] = middle_of(cloth.mesh, spring);
+        places.push_back(Law::of_place(s, t, p));
+      }
+    return places;
   }
 };
 

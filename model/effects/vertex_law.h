@@ -150,7 +150,7 @@ struct VertexDual {
       derivatives.by_motion.push_back({k, area.above, -by_t, none});
     }
     const auto add_column = [&](int parameter, int column) {
-      if (!j.col(column).isZero(0))
+      if (derivatives.asks_for(parameter) && !j.col(column).isZero(0))
         derivatives.by_parameter.push_back({k, parameter, j.col(column)});
     };
     for (int axis = 0; axis < 3; ++axis) add_column(ParameterNumber::gravity(axis), 9 + axis);

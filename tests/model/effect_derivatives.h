@@ -99,6 +99,26 @@ class EffectMap {
       j.block<3, 3>(3 * b.on, 3 * b.of) += b.by_position;
       j.block<3, 3>(3 * b.on, first_velocity() + 3 * b.of) += b.by_velocity;
     }
+    for (const auto& b : d.by_spring) {
+      const Eigen::Matrix3d by_along = b.tension_ratio_n_per_m * Eigen::Matrix3d::Identity() +
+                                       b.direction * b.w_n_per_m.transpose();
+      const Eigen::Matrix3d by_rate = b.damping_ns_per_m * b.direction * b.direction.transpose();
+      for (const auto& [on, sign] : {std::pair(b.a, 1.0), std::pair(b.b, -1.0)}) {
+        j.block<3, 3>(3 * on, 3 * b.b) += sign * by_along;
+        j.block<3, 3>(3 * on, 3 * b.a) -= sign * by_along;
+        j.block<3, 3>(3 * on, first_velocity() + 3 * b.b) += sign * by_rate;
+        j.block<3, 3>(3 * on, first_velocity() + 3 * b.a) -= sign * by_rate;
+      }
+    }
+    const auto add_tension = [&](int spring, int column, double derivative) {
+      const auto& b = d.by_spring[static_cast<size_t>(spring)];
+      j.block<3, 1>(3 * b.a, column) += derivative * b.direction;
+      j.block<3, 1>(3 * b.b, column) -= derivative * b.direction;
+    };
+    for (const auto& b : d.tension_by_parameter)
+      add_tension(b.spring, first_parameter() + b.parameter, b.derivative);
+    for (const auto& b : d.tension_by_memory)
+      add_tension(b.spring, first_memory() + b.number, b.derivative);
     for (const auto& b : d.by_parameter)
       j.block<3, 1>(3 * b.on, first_parameter() + b.parameter) += b.derivative;
     for (const auto& b : d.by_memory)
