@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <limits>
@@ -11,6 +12,7 @@
 
 #include "apps/study/undeclared_json.h"
 #include "data/input_error.h"
+#include "fit/diagnosis/law_derivatives.h"
 #include "fit/draws.h"
 #include "fit/measurement_effects/registry.h"
 
@@ -96,26 +98,42 @@ const ParameterEstimate* estimate_of(const FitResult& result, const std::string&
   return nullptr;
 }
 
-/// Amplitudes of a hidden law that was accepted as it is.
-void compare_amplitudes(const DrawnLaw& drawn, const FitResult& result, HiddenInTrial& hidden) {
+/// Amplitudes of a hidden law that was accepted as it is, and their ratio to the truth: as the
+/// recording sees them, by the derivatives at the shape that was found, so that a wave's other sign
+/// half a turn later is the same.
+void compare_amplitudes(const RecordingInformation& information, const DrawnLaw& drawn,
+                        const FitResult& result, HiddenInTrial& hidden) {
   const EffectDescription effect = describe_effect(drawn.term.effect);
-  double along = 0, square = 0;
-  for (size_t k = 0; k < drawn.term.amplitudes.size(); ++k) {
-    const std::string& name = drawn.term.amplitudes[k];
-    const ParameterEstimate* estimate = estimate_of(result, drawn.term.effect, name);
+  Term found = drawn.term;
+  for (auto& [name, value] : found.shape)
+    if (const ParameterEstimate* estimate = estimate_of(result, found.effect, name))
+      value = estimate->value;
+  Eigen::VectorXd amount = Eigen::VectorXd::Zero(drawn.amount.size());
+  for (Eigen::Index k = 0; k < amount.size(); ++k) {
+    const std::string& name = drawn.term.amplitudes[static_cast<size_t>(k)];
+    const ParameterEstimate* estimate = estimate_of(result, found.effect, name);
     if (estimate == nullptr || estimate->state == ParameterState::undetermined) continue;
-    const EffectParameter& parameter =
-        *std::ranges::find(effect.parameters, name, &EffectParameter::name);
-    const double truth = drawn.amount[static_cast<Eigen::Index>(k)];
-    hidden.found.push_back({.name = drawn.term.effect + "." + name,
-                            .truth = parameter.neutral + truth,
+    const double neutral =
+        std::ranges::find(effect.parameters, name, &EffectParameter::name)->neutral;
+    amount[k] = estimate->value - neutral;
+    hidden.found.push_back({.name = found.effect + "." + name,
+                            .truth = neutral + drawn.amount[k],
                             .estimate = estimate->value,
                             .sigma = estimate->sigma});
-    const double scale = parameter.typical * parameter.typical;
-    along += truth * (estimate->value - parameter.neutral) / scale;
-    square += truth * truth / scale;
   }
-  if (square > 0) hidden.amplitude_ratio = along / square;
+  const std::array<Term, 2> terms{found, drawn.term};
+  const std::vector<Columns> columns = law_derivatives(information.model, terms);
+  if (hidden.found.empty() || columns[0].empty() || columns[1].empty()) return;
+  const Eigen::VectorXd seen = information.projection.columns({columns[0].front() * amount});
+  const Eigen::VectorXd truth = information.projection.columns({columns[1].front() * drawn.amount});
+  hidden.amplitude_ratio = seen.dot(truth) / truth.squaredNorm();
+  if (hidden.amplitude_ratio > 0 && amount.dot(drawn.amount) < 0)
+    for (FoundAmplitude& one : hidden.found) {
+      const std::string name = one.name.substr(found.effect.size() + 1);
+      const double neutral =
+          std::ranges::find(effect.parameters, name, &EffectParameter::name)->neutral;
+      one.estimate = 2 * neutral - one.estimate;
+    }
 }
 
 double held_out_rms(const FitReport& report) {
@@ -311,7 +329,9 @@ UndeclaredTrial undeclared_once(const UndeclaredOptions& options, int index, std
   for (size_t n = 0; n < laws.size(); ++n) {
     const bool same_law =
         std::ranges::find(trial.accepted, setting->laws[n].term.title()) != trial.accepted.end();
-    if (same_law) compare_amplitudes(setting->laws[n], diagnosis.found().result, trial.hidden[n]);
+    if (same_law)
+      compare_amplitudes(releases.at(setting->release)->information(), setting->laws[n],
+                         diagnosis.found().result, trial.hidden[n]);
   }
   if (!laws.empty())
     trial.with_truth =

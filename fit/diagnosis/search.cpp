@@ -124,7 +124,7 @@ class Search {
     std::vector<Line> lines;
     lines.push_back({.model = std::move(base), .accepted = {}, .refused = {}});
     lines.front().cost = cost(lines.front().model);
-    Shortlist list = shortlist(lines.front().model);
+    Shortlist list = shortlist(lines.front().model, is_biased(lines.front().model));
     if (stopped_) return cancelled();
     result.first = list.merged();
     result.first_share = list.share;
@@ -141,10 +141,16 @@ class Search {
           continue;
         }
         next->cost = cost(next->model);
-        list = shortlist(next->model);
+        list = shortlist(next->model, is_biased(next->model));
         if (stopped_) return cancelled();
       }
       std::vector<Line> children = extend(*next, list);
+      // What its other numbers have taken up of a missing law shows least over all frames.
+      if (!stopped_ && children.empty() && list.share == 1 &&
+          !judge_adequacy(next->model, setup_.options.loss).adequate) {
+        list = shortlist(next->model, true);
+        if (!stopped_ && list.share < 1) children = extend(*next, list);
+      }
       if (stopped_) return cancelled();
       for (Line& child : children) child.accepted.back().alike = alike(children, child);
       const bool is_end = children.empty() && next == lines.begin();
@@ -190,13 +196,17 @@ class Search {
     return scores;
   }
 
-  Shortlist shortlist(const ModelFit& model) {
+  static bool is_biased(const ModelFit& model) {
+    return model.residual().squaredNorm() >
+           kHardlyBiased * static_cast<double>(model.residual_count());
+  }
+
+  /// `over_few`: over few frames too.
+  Shortlist shortlist(const ModelFit& model, bool over_few) {
     std::vector<ModelFit> shorter;
-    const bool biased = model.residual().squaredNorm() >
-                        kHardlyBiased * static_cast<double>(model.residual_count());
     Shortlist list;
     for (const double share : kScoreShares) {
-      if (share < 1 && !biased) continue;
+      if (share < 1 && !over_few) continue;
       ModelFit fitted = model;
       if (share < 1) {
         fitted = shortened(model, share);
