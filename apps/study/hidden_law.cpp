@@ -204,23 +204,33 @@ std::vector<std::string> right_class(const RecordingInformation& information, co
 }
 
 double mimicked_by_others(const RecordingInformation& information, const DrawnLaw& drawn,
-                          const std::vector<std::vector<Eigen::MatrixXd>>& projected) {
-  Eigen::Index count = 0;
-  const auto is_other = [&](size_t n) {
-    return information.laws[n].front().effect != drawn.term.effect;
-  };
+                          const std::vector<std::vector<Eigen::MatrixXd>>& projected, int most) {
+  // Forward selection: what is left of the hidden law, and of the others, beside those taken.
+  Eigen::VectorXd left = drawn.projected;
+  std::vector<Eigen::MatrixXd> others;
   for (size_t n = 0; n < projected.size(); ++n)
-    for (const Eigen::MatrixXd& columns : projected[n]) count += is_other(n) ? columns.cols() : 0;
-  Eigen::MatrixXd together(drawn.projected.size(), count);
-  Eigen::Index first = 0;
-  for (size_t n = 0; n < projected.size(); ++n) {
-    if (!is_other(n)) continue;
-    for (const Eigen::MatrixXd& columns : projected[n]) {
-      together.middleCols(first, columns.cols()) = columns;
-      first += columns.cols();
+    for (const Eigen::MatrixXd& columns : projected[n])
+      if (information.laws[n].front().effect != drawn.term.effect && columns.cols() > 0)
+        others.push_back(columns);
+  const double all = left.squaredNorm();
+  for (int taken = 0; taken < most; ++taken) {
+    const Eigen::MatrixXd* best = nullptr;
+    double least = left.squaredNorm();
+    for (const Eigen::MatrixXd& columns : others) {
+      const double rest = (1 - squared_multiple_correlation(left, columns)) * left.squaredNorm();
+      if (rest >= least) continue;
+      least = rest;
+      best = &columns;
     }
+    if (best == nullptr) break;
+    const Eigen::MatrixXd chosen = best->colwise().normalized();
+    const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(chosen);
+    const Eigen::MatrixXd basis =
+        Eigen::MatrixXd(qr.householderQ() * Eigen::MatrixXd::Identity(chosen.rows(), qr.rank()));
+    left -= basis * (basis.transpose() * left);
+    for (Eigen::MatrixXd& columns : others) columns -= basis * (basis.transpose() * columns);
   }
-  return squared_multiple_correlation(drawn.projected, together);
+  return 1 - left.squaredNorm() / all;
 }
 
 }  // namespace clothfit

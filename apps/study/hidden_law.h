@@ -68,8 +68,10 @@ std::vector<std::vector<Eigen::MatrixXd>> projected_laws(const RecordingInformat
 std::vector<std::string> right_class(const RecordingInformation& information, const DrawnLaw& drawn,
                                      const std::vector<std::vector<Eigen::MatrixXd>>& projected);
 
-/// How well all laws of all other effects together mimic it: their squared multiple correlation.
+/// How well laws of other effects together mimic it: the squared multiple correlation of the `most`
+/// that do it best, chosen one after the other, each at its best shape. As many as a diagnosis may
+/// add: all laws at all shapes, hundreds of smooth functions, mimic anything.
 double mimicked_by_others(const RecordingInformation& information, const DrawnLaw& drawn,
-                          const std::vector<std::vector<Eigen::MatrixXd>>& projected);
+                          const std::vector<std::vector<Eigen::MatrixXd>>& projected, int most);
 
 }  // namespace clothfit

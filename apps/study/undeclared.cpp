@@ -79,7 +79,8 @@ std::optional<Setting> draw_setting(const UndeclaredOptions& options,
     setting.right.push_back(right_class(information, drawn, release->projected_laws()));
   if (options.hide == UndeclaredOptions::Hide::withheld) {
     setting.mimicked =
-        mimicked_by_others(information, setting.laws.front(), release->projected_laws());
+        mimicked_by_others(information, setting.laws.front(), release->projected_laws(),
+                           options.diagnosis.most_effects);
     mimicked = std::fmin(mimicked, setting.mimicked);
     if (setting.mimicked >= options.most_mimicked) return std::nullopt;
   }
