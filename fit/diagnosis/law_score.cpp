@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 namespace clothfit {
@@ -63,8 +64,9 @@ std::vector<LawScore> score_laws(const ModelFit& model, const ModelProjection& p
       law_of_test.push_back(law);
     }
   }
-  const double above =
-      projection.residual().squaredNorm() - (projection.weights() - projection.taken());
+  const double free = std::max(1.0, projection.weights() - projection.taken());
+  // Less than chi-square's own standard deviation is not known to be there.
+  const double above = std::max(projection.residual().squaredNorm() - free, std::sqrt(2 * free));
   std::vector<LawScore> best;
   size_t law_of_best = 0;
   for (size_t first = 0; first < tests.size(); first += kAtOnce) {
@@ -80,7 +82,7 @@ std::vector<LawScore> score_laws(const ModelFit& model, const ModelProjection& p
     for (size_t k = 0; k < some.size(); ++k) {
       if (columns[k].empty()) continue;
       LawScore score = judge(some[k], projection, std::move(columns[k]));
-      if (above > 0) score.share = score.fall / above;
+      score.share = score.fall / above;
       const size_t law = law_of_test[first + k];
       if (best.empty() || law_of_best != law)
         best.push_back(std::move(score));

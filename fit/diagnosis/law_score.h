@@ -15,8 +15,9 @@ struct LawScore {
   Eigen::VectorXd amount;  ///< of its amplitudes beyond neutral, in their units
   Eigen::VectorXd sigma;   ///< of each from the noise, all else free; infinite where unseen
   double fall = 0;         ///< of chi-square
-  double share = 0;        ///< of it in all that the projected residual has above its noise
-  Columns columns;         ///< derivatives of the residuals by the amplitudes
+  /// Of it in all that the projected residual has above its noise, or above that one's scatter.
+  double share = 0;
+  Columns columns;  ///< derivatives of the residuals by the amplitudes
   /// Of amount `k`: the amplitude, and whose it is where each recording has its own.
   std::string amount_name(Eigen::Index k) const;
 };

@@ -29,6 +29,12 @@ double price(const ModelFit& model) {
   return amplitudes * std::log(static_cast<double>(model.residual_count()));
 }
 
+/// What a model's chi-square has above what noise makes, twice its standard deviation included.
+double surely_above(const ModelFit& model, double threshold) {
+  const auto count = static_cast<double>(model.residual_count());
+  return std::max(0.0, model.chi_square(threshold) - count - 2 * std::sqrt(2 * count));
+}
+
 /// A line of the search: a model, and what was said of the laws that led to it.
 struct Line {
   ModelFit model;
@@ -124,7 +130,7 @@ class Search {
     std::vector<Line> lines;
     lines.push_back({.model = std::move(base), .accepted = {}, .refused = {}});
     lines.front().cost = cost(lines.front().model);
-    Shortlist list = shortlist(lines.front().model, is_biased(lines.front().model));
+    Shortlist list = shortlist(lines.front().model);
     if (stopped_) return cancelled();
     result.first = list.merged();
     result.first_share = list.share;
@@ -141,16 +147,10 @@ class Search {
           continue;
         }
         next->cost = cost(next->model);
-        list = shortlist(next->model, is_biased(next->model));
+        list = shortlist(next->model);
         if (stopped_) return cancelled();
       }
       std::vector<Line> children = extend(*next, list);
-      // What its other numbers have taken up of a missing law shows least over all frames.
-      if (!stopped_ && children.empty() && list.share == 1 &&
-          !judge_adequacy(next->model, setup_.options.loss).adequate) {
-        list = shortlist(next->model, true);
-        if (!stopped_ && list.share < 1) children = extend(*next, list);
-      }
       if (stopped_) return cancelled();
       for (Line& child : children) child.accepted.back().alike = alike(children, child);
       const bool is_end = children.empty() && next == lines.begin();
@@ -196,17 +196,30 @@ class Search {
     return scores;
   }
 
-  static bool is_biased(const ModelFit& model) {
-    return model.residual().squaredNorm() >
-           kHardlyBiased * static_cast<double>(model.residual_count());
+  Shortlist shortlist(const ModelFit& model) {
+    if (model.residual().squaredNorm() >
+        kHardlyBiased * static_cast<double>(model.residual_count()))
+      return shortlist_from(model, kScoreShares[0], kVisible);
+    Shortlist list = shortlist_from(model, 1, kVisible);
+    if (stopped_) return {};
+    // What its other numbers have taken up of a missing law shows least over all frames.
+    constexpr double kMostOfIt = 0.5, kSure = 4;
+    const double above = surely_above(model, threshold_);
+    double foreseen = 0;
+    for (const LawScore& score : list.best) foreseen = std::max(foreseen, score.fall);
+    if (above == 0 || foreseen > kMostOfIt * above) return list;
+    const double scatter = std::sqrt(2 / static_cast<double>(model.residual_count()));
+    Shortlist over_few = shortlist_from(model, kScoreShares[0], 1 + kSure * scatter);
+    return over_few.share < 1 ? over_few : list;
   }
 
-  /// `over_few`: over few frames too.
-  Shortlist shortlist(const ModelFit& model, bool over_few) {
+  /// Over shares of the frames from `first` on at which chi-square per residual is `visible`, or
+  /// all.
+  Shortlist shortlist_from(const ModelFit& model, double first, double visible_from) {
     std::vector<ModelFit> shorter;
     Shortlist list;
     for (const double share : kScoreShares) {
-      if (share < 1 && !over_few) continue;
+      if (share < first) continue;
       ModelFit fitted = model;
       if (share < 1) {
         fitted = shortened(model, share);
@@ -216,8 +229,8 @@ class Search {
       }
       if (stopped_) return {};
       if (!fitted.usable) continue;
-      const bool visible =
-          fitted.residual().squaredNorm() > kVisible * static_cast<double>(fitted.residual_count());
+      const bool visible = fitted.residual().squaredNorm() >
+                           visible_from * static_cast<double>(fitted.residual_count());
       if (!visible && shorter.empty() && share < 1) continue;
       if (shorter.empty()) list.share = share;
       shorter.push_back(std::move(fitted));
@@ -432,9 +445,9 @@ double worth_naming(const ModelFit& model, double threshold) {
   constexpr double kNoiseKnown = 0.005, kOfExcess = 1.0 / 3, kOfAll = 0.05, kOfNoise = 0.25;
   const auto count = static_cast<double>(model.residual_count());
   const double all = model.chi_square(threshold);
-  const double surely_above = std::max(0.0, all - count - 2 * std::sqrt(2 * count));
   const double of_much = std::max(kOfAll * all, kOfNoise * count);
-  return std::max(kNoiseKnown * count, std::min(kOfExcess * surely_above, of_much));
+  return std::max(kNoiseKnown * count,
+                  std::min(kOfExcess * surely_above(model, threshold), of_much));
 }
 
 LawSearch search_laws(const DiagnosisSetup& setup, ModelFit base, const SearchOptions& options,
