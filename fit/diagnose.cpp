@@ -26,8 +26,9 @@ constexpr double kForceShare = 0.28;
 /// The fitted model on the mesh that is analysed: twice the cells a side where that leaves clearly
 /// less, for derivatives of a mesh that cannot follow the cloth mistake one effect for another.
 /// `setup` is given that mesh.
-ModelFit on_analysed_mesh(ModelFit own, DiagnosisSetup& setup) {
+ModelFit on_analysed_mesh(ModelFit own, DiagnosisSetup& setup, const ProgressCallback& progress) {
   constexpr double kClearlyLess = 0.05;  // of chi-square, per residual
+  constexpr double kMuch = 1.2;          // chi-square per residual
   if (setup.options.spring_set != SpringSet::fabric) return own;
   const DiagnosisSetup other = with_other_mesh(setup, own);
   if (other.columns < setup.columns) return own;
@@ -35,6 +36,18 @@ ModelFit on_analysed_mesh(ModelFit own, DiagnosisSetup& setup) {
   const double least_gain = kClearlyLess * static_cast<double>(own.residual_count());
   if (!finer.usable || own.residual().squaredNorm() - finer.residual().squaredNorm() < least_gain)
     return own;
+  // The other mesh's optimum can lie in another valley than its own one, from which it began.
+  if (setup.inputs.size() == 1 &&
+      finer.residual().squaredNorm() > kMuch * static_cast<double>(finer.residual_count())) {
+    FitOptions anew = setup.options;
+    anew.mesh_columns = other.columns;
+    anew.mesh_rows = other.rows;
+    const FitReport report = fit(setup.inputs.front(), anew, progress);
+    ModelFit fitted = report.usable() ? model_at(other, {}, {report.values}) : ModelFit();
+    if (report.usable()) linearise_model(fitted);
+    if (fitted.usable && fitted.residual().squaredNorm() < finer.residual().squaredNorm())
+      finer = std::move(fitted);
+  }
   linearise_model(finer);
   if (!finer.usable) return own;
   setup.columns = other.columns;
@@ -160,7 +173,7 @@ class Run {
     ModelFit base = base_model(declared, first);
     if (!usable(base, "the derivatives at the optimum could not be computed")) return;
     DiagnosisSetup setup = declared;
-    base = on_analysed_mesh(std::move(base), setup);
+    base = on_analysed_mesh(std::move(base), setup, progress_);
     refine_with_discretisation(base, setup, progress_);
     if (!usable(base, "the fit went astray where it was to be refined")) return;
     result_.columns = setup.columns;
