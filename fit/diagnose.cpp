@@ -55,6 +55,19 @@ ModelFit on_analysed_mesh(ModelFit own, DiagnosisSetup& setup, const ProgressCal
   return finer;
 }
 
+/// Gives observations that state no sigma the one that a problem has found for them.
+void state_noise(const FitProblem& problem, FitInput& input) {
+  for (const ObservationSet& set : problem.observations) {
+    if (!set.camera) {
+      for (Position3d& row : input.tracks3d)
+        if (!(row.sigma_m > 0)) row.sigma_m = set.noise;
+    } else {
+      for (Position2d& row : input.tracks2d.at(set.kind))
+        if (!(row.sigma_px > 0)) row.sigma_px = set.noise;
+    }
+  }
+}
+
 /// `least`: sigmas from which on an amplitude would be accepted. Of amplitudes that each recording
 /// has for itself, those of the recording that sees them best.
 std::vector<DetectionLimit> limits_of(const std::vector<LawScore>& scores, double least) {
@@ -306,6 +319,7 @@ class Run {
     ModelFit own = model_at(alone, model.terms, {shared});
     if (PooledSpace(own.problem_pointers()).own_of(0).empty()) {
       // Nothing is fitted: all frames but those that a recording must have are held out.
+      state_noise(*own.problems.front(), unseen);
       unseen.recording.held_out_from_frame = kLeastFitted;
       if (!unseen.held_tracks.empty()) unseen.held_tracks = held_tracks_from_pixels(unseen);
       offsets = mean_offsets(report);

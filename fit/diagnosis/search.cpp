@@ -207,7 +207,9 @@ class Search {
     const double above = surely_above(model, threshold_);
     double foreseen = 0;
     for (const LawScore& score : list.best) foreseen = std::max(foreseen, score.fall);
-    if (above == 0 || foreseen > kMostOfIt * above) return list;
+    if (above == 0 || foreseen > kMostOfIt * above ||
+        judge_adequacy(model, setup_.options.loss).adequate)
+      return list;
     const double scatter = std::sqrt(2 / static_cast<double>(model.residual_count()));
     Shortlist over_few = shortlist_from(model, kScoreShares[0], 1 + kSure * scatter);
     return over_few.share < 1 ? over_few : list;
