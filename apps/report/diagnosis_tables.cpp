@@ -56,12 +56,13 @@ Table trial_table(const Diagnosis& diagnosis) {
                "mended without physics", "clear of neutral", "outcome"},
               {}};
   const auto add = [&](size_t round, const LawTrial& trial) {
-    table.rows.push_back({std::to_string(round), trial.term.title(),
-                          significant(trial.foreseen_fall, 3), significant(trial.fall, 3),
-                          significant(trial.cross_validated, 4), significant(trial.without_it, 4),
-                          significant(trial.best_trivial, 4),
-                          fmt::format("{:.1f} sigma", trial.clear_of_neutral),
-                          trial.refused.empty() ? "could be accepted" : trial.refused});
+    table.rows.push_back(
+        {std::to_string(round), trial.term.title(), significant(trial.foreseen_fall, 3),
+         significant(trial.fall, 3), significant(trial.cross_validated, 4),
+         significant(trial.without_it, 4), significant(trial.best_trivial, 4),
+         std::isfinite(trial.clear_of_neutral) ? fmt::format("{:.1f} sigma", trial.clear_of_neutral)
+                                               : "-",
+         trial.refused.empty() ? "could be accepted" : trial.refused});
   };
   size_t round = 1;
   for (const AcceptedEffect& accepted : diagnosis.accepted) {

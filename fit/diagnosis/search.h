@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -9,15 +10,17 @@
 
 namespace clothfit {
 
-/// What is said of a law with which a model was fitted again.
+/// What is said of a law with which a model was fitted again; NaN where it was refused before that
+/// was asked.
 struct LawTrial {
+  static constexpr double kNotAsked = std::numeric_limits<double>::quiet_NaN();
   Term term;
-  double foreseen_fall = 0;                    ///< of chi-square, by the score
-  double fall = 0;                             ///< by the fit
-  double cross_validated = 0, without_it = 0;  ///< chi-square per observation left out
-  double best_trivial = 0;                     ///< the same of the model without it, mended
-  double clear_of_neutral = 0;                 ///< standard deviations, clustered
-  std::string refused;                         ///< why it is not accepted; empty: it is
+  double foreseen_fall = 0;                                    ///< of chi-square, by the score
+  double fall = kNotAsked;                                     ///< by the fit
+  double cross_validated = kNotAsked, without_it = kNotAsked;  ///< chi-square per one left out
+  double best_trivial = kNotAsked;      ///< the same of the model without it, mended
+  double clear_of_neutral = kNotAsked;  ///< standard deviations, clustered
+  std::string refused;                  ///< why it is not accepted; empty: it is
 };
 
 /// One effect that was accepted, with what speaks for it.
