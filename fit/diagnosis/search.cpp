@@ -185,13 +185,29 @@ class Search {
   }
   double cost(const ModelFit& model) const { return model.chi_square(threshold_) + price(model); }
 
-  /// Scores of all laws, each at its best shape, with the derivatives of a coarser mesh.
+  /// Scores of all laws, each at its best shape, on the grid and then beside it, with the
+  /// derivatives of a coarser mesh.
   std::vector<LawScore> roughly_scored(const ModelFit& model,
                                        const std::vector<LawShapes>& laws) const {
     ModelFit rough = with_derivatives_of(coarse_, model);
     const ModelFit& by = rough.usable ? rough : model;
-    std::vector<LawScore> scores =
-        score_laws(by, ModelProjection(by, setup_.options.loss), laws, progress_);
+    const ModelProjection projection(by, setup_.options.loss);
+    std::vector<LawScore> scores = score_laws(by, projection, laws, progress_);
+    // Between the grid's points a law may explain several times as much.
+    constexpr double kSome = 0.1, kParts[] = {0.5, 0.25};
+    for (const double part : kParts) {
+      double most = least_fall(1);
+      for (const LawScore& score : scores) most = std::max(most, score.fall);
+      std::vector<LawShapes> around;
+      for (const LawScore& score : scores)
+        if (score.fall > kSome * most && !score.term.shape.empty())
+          around.push_back(shapes_around(score.term, part));
+      for (LawScore& moved : score_laws(by, projection, around, progress_)) {
+        LawScore& same = *std::ranges::find_if(
+            scores, [&](const LawScore& known) { return known.term.same_law(moved.term); });
+        if (moved.fall > same.fall) same = std::move(moved);
+      }
+    }
     std::ranges::stable_sort(scores, std::greater<>(), &LawScore::share);
     return scores;
   }

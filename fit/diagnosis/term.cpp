@@ -113,6 +113,22 @@ FitInput with_terms(FitInput input, const std::vector<Term>& terms) {
   return input;
 }
 
+LawShapes shapes_around(const Term& term, double part) {
+  const EffectDescription effect = describe_effect(term.effect);
+  LawShapes around;
+  for (const auto& [name, value] : term.shape) {
+    const EffectParameter& parameter =
+        *std::ranges::find(effect.parameters, name, &EffectParameter::name);
+    for (const double way : {-part, part}) {
+      const double moved = value + way * term.shape_sigma.at(name);
+      if (moved < parameter.lower || moved > parameter.upper) continue;
+      around.push_back(term);
+      around.back().shape[name] = moved;
+    }
+  }
+  return around;
+}
+
 bool is_empirical(const std::string& effect) {
   return effect == "force_law" || effect == "tension_law";
 }

@@ -38,6 +38,10 @@ EffectDescription describe_effect(const std::string& name);
 /// One law with every shape that it is tested with: the same term but for its shape.
 using LawShapes = std::vector<Term>;
 
+/// The term at shapes around its own: each number of it moved either way by a part of the grid's
+/// spacing, as far as its range allows.
+LawShapes shapes_around(const Term& term, double part);
+
 /// Whether an effect says what a force looks like and names no cause for it: a law that a diagnosis
 /// proposes is made of its laws (fit/diagnosis/proposed_law.h), and none is tested as a cause.
 bool is_empirical(const std::string& effect);
