@@ -460,7 +460,7 @@ class Search {
 }  // namespace
 
 double worth_naming(const ModelFit& model, double threshold) {
-  constexpr double kNoiseKnown = 0.003, kOfExcess = 1.0 / 3, kOfAll = 0.05, kOfNoise = 0.25;
+  constexpr double kNoiseKnown = 0.005, kOfExcess = 1.0 / 3, kOfAll = 0.05, kOfNoise = 0.25;
   const auto count = static_cast<double>(model.residual_count());
   const double all = model.chi_square(threshold);
   const double of_much = std::max(kOfAll * all, kOfNoise * count);
