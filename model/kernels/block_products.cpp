@@ -28,8 +28,8 @@ namespace HWY_NAMESPACE {
 using LanesTag = Tag<ExactLanes>;
 using LaneNumbers = Vector<ExactLanes>;
 
-/// Calls `visit(first)` for each vector that the lanes consist of, the place of its
-/// first number.
+/// Calls `visit(first)` for each vector that the lanes consist of, with the place of its first
+/// number.
 template <class Visit>
 HWY_INLINE void for_parts(const Visit& visit) {
   const auto step = static_cast<std::ptrdiff_t>(hn::Lanes(LanesTag()));
