@@ -7,10 +7,12 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <set>
 
 #include "data/input_error.h"
 #include "fit/diagnosis/clearance.h"
 #include "fit/diagnosis/discretisation.h"
+#include "fit/diagnosis/refit.h"
 #include "fit/draws.h"
 #include "fit/held_tracks.h"
 #include "fit/measurement_effects/registry.h"
@@ -28,42 +30,35 @@ constexpr double kForceShare = 0.28;
 /// `setup` is given that mesh.
 ModelFit on_analysed_mesh(ModelFit own, DiagnosisSetup& setup, const ProgressCallback& progress) {
   constexpr double kClearlyLess = 0.05;  // of chi-square, per residual
-  constexpr double kMuch = 1.2;          // chi-square per residual
   if (setup.options.spring_set != SpringSet::fabric) return own;
   const DiagnosisSetup other = with_other_mesh(setup, own);
   if (other.columns < setup.columns) return own;
-  ModelFit finer = fit_on_mesh(other, own);
+  // From where the declared mesh's optimum lies a fit can end in another valley.
+  ModelFit finer = fitted_anew(other, {}, progress);
+  if (!finer.usable) {
+    finer = fit_on_mesh(other, own, progress);
+    if (finer.usable) linearise_model(finer);
+  }
   const double least_gain = kClearlyLess * static_cast<double>(own.residual_count());
   if (!finer.usable || own.residual().squaredNorm() - finer.residual().squaredNorm() < least_gain)
     return own;
-  // The other mesh's optimum can lie in another valley than its own one, from which it began.
-  if (setup.inputs.size() == 1 &&
-      finer.residual().squaredNorm() > kMuch * static_cast<double>(finer.residual_count())) {
-    FitOptions anew = setup.options;
-    anew.mesh_columns = other.columns;
-    anew.mesh_rows = other.rows;
-    const FitReport report = fit(setup.inputs.front(), anew, progress);
-    ModelFit fitted = report.usable() ? model_at(other, {}, {report.values}) : ModelFit();
-    if (report.usable()) linearise_model(fitted);
-    if (fitted.usable && fitted.residual().squaredNorm() < finer.residual().squaredNorm())
-      finer = std::move(fitted);
-  }
-  linearise_model(finer);
-  if (!finer.usable) return own;
   setup.columns = other.columns;
   setup.rows = other.rows;
   return finer;
 }
 
-/// Gives observations that state no sigma the one that a problem has found for them.
+/// Gives observations that state no sigma the one that a problem has found for them; not those of
+/// markers that drive held points.
 void state_noise(const FitProblem& problem, FitInput& input) {
   for (const ObservationSet& set : problem.observations) {
+    std::set<int> observed;
+    for (const Observation& row : set.rows) observed.insert(row.marker);
     if (!set.camera) {
       for (Position3d& row : input.tracks3d)
-        if (!(row.sigma_m > 0)) row.sigma_m = set.noise;
+        if (!(row.sigma_m > 0) && observed.contains(row.marker)) row.sigma_m = set.noise;
     } else {
       for (Position2d& row : input.tracks2d.at(set.kind))
-        if (!(row.sigma_px > 0)) row.sigma_px = set.noise;
+        if (!(row.sigma_px > 0) && observed.contains(row.marker)) row.sigma_px = set.noise;
     }
   }
 }

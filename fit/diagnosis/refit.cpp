@@ -223,4 +223,17 @@ std::vector<ModelFit> fit_with_laws(const DiagnosisSetup& setup, const ModelFit&
   return fitted;
 }
 
+ModelFit fitted_anew(const DiagnosisSetup& setup, const std::vector<Term>& terms,
+                     const ProgressCallback& progress) {
+  if (setup.inputs.size() != 1) return {};
+  FitOptions options = options_with(setup, terms, 0);
+  options.mesh_columns = setup.columns;
+  options.mesh_rows = setup.rows;
+  const FitReport report = fit(with_terms(setup.inputs.front(), terms), options, progress);
+  if (!report.usable()) return {};
+  ModelFit fitted = model_at(setup, terms, {report.values});
+  linearise_model(fitted);
+  return fitted;
+}
+
 }  // namespace clothfit

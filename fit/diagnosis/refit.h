@@ -37,4 +37,9 @@ std::vector<ModelFit> fit_with_laws(const DiagnosisSetup& setup, const ModelFit&
                                     const std::vector<const LawScore*>& scores, double first_share,
                                     double threshold, const ProgressCallback& progress);
 
+/// The model with these laws identified from scratch, as if nothing were known of its parameters
+/// (fit/fit.h), linearised. Not usable where that leads nowhere, nor for several recordings.
+ModelFit fitted_anew(const DiagnosisSetup& setup, const std::vector<Term>& terms,
+                     const ProgressCallback& progress);
+
 }  // namespace clothfit

@@ -96,6 +96,13 @@ void drop_repeated(std::vector<Line>& lines) {
   }
 }
 
+/// Of sorted lines, those that have gained far less than the best one.
+void drop_hopeless(std::vector<Line>& lines, double base_cost) {
+  constexpr double kFarLess = 0.5;
+  const double enough = kFarLess * (base_cost - lines.front().cost);
+  std::erase_if(lines, [&](const Line& line) { return base_cost - line.cost < enough; });
+}
+
 class Search {
  public:
   Search(const DiagnosisSetup& setup, const SearchOptions& options,
@@ -129,7 +136,8 @@ class Search {
     };
     std::vector<Line> lines;
     lines.push_back({.model = std::move(base), .accepted = {}, .refused = {}});
-    lines.front().cost = cost(lines.front().model);
+    const double base_cost = cost(lines.front().model);
+    lines.front().cost = base_cost;
     Shortlist list = shortlist(lines.front().model);
     if (stopped_) return cancelled();
     result.first = list.merged();
@@ -141,6 +149,8 @@ class Search {
       if (next == lines.end()) break;
       if (!next->accepted.empty()) {
         refine_with_discretisation(next->model, setup_, progress_);
+        if (stopped_) return cancelled();
+        if (next == lines.begin()) leave_valley(next->model);
         if (stopped_) return cancelled();
         if (!next->model.usable) {
           next->finished = true;
@@ -158,6 +168,7 @@ class Search {
       std::ranges::move(children, std::back_inserter(lines));
       std::ranges::stable_sort(lines, {}, &Line::cost);
       drop_repeated(lines);
+      drop_hopeless(lines, base_cost);
       if (lines.size() > static_cast<size_t>(options_.lines))
         lines.erase(lines.begin() + options_.lines, lines.end());
     }
@@ -194,7 +205,7 @@ class Search {
     const ModelProjection projection(by, setup_.options.loss);
     std::vector<LawScore> scores = score_laws(by, projection, laws, progress_);
     // Between the grid's points a law may explain several times as much.
-    constexpr double kSome = 0.1, kParts[] = {0.5, 0.25};
+    constexpr double kSome = 0.25, kParts[] = {0.5, 0.25};
     for (const double part : kParts) {
       double most = least_fall(1);
       for (const LawScore& score : scores) most = std::max(most, score.fall);
@@ -369,6 +380,16 @@ class Search {
     }
   }
 
+  /// Identifies a model that leaves more than noise anew: its optimum may lie in another valley
+  /// than the one that it was led into.
+  void leave_valley(ModelFit& model) const {
+    if (!model.usable || surely_above(model, threshold_) == 0) return;
+    ModelFit anew = fitted_anew(setup_, model.terms, progress_);
+    if (!anew.usable || anew.chi_square(threshold_) >= model.chi_square(threshold_)) return;
+    refine_with_discretisation(anew, setup_, progress_);
+    if (anew.usable) model = std::move(anew);
+  }
+
   /// Directions of their own for the models that leave least, of those that stand far from where
   /// the line's directions were taken.
   void let_best_err(std::vector<Tried>& tried, const ModelFit& line) const {
@@ -460,7 +481,7 @@ class Search {
 }  // namespace
 
 double worth_naming(const ModelFit& model, double threshold) {
-  constexpr double kNoiseKnown = 0.005, kOfExcess = 1.0 / 3, kOfAll = 0.05, kOfNoise = 0.25;
+  constexpr double kNoiseKnown = 0.003, kOfExcess = 1.0 / 3, kOfAll = 0.05, kOfNoise = 0.25;
   const auto count = static_cast<double>(model.residual_count());
   const double all = model.chi_square(threshold);
   const double of_much = std::max(kOfAll * all, kOfNoise * count);
