@@ -45,24 +45,27 @@ struct Line {
   std::vector<LawTrial> refused;
 };
 
+std::vector<LawScore> without_columns(std::vector<LawScore> scores) {
+  for (LawScore& score : scores) score.columns.clear();
+  return scores;
+}
+
 /// What a line's next law may be.
 struct Shortlist {
   double share = 1;              ///< the shortest horizon
   ModelFit early;                ///< the model fitted over that
-  std::vector<LawScore> scores;  ///< of all laws there, by the derivatives of the coarser mesh
-  /// Of the best of them by those of the model's own mesh, averaged over horizons; with columns
-  /// where all frames are one.
+  std::vector<LawScore> scores;  ///< of all laws there
+  /// Of the best of them, averaged over horizons; with columns where all frames are one.
   std::vector<LawScore> best;
 
-  /// All scores, those of the model's own mesh where there are any.
+  /// All scores, averaged ones where there are any.
   std::vector<LawScore> merged() const {
     std::vector<LawScore> all = scores;
     for (LawScore& score : all)
       for (const LawScore& known : best)
         if (known.term.same_law(score.term)) score = known;
-    for (LawScore& score : all) score.columns.clear();
     std::ranges::stable_sort(all, std::greater<>(), &LawScore::share);
-    return all;
+    return without_columns(std::move(all));
   }
 };
 
@@ -136,6 +139,7 @@ class Search {
     };
     std::vector<Line> lines;
     lines.push_back({.model = std::move(base), .accepted = {}, .refused = {}});
+    base_chi_square_ = lines.front().model.chi_square(threshold_);
     const double base_cost = cost(lines.front().model);
     lines.front().cost = base_cost;
     Shortlist list = shortlist(lines.front().model);
@@ -195,6 +199,10 @@ class Search {
     return result;
   }
   double cost(const ModelFit& model) const { return model.chi_square(threshold_) + price(model); }
+
+  double worth(const ModelFit& model) const {
+    return worth_naming(model, threshold_, base_chi_square_ - model.chi_square(threshold_));
+  }
 
   /// Scores of all laws, each at its best shape, on the grid and then beside it, with the
   /// derivatives of a coarser mesh.
@@ -265,35 +273,34 @@ class Search {
       shorter.push_back(std::move(fitted));
       if (shorter.size() == kScoreHorizons) break;
     }
-    std::vector<LawShapes> laws;
+    const auto horizons = static_cast<double>(shorter.size());
     for (size_t k = 0; k < shorter.size(); ++k) {
       const ModelFit& at = shorter[k];
       if (k == 0) {
         list.scores = roughly_scored(at, untested(model));
         if (stopped_) return {};
-        for (LawScore& score : list.scores) score.columns.clear();
-        const size_t best = std::min(list.scores.size(), static_cast<size_t>(2 * options_.refits));
-        for (size_t n = 0; n < best; ++n) {
-          laws.push_back({list.scores[n].term});
-          list.best.push_back(list.scores[n]);
-          list.best.back().share = 0;
-        }
+        list.best = list.scores;
       }
+      std::vector<LawShapes> laws;
+      for (const LawScore& score : list.best) laws.push_back({score.term});
       std::vector<LawScore> scores =
           score_laws(at, ModelProjection(at, setup_.options.loss), laws, progress_);
       if (stopped_) return {};
       for (LawScore& score : scores) {
         LawScore& same = *std::ranges::find_if(
             list.best, [&](const LawScore& known) { return known.term.same_law(score.term); });
-        same.share += score.share / static_cast<double>(shorter.size());
-        if (k > 0 && score.fall <= same.fall) continue;
-        same.fall = score.fall;
-        same.amount = score.amount;
-        same.sigma = score.sigma;
-        if (list.share == 1) same.columns = std::move(score.columns);
+        const double share = (k > 0 ? same.share : 0) + score.share / horizons;
+        if (k == 0 || score.fall > same.fall) {
+          if (list.share < 1) score.columns.clear();
+          same = std::move(score);
+        }
+        same.share = share;
       }
+      std::ranges::stable_sort(list.best, std::greater<>(), &LawScore::share);
+      if (k == 0) list.scores = without_columns(list.best);
+      const size_t best = std::min(list.best.size(), static_cast<size_t>(2 * options_.refits));
+      list.best.erase(list.best.begin() + static_cast<std::ptrdiff_t>(best), list.best.end());
     }
-    std::ranges::stable_sort(list.best, std::greater<>(), &LawScore::share);
     if (!shorter.empty()) list.early = std::move(shorter.front());
     return list;
   }
@@ -303,12 +310,12 @@ class Search {
     line.finished = true;
     if (list.share == 1) line.last = list.scores;
     std::vector<const LawScore*> scores;
-    const double worth = worth_naming(line.model, threshold_);
+    const double least_gain = worth(line.model);
     for (const LawScore& score : list.best) {
       if (score.fall < least_fall(score.amount.size())) continue;
       // Where little is left over all frames, a fit gains about what was foreseen.
       constexpr double kMoreThanForeseen = 1.25;
-      if (list.share == 1 && kMoreThanForeseen * score.fall < worth) continue;
+      if (list.share == 1 && kMoreThanForeseen * score.fall < least_gain) continue;
       if (scores.size() == static_cast<size_t>(options_.refits)) break;
       scores.push_back(&score);
     }
@@ -368,7 +375,7 @@ class Search {
       LawTrial trial = line.accepted[k].trial;
       const double rise = without.chi_square(threshold_) - line.model.chi_square(threshold_);
       const double least = least_fall(static_cast<Eigen::Index>(trial.term.amplitudes.size()));
-      if (!without.usable || rise >= std::max(least, worth_naming(without, threshold_))) {
+      if (!without.usable || rise >= std::max(least, worth(without))) {
         ++k;
         continue;
       }
@@ -451,7 +458,7 @@ class Search {
       trial.refused = "the fit gains less than half of what was foreseen";
       return trial;
     }
-    if (trial.fall < worth_naming(before, threshold_)) {
+    if (trial.fall < worth(before)) {
       trial.refused = "it takes too little of what is above the noise";
       return trial;
     }
@@ -474,19 +481,21 @@ class Search {
   DiagnosisSetup coarse_;
   const SearchOptions& options_;
   double threshold_;
+  double base_chi_square_ = 0;
   bool stopped_ = false;  ///< set by `progress_` once it has said so
   ProgressCallback progress_;
 };
 
 }  // namespace
 
-double worth_naming(const ModelFit& model, double threshold) {
+double worth_naming(const ModelFit& model, double threshold, double explained) {
   constexpr double kNoiseKnown = 0.003, kOfExcess = 1.0 / 3, kOfAll = 0.05, kOfNoise = 0.25;
+  constexpr double kFormKnown = 0.01;
   const auto count = static_cast<double>(model.residual_count());
   const double all = model.chi_square(threshold);
   const double of_much = std::max(kOfAll * all, kOfNoise * count);
-  return std::max(kNoiseKnown * count,
-                  std::min(kOfExcess * surely_above(model, threshold), of_much));
+  return std::max({kNoiseKnown * count, kFormKnown * kFormKnown * explained,
+                   std::min(kOfExcess * surely_above(model, threshold), of_much)});
 }
 
 LawSearch search_laws(const DiagnosisSetup& setup, ModelFit base, const SearchOptions& options,

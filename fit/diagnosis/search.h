@@ -46,8 +46,9 @@ inline constexpr int kTimeBlocks = 5;
 /// known to a third of a per cent at best. And a model whose own numerics err leaves structure
 /// that many laws follow a little: what is missing takes a third of all that is surely above the
 /// noise, or, where much is missing that no single law explains, a twentieth of all that is left
-/// and a quarter of the noise.
-double worth_naming(const ModelFit& model, double threshold);
+/// and a quarter of the noise. Nor is the form of a law known better than to a per cent: beside
+/// laws that explain much (`explained`, of chi-square), little more is worth a name.
+double worth_naming(const ModelFit& model, double threshold, double explained = 0);
 
 struct LawSearch {
   bool cancelled = false;

@@ -32,16 +32,28 @@ TEST(WorthNaming, IsOfTheNoiseOrOfWhatIsAboveItOrOfAll) {
   const double prior = that_leaves(setup, 0).chi_square(kSquares);
 
   // Noise alone, and less than noise
-  EXPECT_NEAR(worth(1), 0.005 * count, 1e-9 * count);
-  EXPECT_NEAR(worth(0.5), 0.005 * count, 1e-9 * count);
+  EXPECT_NEAR(worth(1), 0.003 * count, 1e-9 * count);
+  EXPECT_NEAR(worth(0.5), 0.003 * count, 1e-9 * count);
   // A little above: a third of what two standard deviations do not explain
   const double little = 1.15;
   EXPECT_NEAR(worth(little), (0.15 * count - scatter + prior) / 3, 1e-9 * count);
-  EXPECT_GT(worth(little), 0.005 * count);
+  EXPECT_GT(worth(little), 0.003 * count);
   // More: a quarter of the noise is enough
   EXPECT_NEAR(worth(3), 0.25 * count, 1e-9 * count);
   // Far above: a twentieth of all
   EXPECT_NEAR(worth(50), 0.05 * (50 * count + prior), 1e-9 * count);
+}
+
+TEST(WorthNaming, IsMoreBesideALawThatExplainsMuch) {
+  const FitInput input = synthetic_input({});
+  const FitOptions options;
+  const DiagnosisSetup setup{.inputs = {&input, 1}, .options = options, .columns = 9, .rows = 9};
+  const ModelFit model = that_leaves(setup, 1);
+  const auto count = static_cast<double>(model.residual_count());
+
+  // A form that is known to a per cent leaves a ten-thousandth of what it explains.
+  EXPECT_NEAR(worth_naming(model, kSquares, 100 * count), 0.01 * count, 1e-9 * count);
+  EXPECT_NEAR(worth_naming(model, kSquares, 10 * count), 0.003 * count, 1e-9 * count);
 }
 
 TEST(WorthNaming, CountsLargeResidualsAsTheFitDoes) {
