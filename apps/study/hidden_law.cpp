@@ -84,13 +84,15 @@ std::vector<HiddenLaw> hidden_laws(ObservationKind observations) {
 
 RecordingInformation recording_information(const SyntheticScene& scene, const FitOptions& fit,
                                            std::uint64_t seed) {
+  // A coarse mesh sees some laws twice as well as a recording shows them, or half as well.
+  const int mesh = std::min(scene.truth_mesh, 2 * fit.mesh_columns - 1);
   SyntheticScene twin = scene;
-  twin.truth_mesh = fit.mesh_columns;
+  twin.truth_mesh = mesh;
   twin.integrator = TruthIntegrator::euler;
   twin.hidden.clear();
   twin.noisy = false;
   SyntheticRecording recording = make_synthetic_recording(twin, seed);
-  FitProblem problem = make_problem(recording.input, fit, fit.mesh_columns, fit.mesh_rows);
+  FitProblem problem = make_problem(recording.input, fit, mesh, mesh);
   if (problem.start == StartKind::unknown) start_at_truth(twin, seed, problem);
   const Eigen::VectorXd values = values_of(problem, recording.truth);
   const int frames = problem.first_held_out;

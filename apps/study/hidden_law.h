@@ -21,9 +21,10 @@ struct HiddenLaw {
 std::vector<HiddenLaw> hidden_laws(ObservationKind observations);
 
 /// What a recording says of laws before any noise: a linear model of the fit around the truth
-/// without hidden effects, over the fitted frames.
+/// without hidden effects, over the fitted frames, on the truth's mesh (of twice the cells a side
+/// of the fit's at most).
 struct RecordingInformation {
-  SyntheticRecording recording;  ///< without noise, of a cloth on the fit's mesh
+  SyntheticRecording recording;  ///< without noise, of a cloth on that mesh
   std::vector<LawShapes> laws;   ///< that a diagnosis tests
   ModelFit model;
   ModelProjection projection;  ///< everything that the fit has free is taken out
