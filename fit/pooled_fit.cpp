@@ -52,7 +52,7 @@ double settle(const FitProblem& problem, PooledPart& part, double threshold) {
   if (part.directions.cols() > 0)
     part.amounts =
         amounts_of(part.directions, huber_weights(objective, residual_of(part), threshold),
-                   part.linear.residual);
+                   corrected_residual(part));
   return huber_cost(objective, residual_of(part), threshold) + 0.5 * part.amounts.squaredNorm() +
          prior_cost(problem, part.values).cost;
 }
@@ -236,9 +236,14 @@ class Pool {
 
 }  // namespace
 
+Eigen::VectorXd corrected_residual(const PooledPart& part) {
+  if (part.correction.size() == 0) return part.linear.residual;
+  return part.linear.residual + part.correction;
+}
+
 Eigen::VectorXd residual_of(const PooledPart& part) {
-  if (part.amounts.size() == 0) return part.linear.residual;
-  return part.linear.residual + part.directions * part.amounts;
+  if (part.amounts.size() == 0) return corrected_residual(part);
+  return corrected_residual(part) + part.directions * part.amounts;
 }
 
 Quadratic quadratic_of(const FitProblem& problem, const PooledPart& part, double threshold) {
@@ -382,8 +387,11 @@ PooledFit fit_pooled(std::span<const FitProblem* const> problems,
                      const ProgressCallback& progress) {
   std::vector<PooledPart> parts;
   for (const FitProblem* problem : problems) {
-    parts.push_back(
-        {.values = problem->space.start(), .linear = {}, .directions = {}, .amounts = {}});
+    parts.push_back({.values = problem->space.start(),
+                     .linear = {},
+                     .correction = {},
+                     .directions = {},
+                     .amounts = {}});
     for (const auto& [name, value] : start)
       if (const int p = problem->space.index(name); p >= 0) parts.back().values[p] = value;
   }

@@ -20,13 +20,18 @@ struct PooledPart {
   /// residuals, and exact derivatives or such as served (PooledOptions::kept_within).
   Linearisation linear;
   bool borrowed = false;  ///< the derivatives are those of another model, until a step fails
-  /// Directions, residuals x any, in which the model may err, each by a standard normal amount:
-  /// residuals are r + directions * amount, and the amounts are fitted along.
+  /// What the model is expected to err by, added to its residuals; empty: nothing.
+  Eigen::VectorXd correction;
+  /// Directions, residuals x any, in which it may err beyond that, each by a standard normal
+  /// amount: residuals are r + correction + directions * amount, and the amounts are fitted along.
   Eigen::MatrixXd directions;
   Eigen::VectorXd amounts;  ///< of the directions, as they were fitted
 };
 
-/// Residuals of a part with what its directions explain taken out.
+/// Residuals of a part with what it is expected to err by taken out.
+Eigen::VectorXd corrected_residual(const PooledPart& part);
+
+/// The same, and what its directions explain.
 Eigen::VectorXd residual_of(const PooledPart& part);
 
 struct PooledOptions {

@@ -105,6 +105,7 @@ RecordingInformation recording_information(const SyntheticScene& scene, const Fi
                             .frames = frames,
                             .steps = stable.times(1 / kStabilityMargin),
                             .linear = {},
+                            .correction = {},
                             .directions = {},
                             .amounts = {}}}};
   linearise_model(model);

@@ -62,6 +62,7 @@ class Folds {
       // Such a step led out of what is stable.
       if (result[n].size() != objectives_[n].residual_count())
         result[n] = model_.parts[n].linear.residual;
+      if (model_.parts[n].correction.size() > 0) result[n] += model_.parts[n].correction;
       if (amounts[n].size() > 0) result[n] += model_.parts[n].directions * amounts[n];
     }
     return result;

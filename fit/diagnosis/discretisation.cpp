@@ -49,44 +49,48 @@ ModelFit fit_on_mesh(const DiagnosisSetup& other, const ModelFit& model,
   return fitted;
 }
 
-std::vector<Eigen::MatrixXd> discretisation_directions(const DiagnosisSetup& setup,
+std::vector<DiscretisationError> discretisation_errors(const DiagnosisSetup& setup,
                                                        const ModelFit& model) {
-  std::vector<std::vector<Eigen::VectorXd>> directions(model.parts.size());
-  const auto add = [&](size_t n, const Eigen::VectorXd& residual, double factor) {
-    const Eigen::VectorXd& own = model.parts[n].linear.residual;
-    if (residual.size() == own.size()) directions[n].push_back(factor * (residual - own));
+  std::vector<DiscretisationError> errors;
+  for (const PooledPart& part : model.parts)
+    errors.push_back({.expected = {}, .directions = {part.linear.residual.size(), 0}});
+  const auto add = [&](size_t n, const Eigen::VectorXd& direction) {
+    Eigen::MatrixXd& directions = errors[n].directions;
+    directions.conservativeResize(Eigen::NoChange, directions.cols() + 1);
+    directions.rightCols(1) = direction;
   };
   for (size_t n = 0; n < model.parts.size(); ++n) {
+    // What is left of an error of first order when the half of it is known.
+    constexpr double kKnownTo = 0.5;
     const PooledPart& part = model.parts[n];
     const TrajectoryObjective half(*model.problems[n], part.frames, part.steps.times(0.5));
-    add(n, half.residuals({part.values}).front(), 2);
+    const Eigen::VectorXd residual = half.residuals({part.values}).front();
+    if (residual.size() != part.linear.residual.size()) continue;
+    errors[n].expected = 2 * (residual - part.linear.residual);
+    add(n, kKnownTo * errors[n].expected);
   }
   if (setup.options.spring_set == SpringSet::fabric) {
     const DiagnosisSetup other = with_other_mesh(setup, model);
     const double finer = static_cast<double>(other.columns - 1) / (setup.columns - 1);
     const ModelFit there = fit_on_mesh(other, model);
-    // Of second order in the spacing: a coarser mesh errs four times as much.
-    for (size_t n = 0; there.usable && n < there.parts.size(); ++n)
-      add(n, there.parts[n].linear.residual, finer < 1 ? 1.0 / 3 : 4.0 / 3);
+    for (size_t n = 0; there.usable && n < there.parts.size(); ++n) {
+      const Eigen::VectorXd& own = model.parts[n].linear.residual;
+      const Eigen::VectorXd& residual = there.parts[n].linear.residual;
+      // Of second order in the spacing: a coarser mesh errs four times as much.
+      if (residual.size() == own.size()) add(n, (finer < 1 ? 1.0 / 3 : 4.0 / 3) * (residual - own));
+    }
   }
-
-  std::vector<Eigen::MatrixXd> result;
-  for (size_t n = 0; n < directions.size(); ++n) {
-    result.emplace_back(model.parts[n].linear.residual.size(),
-                        static_cast<Eigen::Index>(directions[n].size()));
-    for (size_t k = 0; k < directions[n].size(); ++k)
-      result.back().col(static_cast<Eigen::Index>(k)) = directions[n][k];
-  }
-  return result;
+  return errors;
 }
 
 void refine_with_discretisation(ModelFit& model, const DiagnosisSetup& setup,
                                 const ProgressCallback& progress) {
   constexpr double kBelievable = 3;
-  std::vector<Eigen::MatrixXd> directions = discretisation_directions(setup, model);
-  for (size_t n = 0; n < directions.size(); ++n) {
-    model.parts[n].amounts = Eigen::VectorXd::Zero(directions[n].cols());
-    model.parts[n].directions = std::move(directions[n]);
+  std::vector<DiscretisationError> errors = discretisation_errors(setup, model);
+  for (size_t n = 0; n < errors.size(); ++n) {
+    model.parts[n].amounts = Eigen::VectorXd::Zero(errors[n].directions.cols());
+    model.parts[n].correction = std::move(errors[n].expected);
+    model.parts[n].directions = std::move(errors[n].directions);
   }
   for (;;) {
     refine_model(model, setup, {}, progress);
@@ -96,7 +100,10 @@ void refine_with_discretisation(ModelFit& model, const DiagnosisSetup& setup,
       std::vector<int> kept;
       for (int k = 0; k < part.amounts.size(); ++k)
         if (std::abs(part.amounts[k]) < kBelievable) kept.push_back(k);
-      believable = believable && std::ssize(kept) == part.amounts.size();
+      if (std::ssize(kept) == part.amounts.size()) continue;
+      believable = false;
+      // The first one is the step's, where an error of it is expected.
+      if (kept.empty() || kept.front() > 0) part.correction.resize(0);
       part.directions = Eigen::MatrixXd(part.directions(Eigen::all, kept));
       part.amounts = Eigen::VectorXd(part.amounts(kept));
     }

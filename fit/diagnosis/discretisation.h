@@ -4,13 +4,18 @@
 
 namespace clothfit {
 
-/// How the residuals change when the model is cut finer or coarser: directions in which it may err
-/// by about as much, of unit variance each, residuals x directions (whitened) of each recording.
-/// One for the time step, carried on to step zero (the scheme is of first order), and one for the
-/// mesh, against one of twice the cells a side, or of half as many where that leaves enough, fitted
-/// to the same observations (with the same parameters the other mesh is often another cloth).
-/// Springs whose natural lengths are fitted are those of one mesh, which then has none.
-std::vector<Eigen::MatrixXd> discretisation_directions(const DiagnosisSetup& setup,
+/// How a recording's residuals (whitened) would change if the model were cut finer.
+struct DiscretisationError {
+  Eigen::VectorXd expected;    ///< empty where nothing is
+  Eigen::MatrixXd directions;  ///< residuals x directions, by a standard normal amount each
+};
+
+/// Of each recording. The time step, carried on to step zero: the scheme is of first order, so that
+/// much is expected, give or take half. The mesh, against one of twice the cells a side, or of half
+/// as many where that leaves enough, fitted to the same observations (with the same parameters the
+/// other mesh is often another cloth); cloth is no limit of meshes, so nothing of it is expected.
+/// Springs whose natural lengths are fitted are those of one mesh, which then has no such error.
+std::vector<DiscretisationError> discretisation_errors(const DiagnosisSetup& setup,
                                                        const ModelFit& model);
 
 /// The setup with the mesh that directions are taken from.
@@ -25,7 +30,7 @@ ModelFit fit_on_mesh(const DiagnosisSetup& other, const ModelFit& model,
 /// Refines a model together with the amounts by which its discretisation errs, in the directions of
 /// where it stands first. A direction that is asked for by several times what it may be is no error
 /// of that discretisation: something else is missing, by which the two meshes were led to different
-/// optima. It is left out.
+/// optima. It is left out, and what was expected along it.
 void refine_with_discretisation(ModelFit& model, const DiagnosisSetup& setup,
                                 const ProgressCallback& progress);
 

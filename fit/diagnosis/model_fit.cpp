@@ -137,6 +137,7 @@ ModelFit model_at(const DiagnosisSetup& setup, const std::vector<Term>& terms,
     model.parts.push_back({.values = values_of(problem, known),
                            .frames = problem.first_held_out,
                            .linear = {},
+                           .correction = {},
                            .directions = {},
                            .amounts = {}});
     model.parts.back().steps =
@@ -162,6 +163,7 @@ ModelFit shortened(const ModelFit& model, double share) {
     for (const Objective::Block& block : objective.blocks())
       if (block.frame < part.frames)
         for (int c = 0; c < block.dimension; ++c) rows.push_back(block.offset + c);
+    if (whole.correction.size() > 0) part.correction = whole.correction(rows);
     if (whole.directions.cols() > 0) part.directions = whole.directions(rows, Eigen::all);
     // Markers' constant offsets are those of the frames that are looked at.
     const bool same = model.problems[n]->marker_offset_sigma_m == 0 && whole.linear.usable;
@@ -205,6 +207,7 @@ ModelFit with_derivatives_of(const DiagnosisSetup& other_mesh, const ModelFit& m
   ModelFit result = model_at(other_mesh, model.terms, model.values());
   for (size_t n = 0; n < result.parts.size(); ++n) {
     result.parts[n].frames = model.parts[n].frames;
+    result.parts[n].correction = model.parts[n].correction;
     result.parts[n].directions = model.parts[n].directions;
     result.parts[n].amounts = model.parts[n].amounts;
   }

@@ -82,7 +82,7 @@ ModelProjection::ModelProjection(const ModelFit& model, Loss loss, bool with_dir
     const std::vector<int>& own = space.own_of(n);
     const PriorCost prior = prior_cost(*problems[n], part.values);
     const Eigen::MatrixXd& jacobian = part.linear.residual_by_coordinate;
-    const Eigen::VectorXd& residual = part.linear.residual;
+    const Eigen::VectorXd residual = corrected_residual(part);
     const bool has_directions = with_directions && part.directions.cols() > 0;
     own_.emplace_back(jacobian(Eigen::all, own), prior.information(own, own), prior.gradient(own),
                       has_directions ? part.directions : Eigen::MatrixXd(residual.size(), 0),

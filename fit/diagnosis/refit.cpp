@@ -53,6 +53,7 @@ ModelFit refined_over(const DiagnosisSetup& setup, ModelFit& whole, const ModelF
     PooledPart& part = fitted.parts[n];
     part.linear = {};
     if (share < 1) continue;
+    part.correction = from.parts[n].correction;
     part.directions = from.parts[n].directions;
     part.amounts = from.parts[n].amounts;
   }
@@ -165,6 +166,7 @@ ModelFit with_terms(const DiagnosisSetup& setup, const ModelFit& model,
     const PooledPart& from = model.parts[n];
     PooledPart& part = result.parts[n];
     part.frames = from.frames;
+    part.correction = from.correction;
     part.directions = from.directions;
     part.amounts = from.amounts;
     // Where a term is dropped the run is another one.

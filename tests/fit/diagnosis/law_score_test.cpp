@@ -213,16 +213,16 @@ TEST(Discretisation, ShowsWhatTheStepAndTheMeshAreWorth) {
   const DiagnosisSetup setup = setup_of({&input, 1});
   const ModelFit model = true_model(setup, cloth);
 
-  const std::vector<Eigen::MatrixXd> directions = discretisation_directions(setup, model);
+  const std::vector<DiscretisationError> errors = discretisation_errors(setup, model);
 
-  ASSERT_EQ(directions.size(), 1u);  // recordings
-  ASSERT_EQ(directions.front().rows(), model.residual_count());
-  ASSERT_EQ(directions.front().cols(), 2);
+  ASSERT_EQ(errors.size(), 1u);  // recordings
+  const Eigen::MatrixXd& directions = errors.front().directions;
+  ASSERT_EQ(directions.rows(), model.residual_count());
+  ASSERT_EQ(directions.cols(), 2);
   // The truth was simulated on this mesh at about this step: its own errors are far below the
   // noise, but not nothing.
   for (int k = 0; k < 2; ++k) {
-    const double rms = directions.front().col(k).norm() /
-                       std::sqrt(static_cast<double>(directions.front().rows()));
+    const double rms = directions.col(k).norm() / std::sqrt(static_cast<double>(directions.rows()));
     EXPECT_GT(rms, 1e-4) << k;
     EXPECT_LT(rms, 20) << k;
   }

@@ -35,12 +35,13 @@ inline ModelFit true_model(const DiagnosisSetup& setup, const SyntheticCloth& cl
   return model;
 }
 
-/// The same model where it stands, that may err as its discretisation does.
+/// The same model where it stands, that may err as its discretisation does; the truth has the same
+/// steps, so that nothing is expected.
 inline ModelFit that_may_err(const DiagnosisSetup& setup, ModelFit model) {
-  std::vector<Eigen::MatrixXd> directions = discretisation_directions(setup, model);
+  std::vector<DiscretisationError> errors = discretisation_errors(setup, model);
   for (size_t n = 0; n < model.parts.size(); ++n) {
-    model.parts[n].amounts = Eigen::VectorXd::Zero(directions[n].cols());
-    model.parts[n].directions = std::move(directions[n]);
+    model.parts[n].amounts = Eigen::VectorXd::Zero(errors[n].directions.cols());
+    model.parts[n].directions = std::move(errors[n].directions);
   }
   return model;
 }
