@@ -159,7 +159,7 @@ TEST(Quadratic, HasTheGradientThatDifferencesOfTheCostShow) {
 }
 
 // Directions of unit variance are a covariance I + E E': with their amounts eliminated a part's
-// cost is that of generalised least squares.
+// cost is that of generalised least squares, of what is left beside what is expected.
 TEST(Quadratic, CountsDirectionsAsACovariance) {
   const FitProblem problem = make_problem(synthetic_input(tiny(1)), {}, 5, 5);
   ASSERT_TRUE(problem.priors.empty());
@@ -171,12 +171,13 @@ TEST(Quadratic, CountsDirectionsAsACovariance) {
         Eigen::MatrixXd::NullaryExpr(rows, columns, [&] { return normal(generator); }));
   };
   const Eigen::MatrixXd jacobian = random(problem.space.size()), errs = 2 * random(3);
-  const Eigen::VectorXd residual = random(1);
+  const Eigen::VectorXd residual = random(1), correction = random(1);
   PooledPart part;
   part.values = true_values(problem);
   part.frames = 4;
   part.steps = 1e-3;
-  part.linear.residual = residual;
+  part.linear.residual = residual - correction;
+  part.correction = correction;
   part.linear.residual_by_coordinate = jacobian;
   part.linear.usable = true;
   part.directions = errs;

@@ -228,6 +228,24 @@ TEST(Discretisation, ShowsWhatTheStepAndTheMeshAreWorth) {
   }
 }
 
+// The scheme is of first order: at an eighth of the step an eighth of the error is left.
+TEST(Discretisation, ExpectsOfTheStepWhatAFinerOneShows) {
+  const SyntheticCloth cloth;
+  const FitInput input = synthetic_input(cloth);
+  const DiagnosisSetup setup = setup_of({&input, 1});
+  const ModelFit model = true_model(setup, cloth);
+  const PooledPart& part = model.parts.front();
+
+  const DiscretisationError error = discretisation_errors(setup, model).front();
+
+  const TrajectoryObjective fine(*model.problems.front(), part.frames, part.steps.times(0.125));
+  const Eigen::VectorXd change = fine.residuals({part.values}).front() - part.linear.residual;
+  ASSERT_EQ(error.expected.size(), change.size());
+  EXPECT_LT((change - 0.875 * error.expected).norm(), 0.05 * error.expected.norm());
+  // Half of it is what the direction allows for.
+  EXPECT_LT((2 * error.directions.col(0) - error.expected).norm(), 1e-9 * error.expected.norm());
+}
+
 // Where nothing is missing the amounts are those of noise, and a fit keeps its directions.
 TEST(Discretisation, OfATrueModelIsBelieved) {
   const SyntheticCloth cloth;

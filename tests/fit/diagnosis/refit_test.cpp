@@ -1,0 +1,71 @@
+// Models that are fitted again in a diagnosis. How well laws race each other: search_test.cpp,
+// tests/fit/diagnose_test.cpp.
+#include "fit/diagnosis/refit.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "tests/fit/diagnosis/true_model.h"
+
+namespace clothfit {
+namespace {
+
+const FitOptions kOptions = [] {
+  FitOptions options;
+  options.loss = Loss::squared;
+  options.generations = 10;
+  options.population = 40;
+  options.refine_best = 1;
+  return options;
+}();
+
+TEST(FittedAnew, IsTheOptimumWhateverIsKnown) {
+  const SyntheticCloth cloth{.drag_rate_per_s = 1.2};
+  const FitInput input = synthetic_input(cloth);
+  const DiagnosisSetup setup{.inputs = {&input, 1}, .options = kOptions, .columns = 9, .rows = 9};
+
+  const ModelFit anew = fitted_anew(setup, {drag_term()}, {});
+
+  ASSERT_TRUE(anew.usable);
+  ASSERT_EQ(anew.terms.size(), 1u);
+  ModelFit near = true_model(setup, cloth, {drag_term()});
+  refine_model(near, setup, {}, {});
+  ASSERT_TRUE(near.usable);
+  // Time steps are chosen anew, and change chi-square by a little of its scatter.
+  const auto count = static_cast<double>(near.residual_count());
+  EXPECT_LT(anew.residual().squaredNorm(),
+            near.residual().squaredNorm() + 0.2 * std::sqrt(2 * count));
+  EXPECT_NEAR(anew.values().front().at("viscous_damping.rate"), 1.2, 0.05);
+}
+
+TEST(FittedAnew, IsOfOneRecording) {
+  const SyntheticCloth cloth;
+  const std::vector<FitInput> inputs(2, synthetic_input(cloth));
+  const DiagnosisSetup setup{.inputs = inputs, .options = kOptions, .columns = 9, .rows = 9};
+
+  EXPECT_FALSE(fitted_anew(setup, {}, {}).usable);
+}
+
+TEST(WithTerms, HandsOnWhatTheModelIsExpectedToErrBy) {
+  const SyntheticCloth cloth;
+  const FitInput input = synthetic_input(cloth);
+  const DiagnosisSetup setup{.inputs = {&input, 1}, .options = kOptions, .columns = 9, .rows = 9};
+  ModelFit model = true_model(setup, cloth);
+  PooledPart& part = model.parts.front();
+  part.correction = Eigen::VectorXd::LinSpaced(part.linear.residual.size(), 0, 1);
+
+  const ModelFit with_drag = with_terms(setup, model, {drag_term()}, {});
+  EXPECT_EQ(with_drag.parts.front().correction, part.correction);
+  // A neutral law changes nothing.
+  EXPECT_LT((with_drag.residual() - model.residual()).norm(), 1e-9 * model.residual().norm());
+
+  const ModelFit early = shortened(model, 0.5);
+  const Eigen::Index rows = early.residual_count();
+  ASSERT_LT(rows, model.residual_count());
+  EXPECT_EQ(early.residual(), model.residual().head(rows));
+}
+
+}  // namespace
+}  // namespace clothfit
