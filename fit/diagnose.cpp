@@ -212,12 +212,12 @@ class Run {
     result_.accepted = std::move(found.accepted);
     result_.refused = std::move(found.refused);
     result_.after = judge_adequacy(found.model, options_.fit.loss);
-    result_.limits =
-        limits_of(found.last,
-                  std::max(5 * std::sqrt(std::max(1.0, result_.after.chi_square_per_dof)),
-                           std::sqrt(worth_naming(found.model, search.threshold,
-                                                  base.chi_square(search.threshold) -
-                                                      found.model.chi_square(search.threshold)))));
+    const double explained =
+        base.chi_square(search.threshold) - found.model.chi_square(search.threshold);
+    const double worth = worth_naming(found.model, search.threshold, explained);
+    result_.limits = limits_of(
+        found.last,
+        std::max(5 * std::sqrt(std::max(1.0, result_.after.chi_square_per_dof)), std::sqrt(worth)));
     const bool adequate = result_.after.adequate;
     if (result_.accepted.empty()) {
       for (DiagnosedRecording& recording : result_.recordings) recording.after = recording.before;
