@@ -4,9 +4,15 @@
 
 #include <Eigen/QR>
 #include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <string>
+#include <tuple>
 
 #include "fit/measurement_effects/applicability.h"
 #include "fit/measurement_effects/registry.h"
+#include "model/effects/harmonic.h"
 #include "model/effects/registry.h"
 
 namespace clothfit {
@@ -125,9 +131,8 @@ std::vector<Eigen::MatrixXd> derivatives_in(const FitProblem& problem, const Poo
   return result;
 }
 
-}  // namespace
-
-std::vector<Columns> law_derivatives(const ModelFit& model, std::span<const Term> laws) {
+/// Of each law by itself.
+std::vector<Columns> derivatives_of_each(const ModelFit& model, std::span<const Term> laws) {
   const size_t recordings = model.parts.size();
   std::vector<std::vector<Eigen::MatrixXd>> of_recording(recordings);
   tbb::parallel_for(size_t{0}, recordings, [&](size_t n) {
@@ -150,6 +155,52 @@ std::vector<Columns> law_derivatives(const ModelFit& model, std::span<const Term
       result[k].push_back(std::move(of));
     }
   }
+  return result;
+}
+
+bool is_harmonic(const Term& law) {
+  const EffectDescription effect = describe_effect(law.effect);
+  const auto own = std::ranges::find(effect.laws, law.law, &EffectLaw::name);
+  return own != effect.laws.end() && Harmonic::is_followed_by(*own);
+}
+
+}  // namespace
+
+std::vector<Columns> law_derivatives(const ModelFit& model, std::span<const Term> laws) {
+  // A harmonic's at any phase are combinations of those at two.
+  constexpr size_t kPhases = 2;
+  std::map<std::tuple<std::string, std::string, double>, std::vector<size_t>> harmonics;
+  for (size_t k = 0; k < laws.size(); ++k)
+    if (is_harmonic(laws[k]))
+      harmonics[{laws[k].effect, laws[k].law, laws[k].shape.at("frequency")}].push_back(k);
+  std::erase_if(harmonics, [](const auto& known) { return known.second.size() <= kPhases; });
+
+  std::vector<bool> combined(laws.size(), false);
+  std::vector<Term> each;
+  for (const auto& [key, phases] : harmonics) {
+    for (const size_t k : phases) combined[k] = true;
+    for (const double phase : {0.0, 0.25}) {
+      each.push_back(laws[phases.front()]);
+      each.back().shape["phase"] = phase;
+    }
+  }
+  for (size_t k = 0; k < laws.size(); ++k)
+    if (!combined[k]) each.push_back(laws[k]);
+
+  std::vector<Columns> found = derivatives_of_each(model, each), result(laws.size());
+  size_t next = 0;
+  for (const auto& [key, phases] : harmonics) {
+    const Columns &in_phase = found[next], &quarter_on = found[next + 1];
+    next += kPhases;
+    if (in_phase.empty() || quarter_on.empty()) continue;
+    for (const size_t k : phases) {
+      const double angle = 2 * std::numbers::pi * laws[k].shape.at("phase");
+      for (size_t n = 0; n < in_phase.size(); ++n)
+        result[k].push_back(std::cos(angle) * in_phase[n] + std::sin(angle) * quarter_on[n]);
+    }
+  }
+  for (size_t k = 0; k < laws.size(); ++k)
+    if (!combined[k]) result[k] = std::move(found[next++]);
   return result;
 }
 

@@ -46,14 +46,22 @@ struct Harmonic {
     return all;
   }
 
-  /// Of an amplitude named `amplitude`. Half a turn more is the other sign.
+  /// Of an amplitude named `amplitude`. Half a turn more is the other sign. Half a turn over the
+  /// duration lies between neighbouring frequencies: further apart, what lies between is lost.
   static std::vector<EffectLaw> laws(const std::string& amplitude) {
-    return {
-        {.name = "",
-         .amplitudes = {amplitude + "_x", amplitude + "_y", amplitude + "_z"},
-         .shapes = {
-             {.parameter = "frequency", .values = {0.5, 1, 1.5, 2, 3, 4, 6}, .per_duration = true},
-             {.parameter = "phase", .values = {0, 0.125, 0.25, 0.375}}}}};
+    return {{.name = "",
+             .amplitudes = {amplitude + "_x", amplitude + "_y", amplitude + "_z"},
+             .shapes = {{.parameter = "frequency",
+                         .values = {0.5, 1, 1.5, 2, 2.5, 3, 3.5, 4, 4.5, 5, 5.5, 6},
+                         .per_duration = true},
+                        {.parameter = "phase", .values = {0, 0.125, 0.25, 0.375}}}}};
+  }
+
+  /// Whether a law's shapes are those of a harmonic. What a small one does at any phase is what it
+  /// does at phase 0 times the phase's cosine, and what it does at a quarter turn times its sine.
+  static bool is_followed_by(const EffectLaw& law) {
+    return law.shapes.size() == 2 && law.shapes[0].parameter == "frequency" &&
+           law.shapes[1].parameter == "phase";
   }
 };
 

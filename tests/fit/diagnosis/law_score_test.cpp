@@ -95,15 +95,26 @@ TEST(LawDerivatives, AreThoseOfAModelThatHasTheLawAtItsNeutralValue) {
   const SyntheticCloth cloth;
   const FitInput input = synthetic_input(cloth);
   const DiagnosisSetup setup = setup_of({&input, 1});
-  const std::vector<Term> laws{
-      drag_term(),
-      {.effect = "wind", .law = "pressure", .amplitudes = {"q_x", "q_y", "q_z"}},
-      {.effect = "nonuniform_mass",
-       .law = "edges",
-       .amplitudes = {"hem_left", "hem_right", "hem_top", "hem_bottom"},
-       .shape = {{"hem_width", 0.02}},
-       .shape_sigma = {{"hem_width", 0.01}}},
-      {.effect = "scale", .law = "", .amplitudes = {"factor"}}};
+  std::vector<Term> laws{drag_term(),
+                         {.effect = "wind", .law = "pressure", .amplitudes = {"q_x", "q_y", "q_z"}},
+                         {.effect = "nonuniform_mass",
+                          .law = "edges",
+                          .amplitudes = {"hem_left", "hem_right", "hem_top", "hem_bottom"},
+                          .shape = {{"hem_width", 0.02}},
+                          .shape_sigma = {{"hem_width", 0.01}}},
+                         {.effect = "scale", .law = "", .amplitudes = {"factor"}}};
+  // Several phases of one frequency, which need not be differentiated one by one.
+  for (const double phase : {-0.2, 0.05, 0.3}) {
+    const std::map<std::string, double> shape{{"frequency", 3}, {"phase", phase}};
+    laws.push_back({.effect = "gust", .law = "", .amplitudes = {"q_x", "q_y", "q_z"}});
+    laws.push_back({.effect = "support_motion",
+                    .law = "",
+                    .amplitudes = {"amplitude_x", "amplitude_y", "amplitude_z"}});
+    laws.push_back({.effect = "camera_shake",
+                    .law = "shift",
+                    .amplitudes = {"shift_x", "shift_y", "shift_z"}});
+    for (size_t k = laws.size() - 3; k < laws.size(); ++k) laws[k].shape = shape;
+  }
 
   const std::vector<Columns> columns = law_derivatives(true_model(setup, cloth), laws);
 
