@@ -102,7 +102,7 @@ TEST(LawsToTest, TryEachCombinationOfShapesWithFrequenciesInTheDuration) {
       EXPECT_EQ(law.front().amplitudes.size(), 4u);
     }
     if (law.front().effect == "gust") {
-      EXPECT_EQ(law.size(), 48u);  // 12 frequencies, 4 phases
+      EXPECT_EQ(law.size(), 48u);                       // 12 frequencies, 4 phases
       EXPECT_EQ(law.front().shape.at("frequency"), 1);  // half a turn in half a second
     }
     if (law.front().effect == "relaxation") {
