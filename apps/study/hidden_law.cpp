@@ -84,7 +84,7 @@ std::vector<HiddenLaw> hidden_laws(ObservationKind observations) {
 
 RecordingInformation recording_information(const SyntheticScene& scene, const FitOptions& fit,
                                            std::uint64_t seed) {
-  // A coarse mesh sees some laws twice as well as a recording shows them, or half as well.
+  // A coarse mesh sees some laws far better than a recording shows them, or far worse.
   const int mesh = std::min(scene.truth_mesh, 2 * fit.mesh_columns - 1);
   SyntheticScene twin = scene;
   twin.truth_mesh = mesh;

@@ -43,7 +43,7 @@ struct SearchOptions {
 inline constexpr int kTimeBlocks = 5;
 
 /// What a law must take of a model's chi-square to be worth a name, however sure it is. Noise is
-/// known to a third of a per cent at best. And a model whose own numerics err leaves structure
+/// known to three tenths of a per cent at best. And a model whose own numerics err leaves structure
 /// that many laws follow a little: what is missing takes a third of all that is surely above the
 /// noise, or, where much is missing that no single law explains, a twentieth of all that is left
 /// and a quarter of the noise. Nor is the form of a law known better than to a per cent: beside
