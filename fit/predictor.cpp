@@ -5,6 +5,11 @@
 #include <cassert>
 
 namespace clothfit {
+namespace {
+
+constexpr size_t kDerivatives = 5;  ///< x_s, x_t, x_ss, x_st, x_tt
+
+}  // namespace
 
 /// A time as weights on the frames of a run:
 /// x(t) = sum over k of  position[k] x(frame + k) + velocity[k] v(frame + k).
@@ -46,7 +51,8 @@ struct Predictor::Looks {
   };
   std::array<Look, 3> look;
   size_t count = 1;
-  Eigen::Vector2d shift_m = Eigen::Vector2d::Zero();  ///< along s and t
+  /// How far beside the marker, as factors of the surface's derivatives there.
+  std::array<double, kDerivatives> beside{};
 
   /// The same of a derivative of the run.
   Eigen::Vector3d of(const MarkerRun& tangent, int marker) const {
@@ -54,9 +60,8 @@ struct Predictor::Looks {
     for (size_t k = 0; k < count; ++k) {
       const Instant& at = look[k].instant;
       sum += look[k].weight * at.of(at.place, tangent, marker);
-      for (size_t d = 0; d < tangent.slopes.size(); ++d)
-        sum += look[k].weight * shift_m[static_cast<Eigen::Index>(d)] *
-               at.of(at.place, tangent.slopes[d], marker);
+      for (size_t d = 0; d < tangent.derivatives.size(); ++d)
+        sum += look[k].weight * beside[d] * at.of(at.place, tangent.derivatives[d], marker);
     }
     return sum;
   }
@@ -101,11 +106,11 @@ MarkerRun marker_run(const FitProblem& problem, const std::vector<Eigen::Matrix3
   const auto seen_with = [&](const Surface::Weights& weights) {
     return MarkerRun{.position_m = marker_positions(weights, position_m),
                      .velocity_m_per_s = marker_positions(weights, velocity_m_per_s),
-                     .slopes = {}};
+                     .derivatives = {}};
   };
   MarkerRun run = seen_with(problem.vertex_weights);
-  for (const Surface::Weights& slope : problem.slope_weights)
-    run.slopes.push_back(seen_with(slope));
+  for (const Surface::Weights& derivative : problem.derivative_weights)
+    run.derivatives.push_back(seen_with(derivative));
   return run;
 }
 
@@ -191,7 +196,7 @@ Predictor::Instant Predictor::instant(double time_s, size_t run_frames) const {
 
 MeasuredPoint Predictor::look(const Sighting& sighting, const Observation& row,
                               const MarkerRun& run, Looks& looks) const {
-  assert(run.slopes.size() == problem_.slope_weights.size());
+  assert(run.derivatives.size() == problem_.derivative_weights.size());
   const MeasuredNumber time_s = seen_s(sighting);
   MeasuredNumber mixed(0.0);
   MeasuredPair shift_m(MeasuredNumber(0.0), MeasuredNumber(0.0));
@@ -199,7 +204,10 @@ MeasuredPoint Predictor::look(const Sighting& sighting, const Observation& row,
     problem_.measurement[e].effect->mix_neighbours(sighting, parameters_[e], mixed);
     problem_.measurement[e].effect->shift_place(sighting, parameters_[e], shift_m);
   }
-  looks.shift_m << shift_m[0].a, shift_m[1].a;
+  const std::array<MeasuredNumber, kDerivatives> beside{
+      shift_m[0], shift_m[1], 0.5 * shift_m[0] * shift_m[0], shift_m[0] * shift_m[1],
+      0.5 * shift_m[1] * shift_m[1]};
+  std::ranges::transform(beside, looks.beside.begin(), &MeasuredNumber::a);
   looks.count = mixes_neighbours_ ? 3 : 1;
   const std::array<MeasuredNumber, 3> weight{1.0 - 2.0 * mixed, mixed, mixed};
   const std::array<double, 3> later_s{0, -frame_interval_s_, frame_interval_s_};
@@ -210,8 +218,8 @@ MeasuredPoint Predictor::look(const Sighting& sighting, const Observation& row,
     if (needs_velocities_) at = instant(at_s.a, run.position_m.size());
     looks.look[k].weight = weight[k].a;
     MeasuredPoint place = at.moving(run, row.marker, at_s);
-    for (size_t d = 0; d < run.slopes.size(); ++d)
-      place += at.moving(run.slopes[d], row.marker, at_s) * shift_m[static_cast<Eigen::Index>(d)];
+    for (size_t d = 0; d < run.derivatives.size(); ++d)
+      place += at.moving(run.derivatives[d], row.marker, at_s) * beside[d];
     point += place * weight[k];
   }
   for (int c = 0; c < kMeasuredPlace; ++c) point[c].v[c] += 1;

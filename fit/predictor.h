@@ -16,8 +16,9 @@ namespace clothfit {
 /// velocities where they were asked for.
 struct MarkerRun {
   std::vector<Eigen::Matrix3Xd> position_m, velocity_m_per_s;
-  /// The same of the surface's slopes there along s and t, x_s and x_t (1, 1/s); or none.
-  std::vector<MarkerRun> slopes;
+  /// The same of the surface's derivatives there, x_s, x_t (1, 1/s), x_ss, x_st, x_tt (1/m,
+  /// 1/(m s)); or none.
+  std::vector<MarkerRun> derivatives;
 };
 
 /// From the motion of the vertices, or from a derivative of it.
@@ -33,7 +34,7 @@ MarkerRun marker_run(const FitProblem& problem, const SimulateResult& run);
 /// Between frames markers follow the cubic through the places and velocities at both (Hermite;
 /// error O(interval^4)), after the last one they go straight on. Before the first one cloth is
 /// where it starts, or, where it starts in motion, has come straight. Beside its markers the cloth
-/// goes straight on along its slopes there.
+/// goes on as its derivatives there say, to second order.
 class Predictor {
  public:
   /// `problem` must outlive it.

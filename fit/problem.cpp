@@ -256,7 +256,7 @@ void add_effects(const Recording& recording, const FitOptions& options, FitProbl
     add_effect(name, "--effect", {}, options, problem);
     present.push_back(name);
   }
-  add_slope_weights(problem);
+  add_derivative_weights(problem);
 }
 
 /// Two level directions, and when a camera's pose was estimated, gravity's direction as an unknown
@@ -377,17 +377,19 @@ Rigid3 place_sheet_of(const Recording& recording, FitProblem& problem) {
 
 }  // namespace
 
-void add_slope_weights(FitProblem& problem) {
+void add_derivative_weights(FitProblem& problem) {
   const auto shifts_place = [](const FitProblem::MeasurementTerm& term) {
     return term.effect->shifts_place();
   };
-  if (!problem.slope_weights.empty()) return;
+  if (!problem.derivative_weights.empty()) return;
   if (std::ranges::none_of(problem.measurement, shifts_place)) return;
   const Mesh& mesh = problem.cloth.mesh;
-  for (const SurfaceQuantity slope : {SurfaceQuantity::by_s, SurfaceQuantity::by_t})
-    problem.slope_weights.push_back(
-        vertex_weights(make_surface(mesh.columns, mesh.rows, mesh.width_m, mesh.height_m,
-                                    problem.marker_place_m, SurfaceInterpolation::bicubic, slope)));
+  for (const SurfaceQuantity derivative :
+       {SurfaceQuantity::by_s, SurfaceQuantity::by_t, SurfaceQuantity::by_ss,
+        SurfaceQuantity::by_st, SurfaceQuantity::by_tt})
+    problem.derivative_weights.push_back(vertex_weights(
+        make_surface(mesh.columns, mesh.rows, mesh.width_m, mesh.height_m, problem.marker_place_m,
+                     SurfaceInterpolation::bicubic, derivative)));
 }
 
 FitProblem make_problem(const FitInput& input, const FitOptions& options, int mesh_columns,

@@ -35,8 +35,9 @@ struct FitProblem {
   std::map<std::string, int> rejected;  ///< observations left out, by reason
   Eigen::Matrix2Xd marker_place_m;      ///< s, t of each marker, 2 x markers
   Surface::Weights vertex_weights;      ///< markers x vertices
-  /// Of the surface's slopes along s and t, as above; where an effect of the measurement asks.
-  std::vector<Surface::Weights> slope_weights;
+  /// Of the surface's derivatives x_s, x_t, x_ss, x_st, x_tt at the markers, as above; where an
+  /// effect of the measurement asks how the surface goes on beside them.
+  std::vector<Surface::Weights> derivative_weights;
   std::vector<int> driving_markers;
 
   ParameterSpace space;
@@ -69,8 +70,9 @@ struct FitProblem {
   int frames() const { return static_cast<int>(frame_time_s.size()); }
 };
 
-/// Gives a problem the slopes that an effect of its measurement looks along, where one does.
-void add_slope_weights(FitProblem& problem);
+/// Gives a problem the surface's derivatives where an effect of its measurement looks beside
+/// markers.
+void add_derivative_weights(FitProblem& problem);
 
 /// Reads a problem out of the input. `mesh_columns` x `mesh_rows` is the mesh of the fit.
 /// Throws InputError for a recording that cannot be fitted as it stands.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 namespace clothfit {
@@ -33,9 +34,10 @@ Eigen::MatrixXd natural_second_derivatives(int n) {
 }
 
 /// Weights (points x n) of the interpolation at the coordinates `x_m` between `n` knots that are
-/// evenly spaced over [0, length_m], or of its `slope` there (1/m).
+/// evenly spaced over [0, length_m], or of its derivative there of that `order` (0 to 2;
+/// 1/m^order).
 Surface::Weights axis_weights(int n, double length_m, const Eigen::VectorXd& x_m,
-                              SurfaceInterpolation interpolation, bool slope) {
+                              SurfaceInterpolation interpolation, int order) {
   Eigen::MatrixXd second_derivatives;
   if (interpolation == SurfaceInterpolation::bicubic) {
     second_derivatives = natural_second_derivatives(n);
@@ -49,15 +51,16 @@ Surface::Weights axis_weights(int n, double length_m, const Eigen::VectorXd& x_m
 
     // On [k, k + 1]: f = (1 - u) f_k + u f_{k+1} + c(1 - u) M_k + c(u) M_{k+1}, c(u) = (u^3 - u)/6.
     Eigen::RowVectorXd weight = Eigen::RowVectorXd::Zero(n);
-    weight(k) = slope ? -1 : 1 - u;
-    weight(k + 1) = slope ? 1 : u;
+    if (order == 0) weight.segment<2>(k) << 1 - u, u;
+    if (order == 1) weight.segment<2>(k) << -1, 1;
     if (interpolation == SurfaceInterpolation::bicubic) {
-      const auto c = [](double v) { return v * (v * v - 1) / 6; };
-      const auto dc = [](double v) { return (3 * v * v - 1) / 6; };
-      weight += (slope ? -dc(1 - u) : c(1 - u)) * second_derivatives.row(k) +
-                (slope ? dc(u) : c(u)) * second_derivatives.row(k + 1);
+      const auto c = [order](double v) {
+        return order == 0 ? v * (v * v - 1) / 6 : order == 1 ? (3 * v * v - 1) / 6 : v;
+      };
+      weight += (order == 1 ? -1 : 1) * c(1 - u) * second_derivatives.row(k) +
+                c(u) * second_derivatives.row(k + 1);
     }
-    if (slope) weight *= (n - 1) / length_m;
+    weight *= std::pow((n - 1) / length_m, order);
 
     const double smallest = kSmallestRelativeWeight * weight.cwiseAbs().maxCoeff();
     for (int j = 0; j < n; ++j) {
@@ -70,6 +73,25 @@ Surface::Weights axis_weights(int n, double length_m, const Eigen::VectorXd& x_m
   return weights;
 }
 
+/// Along s and along t.
+std::pair<int, int> derivative_orders(SurfaceQuantity quantity) {
+  switch (quantity) {
+    case SurfaceQuantity::place:
+      return {0, 0};
+    case SurfaceQuantity::by_s:
+      return {1, 0};
+    case SurfaceQuantity::by_t:
+      return {0, 1};
+    case SurfaceQuantity::by_ss:
+      return {2, 0};
+    case SurfaceQuantity::by_st:
+      return {1, 1};
+    case SurfaceQuantity::by_tt:
+      return {0, 2};
+  }
+  return {0, 0};
+}
+
 }  // namespace
 
 Surface make_surface(int columns, int rows, double width_m, double height_m,
@@ -80,10 +102,9 @@ Surface make_surface(int columns, int rows, double width_m, double height_m,
   Surface surface;
   surface.columns = columns;
   surface.rows = rows;
-  surface.row_weights =
-      axis_weights(rows, height_m, points.row(1), interpolation, quantity == SurfaceQuantity::by_t);
-  surface.column_weights = axis_weights(columns, width_m, points.row(0), interpolation,
-                                        quantity == SurfaceQuantity::by_s);
+  const auto [along_s, along_t] = derivative_orders(quantity);
+  surface.row_weights = axis_weights(rows, height_m, points.row(1), interpolation, along_t);
+  surface.column_weights = axis_weights(columns, width_m, points.row(0), interpolation, along_s);
   return surface;
 }
 

@@ -12,9 +12,10 @@ enum class SurfaceInterpolation {
   bilinear  ///< straight between neighbours; error O(spacing^2): 0.1 to 0.4 mm on a 17 x 17 cloth
 };
 
-/// What weights on the vertices give at a point: its place x, or the surface's slope there along s
-/// or t (m/m), tangent to the cloth and of length 1 where it is not stretched.
-enum class SurfaceQuantity { place, by_s, by_t };
+/// What weights on the vertices give at a point: its place x, the surface's slope there along s or
+/// t (m/m), tangent to the cloth and of length 1 where it is not stretched, or a second derivative
+/// (1/m), how the slopes turn.
+enum class SurfaceQuantity { place, by_s, by_t, by_ss, by_st, by_tt };
 
 /// The points of a cloth that are looked at, as weights on the vertices of a mesh:
 ///
@@ -47,8 +48,9 @@ struct Surface {
 /// vertices over a cloth of `width_m` x `height_m`. Points lie on the cloth; up to a micrometre
 /// outside (what reading a marker file lets pass) counts as the edge. Weights below 1e-12 of the
 /// point's largest are left out: a point at a vertex has one, and far vertices of large meshes none
-/// (the weights fall by 0.27 from vertex to vertex). Slopes are the derivatives of the places: R_i
-/// or C_j by its coordinate in its stead (1/m); error O(spacing^3) of the bicubic surface.
+/// (the weights fall by 0.27 from vertex to vertex). Derivatives are those of the places: R_i
+/// and C_j by their coordinates in their stead; error O(spacing^3) of the bicubic surface's slopes,
+/// O(spacing^2) of its second derivatives, which are nothing across an edge, where splines end.
 Surface make_surface(int columns, int rows, double width_m, double height_m,
                      const Eigen::Matrix2Xd& points,
                      SurfaceInterpolation interpolation = SurfaceInterpolation::bicubic,

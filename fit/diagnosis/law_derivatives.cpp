@@ -65,7 +65,7 @@ void add(Batch& batch, size_t index, const Term& law) {
   if (entry) {
     batch.problem.measurement.push_back(
         {.effect = entry->make(), .description = effect, .parameters = std::move(bindings)});
-    add_slope_weights(batch.problem);
+    add_derivative_weights(batch.problem);
   } else {
     const std::shared_ptr<const Effect> made = find_effect(law.effect, law.effect).make();
     for (size_t k = 0; k < bindings.size(); ++k) {

@@ -11,10 +11,12 @@
 ///   ds = shift_s + stretch_s (s - s_m) - turn (t - t_m)
 ///   dt = shift_t + stretch_t (t - t_m) + turn (s - s_m),
 ///
-/// (s_m, t_m) the mean of all markers, and appears at x + x_s ds + x_t dt: straight on along the
-/// surface's slopes, which leaves out half the curvature times the way squared (0.1 mm at 10 /m and
-/// 5 mm). Parameters: shift_s, shift_t (m), stretch_s, stretch_t (1), turn (rad), neutral at 0.
-/// Ours.
+/// (s_m, t_m) the mean of all markers, and appears where the surface is there, to second order:
+///
+///   x + x_s ds + x_t dt + x_ss ds^2 / 2 + x_st ds dt + x_tt dt^2 / 2
+///
+/// (to first order 0.1 mm would be left out at a curvature of 10 /m and 5 mm). Parameters: shift_s,
+/// shift_t (m), stretch_s, stretch_t (1), turn (rad), neutral at 0. Ours.
 namespace clothfit::marker_placement {
 
 EffectDescription describe();

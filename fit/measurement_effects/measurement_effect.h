@@ -61,8 +61,7 @@ class MeasurementEffect {
                               MeasuredNumber& /*weight*/) const {}
 
   /// Adds to the way `shift_m` (s and t, m) over the cloth from where the marker is said to be to
-  /// where it is. Taken along the surface's slopes there, x_s ds + x_t dt, which leaves out half
-  /// the curvature times the way squared: at 10 /m and 5 mm, 0.1 mm.
+  /// where it is. Taken as the surface's derivatives there say, to second order.
   virtual void shift_place(const Sighting& /*sighting*/, Parameters /*parameters*/,
                            MeasuredPair& /*shift_m*/) const {}
 

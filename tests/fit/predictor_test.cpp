@@ -139,20 +139,22 @@ TEST(Predictor, MixesTheLooksOneFrameIntervalBeforeAndAfter) {
   }
 }
 
-TEST(Predictor, GoesAlongTheSlopesBesideAMarkerAtTheTimeItLooksAt) {
-  // Given a marker that is 2 mm and -3 mm elsewhere, on slopes that change steadily
+TEST(Predictor, GoesOnBesideAMarkerAsTheSurfaceDoesThereAtTheTimeItLooksAt) {
+  // Given a marker that is 2 mm and -3 mm elsewhere, on a paraboloid whose slopes change steadily
   const FitProblem problem = problem_with({"marker_placement", "clock_offset"});
   MarkerRun run = cubic_run(problem, 8);
-  const Eigen::Vector3d by_s(1, 0, 0.5), by_t(0, -1, 0.2), change(0.3, -4, 2);
+  const Eigen::Vector3d by_s(1, 0, 0.5), by_t(0, -1, 0.2), by_ss(2, 9, -7), by_st(-3, 8, 1),
+      by_tt(5, -6, 12), change(0.3, -4, 2);
   const auto steady = [&](const Eigen::Vector3d& from) {
-    MarkerRun slope;
+    MarkerRun derivative;
     for (const double t : problem.frame_time_s) {
-      slope.position_m.push_back((from + t * change).replicate(1, problem.marker_place_m.cols()));
-      slope.velocity_m_per_s.push_back(change.replicate(1, problem.marker_place_m.cols()));
+      derivative.position_m.push_back(
+          (from + t * change).replicate(1, problem.marker_place_m.cols()));
+      derivative.velocity_m_per_s.push_back(change.replicate(1, problem.marker_place_m.cols()));
     }
-    return slope;
+    return derivative;
   };
-  run.slopes = {steady(by_s), steady(by_t)};
+  run.derivatives = {steady(by_s), steady(by_t), steady(by_ss), steady(by_st), steady(by_tt)};
   Eigen::VectorXd values = with_offset(problem, 0.004);
   values[problem.space.index("marker_placement.shift_s")] = 0.002;
   values[problem.space.index("marker_placement.shift_t")] = -0.003;
@@ -161,13 +163,15 @@ TEST(Predictor, GoesAlongTheSlopesBesideAMarkerAtTheTimeItLooksAt) {
 
   const double t = problem.frame_time_s[3] + 0.004;
   const Eigen::Vector3d at(t * t * t, 1 - 2 * t * t, 3 * t);
-  EXPECT_LT((*seen - (at + 0.002 * (by_s + t * change) - 0.003 * (by_t + t * change))).norm(),
-            1e-14);
+  const Eigen::Vector3d beside = 0.002 * (by_s + t * change) - 0.003 * (by_t + t * change) +
+                                 2e-6 * (by_ss + t * change) - 6e-6 * (by_st + t * change) +
+                                 4.5e-6 * (by_tt + t * change);
+  EXPECT_LT((*seen - (at + beside)).norm(), 1e-14);
 }
 
-TEST(Predictor, LooksUpSlopesOnlyWhereAnEffectAsks) {
-  EXPECT_TRUE(problem_with({"scale", "clock_offset"}).slope_weights.empty());
-  EXPECT_EQ(problem_with({"in_surface_sliding"}).slope_weights.size(), 2u);
+TEST(Predictor, LooksBesideMarkersOnlyWhereAnEffectAsks) {
+  EXPECT_TRUE(problem_with({"scale", "clock_offset"}).derivative_weights.empty());
+  EXPECT_EQ(problem_with({"in_surface_sliding"}).derivative_weights.size(), 5u);
 }
 
 }  // namespace
