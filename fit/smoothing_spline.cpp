@@ -22,6 +22,7 @@ constexpr double kHuber = 1.345;  ///< 95 % efficient for normal noise
 constexpr double kCaution = 1.4;
 constexpr int kMostIterations = 50;
 constexpr Eigen::Index kFewestForOutliers = 8;
+constexpr Eigen::Index kNeighbours = 6;  ///< to either side, that a sample is held against
 
 /// Symmetric matrix with two bands above its diagonal: band(k, i) is entry [i, i + k].
 using Band = Eigen::Matrix3Xd;
@@ -260,9 +261,12 @@ std::pair<std::vector<double>, std::vector<Eigen::Index>> used_samples(
   return used;
 }
 
-/// Largest coordinate of each sample's distance from the path, in robust standard deviations.
-/// `freedom` is 1 - leverage of each sample: a sample that the path follows closely has a small
-/// residual for that reason alone.
+/// Largest coordinate of each sample's distance from the path, in robust standard deviations: of
+/// all samples, or of those around it where these lie further off. A track that was still and
+/// begins to move fast leaves the path by what lies between samples that are far apart, or stamped
+/// late; none of it is an outlier for being larger than the noise at rest. `freedom` is 1 -
+/// leverage of each sample: a sample that the path follows closely has a small residual for that
+/// reason alone.
 Eigen::VectorXd robust_distances(const SmoothingSpline& spline, const Eigen::VectorXd& freedom,
                                  const std::vector<double>& time_s, const Eigen::MatrixXd& samples,
                                  const Eigen::VectorXd& variance) {
@@ -276,9 +280,19 @@ Eigen::VectorXd robust_distances(const SmoothingSpline& spline, const Eigen::Vec
   // Samples on a line to the last digit have no noise to measure outliers by; their rounding is.
   const double rounding = 8 * std::numeric_limits<double>::epsilon() *
                           samples.cwiseAbs().maxCoeff() / std::sqrt(variance.minCoeff());
-  const double scale = kMadToSigma * median({distance.data(), distance.data() + distance.size()});
-  return distance.colwise().maxCoeff().transpose() /
-         std::max({scale, rounding, std::numeric_limits<double>::min()});
+  const double of_all =
+      std::max({kMadToSigma * median({distance.data(), distance.data() + distance.size()}),
+                rounding, std::numeric_limits<double>::min()});
+  Eigen::VectorXd result = distance.colwise().maxCoeff().transpose();
+  for (Eigen::Index i = 0; i < n; ++i) {
+    std::vector<double> around;
+    for (Eigen::Index k = std::max<Eigen::Index>(0, i - kNeighbours);
+         k <= std::min(n - 1, i + kNeighbours); ++k)
+      if (k != i) around.insert(around.end(), distance.col(k).begin(), distance.col(k).end());
+    const double of_these = kMadToSigma * median(std::move(around));
+    result[i] /= std::max(of_all, of_these);
+  }
+  return result;
 }
 
 /// The lambda whose path has half a degree of freedom per sample: it bends within a sample or two,

@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "data/input_error.h"
 #include "fit/node_weights.h"
@@ -55,14 +56,14 @@ std::vector<FollowedPoint> driven_points(const FitProblem& problem, int frames) 
   return points;
 }
 
-/// A track without noise has no scale by which to tell an outlier: motion itself stands out then.
+/// A track without noise has no scale by which to tell an outlier, and motion itself stands out:
+/// what a smooth path follows as closely as the rest is none.
 SmoothingSpline smooth_path(const std::vector<double>& time_s, const Eigen::MatrixXd& samples) {
-  constexpr double kMostOutliers = 0.1;  // of the samples
+  constexpr double kAsClosely = 1.3;
   SmoothingSpline path = fit_smoothing_spline(time_s, samples);
-  const auto outliers = static_cast<double>(std::ranges::count(path.outlier, true));
-  if (outliers > kMostOutliers * static_cast<double>(time_s.size()))
-    path = fit_smoothing_spline(time_s, samples, {}, {.robust = false});
-  return path;
+  if (std::ranges::none_of(path.outlier, std::identity())) return path;
+  SmoothingSpline through_all = fit_smoothing_spline(time_s, samples, {}, {.robust = false});
+            return through_all.noise_sigma < kAsClosely * path.noise_sigma ? through_all : path;
 }
 
 /// The markers, smoothed. Adds the squares of the splines' sigma to `squared_sigma`.
