@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "calib/projection.h"
+#include "data/input_error.h"
 #include "fit/measurement_effects/registry.h"
 
 namespace clothfit {
@@ -16,28 +17,66 @@ constexpr double kBeyondS = 0.25;  ///< seconds after the last frame that can be
 
 }  // namespace
 
-TrueSight::TrueSight(const SyntheticScene& scene, const Recording& recording, std::uint64_t seed)
-    : scene_(scene) {
-  bool between_frames = false;
+HiddenMeasurement::HiddenMeasurement(const SyntheticScene& scene, const Recording& recording)
+    : size_m(scene.size_m), frame_rate_hz(scene.frame_rate_hz), frames(scene.frames) {
   for (const HiddenEffect& hidden : scene.hidden) {
     const MeasurementEffectEntry* entry = measurement_effect_named(hidden.name);
     if (entry == nullptr) continue;
-    Term& term = terms_.emplace_back();
+    Term& term = terms.emplace_back();
     term.effect = entry->make();
     for (const double value : hidden.values) term.parameters.emplace_back(value);
     between_frames =
         between_frames || term.effect->shifts_time() || term.effect->mixes_neighbours();
-    shifts_place_ = shifts_place_ || term.effect->shifts_place();
+    shifts_place = shifts_place || term.effect->shifts_place();
   }
   const std::vector<Marker>& markers = recording.markers.markers;
-  marker_m_.resize(2, static_cast<Eigen::Index>(markers.size()));
+  stated_m.resize(2, static_cast<Eigen::Index>(markers.size()));
   for (size_t m = 0; m < markers.size(); ++m)
-    marker_m_.col(static_cast<Eigen::Index>(m)) << markers[m].s_m, markers[m].t_m;
-  surface_ =
-      make_surface(scene.truth_mesh, scene.truth_mesh, scene.size_m, scene.size_m, marker_m_);
+    stated_m.col(static_cast<Eigen::Index>(m)) << markers[m].s_m, markers[m].t_m;
+}
+
+Sighting HiddenMeasurement::sighting(int frame, int marker, const CameraParameters* camera,
+                                     const Eigen::Vector3d& sheet_middle_m) const {
+  return {.time_s = frame / frame_rate_hz,
+          .first_time_s = 0,
+          .frame_interval_s = 1 / frame_rate_hz,
+          .sheet_middle_m = sheet_middle_m,
+          .from_pattern_middle_m = stated_m.col(marker) - stated_m.rowwise().mean(),
+          .camera = camera,
+          .observed_row_px = 0};
+}
+
+Eigen::Matrix2Xd HiddenMeasurement::places_m(int frame) const {
+  Eigen::Matrix2Xd place_m = stated_m;
+  for (Eigen::Index m = 0; m < place_m.cols(); ++m) {
+    const Sighting from = sighting(frame, static_cast<int>(m), nullptr, Eigen::Vector3d::Zero());
+    MeasuredPair shift_m(MeasuredNumber(0.0), MeasuredNumber(0.0));
+    for (const Term& term : terms) term.effect->shift_place(from, term.parameters, shift_m);
+    place_m.col(m) += Eigen::Vector2d(shift_m[0].a, shift_m[1].a);
+  }
+  return place_m;
+}
+
+bool HiddenMeasurement::stay_on_cloth() const {
+  constexpr double kRounding_m = 1e-9;
+  for (int frame = 0; shifts_place && frame < frames; ++frame) {
+    const Eigen::Matrix2Xd place_m = places_m(frame);
+    if (place_m.minCoeff() < -kRounding_m || place_m.maxCoeff() > size_m + kRounding_m)
+      return false;
+  }
+  return true;
+}
+
+TrueSight::TrueSight(const SyntheticScene& scene, const Recording& recording, std::uint64_t seed)
+    : scene_(scene), hidden_(scene, recording) {
+  if (!hidden_.stay_on_cloth())
+    throw InputError("recover", "a hidden effect puts markers beside the cloth",
+                     "places that are on it", "hide less of it, or another one");
+  surface_ = make_surface(scene.truth_mesh, scene.truth_mesh, scene.size_m, scene.size_m,
+                          hidden_.stated_m);
 
   std::vector<double> time_s = scene_frame_times_s(scene);
-  if (between_frames) {
+  if (hidden_.between_frames) {
     between_ = kBetween;
     const double apart_s = 1 / (scene.frame_rate_hz * between_);
     before_ = static_cast<int>(scene.before_s / apart_s);
@@ -52,29 +91,10 @@ TrueSight::TrueSight(const SyntheticScene& scene, const Recording& recording, st
   sheet_middle_m_ = motion_m_[static_cast<size_t>(before_)].rowwise().mean();
 }
 
-Sighting TrueSight::sighting(int frame, int marker, const CameraParameters* camera) const {
-  return {.time_s = frame / scene_.frame_rate_hz,
-          .first_time_s = 0,
-          .frame_interval_s = 1 / scene_.frame_rate_hz,
-          .sheet_middle_m = sheet_middle_m_,
-          .from_pattern_middle_m = marker_m_.col(marker) - marker_m_.rowwise().mean(),
-          .camera = camera,
-          .observed_row_px = 0};
-}
-
-/// Where the markers really are on the cloth.
-Surface TrueSight::surface_seen(int frame, const CameraParameters* camera) const {
-  if (!shifts_place_) return surface_;
-  Eigen::Matrix2Xd place_m = marker_m_;
-  for (Eigen::Index m = 0; m < place_m.cols(); ++m) {
-    const Sighting from = sighting(frame, static_cast<int>(m), camera);
-    MeasuredPair shift_m(MeasuredNumber(0.0), MeasuredNumber(0.0));
-    for (const Term& term : terms_) term.effect->shift_place(from, term.parameters, shift_m);
-    // A marker cannot leave the cloth.
-    for (int c = 0; c < 2; ++c)
-      place_m(c, m) = std::clamp(place_m(c, m) + shift_m[c].a, 0.0, scene_.size_m);
-  }
-  return make_surface(scene_.truth_mesh, scene_.truth_mesh, scene_.size_m, scene_.size_m, place_m);
+Surface TrueSight::surface_seen(int frame) const {
+  if (!hidden_.shifts_place) return surface_;
+  return make_surface(scene_.truth_mesh, scene_.truth_mesh, scene_.size_m, scene_.size_m,
+                      hidden_.places_m(frame));
 }
 
 /// By the cubic through the four instants around.
@@ -99,7 +119,7 @@ Eigen::Vector3d TrueSight::at(double time_s, int marker, const Surface& surface,
 Eigen::Vector3d TrueSight::look(const Sighting& from, int marker, const Surface& surface,
                                 Instants& known) const {
   MeasuredNumber seen_s(from.time_s), mixed(0.0);
-  for (const Term& term : terms_) {
+  for (const HiddenMeasurement::Term& term : hidden_.terms) {
     term.effect->shift_time(from, term.parameters, seen_s);
     term.effect->mix_neighbours(from, term.parameters, mixed);
   }
@@ -109,27 +129,28 @@ Eigen::Vector3d TrueSight::look(const Sighting& from, int marker, const Surface&
         mixed.a * (at(seen_s.a - from.frame_interval_s, marker, surface, known) - 2 * place_m +
                    at(seen_s.a + from.frame_interval_s, marker, surface, known));
   MeasuredPoint moved = place_m.cast<MeasuredNumber>();
-  for (const Term& term : terms_) term.effect->move(from, term.parameters, moved);
+  for (const HiddenMeasurement::Term& term : hidden_.terms)
+    term.effect->move(from, term.parameters, moved);
   for (int c = 0; c < 3; ++c) place_m[c] = moved[c].a;
   return place_m;
 }
 
 Eigen::Matrix3Xd TrueSight::places(int frame) const {
-  const Surface surface = surface_seen(frame, nullptr);
+  const Surface surface = surface_seen(frame);
   Instants known;
-  Eigen::Matrix3Xd result(3, marker_m_.cols());
+  Eigen::Matrix3Xd result(3, hidden_.stated_m.cols());
   for (int m = 0; m < result.cols(); ++m)
-    result.col(m) = look(sighting(frame, m, nullptr), m, surface, known);
+    result.col(m) = look(hidden_.sighting(frame, m, nullptr, sheet_middle_m_), m, surface, known);
   return result;
 }
 
 std::vector<std::optional<Eigen::Vector2d>> TrueSight::pixels(
     int frame, const CameraParameters& camera) const {
-  const Surface surface = surface_seen(frame, &camera);
+  const Surface surface = surface_seen(frame);
   Instants known;
   std::vector<std::optional<Eigen::Vector2d>> result;
-  for (int m = 0; m < marker_m_.cols(); ++m) {
-    Sighting from = sighting(frame, m, &camera);
+  for (int m = 0; m < hidden_.stated_m.cols(); ++m) {
+    Sighting from = hidden_.sighting(frame, m, &camera, sheet_middle_m_);
     std::optional<Eigen::Vector2d> pixel;
     // A row that is read later is seen later, elsewhere, and so in another row.
     const int looks = between_ > 1 ? 4 : 1;
@@ -138,9 +159,10 @@ std::vector<std::optional<Eigen::Vector2d>> TrueSight::pixels(
       pixel = project(camera, camera_from_world(camera) * look(from, m, surface, known));
       if (!pixel) break;
     }
-    if (pixel && !terms_.empty()) {
+    if (pixel && !hidden_.terms.empty()) {
       MeasuredPair moved(MeasuredNumber(pixel->x()), MeasuredNumber(pixel->y()));
-      for (const Term& term : terms_) term.effect->move_pixel(from, term.parameters, moved);
+      for (const HiddenMeasurement::Term& term : hidden_.terms)
+        term.effect->move_pixel(from, term.parameters, moved);
       pixel = Eigen::Vector2d(moved[0].a, moved[1].a);
     }
     result.push_back(pixel);

@@ -10,6 +10,7 @@
 #include <map>
 #include <optional>
 
+#include "apps/study/true_sight.h"
 #include "apps/study/undeclared_json.h"
 #include "data/input_error.h"
 #include "fit/diagnosis/law_derivatives.h"
@@ -49,8 +50,8 @@ std::vector<HiddenLaw> laws_of_trial(const UndeclaredOptions& options, int index
   return result;
 }
 
-/// Laws with numbers for one release; nothing where one of them cannot be seen in it. `mimicked` is
-/// lowered to how well others mimic one that is withheld.
+/// Laws with numbers for one release; nothing where one of them cannot be seen in it, or puts
+/// markers beside the cloth. `mimicked` is lowered to how well others mimic one that is withheld.
 std::optional<Setting> draw_setting(const UndeclaredOptions& options,
                                     const std::vector<HiddenLaw>& laws, std::uint64_t seed,
                                     std::uint64_t release_seed, Releases& releases,
@@ -75,6 +76,10 @@ std::optional<Setting> draw_setting(const UndeclaredOptions& options,
     setting.laws[0].projected = first;
     setting.laws[1].projected = second;
   }
+  SyntheticScene scene = options.scene;
+  for (const DrawnLaw& drawn : setting.laws) scene.hidden.push_back(hidden_effect(drawn));
+  if (!HiddenMeasurement(scene, information.recording.input.recording).stay_on_cloth())
+    return std::nullopt;
   for (const DrawnLaw& drawn : setting.laws)
     setting.right.push_back(right_class(information, drawn, release->projected_laws()));
   if (options.hide == UndeclaredOptions::Hide::withheld) {
@@ -290,7 +295,7 @@ UndeclaredTrial undeclared_once(const UndeclaredOptions& options, int index, std
   if (!setting) {
     trial.refused = std::isfinite(trial.mimicked)
                         ? fmt::format("others mimic it, R2 at least {:.3f}", trial.mimicked)
-                        : "not seen within its bounds";
+                        : "not seen within its bounds on the cloth";
     return trial;
   }
   trial.mimicked = setting->mimicked;

@@ -10,6 +10,7 @@
 
 #include "apps/study/recover.h"
 #include "apps/study/undeclared_summary.h"
+#include "data/input_error.h"
 #include "fit/diagnosis/law_derivatives.h"
 #include "tests/apps/scratch_folder.h"
 
@@ -121,6 +122,39 @@ TEST(TrueSight, SeesThroughALongerLensFurtherOut) {
   const Eigen::Vector2d moved =
       longer.input.tracks2d.at(camera.name).back().position_px - row.position_px;
   EXPECT_LT((moved - 0.01 * from_centre).norm(), 1e-9);
+}
+
+TEST(TrueSight, SeesAShrunkPatternWhereTheClothIs) {
+  SyntheticScene scene = small_scene();
+  scene.noisy = false;
+  scene.hidden = {{"marker_placement", {0, 0, -0.02, -0.01, 0}}};
+  const SyntheticRecording shrunk = make_synthetic_recording(scene, 5);
+
+  // Given the truth's own surface at the places that the pattern really has
+  const std::vector<Marker>& markers = shrunk.input.recording.markers.markers;
+  Eigen::Matrix2Xd place_m(2, static_cast<Eigen::Index>(markers.size()));
+  for (size_t m = 0; m < markers.size(); ++m)
+    place_m.col(static_cast<Eigen::Index>(m)) << 0.98 * (markers[m].s_m - 0.2) + 0.2,
+        0.99 * (markers[m].t_m - 0.2) + 0.2;
+  const Surface surface =
+      make_surface(scene.truth_mesh, scene.truth_mesh, scene.size_m, scene.size_m, place_m);
+  const auto motion_m = simulate_scene(scene, 5, scene_frame_times_s(scene));
+
+  for (const auto& row : shrunk.input.tracks3d)
+    EXPECT_LT((row.position_m -
+               surface.evaluate(motion_m[static_cast<size_t>(row.frame)]).col(row.marker))
+                  .norm(),
+              1e-12);
+}
+
+TEST(TrueSight, RefusesMarkersBesideTheCloth) {
+  // Given markers up to the edges
+  SyntheticScene scene = small_scene();
+  for (const std::vector<double>& placement :
+       {std::vector<double>{0, 0, 0.001, 0, 0}, {0.001, 0, 0, 0, 0}, {0, 0, 0, 0, 0.001}}) {
+    scene.hidden = {{"marker_placement", placement}};
+    EXPECT_THROW(make_synthetic_recording(scene, 5), InputError);
+  }
 }
 
 TEST(HiddenLaw, AmountsToAsManySigmasAsItSays) {
