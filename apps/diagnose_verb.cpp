@@ -34,6 +34,7 @@ namespace fs = std::filesystem;
 
 struct DiagnoseFlags {
   std::vector<fs::path> recordings, held_out;
+  bool whole = false;
   fs::path out;
   std::string observations = "automatic";
   std::string mesh;
@@ -64,6 +65,8 @@ std::vector<Recording> read_recordings(const DiagnoseFlags& flags) {
         throw InputError(typed.string(), "is named twice",
                          "each recording once, to be fitted or held out");
       recordings.push_back(read_recording(folder));
+      if (flags.whole && folders == &flags.recordings)
+        recordings.back().held_out_from_frame.reset();
     }
   return recordings;
 }
@@ -74,6 +77,7 @@ std::string command_text(const DiagnoseFlags& flags) {
   std::string text = "clothfit diagnose";
   for (const fs::path& recording : flags.recordings) text += " " + recording.string();
   for (const fs::path& recording : flags.held_out) text += " --held-out " + recording.string();
+  if (flags.whole) text += " --whole";
   for (const std::string& effect : flags.options.fit.effects) text += " --effect " + effect;
   for (const std::string& effect : flags.options.without) text += " --without " + effect;
   for (const std::string& prior : flags.priors) text += " --prior " + prior;
@@ -152,6 +156,9 @@ int run_diagnose(DiagnoseFlags flags) {
   flags.options.reinject = true;
   fit.loss = flags.loss == "squared" ? Loss::squared : Loss::huber;
   flags.options.validate();
+  if (flags.whole && flags.held_out.empty())
+    throw InputError("--whole", "no recording judges", "recordings behind --held-out",
+                     "name some, or leave --whole out");
   const std::string command = command_text(flags);
   std::vector<Recording> recordings = read_recordings(flags);
 
@@ -200,6 +207,9 @@ void add_diagnose_verb(CLI::App& program, VerbAction& action) {
   verb->add_option("--held-out", flags->held_out,
                    "Further recordings of the cloth, which nothing sees until the end")
       ->type_name("RECORDING");
+  verb->add_flag("--whole", flags->whole,
+                 "Fit recordings whole, the frames that they hold out included: those behind "
+                 "--held-out judge");
   verb->add_option("--effect", options.fit.effects,
                    "Effect that is known to act, fitted from the beginning; may be repeated")
       ->type_name("NAME");

@@ -320,6 +320,20 @@ TEST_F(Program, NeverWritesOverTheJournalOfAStudy) {
   EXPECT_THAT(names_in(here_), ::testing::ElementsAre("hours"));
 }
 
+TEST_F(Program, RefusesToDiagnoseWhatNothingJudges) {
+  copy_bundled("swing_plain");
+  const auto refusal = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), {"diagnose", recording_.string()});
+    const ProgramRun run = run_program(more, here_);
+    EXPECT_EQ(run.exit_code, 3);
+    return run.error;
+  };
+
+  EXPECT_THAT(refusal({"--whole"}), HasSubstr("--whole: no recording judges"));
+  EXPECT_THAT(refusal({"--held-out", recording_.string()}), HasSubstr("is named twice"));
+  EXPECT_THAT(names_in(here_), IsEmpty());
+}
+
 TEST_F(Program, KnowsLengthsByTheirUnit) {
   copy_bundled("swing_plain");
   const auto fit_with_offsets = [&](const char* length) {
