@@ -23,6 +23,8 @@ constexpr double kCaution = 1.4;
 constexpr int kMostIterations = 50;
 constexpr Eigen::Index kFewestForOutliers = 8;
 constexpr Eigen::Index kNeighbours = 6;  ///< to either side, that a sample is held against
+/// What a moving coordinate leaves of the way from sample to sample, at most. Noise leaves 0.7.
+constexpr double kShareOfStep = 1.0 / 3;
 
 /// Symmetric matrix with two bands above its diagonal: band(k, i) is entry [i, i + k].
 using Band = Eigen::Matrix3Xd;
@@ -261,36 +263,55 @@ std::pair<std::vector<double>, std::vector<Eigen::Index>> used_samples(
   return used;
 }
 
-/// Largest coordinate of each sample's distance from the path, in robust standard deviations: of
-/// all samples, or of those around it where these lie further off. A track that was still and
-/// begins to move fast leaves the path by what lies between samples that are far apart, or stamped
-/// late; none of it is an outlier for being larger than the noise at rest. `freedom` is 1 -
-/// leverage of each sample: a sample that the path follows closely has a small residual for that
-/// reason alone.
+/// The samples around one, it left out.
+std::vector<Eigen::Index> around(Eigen::Index sample, Eigen::Index count) {
+  std::vector<Eigen::Index> result;
+  for (Eigen::Index k = std::max<Eigen::Index>(0, sample - kNeighbours);
+       k <= std::min(count - 1, sample + kNeighbours); ++k)
+    if (k != sample) result.push_back(k);
+  return result;
+}
+
+/// Largest coordinate of each sample's distance from the path, in robust standard deviations.
+/// `freedom` is 1 - leverage of each sample: a sample that the path follows closely has a small
+/// residual for that reason alone.
+///
+/// The standard deviation is that of all samples and coordinates; where a coordinate moves, that of
+/// the samples around, if more. A track that was still and begins to move fast leaves the path by
+/// what lies between samples that are far apart, or stamped late: by much more than the noise at
+/// rest, but by little of the way from sample to sample. Rows of outliers leave it by as much as
+/// lies between them.
 Eigen::VectorXd robust_distances(const SmoothingSpline& spline, const Eigen::VectorXd& freedom,
                                  const std::vector<double>& time_s, const Eigen::MatrixXd& samples,
                                  const Eigen::VectorXd& variance) {
   const Eigen::Index n = samples.cols();
-  Eigen::MatrixXd distance(samples.rows(), n);
+  const Eigen::ArrayXd sigma = variance.array().sqrt();
+  Eigen::MatrixXd distance(samples.rows(), n), step = Eigen::MatrixXd::Zero(samples.rows(), n);
   for (Eigen::Index i = 0; i < n; ++i) {
     distance.col(i) =
         (samples.col(i) - spline.position(time_s[static_cast<std::size_t>(i)])).cwiseAbs() /
-        std::sqrt(variance(i) * std::max(freedom(i), 1e-6));
+        (sigma[i] * std::sqrt(std::max(freedom(i), 1e-6)));
+    if (i > 0) step.col(i) = (samples.col(i) - samples.col(i - 1)).cwiseAbs() / sigma[i];
   }
   // Samples on a line to the last digit have no noise to measure outliers by; their rounding is.
-  const double rounding = 8 * std::numeric_limits<double>::epsilon() *
-                          samples.cwiseAbs().maxCoeff() / std::sqrt(variance.minCoeff());
+  const double rounding =
+      8 * std::numeric_limits<double>::epsilon() * samples.cwiseAbs().maxCoeff() / sigma.minCoeff();
   const double of_all =
       std::max({kMadToSigma * median({distance.data(), distance.data() + distance.size()}),
                 rounding, std::numeric_limits<double>::min()});
-  Eigen::VectorXd result = distance.colwise().maxCoeff().transpose();
+  Eigen::VectorXd result = Eigen::VectorXd::Zero(n);
   for (Eigen::Index i = 0; i < n; ++i) {
-    std::vector<double> around;
-    for (Eigen::Index k = std::max<Eigen::Index>(0, i - kNeighbours);
-         k <= std::min(n - 1, i + kNeighbours); ++k)
-      if (k != i) around.insert(around.end(), distance.col(k).begin(), distance.col(k).end());
-    const double of_these = kMadToSigma * median(std::move(around));
-    result[i] /= std::max(of_all, of_these);
+    const std::vector<Eigen::Index> others = around(i, n);
+    for (Eigen::Index c = 0; c < samples.rows(); ++c) {
+      const auto median_of = [&](const Eigen::MatrixXd& amounts) {
+        const Eigen::VectorXd these = amounts(c, others).transpose();
+        return median({these.begin(), these.end()});
+      };
+      const double near = median_of(distance);
+      const bool moves = near < kShareOfStep * median_of(step);
+      result[i] = std::max(
+          result[i], distance(c, i) / (moves ? std::max(of_all, kMadToSigma * near) : of_all));
+    }
   }
   return result;
 }

@@ -26,10 +26,10 @@ namespace clothfit {
 /// Outliers are looked for with a path of its own, one that bends within a sample or two and is
 /// fitted with iterated Huber weights, so that it takes neither an outlier for motion nor a kink
 /// for an outlier. Samples beyond `reject_beyond` robust standard deviations of it are left out: of
-/// all samples or, where those around lie further off, of these. Motion that begins after a rest,
-/// sampled slowly, is no row of outliers.
-/// The smoothing spline is fitted to the rest with full weights, so that its noise and degrees
-/// of freedom mean what they say.
+/// all samples or, where the track moves from sample to sample by much more than it leaves that
+/// path, of the dozen around. Motion that begins after a rest, sampled slowly, is no row of
+/// outliers. The smoothing spline is fitted to the rest with full weights, so that its noise and
+/// degrees of freedom mean what they say.
 struct SmoothingSplineOptions {
   std::optional<double> smoothing =
       std::nullopt;            ///< lambda, > 0; chosen from the data when absent

@@ -57,13 +57,18 @@ std::vector<FollowedPoint> driven_points(const FitProblem& problem, int frames) 
 }
 
 /// A track without noise has no scale by which to tell an outlier, and motion itself stands out:
-/// what a smooth path follows as closely as the rest is none.
+/// samples that a smooth path through all of them follows as closely as the rest are none.
 SmoothingSpline smooth_path(const std::vector<double>& time_s, const Eigen::MatrixXd& samples) {
-  constexpr double kAsClosely = 1.3;
+  constexpr double kAsClosely = 9;  // times the noise: sharp turns, sampled 60 times a second
   SmoothingSpline path = fit_smoothing_spline(time_s, samples);
   if (std::ranges::none_of(path.outlier, std::identity())) return path;
   SmoothingSpline through_all = fit_smoothing_spline(time_s, samples, {}, {.robust = false});
-            return through_all.noise_sigma < kAsClosely * path.noise_sigma ? through_all : path;
+  for (size_t k = 0; k < time_s.size(); ++k) {
+    const Eigen::VectorXd off =
+        samples.col(static_cast<Eigen::Index>(k)) - through_all.position(time_s[k]);
+    if (path.outlier[k] && off.cwiseAbs().maxCoeff() > kAsClosely * path.noise_sigma) return path;
+  }
+  return through_all;
 }
 
 /// The markers, smoothed. Adds the squares of the splines' sigma to `squared_sigma`.

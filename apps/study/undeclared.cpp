@@ -253,7 +253,7 @@ std::string UndeclaredOptions::key() const {
   std::string without;
   for (const std::string& effect : diagnosis.without) without += " " + effect;
   return fmt::format(
-      "undeclared 2 seed {} hide {} {} laws {} sigmas {} {} scene {} {} {} {} {} {} {} {} {} {} {} "
+      "undeclared 3 seed {} hide {} {} laws {} sigmas {} {} scene {} {} {} {} {} {} {} {} {} {} {} "
       "{} "
       "{} {} {} {} {} {} {} {} {} {} {} fit {} {} {} {} {} {} {} {} {} diagnosis {} {} {}{}",
       seed, to_string(hide), most_mimicked, hidden, draw.least, draw.most, scene.size_m,

@@ -108,6 +108,22 @@ TEST(TrackStates, ApproachTheTruthAsTheFrameRateGrows) {
   EXPECT_LT(error[3].velocity_m_per_s, 1.2e-3);
 }
 
+TEST(TrackStates, AreNotDrawnAwayByAnOutlier) {
+  // Given one place of a marker in the middle that is off by 30 times the noise
+  constexpr int kFrame = 36, kMarker = 12;
+  DenseRecording recording(120, 1e-4, 0.6);
+  for (Observation& row : recording.problem.observations.front().rows)
+    if (row.frame == kFrame && row.marker == kMarker) row.observed.z() += 3e-3;
+
+  const TrackStates found = recorded_states_of_tracks(recording.problem);
+
+  const auto at = std::ranges::find(found.frame, kFrame);
+  ASSERT_NE(at, found.frame.end());
+  const auto n = static_cast<size_t>(at - found.frame.begin());
+  EXPECT_LT((found.states.position_m[n] - recording.truth.position_m[kFrame]).col(kMarker).norm(),
+            5e-4);
+}
+
 TEST(TrackStates, LeaveOutFramesThatMissTooManyMarkers) {
   // Given a third of the markers hidden for ten frames, one for longer, another for two
   DenseRecording recording(120, 1e-4, 0.6);
