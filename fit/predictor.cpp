@@ -5,12 +5,6 @@
 #include <cassert>
 
 namespace clothfit {
-namespace {
-
-constexpr size_t kDerivatives = 5;  ///< x_s, x_t, x_ss, x_st, x_tt
-
-}  // namespace
-
 /// A time as weights on the frames of a run:
 /// x(t) = sum over k of  position[k] x(frame + k) + velocity[k] v(frame + k).
 struct Predictor::Instant {
@@ -52,7 +46,7 @@ struct Predictor::Looks {
   std::array<Look, 3> look;
   size_t count = 1;
   /// How far beside the marker, as factors of the surface's derivatives there.
-  std::array<double, kDerivatives> beside{};
+  std::array<double, kSurfaceDerivatives.size()> beside{};
 
   /// The same of a derivative of the run.
   Eigen::Vector3d of(const MarkerRun& tangent, int marker) const {
@@ -204,7 +198,7 @@ MeasuredPoint Predictor::look(const Sighting& sighting, const Observation& row,
     problem_.measurement[e].effect->mix_neighbours(sighting, parameters_[e], mixed);
     problem_.measurement[e].effect->shift_place(sighting, parameters_[e], shift_m);
   }
-  const std::array<MeasuredNumber, kDerivatives> beside{
+  const std::array<MeasuredNumber, kSurfaceDerivatives.size()> beside{
       shift_m[0], shift_m[1], 0.5 * shift_m[0] * shift_m[0], shift_m[0] * shift_m[1],
       0.5 * shift_m[1] * shift_m[1]};
   std::ranges::transform(beside, looks.beside.begin(), &MeasuredNumber::a);

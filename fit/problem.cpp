@@ -384,9 +384,7 @@ void add_derivative_weights(FitProblem& problem) {
   if (!problem.derivative_weights.empty()) return;
   if (std::ranges::none_of(problem.measurement, shifts_place)) return;
   const Mesh& mesh = problem.cloth.mesh;
-  for (const SurfaceQuantity derivative :
-       {SurfaceQuantity::by_s, SurfaceQuantity::by_t, SurfaceQuantity::by_ss,
-        SurfaceQuantity::by_st, SurfaceQuantity::by_tt})
+  for (const SurfaceQuantity derivative : kSurfaceDerivatives)
     problem.derivative_weights.push_back(vertex_weights(
         make_surface(mesh.columns, mesh.rows, mesh.width_m, mesh.height_m, problem.marker_place_m,
                      SurfaceInterpolation::bicubic, derivative)));

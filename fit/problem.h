@@ -35,7 +35,7 @@ struct FitProblem {
   std::map<std::string, int> rejected;  ///< observations left out, by reason
   Eigen::Matrix2Xd marker_place_m;      ///< s, t of each marker, 2 x markers
   Surface::Weights vertex_weights;      ///< markers x vertices
-  /// Of the surface's derivatives x_s, x_t, x_ss, x_st, x_tt at the markers, as above; where an
+  /// Of kSurfaceDerivatives at the markers, x_s, x_t, x_ss, x_st, x_tt, as above; where an
   /// effect of the measurement asks how the surface goes on beside them.
   std::vector<Surface::Weights> derivative_weights;
   std::vector<int> driving_markers;

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/SparseCore>
+#include <array>
 #include <span>
 
 namespace clothfit {
@@ -16,6 +17,11 @@ enum class SurfaceInterpolation {
 /// t (m/m), tangent to the cloth and of length 1 where it is not stretched, or a second derivative
 /// (1/m), how the slopes turn.
 enum class SurfaceQuantity { place, by_s, by_t, by_ss, by_st, by_tt };
+
+/// The derivatives among them, in that order.
+inline constexpr std::array kSurfaceDerivatives{SurfaceQuantity::by_s, SurfaceQuantity::by_t,
+                                                SurfaceQuantity::by_ss, SurfaceQuantity::by_st,
+                                                SurfaceQuantity::by_tt};
 
 /// The points of a cloth that are looked at, as weights on the vertices of a mesh:
 ///
@@ -48,9 +54,9 @@ struct Surface {
 /// vertices over a cloth of `width_m` x `height_m`. Points lie on the cloth; up to a micrometre
 /// outside (what reading a marker file lets pass) counts as the edge. Weights below 1e-12 of the
 /// point's largest are left out: a point at a vertex has one, and far vertices of large meshes none
-/// (the weights fall by 0.27 from vertex to vertex). Derivatives are those of the places: R_i
-/// and C_j by their coordinates in their stead; error O(spacing^3) of the bicubic surface's slopes,
-/// O(spacing^2) of its second derivatives, which are nothing across an edge, where splines end.
+/// (the weights fall by 0.27 from vertex to vertex). Of a derivative, R_i or C_j or both are
+/// differentiated. Away from the edges the bicubic surface's slopes err by O(spacing^3), its second
+/// derivatives by O(spacing^2); on an edge natural splines do not bend: x_ss or x_tt is nothing.
 Surface make_surface(int columns, int rows, double width_m, double height_m,
                      const Eigen::Matrix2Xd& points,
                      SurfaceInterpolation interpolation = SurfaceInterpolation::bicubic,

@@ -103,19 +103,24 @@ void write_diagnosis(const Diagnosis& diagnosis, const std::string& command,
   json["refused"] = ordered_json::array();
   for (const LawTrial& trial : diagnosis.refused) json["refused"].push_back(trial_json(trial));
   json["errors"] = ordered_json::array();
+  // What was not held out, or not fitted, has no error.
+  const auto known = [](const ErrorSummary& error, double rms) {
+    return error.count > 0 ? ordered_json(rms) : ordered_json(nullptr);
+  };
   for (const auto& [recording, before, after] : errors_before_after(diagnosis)) {
-    json["errors"].push_back({{"recording", recording->before.result.recording},
-                              {"kind", before->kind},
-                              {"unit", before->unit},
-                              {"noise", before->noise},
-                              {"fitted_before", before->fitted.rms},
-                              {"fitted_after", after->fitted.rms},
-                              {"held_out_before", before->held_out.rms},
-                              {"held_out_after", after->held_out.rms},
-                              {"fitted_before_distance", before->fitted.rms_distance},
-                              {"fitted_after_distance", after->fitted.rms_distance},
-                              {"held_out_before_distance", before->held_out.rms_distance},
-                              {"held_out_after_distance", after->held_out.rms_distance}});
+    json["errors"].push_back(
+        {{"recording", recording->before.result.recording},
+         {"kind", before->kind},
+         {"unit", before->unit},
+         {"noise", before->noise},
+         {"fitted_before", known(before->fitted, before->fitted.rms)},
+         {"fitted_after", known(after->fitted, after->fitted.rms)},
+         {"held_out_before", known(before->held_out, before->held_out.rms)},
+         {"held_out_after", known(after->held_out, after->held_out.rms)},
+         {"fitted_before_distance", known(before->fitted, before->fitted.rms_distance)},
+         {"fitted_after_distance", known(after->fitted, after->fitted.rms_distance)},
+         {"held_out_before_distance", known(before->held_out, before->held_out.rms_distance)},
+         {"held_out_after_distance", known(after->held_out, after->held_out.rms_distance)}});
   }
   json["adequacy"] = {{"before", adequacy_json(diagnosis.before)},
                       {"after", adequacy_json(diagnosis.after)}};

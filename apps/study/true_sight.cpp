@@ -57,7 +57,7 @@ Eigen::Matrix2Xd HiddenMeasurement::places_m(int frame) const {
   return place_m;
 }
 
-bool HiddenMeasurement::stay_on_cloth() const {
+bool HiddenMeasurement::markers_stay_on_cloth() const {
   constexpr double kRounding_m = 1e-9;
   for (int frame = 0; shifts_place && frame < frames; ++frame) {
     const Eigen::Matrix2Xd place_m = places_m(frame);
@@ -69,7 +69,7 @@ bool HiddenMeasurement::stay_on_cloth() const {
 
 TrueSight::TrueSight(const SyntheticScene& scene, const Recording& recording, std::uint64_t seed)
     : scene_(scene), hidden_(scene, recording) {
-  if (!hidden_.stay_on_cloth())
+  if (!hidden_.markers_stay_on_cloth())
     throw InputError("recover", "a hidden effect puts markers beside the cloth",
                      "places that are on it", "hide less of it, or another one");
   surface_ = make_surface(scene.truth_mesh, scene.truth_mesh, scene.size_m, scene.size_m,

@@ -28,7 +28,7 @@ struct HiddenMeasurement {
   /// Where the markers really are in a frame: s and t (m), 2 x markers. Only on the cloth does the
   /// truth have a surface that shows them.
   Eigen::Matrix2Xd places_m(int frame) const;
-  bool stay_on_cloth() const;
+  bool markers_stay_on_cloth() const;
 
   double size_m = 0, frame_rate_hz = 0;
   int frames = 0;

@@ -9,6 +9,8 @@
 #include <limits>
 #include <map>
 #include <optional>
+#include <span>
+#include <utility>
 
 #include "apps/study/true_sight.h"
 #include "apps/study/undeclared_json.h"
@@ -24,6 +26,7 @@ constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 constexpr double kTold = 0.9;      ///< correlation of two hidden laws, below
 constexpr int kWithheldDraws = 3;  ///< each asks for the derivatives of every law
 constexpr int kDraws = 20;         ///< of release, shape and direction, before a trial is given up
+constexpr int kDirections = 20;    ///< of a law in one release
 enum Series : int { kPartner = 320, kReleases };
 
 /// What a trial hides, with the release that shows it.
@@ -50,6 +53,14 @@ std::vector<HiddenLaw> laws_of_trial(const UndeclaredOptions& options, int index
   return result;
 }
 
+bool markers_stay_on_cloth(const UndeclaredOptions& options,
+                           const RecordingInformation& information,
+                           std::span<const DrawnLaw> laws) {
+  SyntheticScene scene = options.scene;
+  for (const DrawnLaw& drawn : laws) scene.hidden.push_back(hidden_effect(drawn));
+  return HiddenMeasurement(scene, information.recording.input.recording).markers_stay_on_cloth();
+}
+
 /// Laws with numbers for one release; nothing where one of them cannot be seen in it, or puts
 /// markers beside the cloth. `mimicked` is lowered to how well others mimic one that is withheld.
 std::optional<Setting> draw_setting(const UndeclaredOptions& options,
@@ -60,26 +71,31 @@ std::optional<Setting> draw_setting(const UndeclaredOptions& options,
   if (laws.empty()) return setting;
   const std::shared_ptr<const Release> release = releases.at(release_seed);
   const RecordingInformation& information = release->information();
+  std::vector<std::uint64_t> seeds;
   for (size_t n = 0; n < laws.size(); ++n) {
-    setting.laws.push_back(
-        draw_law(information, laws[n], options.draw, derived_seed(seed, static_cast<int>(n))));
-    if (setting.laws.back().amount.size() == 0) return std::nullopt;
+    // A pattern of markers that reaches the edges can shrink only: other directions are drawn anew.
+    for (int k = 0; k < kDirections && setting.laws.size() == n; ++k) {
+      seeds.resize(n);
+      seeds.push_back(derived_seed(seed, static_cast<int>(n) + 2 * k));
+      DrawnLaw drawn = draw_law(information, laws[n], options.draw, seeds.back());
+      if (drawn.amount.size() == 0) return std::nullopt;
+      if (markers_stay_on_cloth(options, information, {&drawn, 1}))
+        setting.laws.push_back(std::move(drawn));
+    }
+    if (setting.laws.size() == n) return std::nullopt;
   }
   if (laws.size() == 2) {
     // Each is to be seen beside the other, so that the other's direction is nobody's evidence.
     const Eigen::VectorXd first = setting.laws[0].projected, second = setting.laws[1].projected;
     if (std::abs(first.dot(second)) > kTold) return std::nullopt;
-    setting.laws[0] = draw_law(information, laws[0], options.draw, derived_seed(seed, 0), second);
-    setting.laws[1] = draw_law(information, laws[1], options.draw, derived_seed(seed, 1), first);
+    setting.laws[0] = draw_law(information, laws[0], options.draw, seeds[0], second);
+    setting.laws[1] = draw_law(information, laws[1], options.draw, seeds[1], first);
     for (DrawnLaw& drawn : setting.laws)
       if (drawn.amount.size() == 0) return std::nullopt;
     setting.laws[0].projected = first;
     setting.laws[1].projected = second;
   }
-  SyntheticScene scene = options.scene;
-  for (const DrawnLaw& drawn : setting.laws) scene.hidden.push_back(hidden_effect(drawn));
-  if (!HiddenMeasurement(scene, information.recording.input.recording).stay_on_cloth())
-    return std::nullopt;
+  if (!markers_stay_on_cloth(options, information, setting.laws)) return std::nullopt;
   for (const DrawnLaw& drawn : setting.laws)
     setting.right.push_back(right_class(information, drawn, release->projected_laws()));
   if (options.hide == UndeclaredOptions::Hide::withheld) {
@@ -295,7 +311,7 @@ UndeclaredTrial undeclared_once(const UndeclaredOptions& options, int index, std
   if (!setting) {
     trial.refused = std::isfinite(trial.mimicked)
                         ? fmt::format("others mimic it, R2 at least {:.3f}", trial.mimicked)
-                        : "not seen within its bounds on the cloth";
+                        : "not seen within its bounds, or beside the cloth";
     return trial;
   }
   trial.mimicked = setting->mimicked;

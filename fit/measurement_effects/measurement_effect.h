@@ -61,7 +61,8 @@ class MeasurementEffect {
                               MeasuredNumber& /*weight*/) const {}
 
   /// Adds to the way `shift_m` (s and t, m) over the cloth from where the marker is said to be to
-  /// where it is. Taken as the surface's derivatives there say, to second order.
+  /// where it is. Taken as the surface's derivatives there say, to second order. It depends on the
+  /// marker and the time alone, on no camera and no place of the cloth in the world.
   virtual void shift_place(const Sighting& /*sighting*/, Parameters /*parameters*/,
                            MeasuredPair& /*shift_m*/) const {}
 
