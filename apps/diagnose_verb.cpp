@@ -96,6 +96,7 @@ std::string command_text(const DiagnoseFlags& flags) {
   add("--lines", flags.options.lines, defaults.lines);
   add("--refits", flags.options.refits, defaults.refits);
   add("--most-effects", flags.options.most_effects, defaults.most_effects);
+  add("--law-terms", flags.options.law_terms, defaults.law_terms);
   if (flags.plant != "10") text += " --plant " + flags.plant;
   return text;
 }
@@ -248,6 +249,9 @@ void add_diagnose_verb(CLI::App& program, VerbAction& action) {
   verb->add_option("--refits", options.refits, "Laws of each line that are fitted in one round")
       ->capture_default_str();
   verb->add_option("--most-effects", options.most_effects, "Effects to add, at most")
+      ->capture_default_str();
+  verb->add_option("--law-terms", options.law_terms,
+                   "Terms of a law that is proposed for what remains, at most; 0: none is")
       ->capture_default_str();
   verb->add_option("--plant", flags->plant,
                    "Laws that are planted on twins of the recording at 1.6 times their limit, to "

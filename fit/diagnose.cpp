@@ -227,11 +227,13 @@ class Run {
       result_.verdict = adequate ? DiagnosisVerdict::explained : DiagnosisVerdict::partly_explained;
     }
     search_all_twins(setup, found.model, search);
-    if (cancelled_ || adequate) return;
-    result_.law = propose_law(
-        setup, found.model,
-        {.blocks = kTimeBlocks, .without = options_.without, .threshold = search.threshold},
-        progress_);
+    if (cancelled_ || adequate || options_.law_terms == 0) return;
+    result_.law = propose_law(setup, found.model,
+                              {.most_terms = options_.law_terms,
+                               .blocks = kTimeBlocks,
+                               .without = options_.without,
+                               .threshold = search.threshold},
+                              progress_);
     if (cancelled_ || !result_.law.found()) return;
     report_model(setup, result_.law.model, &DiagnosedRecording::with_law);
   }
@@ -399,6 +401,7 @@ void DiagnoseOptions::validate() const {
   require(lines >= 1 && lines <= 20, "lines", "1 to 20");
   require(refits >= 1 && refits <= 50, "refits", "1 to 50");
   require(most_effects >= 0 && most_effects <= 10, "most-effects", "0 to 10");
+  require(law_terms >= 0 && law_terms <= 10, "law-terms", "0 to 10");
   require(plants >= 0, "plant", "a number of laws, or all");
   require(!fit.forecast && !fit.start, "start", "a diagnosis finds its own");
   for (const std::string& effect : without) require_effect(effect, "--without");

@@ -21,6 +21,7 @@ struct DiagnoseOptions {
   int lines = 3;   ///< of search that are followed side by side
   int refits = 6;  ///< laws of each line that are fitted in one round
   int most_effects = 4;
+  int law_terms = 4;  ///< of a law that is proposed for what remains, at most; 0: none is
   /// Laws whose detection limits are confirmed by planting them on twins of the recordings, one of
   /// each effect, those first that are seen best.
   int plants = 0;

@@ -97,6 +97,20 @@ TEST(Diagnose, FitsTwoRecordingsTogetherAndJudgesAThird) {
   }
 }
 
+TEST(Diagnose, ProposesNoLawWhereItIsToldNotTo) {
+  DiagnoseOptions options = quick();
+  options.most_effects = 0;  // the drag is left
+  options.law_terms = 0;
+  const Diagnosis diagnosis = diagnose(synthetic_input({.drag_rate_per_s = 1.2}), options, {});
+
+  EXPECT_EQ(diagnosis.verdict, DiagnosisVerdict::unexplained);
+  EXPECT_TRUE(diagnosis.law.trials.empty());
+  EXPECT_FALSE(diagnosis.law.found());
+
+  options.law_terms = 1;
+  EXPECT_TRUE(diagnose(synthetic_input({.drag_rate_per_s = 1.2}), options, {}).law.found());
+}
+
 TEST(Diagnose, EndsSoonWhenItIsToldTo) {
   int calls = 0;
   const Diagnosis diagnosis =
@@ -115,6 +129,9 @@ TEST(Diagnose, RefusesRecordingsOfTwoCloths) {
 TEST(Diagnose, RefusesOptionsThatMakeNoSense) {
   DiagnoseOptions options = quick();
   options.lines = 0;
+  EXPECT_THROW(diagnose(synthetic_input({}), options, {}), InputError);
+  options = quick();
+  options.law_terms = 11;
   EXPECT_THROW(diagnose(synthetic_input({}), options, {}), InputError);
   options = quick();
   options.without = {"aether"};
