@@ -45,12 +45,13 @@ std::string yes(bool is) {
 }  // namespace
 
 Table undeclared_trials_table(const UndeclaredResult& result) {
-  Table table{
-      .header = {"trial",     "hidden",          "shape",        "sigmas",      "right",
-                 "mimicked",  "verdict",         "accepted",     "right_first", "all_named",
-                 "amplitude", "amplitude_ratio", "error_before", "error_after", "error_truth",
-                 "noise",     "fitted_before",   "fitted_after", "seconds",     "drawing_seconds"},
-      .rows = {}};
+  Table table{.header = {"trial",          "hidden",        "shape",        "sigmas",
+                         "right",          "mimicked",      "verdict",      "accepted",
+                         "right_first",    "all_named",     "amplitude",    "amplitude_ratio",
+                         "error_before",   "error_after",   "error_truth",  "error_law",
+                         "noise",          "fitted_before", "fitted_after", "seconds",
+                         "drawing_seconds"},
+              .rows = {}};
   for (size_t n = 0; n < result.trials.size(); ++n) {
     const UndeclaredTrial& trial = result.trials[n];
     const bool usable = trial.usable();
@@ -86,6 +87,7 @@ Table undeclared_trials_table(const UndeclaredResult& result) {
          exact_text(trial.before),
          exact_text(trial.after),
          exact_text(trial.with_truth),
+         exact_text(trial.with_law),
          exact_text(trial.noise),
          exact_text(trial.before_fitted),
          exact_text(trial.after_fitted),
@@ -125,6 +127,8 @@ Table undeclared_effects_table(const UndeclaredResult& result) {
                          "partly_explained",
                          "unexplained",
                          "adequate",
+                         "laws_asked",
+                         "laws_halving",
                          "mean_class_size",
                          "mean_sigmas",
                          "amplitude_ratio",
@@ -149,6 +153,8 @@ Table undeclared_effects_table(const UndeclaredResult& result) {
                           std::to_string(row.partly),
                           std::to_string(row.unexplained),
                           std::to_string(row.adequate),
+                          std::to_string(row.law_halves.trials),
+                          std::to_string(row.law_halves.hits),
                           exact_text(row.class_size.value()),
                           exact_text(row.sigmas.value()),
                           exact_text(row.amplitude_ratio.value()),
@@ -163,15 +169,20 @@ Table undeclared_effects_table(const UndeclaredResult& result) {
 }
 
 Table short_undeclared_effects_table(const UndeclaredResult& result) {
-  Table table{.header = {"hidden", "trials", "not drawn", "right first (95 %)", "all named",
-                         "unexplained", "partly", "class", "found / true", "within 2 sigma",
-                         "before / noise", "after / noise", "after / true model", "s"},
-              .rows = {}};
+  Table table{
+      .header = {"hidden", "trials", "not drawn", "right first (95 %)", "all named", "unexplained",
+                 "partly", "law halves", "class", "found / true", "within 2 sigma",
+                 "before / noise", "after / noise", "after / true model", "s"},
+      .rows = {}};
   for (const UndeclaredSummary& row : undeclared_summaries(result))
     table.rows.push_back({row.title, std::to_string(row.right_first.trials),
                           std::to_string(row.refused), rate_text(row.right_first),
                           percent(row.all_named.share()), std::to_string(row.unexplained),
-                          std::to_string(row.partly), significant(row.class_size.value(), 2),
+                          std::to_string(row.partly),
+                          row.law_halves.trials > 0
+                              ? fmt::format("{} of {}", row.law_halves.hits, row.law_halves.trials)
+                              : "-",
+                          significant(row.class_size.value(), 2),
                           ratio_text(row.amplitude_ratio.value()), percent(row.covered.share()),
                           ratio_text(row.before_noise.value()), ratio_text(row.over_noise.value()),
                           ratio_text(row.over_truth.value()), significant(row.seconds.value(), 2)});

@@ -269,7 +269,7 @@ std::string UndeclaredOptions::key() const {
   std::string without;
   for (const std::string& effect : diagnosis.without) without += " " + effect;
   return fmt::format(
-      "undeclared 3 seed {} hide {} {} laws {} sigmas {} {} scene {} {} {} {} {} {} {} {} {} {} {} "
+      "undeclared 4 seed {} hide {} {} laws {} sigmas {} {} scene {} {} {} {} {} {} {} {} {} {} {} "
       "{} "
       "{} {} {} {} {} {} {} {} {} {} {} fit {} {} {} {} {} {} {} {} {} diagnosis {} {} {}{}",
       seed, to_string(hide), most_mimicked, hidden, draw.least, draw.most, scene.size_m,
@@ -297,7 +297,8 @@ bool UndeclaredTrial::all_named() const {
 UndeclaredTrial undeclared_once(const UndeclaredOptions& options, int index, std::uint64_t seed,
                                 Releases& releases) {
   const auto began = std::chrono::steady_clock::now();
-  UndeclaredTrial trial{.before = kNone, .after = kNone, .with_truth = kNone, .noise = kNone};
+  UndeclaredTrial trial{
+      .before = kNone, .after = kNone, .with_truth = kNone, .noise = kNone, .with_law = kNone};
   const std::vector<HiddenLaw> laws = laws_of_trial(options, index, seed);
   for (const HiddenLaw& law : laws) trial.hidden.push_back({.law = law});
   std::optional<Setting> setting;
@@ -330,7 +331,10 @@ UndeclaredTrial undeclared_once(const UndeclaredOptions& options, int index, std
   UndeclaredOptions own = options;
   own.diagnosis.fit.seed = seed;
   own.diagnosis.fit.threads = 1;  // trials run side by side
-  if (withheld) own.diagnosis.without.push_back(laws.front().effect);
+  if (withheld)
+    own.diagnosis.without.push_back(laws.front().effect);
+  else
+    own.diagnosis.law_terms = 0;  // nobody asks for it where the hidden effect is known
   const auto diagnosis_began = std::chrono::steady_clock::now();
   const Diagnosis diagnosis = diagnose(recording.input, own.diagnosis, {});
   trial.seconds = seconds_since(diagnosis_began);
@@ -345,6 +349,7 @@ UndeclaredTrial undeclared_once(const UndeclaredOptions& options, int index, std
   name_hidden(trial);
   trial.before = held_out_rms(diagnosis.base());
   trial.after = held_out_rms(diagnosis.found());
+  if (diagnosis.law.found()) trial.with_law = held_out_rms(diagnosis.with_law());
   trial.before_fitted = fitted_rms(diagnosis.base());
   trial.after_fitted = fitted_rms(diagnosis.found());
   trial.noise = diagnosis.base().result.errors.front().noise;

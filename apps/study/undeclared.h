@@ -69,6 +69,7 @@ struct UndeclaredTrial {
   /// rms over coordinates of held-out frames (m or px): of the model as declared, with what was
   /// accepted, and with the true laws declared; and the noise. NaN where there is none.
   double before = 0, after = 0, with_truth = 0, noise = 0;
+  double with_law = 0;  ///< with the law that was proposed, where an effect was withheld
   double before_fitted = 0, after_fitted = 0;
   double drawing_seconds = 0, seconds = 0;  ///< the only numbers that differ from run to run
 

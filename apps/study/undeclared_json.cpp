@@ -53,7 +53,7 @@ std::string payload_of(const UndeclaredTrial& trial) {
             {"accepted", trial.accepted},         {"accepted_effects", trial.accepted_effects}};
   for (const HiddenInTrial& hidden : trial.hidden) json["hidden"].push_back(json_of(hidden));
   for (const double error : {trial.before, trial.after, trial.with_truth, trial.noise,
-                             trial.before_fitted, trial.after_fitted})
+                             trial.before_fitted, trial.after_fitted, trial.with_law})
     json["errors"].push_back(number(error));
   json["seconds"] = {trial.drawing_seconds, trial.seconds};
   return json.dump();
@@ -75,6 +75,7 @@ UndeclaredTrial undeclared_trial_of(const std::string& payload) {
       .after = number_of(errors[1]),
       .with_truth = number_of(errors[2]),
       .noise = number_of(errors[3]),
+      .with_law = number_of(errors[6]),
       .before_fitted = number_of(errors[4]),
       .after_fitted = number_of(errors[5]),
       .drawing_seconds = json.at("seconds")[0],

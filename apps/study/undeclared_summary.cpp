@@ -39,6 +39,12 @@ void add(UndeclaredSummary& summary, const UndeclaredTrial& trial) {
       ++summary.unexplained;
       break;
   }
+  const bool structure = trial.verdict == DiagnosisVerdict::partly_explained ||
+                         trial.verdict == DiagnosisVerdict::unexplained;
+  if (std::isfinite(trial.mimicked) && structure) {
+    ++summary.law_halves.trials;
+    summary.law_halves.hits += trial.with_law <= 0.5 * trial.before ? 1 : 0;
+  }
   if (!trial.accepted.empty()) summary.over_truth.add(trial.after / trial.with_truth);
   summary.over_noise.add(trial.after / trial.noise);
   summary.before_noise.add(trial.before / trial.noise);

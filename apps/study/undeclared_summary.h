@@ -30,6 +30,9 @@ struct UndeclaredSummary {
   Rate right_first;  ///< of clean recordings: nothing accepted
   Rate all_named;    ///< each hidden effect by one of its own
   int explained = 0, partly = 0, unexplained = 0, adequate = 0;
+  /// Where an effect was withheld and something was seen to be missing: whether the law that was
+  /// proposed leaves half of the held-out error at most.
+  Rate law_halves;
   Mean class_size, sigmas;
   Mean amplitude_ratio;
   Rate covered;       ///< amplitudes within two of their own sigmas of the truth

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "apps/study/recover.h"
 #include "apps/study/undeclared_summary.h"
@@ -208,6 +209,33 @@ TEST(Rate, HasExactBounds) {
   // Tables have 0.272 and 0.728 for 10 of 20.
   EXPECT_NEAR((Rate{.hits = 10, .trials = 20}.bounds().lower), 0.272, 5e-4);
   EXPECT_NEAR((Rate{.hits = 10, .trials = 20}.bounds().upper), 0.728, 5e-4);
+}
+
+TEST(UndeclaredSummaries, CountLawsThatHalveTheErrorWhereAnEffectWasWithheld) {
+  UndeclaredTrial trial{.hidden = {{.law = {"viscous_damping", ""}}},
+                        .mimicked = 0.2,
+                        .stop = FitStop::converged,
+                        .verdict = DiagnosisVerdict::unexplained,
+                        .before = 4,
+                        .after = 4,
+                        .with_truth = 1,
+                        .noise = 1,
+                        .with_law = 2};
+  UndeclaredResult result;
+  result.trials.push_back(trial);  // half is left
+  trial.with_law = 2.1;
+  result.trials.push_back(trial);
+  trial.with_law = std::numeric_limits<double>::quiet_NaN();  // none was found
+  result.trials.push_back(trial);
+  trial.verdict = DiagnosisVerdict::adequate;  // none was asked for
+  result.trials.push_back(trial);
+  trial = result.trials.front();
+  trial.mimicked = std::numeric_limits<double>::quiet_NaN();  // not withheld
+  result.trials.push_back(trial);
+
+  const Rate halves = undeclared_summaries(result).back().law_halves;
+  EXPECT_EQ(halves.hits, 1);
+  EXPECT_EQ(halves.trials, 3);
 }
 
 TEST(Undeclared, NamesADragAndItsAmount) {
