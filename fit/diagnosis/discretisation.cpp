@@ -31,6 +31,10 @@ ModelFit fit_on_mesh(const DiagnosisSetup& other, const ModelFit& model,
     stage.rounds = 1;
     stage.own_only = own_only;
     if (share < 1) stage.least_fall = 0;
+    // Of a start in motion there are hundreds of directions: where parameters stand matters little,
+    // for what they change is fitted along, and updated derivatives lead near for some runs.
+    stage.rough = std::ranges::any_of(
+        fitted.problems, [](const auto& problem) { return problem->start == StartKind::unknown; });
     for (size_t n = 0; n < fitted.parts.size(); ++n) {
       PooledPart& part = fitted.parts[n];
       part.frames = own.parts[n].frames;
@@ -41,6 +45,7 @@ ModelFit fit_on_mesh(const DiagnosisSetup& other, const ModelFit& model,
         part.linear.usable = part.linear.residual.size() == objective.residual_count();
         part.borrowed = true;
       }
+      stage.rough = stage.rough && part.linear.usable;
       if (share < 1) stage.least_fall += kRough * objective.residual_count();
     }
     refine_model(fitted, other, stage, progress);

@@ -22,8 +22,9 @@ std::vector<DiscretisationError> discretisation_errors(const DiagnosisSetup& set
 DiagnosisSetup with_other_mesh(const DiagnosisSetup& setup, const ModelFit& model);
 
 /// The model fitted on another mesh, over growing horizons. It begins with the derivatives of the
-/// model's own mesh, where there are any, which serve for most of the way. `own_only`: what is
-/// shared by recordings stays.
+/// model's own mesh, where there are any, which serve for most of the way; where recordings begin
+/// in motion all the way, and it ends near the optimum. `own_only`: what is shared by recordings
+/// stays.
 ModelFit fit_on_mesh(const DiagnosisSetup& other, const ModelFit& model,
                      const ProgressCallback& progress = {}, bool own_only = false);
 

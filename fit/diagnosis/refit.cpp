@@ -228,6 +228,9 @@ std::vector<ModelFit> fit_with_laws(const DiagnosisSetup& setup, const ModelFit&
 ModelFit fitted_anew(const DiagnosisSetup& setup, const std::vector<Term>& terms,
                      const ProgressCallback& progress) {
   if (setup.inputs.size() != 1) return {};
+  // Of a start in motion there are hundreds of numbers more: minutes, where a fit from a known
+  // model takes seconds.
+  if (setup.inputs.front().recording.start == StartKind::unknown) return {};
   FitOptions options = options_with(setup, terms, 0);
   options.mesh_columns = setup.columns;
   options.mesh_rows = setup.rows;

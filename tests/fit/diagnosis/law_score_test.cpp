@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/QR>
 #include <cmath>
 #include <span>
 #include <string>
@@ -255,6 +256,37 @@ TEST(Discretisation, ExpectsOfTheStepWhatAFinerOneShows) {
   EXPECT_LT((change - 0.875 * error.expected).norm(), 0.05 * error.expected.norm());
   // Half of it is what the direction allows for.
   EXPECT_LT((2 * error.directions.col(0) - error.expected).norm(), 1e-9 * error.expected.norm());
+}
+
+// Of a start in motion the other mesh's fit goes by derivatives that are only updated. What it may
+// stop short of is a change of parameters, which are fitted along with the direction it gives.
+TEST(Discretisation, OfAStartInMotionStopsShortOnlyAlongTheParameters) {
+  FitInput input = synthetic_input({.frames = 28, .held_out_from = 20});
+  input.recording.start = StartKind::unknown;
+  FitOptions options = kOptions;
+  options.start_nodes = 4;
+  const DiagnosisSetup setup{.inputs = {&input, 1}, .options = options, .columns = 13, .rows = 13};
+  ModelFit model = model_at(setup, {}, {named(SyntheticCloth().fabric)});
+  refine_model(model, setup, {}, {});
+  ASSERT_TRUE(model.usable);
+  const DiagnosisSetup other = with_other_mesh(setup, model);
+  ASSERT_EQ(other.columns, 7);
+
+  const ModelFit there = fit_on_mesh(other, model);
+
+  ASSERT_TRUE(there.usable);
+  ModelFit optimum = there;
+  optimum.parts.front().linear = {};
+  refine_model(optimum, other, {}, {});
+  ASSERT_TRUE(optimum.usable);
+  linearise_model(optimum);
+  const Eigen::VectorXd direction = there.residual() - model.residual();
+  const Eigen::VectorXd short_of = there.residual() - optimum.residual();
+  const Eigen::MatrixXd& jacobian = optimum.parts.front().linear.residual_by_coordinate;
+  const Eigen::VectorXd along = jacobian * jacobian.colPivHouseholderQr().solve(short_of);
+  EXPECT_LT((short_of - along).norm(), 0.2 * direction.norm());
+  EXPECT_LT((short_of - along).norm(), 0.4 * short_of.norm());
+  EXPECT_LT(there.residual().squaredNorm(), 1.5 * optimum.residual().squaredNorm());
 }
 
 // Where nothing is missing the amounts are those of noise, and a fit keeps its directions.

@@ -48,6 +48,14 @@ TEST(FittedAnew, IsOfOneRecording) {
   EXPECT_FALSE(fitted_anew(setup, {}, {}).usable);
 }
 
+TEST(FittedAnew, IsOfAKnownStart) {
+  FitInput input = synthetic_input({});
+  input.recording.start = StartKind::unknown;
+  const DiagnosisSetup setup{.inputs = {&input, 1}, .options = kOptions, .columns = 9, .rows = 9};
+
+  EXPECT_FALSE(fitted_anew(setup, {}, {}).usable);
+}
+
 TEST(WithTerms, HandsOnWhatTheModelIsExpectedToErrBy) {
   const SyntheticCloth cloth;
   const FitInput input = synthetic_input(cloth);
