@@ -30,7 +30,7 @@ caption { text-align: left; color: var(--soft); padding: 0 0 .4rem; }
 th, td { padding: .32rem .7rem .32rem 0; text-align: left; vertical-align: top; }
 thead th { border-bottom: 1.5px solid var(--ink); font-weight: 600; vertical-align: bottom; }
 tbody td, tbody th { border-bottom: 1px solid var(--rule); font-weight: 400; }
-.number { text-align: right; } td.number, tbody th { white-space: nowrap; }
+.number { text-align: right; } td.number, td.brief, tbody th { white-space: nowrap; }
 td:last-child, th:last-child { padding-right: 0; }
 .matrix { width: auto; } .matrix td, .matrix th { padding: .25rem .45rem; }
 .matrix thead th { writing-mode: vertical-rl; transform: rotate(180deg); text-align: left; border-bottom: 0; border-top: 1.5px solid var(--ink); padding: .45rem .25rem; }
@@ -93,11 +93,17 @@ std::string typeset_number(const std::string& text) {
 }
 
 std::string html_table(const Table& table, const std::string& caption) {
-  std::vector<bool> number(table.header.size(), true);
+  constexpr std::size_t kBrief = 28;  // letters: a rate with its bounds stays on a line
+  std::vector<bool> number(table.header.size(), true), brief(table.header.size(), true);
   for (const std::vector<std::string>& row : table.rows) {
-    for (std::size_t c = 0; c < row.size(); ++c) number[c] = number[c] && shows_number(row[c]);
+    for (std::size_t c = 0; c < row.size(); ++c) {
+      number[c] = number[c] && shows_number(row[c]);
+      brief[c] = brief[c] && row[c].size() <= kBrief;
+    }
   }
-  const auto mark = [&](std::size_t c) { return number[c] ? " class=\"number\"" : ""; };
+  const auto mark = [&](std::size_t c) {
+    return number[c] ? " class=\"number\"" : brief[c] ? " class=\"brief\"" : "";
+  };
 
   std::string html = "<div class=\"wide\"><table>";
   if (!caption.empty()) html += "<caption>" + escape_xml(caption) + "</caption>";

@@ -169,23 +169,29 @@ Table undeclared_effects_table(const UndeclaredResult& result) {
 }
 
 Table short_undeclared_effects_table(const UndeclaredResult& result) {
-  Table table{
-      .header = {"hidden", "trials", "not drawn", "right first (95 %)", "all named", "unexplained",
-                 "partly", "law halves", "class", "found / true", "within 2 sigma",
-                 "before / noise", "after / noise", "after / true model", "s"},
-      .rows = {}};
-  for (const UndeclaredSummary& row : undeclared_summaries(result))
+  const std::vector<UndeclaredSummary> summaries = undeclared_summaries(result);
+  Table table{.header = {"hidden", "trials", "not drawn", "right first (95 %)", "all named",
+                         "unexplained", "partly", "class", "found / true", "within 2 sigma",
+                         "before / noise", "after / noise", "after / true model", "s"},
+              .rows = {}};
+  for (const UndeclaredSummary& row : summaries)
     table.rows.push_back({row.title, std::to_string(row.right_first.trials),
                           std::to_string(row.refused), rate_text(row.right_first),
                           percent(row.all_named.share()), std::to_string(row.unexplained),
-                          std::to_string(row.partly),
-                          row.law_halves.trials > 0
-                              ? fmt::format("{} of {}", row.law_halves.hits, row.law_halves.trials)
-                              : "-",
-                          significant(row.class_size.value(), 2),
+                          std::to_string(row.partly), significant(row.class_size.value(), 2),
                           ratio_text(row.amplitude_ratio.value()), percent(row.covered.share()),
                           ratio_text(row.before_noise.value()), ratio_text(row.over_noise.value()),
                           ratio_text(row.over_truth.value()), significant(row.seconds.value(), 2)});
+  // Of all trials, the last line.
+  if (summaries.empty() || summaries.back().law_halves.trials == 0) return table;
+  constexpr std::ptrdiff_t kBehindPartly = 7;
+  table.header.insert(table.header.begin() + kBehindPartly, "law halves");
+  for (std::size_t n = 0; n < summaries.size(); ++n) {
+    const Rate& halves = summaries[n].law_halves;
+    table.rows[n].insert(
+        table.rows[n].begin() + kBehindPartly,
+        halves.trials > 0 ? fmt::format("{} of {}", halves.hits, halves.trials) : "-");
+  }
   return table;
 }
 
