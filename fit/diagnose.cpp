@@ -37,6 +37,11 @@ ModelFit on_analysed_mesh(ModelFit own, DiagnosisSetup& setup, const ProgressCal
   ModelFit finer = fitted_anew(other, {}, progress);
   if (!finer.usable) {
     finer = fit_on_mesh(other, own, progress);
+    if (finer.usable && finer.rough) {
+      // Optima are compared, not what updated derivatives stop short of.
+      for (PooledPart& part : finer.parts) part.linear = {};
+      refine_model(finer, other, {}, progress);
+    }
     if (finer.usable) linearise_model(finer);
   }
   const double least_gain = kClearlyLess * static_cast<double>(own.residual_count());
