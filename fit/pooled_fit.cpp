@@ -84,6 +84,12 @@ class Pool {
     return all;
   }
   double cost() const { return cost_; }
+  /// Chi-square per residual, where it is more than one.
+  double scatter() const {
+    Eigen::Index count = 0;
+    for (const PooledPart& part : parts_) count += part.linear.residual.size();
+    return std::max(1.0, 2 * cost_ / static_cast<double>(count));
+  }
   bool is_linearised() const {
     return std::ranges::all_of(parts_, [](const PooledPart& part) { return part.linear.usable; });
   }
@@ -334,7 +340,7 @@ PooledFit fit_pooled(std::span<const FitProblem* const> problems, std::vector<Po
       const Eigen::VectorXd way = next - x;
       const double foreseen = space.foreseen_fall(here, way);
       const double moved = looked_at(way);
-      if (step.allFinite() && foreseen < options.least_fall) {
+      if (step.allFinite() && foreseen < options.least_fall * pool.scatter()) {
         settled = true;
         break;
       }

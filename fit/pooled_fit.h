@@ -38,7 +38,9 @@ struct PooledOptions {
   int iterations = 60;       ///< in all, without steps that were refused
   int rounds = 6;            ///< each with time steps and loss chosen anew, until one hardly moves
   double least_step = 1e-7;  ///< it ends when no shared coordinate moves further,
-  double least_fall = 0;     ///< or the next step promises no more of the cost
+  /// or the next step promises no more of the cost than this, times chi-square per residual where
+  /// that is above one: the more is left, the less sure is any parameter.
+  double least_fall = 0;
   double stability_margin = 1.5;
   Loss loss = Loss::squared;
   /// Exact derivatives are had anew, updated, or kept, as in a refinement (RefineOptions).

@@ -9,8 +9,13 @@ struct Law {
   static constexpr int kParameters = Harmonic::kParameters;
 
   template <class Real>
-  static Vector3<Real> force(const VertexSight<Real>& at, const Harmonic::Parameters<Real>& p) {
-    return -at.mass_kg * Harmonic::sine(p, at.time_s) * Harmonic::amplitude(p);
+  static Vector3<Real> at_moment(const Harmonic::Parameters<Real>& p, double time_s) {
+    return Harmonic::vector(p, time_s);
+  }
+
+  template <class Real>
+  static Vector3<Real> force(const VertexSight<Real>& at, const Vector3<Real>& frame_m_per_s2) {
+    return -at.mass_kg * frame_m_per_s2;
   }
 
   static EffectRates rates(const Cloth&, const SpringParameters&, const std::vector<double>&) {

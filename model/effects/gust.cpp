@@ -9,10 +9,14 @@ struct Law {
   static constexpr int kParameters = Harmonic::kParameters;
 
   template <class Real>
-  static Vector3<Real> force(const VertexSight<Real>& at, const Harmonic::Parameters<Real>& p) {
+  static Vector3<Real> at_moment(const Harmonic::Parameters<Real>& p, double time_s) {
+    return Harmonic::vector(p, time_s);
+  }
+
+  template <class Real>
+  static Vector3<Real> force(const VertexSight<Real>& at, const Vector3<Real>& pressure_pa) {
     // A vertex whose surface is folded to nothing catches no wind.
-    return Harmonic::sine(p, at.time_s) * dot(at.area_m2, Harmonic::amplitude(p)) *
-           direction(at.area_m2);
+    return dot(at.area_m2, pressure_pa) * direction(at.area_m2);
   }
 
   /// A force that follows the surface's attitude alone adds stiffness of the order of q times a

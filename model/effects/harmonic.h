@@ -20,13 +20,8 @@ struct Harmonic {
   using Parameters = std::array<Real, kParameters>;
 
   template <class Real>
-  static Vector3<Real> amplitude(const Parameters<Real>& p) {
-    return {p[0], p[1], p[2]};
-  }
-
-  template <class Real>
-  static Real sine(const Parameters<Real>& p, double time_s) {
-    return sine_of_turns(p[3] * Real(time_s) + p[4]);
+  static Vector3<Real> vector(const Parameters<Real>& p, double time_s) {
+    return sine_of_turns(p[3] * Real(time_s) + p[4]) * Vector3<Real>{p[0], p[1], p[2]};
   }
 
   static std::vector<EffectParameter> parameters(const EffectParameter& amplitude) {

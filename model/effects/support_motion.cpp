@@ -11,7 +11,7 @@ struct Law {
   template <class Real>
   static Vector3<Real> shift(const SupportSight<Real>& at, const Harmonic::Parameters<Real>& p,
                              std::array<Real, 0>&) {
-    return (Harmonic::sine(p, at.end_time_s) - Harmonic::sine(p, 0)) * Harmonic::amplitude(p);
+    return Harmonic::vector(p, at.end_time_s) - Harmonic::vector(p, 0);
   }
 
   static EffectRates rates(const Cloth&, const SpringParameters&, const std::vector<double>&) {

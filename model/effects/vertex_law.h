@@ -189,11 +189,24 @@ struct MassDual {
   }
 };
 
+/// What a law's parameters come to at a moment, the same for all vertices: what the law makes of
+/// them, or themselves.
+template <class Law, class Real, size_t count>
+auto at_moment(const std::array<Real, count>& parameters, double time_s) {
+  if constexpr (requires { Law::at_moment(parameters, time_s); })
+    return Law::at_moment(parameters, time_s);
+  else
+    return parameters;
+}
+
 /// An effect whose force on a vertex follows from what is seen there. A Law has
 ///   static constexpr int kParameters;
 ///   template <class Real> static Vector3<Real> force(const VertexSight<Real>&,
 ///                                                    const std::array<Real, kParameters>&);  // N
 ///   static EffectRates rates(const Cloth&, const SpringParameters&, const std::vector<double>&);
+/// Where the parameters act through something that changes with time alone, it may have that too,
+/// which `force` is then given in their place:
+///   template <class Real> static T at_moment(const std::array<Real, kParameters>&, double time_s);
 /// Lanes, tangents and the adjoint follow from these.
 template <class Law>
 class VertexLawEffect final : public LawEffect<VertexLawEffect<Law>, Law> {
@@ -201,7 +214,7 @@ class VertexLawEffect final : public LawEffect<VertexLawEffect<Law>, Law> {
   template <class L>
   static void add(const EffectScene<L>& scene, const EffectValues<L>& parameters, EffectMemory<L>&,
                   LaneVectors<L>& force_n) {
-    const auto p = reals_of<L, Law::kParameters>(parameters);
+    const auto p = at_moment<Law>(reals_of<L, Law::kParameters>(parameters), scene.time_s);
     for_vertices<L>(scene, [&](int k, const AreaStencil&, const VertexSight<RealOf<L>>& sight) {
       add_at<L>(force_n, k, Law::force(sight, p));
     });
@@ -211,8 +224,9 @@ class VertexLawEffect final : public LawEffect<VertexLawEffect<Law>, Law> {
                        const EffectValues<SingleLane>& parameters, const EffectMemory<SingleLane>&,
                        EffectLinearisation& derivatives) const override {
     using Dual = VertexDual<0, Law::kParameters>;
-    const auto p = Dual::parameters_of(parameters);
-    const auto fixed = MassDual::parameters_of<Law::kParameters>(parameters);
+    const auto p = at_moment<Law>(Dual::parameters_of(parameters), scene.time_s);
+    const auto fixed =
+        at_moment<Law>(MassDual::parameters_of<Law::kParameters>(parameters), scene.time_s);
     for_vertices<SingleLane>(
         scene, [&](int k, const AreaStencil& area, const VertexSight<double>& sight) {
           Dual::add_blocks(k, area, scene.position_m,
