@@ -12,7 +12,6 @@
 
 #include "fit/measurement_effects/applicability.h"
 #include "fit/measurement_effects/registry.h"
-#include "model/effects/harmonic.h"
 #include "model/effects/registry.h"
 
 namespace clothfit {
@@ -156,12 +155,6 @@ std::vector<Columns> derivatives_of_each(const ModelFit& model, std::span<const 
     }
   }
   return result;
-}
-
-bool is_harmonic(const Term& law) {
-  const EffectDescription effect = describe_effect(law.effect);
-  const auto own = std::ranges::find(effect.laws, law.law, &EffectLaw::name);
-  return own != effect.laws.end() && Harmonic::is_followed_by(*own);
 }
 
 }  // namespace

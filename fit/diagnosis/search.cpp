@@ -180,7 +180,7 @@ class Search {
     prune(best);
     if (stopped_) return cancelled();
     // Of laws that are not in the model, over all frames.
-    if (best.last.empty()) best.last = roughly_scored(best.model, untested(best.model));
+    if (best.last.empty()) best.last = scored(best.model, untested(best.model));
     if (stopped_) return cancelled();
     result.model = std::move(best.model);
     result.accepted = std::move(best.accepted);
@@ -204,14 +204,31 @@ class Search {
     return worth_naming(model, threshold_, base_chi_square_ - model.chi_square(threshold_));
   }
 
-  /// Scores of all laws, each at its best shape, on the grid and then beside it, with the
-  /// derivatives of a coarser mesh.
-  std::vector<LawScore> roughly_scored(const ModelFit& model,
+  /// Scores of all laws, each at its best shape. Harmonics are many and differ by when they act:
+  /// a coarser mesh chooses where among them is looked. A place on the cloth it may get wrong
+  /// altogether.
+  std::vector<LawScore> scored(const ModelFit& model, std::vector<LawShapes> laws) const {
+    const ModelProjection projection(model, setup_.options.loss);
+    if (coarse_.columns < setup_.columns || coarse_.rows < setup_.rows) {
+      std::vector<LawShapes> harmonics;
+      for (const LawShapes& law : laws)
+        if (is_harmonic(law.front())) harmonics.push_back(law);
+      const ModelFit rough = with_derivatives_of(coarse_, model);
+      if (rough.usable) {
+        const ModelProjection rough_projection(rough, setup_.options.loss);
+        const std::vector<LawScore> chosen = at_best_shapes(rough, rough_projection, harmonics);
+        for (LawShapes& law : laws)
+          for (const LawScore& score : chosen)
+            if (score.term.same_law(law.front())) law = {score.term};
+      }
+    }
+    return at_best_shapes(model, projection, laws);
+  }
+
+  /// On the grid and then beside it.
+  std::vector<LawScore> at_best_shapes(const ModelFit& model, const ModelProjection& projection,
                                        const std::vector<LawShapes>& laws) const {
-    ModelFit rough = with_derivatives_of(coarse_, model);
-    const ModelFit& by = rough.usable ? rough : model;
-    const ModelProjection projection(by, setup_.options.loss);
-    std::vector<LawScore> scores = score_laws(by, projection, laws, progress_);
+    std::vector<LawScore> scores = score_laws(model, projection, laws, progress_);
     // Between the grid's points a law may explain several times as much.
     constexpr double kSome = 0.25, kParts[] = {0.5, 0.25};
     for (const double part : kParts) {
@@ -221,7 +238,7 @@ class Search {
       for (const LawScore& score : scores)
         if (score.fall > kSome * most && !score.term.shape.empty())
           around.push_back(shapes_around(score.term, part));
-      for (LawScore& moved : score_laws(by, projection, around, progress_)) {
+      for (LawScore& moved : score_laws(model, projection, around, progress_)) {
         LawScore& same = *std::ranges::find_if(
             scores, [&](const LawScore& known) { return known.term.same_law(moved.term); });
         if (moved.fall > same.fall) same = std::move(moved);
@@ -277,27 +294,29 @@ class Search {
     for (size_t k = 0; k < shorter.size(); ++k) {
       const ModelFit& at = shorter[k];
       if (k == 0) {
-        list.scores = roughly_scored(at, untested(model));
-        if (stopped_) return {};
-        list.best = list.scores;
-      }
-      std::vector<LawShapes> laws;
-      for (const LawScore& score : list.best) laws.push_back({score.term});
-      std::vector<LawScore> scores =
-          score_laws(at, ModelProjection(at, setup_.options.loss), laws, progress_);
-      if (stopped_) return {};
-      for (LawScore& score : scores) {
-        LawScore& same = *std::ranges::find_if(
-            list.best, [&](const LawScore& known) { return known.term.same_law(score.term); });
-        const double share = (k > 0 ? same.share : 0) + score.share / horizons;
-        if (k == 0 || score.fall > same.fall) {
+        list.best = scored(at, untested(model));
+        for (LawScore& score : list.best) {
+          score.share /= horizons;
           if (list.share < 1) score.columns.clear();
-          same = std::move(score);
         }
-        same.share = share;
+        list.scores = without_columns(list.best);
+      } else {
+        std::vector<LawShapes> laws;
+        for (const LawScore& score : list.best) laws.push_back({score.term});
+        for (LawScore& score :
+             score_laws(at, ModelProjection(at, setup_.options.loss), laws, progress_)) {
+          LawScore& same = *std::ranges::find_if(
+              list.best, [&](const LawScore& known) { return known.term.same_law(score.term); });
+          const double share = same.share + score.share / horizons;
+          if (score.fall > same.fall) {
+            score.columns.clear();
+            same = std::move(score);
+          }
+          same.share = share;
+        }
+        std::ranges::stable_sort(list.best, std::greater<>(), &LawScore::share);
       }
-      std::ranges::stable_sort(list.best, std::greater<>(), &LawScore::share);
-      if (k == 0) list.scores = without_columns(list.best);
+      if (stopped_) return {};
       const size_t best = std::min(list.best.size(), static_cast<size_t>(2 * options_.refits));
       list.best.erase(list.best.begin() + static_cast<std::ptrdiff_t>(best), list.best.end());
     }

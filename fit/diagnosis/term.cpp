@@ -6,6 +6,7 @@
 #include "data/input_error.h"
 #include "fit/held_tracks.h"
 #include "fit/measurement_effects/registry.h"
+#include "model/effects/harmonic.h"
 #include "model/effects/registry.h"
 
 namespace clothfit {
@@ -111,6 +112,12 @@ FitInput with_terms(FitInput input, const std::vector<Term>& terms) {
     for (const std::string& amplitude : term.amplitudes) effect->parameters.erase(amplitude);
   }
   return input;
+}
+
+bool is_harmonic(const Term& law) {
+  const EffectDescription effect = describe_effect(law.effect);
+  const auto own = std::ranges::find(effect.laws, law.law, &EffectLaw::name);
+  return own != effect.laws.end() && Harmonic::is_followed_by(*own);
 }
 
 LawShapes shapes_around(const Term& term, double part) {

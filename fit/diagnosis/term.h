@@ -38,6 +38,9 @@ EffectDescription describe_effect(const std::string& name);
 /// One law with every shape that it is tested with: the same term but for its shape.
 using LawShapes = std::vector<Term>;
 
+/// Whether a law is a sine of time, which says when it acts and not where (Harmonic).
+bool is_harmonic(const Term& law);
+
 /// The term at shapes around its own: each number of it moved either way by a part of the grid's
 /// spacing, as far as its range allows.
 LawShapes shapes_around(const Term& term, double part);

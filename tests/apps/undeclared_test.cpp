@@ -13,6 +13,8 @@
 #include "apps/study/undeclared_summary.h"
 #include "data/input_error.h"
 #include "fit/diagnosis/law_derivatives.h"
+#include "fit/measurement_effects/registry.h"
+#include "model/effects/registry.h"
 #include "tests/apps/scratch_folder.h"
 
 namespace clothfit {
@@ -266,6 +268,42 @@ TEST(Undeclared, AcceptsNothingInACleanRecording) {
   ASSERT_TRUE(trial.usable()) << trial.message;
   EXPECT_TRUE(trial.right_first());
   EXPECT_EQ(trial.verdict, DiagnosisVerdict::adequate);
+}
+
+/// Every effect but one.
+std::vector<std::string> all_but(const std::string& effect) {
+  std::vector<std::string> others;
+  for (const EffectEntry& entry : effect_registry()) others.push_back(entry.name);
+  for (const MeasurementEffectEntry& entry : measurement_effect_registry())
+    others.push_back(entry.name);
+  std::erase(others, effect);
+  return others;
+}
+
+TEST(Undeclared, FindsAPlaceThatACoarserMeshDoesNotShow) {
+  // Stiffer by a tenth around a place between those that are tried: by the derivatives of 9 x 9
+  // vertices it explains nothing.
+  SyntheticScene scene;
+  scene.truth_mesh = 17;
+  scene.markers = 9;
+  scene.noise_m = 0.5e-3;
+  scene.hidden = {{"nonuniform_stiffness", {0.1, 0.433, 0.202, 0.232, 0, 0.1, 0, 0}}};
+  const unsigned long long seed = 1;
+  SCOPED_TRACE("seed " + std::to_string(seed));
+  const SyntheticRecording recording = make_synthetic_recording(scene, seed);
+  DiagnoseOptions options{.fit = small_fit()};
+  options.fit.mesh_columns = options.fit.mesh_rows = 17;
+  options.without = all_but("nonuniform_stiffness");
+  options.law_terms = 0;
+
+  const Diagnosis diagnosis = diagnose(recording.input, options, {});
+
+  ASSERT_TRUE(diagnosis.usable()) << diagnosis.message;
+  ASSERT_EQ(diagnosis.accepted.size(), 1u);
+  const Term& found = diagnosis.accepted.front().trial.term;
+  EXPECT_EQ(found.title(), "nonuniform_stiffness (patch)");
+  EXPECT_NEAR(found.shape.at("patch_s"), 0.433, 0.1);
+  EXPECT_NEAR(found.shape.at("patch_t"), 0.202, 0.1);
 }
 
 TEST(Undeclared, GoesOnFromItsJournalToTheSameNumbers) {
