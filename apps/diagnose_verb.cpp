@@ -128,10 +128,12 @@ void print_result(const Diagnosis& diagnosis, const fs::path& folder) {
     fmt::print("{}\n", text_table(table.header, table.rows));
   };
   fmt::print("\n{}\n\n", diagnosis_sentence(diagnosis));
+  if (diagnosis.seen_elsewhere)
+    fmt::print("Markers seen elsewhere: {}\n", seen_elsewhere_text(*diagnosis.seen_elsewhere));
   for (const AcceptedEffect& accepted : diagnosis.accepted)
     fmt::print("{}: {}\n", accepted.trial.term.title(),
                found_text(accepted.trial.term, diagnosis.found().result));
-  if (!diagnosis.accepted.empty()) fmt::print("\n");
+  if (diagnosis.changed()) fmt::print("\n");
   print(before_after_table(diagnosis));
   if (diagnosis.law.found()) {
     fmt::print("A law for what remains:\n{}\n\n", diagnosis.law.formula);

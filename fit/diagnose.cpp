@@ -174,73 +174,175 @@ class Run {
     return options;
   }
 
+  /// The recordings as one set of options has them fitted.
+  struct Analysis {
+    Analysis(std::span<const FitInput> inputs, FitOptions fit_options)
+        : options(std::move(fit_options)), setup{.inputs = inputs, .options = options} {}
+    Analysis(const Analysis&) = delete;
+    Analysis& operator=(const Analysis&) = delete;
+
+    FitOptions options;
+    DiagnosisSetup setup;  ///< on the mesh that is analysed
+    FitReport first;       ///< a fit of the first recording alone, on its own mesh
+    ModelFit base;
+    SearchOptions search;
+    LawSearch found;
+
+    bool is_on_own_mesh() const {
+      return setup.columns == first.result.mesh_columns && setup.rows == first.result.mesh_rows;
+    }
+  };
+
   void diagnose_all() {
-    FitReport first = fit(fitted_.front(), options_.fit, progress_);
-    result_.stop = first.stop;
-    result_.message = first.message;
-    if (!first.usable()) return;
-    const DiagnosisSetup declared{.inputs = fitted_,
-                                  .options = options_.fit,
-                                  .columns = first.result.mesh_columns,
-                                  .rows = first.result.mesh_rows};
-    ModelFit base = base_model(declared, first);
-    if (!usable(base, "the derivatives at the optimum could not be computed")) return;
-    DiagnosisSetup setup = declared;
-    base = on_analysed_mesh(std::move(base), setup, progress_);
-    refine_with_discretisation(base, setup, progress_);
-    if (!usable(base, "the fit went astray where it was to be refined")) return;
-    result_.columns = setup.columns;
-    result_.rows = setup.rows;
-    // A fit of its own says more of how sure it is.
-    if (fitted_.size() == 1 && setup.columns == declared.columns && setup.rows == declared.rows)
-      result_.recordings.front().before = std::move(first);
-    else if (!report_fitted(setup, base, &DiagnosedRecording::before))
+    Analysis declared(fitted_, options_.fit);
+    if (const std::string why_not = fit_base(declared); cancelled_ || !why_not.empty()) {
+      give_up(declared.first.usable() ? FitStop::diverged : declared.first.stop, why_not);
       return;
-    if (!report_held_out(setup, base, &DiagnosedRecording::before)) return;
-    result_.before = judge_adequacy(base, options_.fit.loss);
+    }
+    result_.stop = declared.first.stop;
+    result_.message = declared.first.message;
+    result_.columns = declared.setup.columns;
+    result_.rows = declared.setup.rows;
+    // A fit of its own says more of how sure it is.
+    if (fitted_.size() == 1 && declared.is_on_own_mesh())
+      result_.recordings.front().before = std::move(declared.first);
+    else if (!report_fitted(declared.setup, declared.base, &DiagnosedRecording::before))
+      return;
+    if (!report_held_out(declared.setup, declared.base, &DiagnosedRecording::before)) return;
+    result_.before = judge_adequacy(declared.base, options_.fit.loss);
 
-    const SearchOptions search{.laws = laws(*base.problems.front()),
-                               .lines = options_.lines,
-                               .refits = options_.refits,
-                               .most_effects = static_cast<size_t>(options_.most_effects),
-                               .threshold = threshold(base)};
-    LawSearch found = search_laws(setup, base, search, progress_);
+    search_for_laws(declared);
     if (cancelled_) return;
-    result_.score_frames = frames_of_share(*base.problems.front(), found.first_share);
-    result_.scores = std::move(found.first);
+    const double share = declared.found.first_share;
+    result_.score_frames = frames_of_share(*declared.base.problems.front(), share);
+    result_.scores = std::move(declared.found.first);
     // Over few frames, where the cloth's answer to a missing force is still small.
-    ModelFit early = shortened(base, std::max(found.first_share, kForceShare));
-    refine_model(early, setup, {.rounds = 1}, progress_);
+    ModelFit early = shortened(declared.base, std::max(share, kForceShare));
+    refine_model(early, declared.setup, {.rounds = 1}, progress_);
     if (cancelled_) return;
-    result_.residual_force = residual_force(early.usable ? early : base);
+    result_.residual_force = residual_force(early.usable ? early : declared.base);
 
-    result_.accepted = std::move(found.accepted);
-    result_.refused = std::move(found.refused);
-    result_.after = judge_adequacy(found.model, options_.fit.loss);
-    const double explained =
-        base.chi_square(search.threshold) - found.model.chi_square(search.threshold);
-    const double worth = worth_naming(found.model, search.threshold, explained);
+    std::optional<Analysis> mended;
+    result_.seen_elsewhere = offsets_to_try(declared);
+    if (result_.seen_elsewhere) {
+      FitOptions with_offsets = options_.fit;
+      with_offsets.marker_offset_sigma_m = result_.seen_elsewhere->rms_m;
+      mended.emplace(fitted_, with_offsets);
+      if (!mend(*mended)) {
+        mended.reset();
+        result_.seen_elsewhere.reset();
+      }
+    }
+    if (!cancelled_) conclude(mended ? *mended : declared);
+  }
+
+  /// Why there is none; empty if there is.
+  std::string fit_base(Analysis& analysis) {
+    analysis.first = fit(fitted_.front(), analysis.options, progress_);
+    if (!analysis.first.usable()) return analysis.first.message;
+    analysis.setup.columns = analysis.first.result.mesh_columns;
+    analysis.setup.rows = analysis.first.result.mesh_rows;
+    ModelFit base = base_model(analysis.setup, analysis.first);
+    if (!base.usable) return "the derivatives at the optimum could not be computed";
+    base = on_analysed_mesh(std::move(base), analysis.setup, progress_);
+    refine_with_discretisation(base, analysis.setup, progress_);
+    if (!base.usable) return "the fit went astray where it was to be refined";
+    analysis.base = std::move(base);
+    return "";
+  }
+
+  void search_for_laws(Analysis& analysis) {
+    analysis.search = {.laws = laws(*analysis.base.problems.front()),
+                       .lines = options_.lines,
+                       .refits = options_.refits,
+                       .most_effects = static_cast<size_t>(options_.most_effects),
+                       .threshold = threshold(analysis.base)};
+    analysis.found = search_laws(analysis.setup, analysis.base, analysis.search, progress_);
+  }
+
+  /// The constants that markers are off by, where nothing explains all and these would mend a good
+  /// part of the rest on blocks that are left out.
+  std::optional<SeenElsewhere> offsets_to_try(const Analysis& analysis) const {
+    constexpr double kGoodPart = 0.25;
+    const ModelFit& model = analysis.found.model;
+    const bool in_space = std::ranges::all_of(model.problems, [](const auto& problem) {
+      return problem->observations.front().dimension == 3;
+    });
+    if (!in_space || options_.fit.marker_offset_sigma_m > 0 ||
+        judge_adequacy(model, options_.fit.loss).adequate)
+      return std::nullopt;
+    const CrossValidation left_out =
+        cross_validate(analysis.setup, model, kTimeBlocks, analysis.search.threshold);
+    if (!left_out.usable ||
+        left_out.mean - left_out.constant_offset < kGoodPart * (left_out.mean - 1))
+      return std::nullopt;
+    return SeenElsewhere{.rms_m = mean_residual_rms_m(),
+                         .cross_validated = left_out.constant_offset,
+                         .without_it = left_out.mean};
+  }
+
+  /// Of the markers' mean residuals in the fitted frames, per coordinate, by the model as declared.
+  double mean_residual_rms_m() const {
+    double squares = 0;
+    Eigen::Index count = 0;
+    for (size_t n = 0; n < fitted_.size(); ++n) {
+      std::map<int, std::pair<Eigen::Vector3d, int>> of_marker;
+      for (const FitReport::Residuals::Row& row :
+           result_.recordings[n].before.residuals.front().rows) {
+        if (row.held_out) continue;
+        auto& [sum, rows] =
+            of_marker.try_emplace(row.marker, Eigen::Vector3d::Zero(), 0).first->second;
+        sum += row.observed - row.predicted;
+        ++rows;
+      }
+      for (const auto& [marker, of] : of_marker) squares += (of.first / of.second).squaredNorm();
+      count += 3 * static_cast<Eigen::Index>(of_marker.size());
+    }
+    return std::sqrt(squares / static_cast<double>(std::max<Eigen::Index>(1, count)));
+  }
+
+  /// Fits and searches anew beside such constants. False where that does not work out.
+  bool mend(Analysis& analysis) {
+    if (!fit_base(analysis).empty() || cancelled_) return false;
+    search_for_laws(analysis);
+    if (cancelled_) return false;
+    const CrossValidation left_out = cross_validate(analysis.setup, analysis.found.model,
+                                                    kTimeBlocks, analysis.search.threshold);
+    return left_out.usable && left_out.mean < result_.seen_elsewhere->without_it;
+  }
+
+  /// Reports what was found, and what else would have been.
+  void conclude(Analysis& analysis) {
+    const ModelFit& model = analysis.found.model;
+    result_.columns = analysis.setup.columns;
+    result_.rows = analysis.setup.rows;
+    result_.accepted = std::move(analysis.found.accepted);
+    result_.refused = std::move(analysis.found.refused);
+    result_.after = judge_adequacy(model, options_.fit.loss);
+    const double explained = analysis.base.chi_square(analysis.search.threshold) -
+                             model.chi_square(analysis.search.threshold);
+    const double worth = worth_naming(model, analysis.search.threshold, explained);
     result_.limits = limits_of(
-        found.last,
+        analysis.found.last,
         std::max(5 * std::sqrt(std::max(1.0, result_.after.chi_square_per_dof)), std::sqrt(worth)));
     const bool adequate = result_.after.adequate;
-    if (result_.accepted.empty()) {
+    if (!result_.changed()) {
       for (DiagnosedRecording& recording : result_.recordings) recording.after = recording.before;
       result_.verdict = adequate ? DiagnosisVerdict::adequate : DiagnosisVerdict::unexplained;
     } else {
-      if (!report_model(setup, found.model, &DiagnosedRecording::after)) return;
+      if (!report_model(analysis.setup, model, &DiagnosedRecording::after)) return;
       result_.verdict = adequate ? DiagnosisVerdict::explained : DiagnosisVerdict::partly_explained;
     }
-    search_all_twins(setup, found.model, search);
+    search_all_twins(analysis.setup, model, analysis.search);
     if (cancelled_ || adequate || options_.law_terms == 0) return;
-    result_.law = propose_law(setup, found.model,
+    result_.law = propose_law(analysis.setup, model,
                               {.most_terms = options_.law_terms,
                                .blocks = kTimeBlocks,
                                .without = options_.without,
-                               .threshold = search.threshold},
+                               .threshold = analysis.search.threshold},
                               progress_);
     if (cancelled_ || !result_.law.found()) return;
-    report_model(setup, result_.law.model, &DiagnosedRecording::with_law);
+    report_model(analysis.setup, result_.law.model, &DiagnosedRecording::with_law);
   }
 
   /// Fitted to all recordings, linearised. `first`: a fit of the first of them alone.
@@ -363,10 +465,6 @@ class Run {
                                             : std::numeric_limits<double>::infinity();
   }
 
-  bool usable(const ModelFit& model, const std::string& otherwise) {
-    if (cancelled_ || model.usable) return !cancelled_;
-    return give_up(FitStop::diverged, otherwise);
-  }
   bool give_up(FitStop stop, const std::string& message) {
     result_.stop = stop;
     result_.message = message;

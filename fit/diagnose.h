@@ -31,9 +31,9 @@ struct DiagnoseOptions {
 
 enum class DiagnosisVerdict {
   adequate,          ///< nothing is missing that this recording could show
-  explained,         ///< effects were accepted, and what is left looks like noise
-  partly_explained,  ///< effects were accepted, and structure remains
-  unexplained        ///< structure, and no effect that explains it
+  explained,         ///< something was accepted, and what is left looks like noise
+  partly_explained,  ///< something was accepted, and structure remains
+  unexplained        ///< structure, and nothing that explains it
 };
 std::string to_string(DiagnosisVerdict verdict);
 
@@ -56,6 +56,13 @@ struct DiagnosedRecording {
   FitReport before, after, with_law;
 };
 
+/// Constants by which markers are seen beside where the model has them (fit/marker_offsets.h).
+struct SeenElsewhere {
+  double rms_m = 0;  ///< of a coordinate: how far, and the standard deviation of their prior
+  /// Chi-square per number left out (fit/diagnosis/cross_validation.h), with them and without.
+  double cross_validated = 0, without_it = 0;
+};
+
 struct Diagnosis {
   FitStop stop = FitStop::converged;
   std::string message;
@@ -64,9 +71,11 @@ struct Diagnosis {
   /// analysed (report_at). Of a single recording on its own mesh `before` is its own fit.
   std::vector<DiagnosedRecording> recordings;
   Adequacy before, after;
-  std::vector<LawScore> scores;          ///< of the base model, the most telling first
-  int columns = 0, rows = 0;             ///< of the mesh that was analysed
-  int score_frames = 0;                  ///< horizon of these, of the first recording
+  std::vector<LawScore> scores;  ///< of the base model, the most telling first
+  int columns = 0, rows = 0;     ///< of the mesh that was analysed
+  int score_frames = 0;          ///< horizon of these, of the first recording
+  /// Where no law did as well as constants for the markers: what follows was found beside them.
+  std::optional<SeenElsewhere> seen_elsewhere;
   std::vector<AcceptedEffect> accepted;  ///< in the order in which they were
   std::vector<LawTrial> refused;         ///< the last round's
   std::vector<DetectionLimit> limits;
@@ -77,6 +86,8 @@ struct Diagnosis {
   ProposedLaw law;               ///< for what is left, where that has structure
   double seconds = 0;
   bool usable() const { return stop != FitStop::cancelled && stop != FitStop::diverged; }
+  /// Whether the model found is another one than the one declared.
+  bool changed() const { return seen_elsewhere.has_value() || !accepted.empty(); }
   /// The first recording's. There is one.
   const FitReport& base() const { return recordings.front().before; }
   const FitReport& found() const { return recordings.front().after; }

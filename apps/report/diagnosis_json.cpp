@@ -87,6 +87,10 @@ void write_diagnosis(const Diagnosis& diagnosis, const std::string& command,
                     {"held_out_recordings", names(true)},
                     {"verdict", to_string(diagnosis.verdict)},
                     {"seconds", diagnosis.seconds}};
+  if (const auto& seen = diagnosis.seen_elsewhere)
+    json["seen_elsewhere"] = {{"rms_m", seen->rms_m},
+                              {"cross_validated", seen->cross_validated},
+                              {"cross_validated_before", seen->without_it}};
   json["accepted"] = ordered_json::array();
   for (const AcceptedEffect& accepted : diagnosis.accepted) {
     ordered_json one = trial_json(accepted.trial);

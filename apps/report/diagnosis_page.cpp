@@ -25,6 +25,7 @@ std::string names_text(const Diagnosis& diagnosis) {
 
 std::string effects_text(const Diagnosis& diagnosis) {
   std::string text;
+  if (diagnosis.seen_elsewhere) text = "constants by which its markers are seen elsewhere";
   for (const AcceptedEffect& accepted : diagnosis.accepted)
     text += (text.empty() ? "" : ", then ") + accepted.trial.term.title();
   return text;
@@ -97,6 +98,21 @@ std::string before_after_text(const Diagnosis& diagnosis) {
 
 std::string what_was_missing(const Diagnosis& diagnosis) {
   std::string content;
+  if (diagnosis.seen_elsewhere) {
+    const SeenElsewhere& seen = *diagnosis.seen_elsewhere;
+    content += "<h3>Markers seen elsewhere</h3>\n";
+    content += paragraph(
+        "Each marker is seen beside where the model has it by about a constant: it sits elsewhere "
+        "on the cloth, the tracker misplaces it, or the cloth rests in folds that no parameter "
+        "describes. No law explains as much, and the constants found in the fitted frames are "
+        "added wherever else the cloth is foreseen.");
+    content += fmt::format("<p class=\"found\"><strong>{}</strong></p>\n",
+                           escape_xml(seen_elsewhere_text(seen)));
+    content += paragraph(fmt::format(
+        "Blocks of time that were left out in turn are predicted with a chi-square of {} per "
+        "number with constants from the others, {} without.",
+        significant(seen.cross_validated, 4), significant(seen.without_it, 4)));
+  }
   for (const AcceptedEffect& accepted : diagnosis.accepted) {
     const LawTrial& trial = accepted.trial;
     content += fmt::format("<h3>{}</h3>\n", escape_xml(trial.term.title()));
@@ -152,7 +168,7 @@ std::string maps_of(const DiagnosedRecording& of, bool changed, const Recording&
 
 /// Of one recording open, of several each behind its name.
 std::string maps(const Diagnosis& diagnosis, std::span<const Recording> recordings) {
-  const bool changed = !diagnosis.accepted.empty();
+  const bool changed = diagnosis.changed();
   if (recordings.size() == 1)
     return maps_of(diagnosis.recordings.front(), changed, recordings.front());
   std::string content;

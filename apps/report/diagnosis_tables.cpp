@@ -162,6 +162,11 @@ Table adequacy_table(const Diagnosis& diagnosis) {
   return table;
 }
 
+std::string seen_elsewhere_text(const SeenElsewhere& seen) {
+  return fmt::format("a constant for each, {} mm in the mean (rms of a coordinate)",
+                     significant(1e3 * seen.rms_m, 3));
+}
+
 std::string found_text(const Term& term, const FitResult& result) {
   std::string text;
   const auto add = [&](const ParameterEstimate& parameter) {

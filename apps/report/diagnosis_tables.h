@@ -42,4 +42,7 @@ Table adequacy_table(const Diagnosis& diagnosis);
 /// "q_x 0.05, q_y 0.21 Pa (frequency 2 Hz)": values that a fit found for a term, with sigma.
 std::string found_text(const Term& term, const FitResult& result);
 
+/// "a constant for each, 8.31 mm in the mean (rms of a coordinate)".
+std::string seen_elsewhere_text(const SeenElsewhere& seen);
+
 }  // namespace clothfit

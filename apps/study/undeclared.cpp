@@ -342,6 +342,11 @@ UndeclaredTrial undeclared_once(const UndeclaredOptions& options, int index, std
   trial.message = diagnosis.message;
   if (!diagnosis.usable()) return trial;
   trial.verdict = diagnosis.verdict;
+  // Never right: no trial hides such a thing.
+  if (diagnosis.seen_elsewhere) {
+    trial.accepted.push_back("markers seen elsewhere");
+    trial.accepted_effects.push_back("markers seen elsewhere");
+  }
   for (const AcceptedEffect& accepted : diagnosis.accepted) {
     trial.accepted.push_back(accepted.trial.term.title());
     trial.accepted_effects.push_back(accepted.trial.term.effect);

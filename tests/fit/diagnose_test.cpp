@@ -4,7 +4,10 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "data/input_error.h"
+#include "fit/draws.h"
 #include "tests/fit/synthetic_cloth.h"
 
 namespace clothfit {
@@ -26,6 +29,7 @@ TEST(Diagnose, NamesAHiddenDragAndItsAmount) {
   ASSERT_EQ(diagnosis.accepted.size(), 1u);
   EXPECT_EQ(diagnosis.accepted.front().trial.term.effect, "viscous_damping");
   EXPECT_EQ(diagnosis.verdict, DiagnosisVerdict::explained);
+  EXPECT_FALSE(diagnosis.seen_elsewhere);
   EXPECT_FALSE(diagnosis.before.adequate);
   ASSERT_EQ(diagnosis.found().result.effects.size(), 1u);
   const ParameterEstimate& rate = diagnosis.found().result.effects.front().parameters.front();
@@ -40,7 +44,7 @@ TEST(Diagnose, FindsNothingWhereNothingIsHiddenAndSaysWhatItWouldHaveSeen) {
   const Diagnosis diagnosis = diagnose(synthetic_input({}), quick(), {});
 
   ASSERT_TRUE(diagnosis.usable()) << diagnosis.message;
-  EXPECT_TRUE(diagnosis.accepted.empty());
+  EXPECT_FALSE(diagnosis.changed());
   EXPECT_EQ(diagnosis.verdict, DiagnosisVerdict::adequate);
   ASSERT_FALSE(diagnosis.limits.empty());
   for (const DetectionLimit& limit : diagnosis.limits)
@@ -48,6 +52,33 @@ TEST(Diagnose, FindsNothingWhereNothingIsHiddenAndSaysWhatItWouldHaveSeen) {
       EXPECT_GT(limit.limit[0], 0);
       EXPECT_LT(limit.limit[0], 0.5);  // 1/s: the drag of the other test is far above it
     }
+}
+
+TEST(Diagnose, SaysThatMarkersAreSeenElsewhereWhereNoLawPutsThemThere) {
+  constexpr double kOff_m = 4e-3;  // a standard deviation, of each coordinate of each marker
+  SyntheticCloth cloth;
+  cloth.seen = [](const SyntheticMotion& motion, double time_s, const Eigen::Vector2d& place_m) {
+    Eigen::Vector3d where = motion(time_s, place_m);
+    Draws draws(5, static_cast<int>(std::lround(1e4 * place_m[0])),
+                static_cast<int>(std::lround(1e4 * place_m[1])));
+    for (double& coordinate : where) coordinate += kOff_m * draws.normal();
+    return where;
+  };
+  DiagnoseOptions options = quick();
+  options.refits = 2;
+  options.lines = 1;
+  const Diagnosis diagnosis = diagnose(synthetic_input(cloth), options, {});
+
+  ASSERT_TRUE(diagnosis.usable()) << diagnosis.message;
+  ASSERT_TRUE(diagnosis.seen_elsewhere);
+  // Of 49 markers' 147 numbers, less what the fit could follow.
+  EXPECT_NEAR(diagnosis.seen_elsewhere->rms_m, kOff_m, 0.2 * kOff_m);
+  EXPECT_TRUE(diagnosis.accepted.empty());
+  EXPECT_EQ(diagnosis.verdict, DiagnosisVerdict::explained);
+  const ObservationErrors& before = diagnosis.base().result.errors.front();
+  const ObservationErrors& after = diagnosis.found().result.errors.front();
+  EXPECT_GT(before.held_out.rms, 4 * before.noise);
+  EXPECT_LT(after.held_out.rms, 1.1 * after.noise);
 }
 
 TEST(Diagnose, DoesNotNameWhatItWasNotToTest) {
