@@ -172,6 +172,7 @@ TangentStepper::TangentStepper(const Cloth& cloth, std::span<const Direction> di
       emerging.memory.row(0) = from.start_memory.transpose().array();
     emerging_.push_back(std::move(emerging));
   }
+  if (!emerging_.empty()) carried_n_ = emerged_last_n_ = force_n_.tangent;
 }
 
 Eigen::VectorXd TangentStepper::emerging_memory(size_t direction) const {
@@ -253,12 +254,45 @@ void TangentStepper::add_effect_forces(const TangentParameters& parameters,
       apply(e, parameters.tangent[g], nullptr, force_n_.tangent[g], state.tangent[g]);
     effect.add_force(scene, parameters.value.effects[e], memory, force_n_.value);
   }
-  for (Emerging& emerging : emerging_) {
+  if (!emerging_.empty()) add_emerging_forces(scene);
+}
+
+void TangentStepper::add_emerging_forces(const EffectScene<SingleLane>& scene) {
+  const auto add_to = [&](Emerging& emerging, std::vector<LaneVectors<>>& tangent) {
     emerged_n_ = force_n_.value;
     emerging.effect->add_force(scene, emerging.parameters, emerging.memory, emerged_n_);
     add_share(emerging.per_change, emerged_n_, force_n_.value, emerging.lane(),
-              force_n_.tangent[emerging.group()]);
+              tangent[emerging.group()]);
+  };
+  // Half a step early rather than late.
+  if (!emerged_once_ || since_emerged_s_ + scene.time_step_s / 2 >= kEmergingInterval_s) {
+    std::swap(carried_n_, emerged_last_n_);
+    for (LaneVectors<>& tangent : emerged_last_n_) tangent.set_zero();
+    for (Emerging& emerging : emerging_)
+      if (!emerging.remembers()) add_to(emerging, emerged_last_n_);
+    // What was had last but one becomes the mean over the steps until the next time, along the line
+    // through both.
+    const double ahead =
+        emerged_once_ ? (since_emerged_s_ - scene.time_step_s) / (2 * since_emerged_s_) : 0;
+    const auto carry_on = [&](auto& before, const auto& last) {
+      before = last + ahead * (last - before);
+    };
+    for (size_t g = 0; g < carried_n_.size(); ++g) {
+      carry_on(carried_n_[g].x, emerged_last_n_[g].x);
+      carry_on(carried_n_[g].y, emerged_last_n_[g].y);
+      carry_on(carried_n_[g].z, emerged_last_n_[g].z);
+    }
+    emerged_once_ = true;
+    since_emerged_s_ = 0;
   }
+  since_emerged_s_ += scene.time_step_s;
+  for (size_t g = 0; g < carried_n_.size(); ++g) {
+    force_n_.tangent[g].x += carried_n_[g].x;
+    force_n_.tangent[g].y += carried_n_[g].y;
+    force_n_.tangent[g].z += carried_n_[g].z;
+  }
+  for (Emerging& emerging : emerging_)
+    if (emerging.remembers()) add_to(emerging, force_n_.tangent);
 }
 
 void TangentStepper::shift_supports(const TangentParameters& parameters,

@@ -14,9 +14,14 @@
 
 namespace clothfit {
 
+/// How long forces of effects that emerge are carried on (EmergingEffect).
+inline constexpr double kEmergingInterval_s = 1e-3;
+
 /// An effect that the cloth does not have, near its neutral values: what it does for a small change
 /// of one parameter, over that change, is how a simulation begins to change. Its own derivatives
-/// are not asked for, so it costs what it costs in one simulation.
+/// are not asked for, so it costs what it costs in one simulation; and where steps are far shorter
+/// than cloth takes to move, a force that depends on nothing remembered is had once in
+/// kEmergingInterval_s and carried on between, to second order in that.
 struct EmergingEffect {
   std::shared_ptr<const Effect> effect;
   std::vector<double> parameters;  ///< neutral, but for the change of one
@@ -92,6 +97,7 @@ class TangentStepper {
     double per_change = 0;
     EffectValues<SingleLane> parameters;
     EffectMemory<SingleLane> memory;
+    bool remembers() const { return memory.cols() > 0; }
 
     size_t group() const { return direction / kLanes; }
     Eigen::Index lane() const { return static_cast<Eigen::Index>(direction % kLanes); }
@@ -99,6 +105,7 @@ class TangentStepper {
 
   void add_effect_forces(const TangentParameters& parameters, const EffectScene<SingleLane>& scene,
                          TangentState& state);
+  void add_emerging_forces(const EffectScene<SingleLane>& scene);
   void shift_supports(const TangentParameters& parameters, const EffectScene<SingleLane>& scene,
                       TangentState& state);
   void change_forces(const TangentParameters& parameters, const EffectScene<SingleLane>& scene,
@@ -124,6 +131,10 @@ class TangentStepper {
   EffectLinearisation derivatives_;
   std::vector<EffectMemory<>> next_memory_;  ///< of each effect
   std::vector<Emerging> emerging_;
+  /// Of each group, what emerges in the steps until it is had again, and when it was had last.
+  std::vector<LaneVectors<>> carried_n_, emerged_last_n_;
+  double since_emerged_s_ = 0;
+  bool emerged_once_ = false;
   LaneVectors<> changed_n_;
   LaneArray<> tension_n_;  ///< changes of what one effect's springs pull with
   LaneVectors<SingleLane> emerged_n_, emerged_target_m_;
