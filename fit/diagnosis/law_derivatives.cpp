@@ -92,13 +92,22 @@ std::vector<Eigen::MatrixXd> derivatives_in(const FitProblem& problem, const Poo
   for (const FitProblem::MeasurementTerm& term : problem.measurement)
     for (const Binding& binding : term.parameters) measured += binding.parameter >= 0 ? 1 : 0;
   std::vector<Batch> batches;
-  // Effects of motion and of the measurement apart: only the former cost derivatives of runs.
-  for (const bool of_measurement : {false, true}) {
-    const int most = of_measurement ? kMeasurementParameters - measured : kMotionAmplitudes;
+  // Effects that only add forces cost least, those of the measurement no derivatives of runs.
+  enum class Kind { adds_forces, changes_runs, measures };
+  const auto kind_of = [](const Term& law) {
+    if (measurement_effect_named(law.effect) != nullptr) return Kind::measures;
+    const std::unique_ptr<Effect> effect = find_effect(law.effect, law.effect).make();
+    return effect->changes_force() || effect->shifts_supports() ? Kind::changes_runs
+                                                                : Kind::adds_forces;
+  };
+  std::vector<Kind> kinds;
+  for (const Term& law : laws) kinds.push_back(kind_of(law));
+  for (const Kind kind : {Kind::adds_forces, Kind::changes_runs, Kind::measures}) {
+    const int most = kind == Kind::measures ? kMeasurementParameters - measured : kMotionAmplitudes;
     bool begun = false;
     for (size_t n = 0; n < laws.size(); ++n) {
+      if (kinds[n] != kind) continue;
       const MeasurementEffectEntry* entry = measurement_effect_named(laws[n].effect);
-      if ((entry != nullptr) != of_measurement) continue;
       if (entry && why_inapplicable(*entry->make(), problem)) continue;
       const auto more = static_cast<int>(laws[n].amplitudes.size());
       if (more > most) continue;

@@ -120,6 +120,12 @@ bool is_harmonic(const Term& law) {
   return own != effect.laws.end() && Harmonic::is_followed_by(*own);
 }
 
+bool is_over_cloth(const Term& law) {
+  const EffectDescription effect = describe_effect(law.effect);
+  const auto own = std::ranges::find(effect.laws, law.law, &EffectLaw::name);
+  return own != effect.laws.end() && std::ranges::any_of(own->shapes, &ShapeGrid::over_cloth);
+}
+
 LawShapes shapes_around(const Term& term, double part) {
   const EffectDescription effect = describe_effect(term.effect);
   LawShapes around;

@@ -38,8 +38,11 @@ EffectDescription describe_effect(const std::string& name);
 /// One law with every shape that it is tested with: the same term but for its shape.
 using LawShapes = std::vector<Term>;
 
-/// Whether a law is a sine of time, which says when it acts and not where (Harmonic).
+/// Whether a law is a sine of time, at any phase (Harmonic).
 bool is_harmonic(const Term& law);
+
+/// Whether a law's shape says where on the cloth it acts.
+bool is_over_cloth(const Term& law);
 
 /// The term at shapes around its own: each number of it moved either way by a part of the grid's
 /// spacing, as far as its range allows.

@@ -43,6 +43,7 @@ struct ShapeGrid {
   std::vector<double> values;  ///< in its unit, or as the two below say
   bool per_duration = false;   ///< frequencies, in units of 1 / duration of the observed motion
   bool of_duration = false;    ///< times since its first frame, as fractions of its duration
+  bool over_cloth = false;     ///< a place or a length on it
 };
 
 /// One law that an effect may follow: data are asked for each law by itself.

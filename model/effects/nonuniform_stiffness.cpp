@@ -90,15 +90,16 @@ EffectDescription describe() {
                      amplitude("edge", 5), place("edge_width", 0.15, 0.05, 0.5),
                      amplitude("gradient_s", 0.9), amplitude("gradient_t", 0.9)},
       .test = EffectTest::profiled,
-      .laws = {{.name = "patch",
-                .amplitudes = {"patch"},
-                .shapes = {{.parameter = "patch_s", .values = {0.2, 0.5, 0.8}},
-                           {.parameter = "patch_t", .values = {0.2, 0.5, 0.8}},
-                           {.parameter = "patch_radius", .values = {0.2, 0.4}}}},
-               {.name = "edge",
-                .amplitudes = {"edge"},
-                .shapes = {{.parameter = "edge_width", .values = {0.1, 0.25}}}},
-               {.name = "gradient", .amplitudes = {"gradient_s", "gradient_t"}, .shapes = {}}}};
+      .laws = {
+          {.name = "patch",
+           .amplitudes = {"patch"},
+           .shapes = {{.parameter = "patch_s", .values = {0.2, 0.5, 0.8}, .over_cloth = true},
+                      {.parameter = "patch_t", .values = {0.2, 0.5, 0.8}, .over_cloth = true},
+                      {.parameter = "patch_radius", .values = {0.2, 0.4}, .over_cloth = true}}},
+          {.name = "edge",
+           .amplitudes = {"edge"},
+           .shapes = {{.parameter = "edge_width", .values = {0.1, 0.25}, .over_cloth = true}}},
+          {.name = "gradient", .amplitudes = {"gradient_s", "gradient_t"}, .shapes = {}}}};
 }
 
 std::unique_ptr<Effect> make() {
