@@ -130,9 +130,12 @@ void print_result(const Diagnosis& diagnosis, const fs::path& folder) {
   fmt::print("\n{}\n\n", diagnosis_sentence(diagnosis));
   if (diagnosis.seen_elsewhere)
     fmt::print("Markers seen elsewhere: {}\n", seen_elsewhere_text(*diagnosis.seen_elsewhere));
-  for (const AcceptedEffect& accepted : diagnosis.accepted)
-    fmt::print("{}: {}\n", accepted.trial.term.title(),
-               found_text(accepted.trial.term, diagnosis.found().result));
+  for (size_t n = 0; n < diagnosis.accepted.size(); ++n) {
+    const Term& term = diagnosis.accepted[n].trial.term;
+    fmt::print("{}: {}\n", term.title(), found_text(term, diagnosis.found().result));
+    if (!diagnosis.separation_of(n).empty())
+      fmt::print("  {}\n", separation_text(term, diagnosis.separation_of(n)));
+  }
   if (diagnosis.changed()) fmt::print("\n");
   print(before_after_table(diagnosis));
   if (diagnosis.law.found()) {

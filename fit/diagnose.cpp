@@ -333,6 +333,10 @@ class Run {
       if (!report_model(analysis.setup, model, &DiagnosedRecording::after)) return;
       result_.verdict = adequate ? DiagnosisVerdict::explained : DiagnosisVerdict::partly_explained;
     }
+    if (options_.separate)
+      result_.separations =
+          separating_recordings(analysis.setup, model, result_.accepted, progress_);
+    if (cancelled_) return;
     search_all_twins(analysis.setup, model, analysis.search);
     if (cancelled_ || adequate || options_.law_terms == 0) return;
     result_.law = propose_law(analysis.setup, model,

@@ -10,6 +10,7 @@
 #include "fit/diagnosis/proposed_law.h"
 #include "fit/diagnosis/residual_force.h"
 #include "fit/diagnosis/search.h"
+#include "fit/diagnosis/separation.h"
 #include "fit/fit.h"
 
 namespace clothfit {
@@ -26,6 +27,7 @@ struct DiagnoseOptions {
   /// each effect, those first that are seen best.
   int plants = 0;
   bool reinject = false;  ///< whether what was found is simulated and searched again
+  bool separate = true;   ///< whether recordings are sought that tell laws apart that are alike
   void validate() const;  ///< throws InputError
 };
 
@@ -77,7 +79,9 @@ struct Diagnosis {
   /// Where no law did as well as constants for the markers: what follows was found beside them.
   std::optional<SeenElsewhere> seen_elsewhere;
   std::vector<AcceptedEffect> accepted;  ///< in the order in which they were
-  std::vector<LawTrial> refused;         ///< the last round's
+  /// Of each accepted effect, what would tell it from each law that is alike; or empty.
+  std::vector<std::vector<Separation>> separations;
+  std::vector<LawTrial> refused;  ///< the last round's
   std::vector<DetectionLimit> limits;
   std::vector<PlantOutcome> plants;  ///< of some of them
   /// What a search finds on twins simulated with what was accepted: nothing, if all is well.
@@ -88,6 +92,11 @@ struct Diagnosis {
   bool usable() const { return stop != FitStop::cancelled && stop != FitStop::diverged; }
   /// Whether the model found is another one than the one declared.
   bool changed() const { return seen_elsewhere.has_value() || !accepted.empty(); }
+  /// Of accepted effect `n`.
+  std::span<const Separation> separation_of(size_t n) const {
+    return n < separations.size() ? std::span<const Separation>(separations[n])
+                                  : std::span<const Separation>();
+  }
   /// The first recording's. There is one.
   const FitReport& base() const { return recordings.front().before; }
   const FitReport& found() const { return recordings.front().after; }

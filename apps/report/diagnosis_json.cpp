@@ -59,6 +59,13 @@ ordered_json found_json(const Term& term, const FitReport& found) {
   return json;
 }
 
+ordered_json separation_json(const Separation& separation) {
+  ordered_json recordings = ordered_json::array();
+  for (const SeparatingRecording& recording : separation.recordings)
+    recordings.push_back({{"what", recording.what}, {"sigmas", recording.sigmas}});
+  return {{"from", separation.from.title()}, {"now", separation.now}, {"recordings", recordings}};
+}
+
 ordered_json adequacy_json(const Adequacy& of) {
   return {{"adequate", of.adequate},
           {"chi_square_per_dof", of.chi_square_per_dof},
@@ -92,7 +99,8 @@ void write_diagnosis(const Diagnosis& diagnosis, const std::string& command,
                               {"cross_validated", seen->cross_validated},
                               {"cross_validated_before", seen->without_it}};
   json["accepted"] = ordered_json::array();
-  for (const AcceptedEffect& accepted : diagnosis.accepted) {
+  for (size_t n = 0; n < diagnosis.accepted.size(); ++n) {
+    const AcceptedEffect& accepted = diagnosis.accepted[n];
     ordered_json one = trial_json(accepted.trial);
     one.erase("refused");
     std::vector<std::string> alike{accepted.trial.term.effect};
@@ -102,6 +110,9 @@ void write_diagnosis(const Diagnosis& diagnosis, const std::string& command,
     one["parameters"] = found_json(accepted.trial.term, diagnosis.found());
     one["instead"] = ordered_json::array();
     for (const LawTrial& trial : accepted.refused) one["instead"].push_back(trial_json(trial));
+    one["separation"] = ordered_json::array();
+    for (const Separation& separation : diagnosis.separation_of(n))
+      one["separation"].push_back(separation_json(separation));
     json["accepted"].push_back(std::move(one));
   }
   json["refused"] = ordered_json::array();

@@ -96,6 +96,18 @@ std::string before_after_text(const Diagnosis& diagnosis) {
   return text + ".";
 }
 
+/// Recordings that would tell an accepted law from others.
+std::string what_to_record(std::span<const Separation> separations) {
+  const Table table = separation_table(separations);
+  if (table.rows.empty()) return "";
+  return paragraph("What to record next: laws are told apart from about five sigma on.") +
+         html_table(table,
+                    "How far this law, as it was found, is from what the other one can do in its "
+                    "place, all else fitted again, in standard deviations of the noise: now, and "
+                    "in recordings that could be made, each by itself, simulated with the model "
+                    "found. The best three that differ in kind; linear, from the derivatives.");
+}
+
 std::string what_was_missing(const Diagnosis& diagnosis) {
   std::string content;
   if (diagnosis.seen_elsewhere) {
@@ -113,7 +125,8 @@ std::string what_was_missing(const Diagnosis& diagnosis) {
         "number with constants from the others, {} without.",
         significant(seen.cross_validated, 4), significant(seen.without_it, 4)));
   }
-  for (const AcceptedEffect& accepted : diagnosis.accepted) {
+  for (size_t n = 0; n < diagnosis.accepted.size(); ++n) {
+    const AcceptedEffect& accepted = diagnosis.accepted[n];
     const LawTrial& trial = accepted.trial;
     content += fmt::format("<h3>{}</h3>\n", escape_xml(trial.term.title()));
     content += paragraph(describe_effect(trial.term.effect).summary + ".");
@@ -131,6 +144,7 @@ std::string what_was_missing(const Diagnosis& diagnosis) {
       std::string names;
       for (const Term& term : accepted.alike) names += (names.empty() ? "" : ", ") + term.title();
       content += paragraph("This recording cannot tell it from: " + names + ".");
+      content += what_to_record(diagnosis.separation_of(n));
     }
   }
   return content;

@@ -20,6 +20,10 @@ std::string shape_text(const Term& term) {
   return text;
 }
 
+std::string sigmas_text(double sigmas) {
+  return fmt::format("{:.{}f}", sigmas, sigmas < 9.95 ? 1 : 0);
+}
+
 /// "q_x 0.05 ± 0.01, q_y ..." with as many digits as sigma allows.
 std::string amounts_text(const LawScore& score) {
   std::string text;
@@ -104,6 +108,33 @@ Table plant_table(const Diagnosis& diagnosis) {
                           parameter->unit, outcome_text(outcome), shape_text(plant.term)});
   }
   return table;
+}
+
+Table separation_table(std::span<const Separation> separations) {
+  Table table{{"law", "now, sigma", "in a recording", "then, sigma"}, {}};
+  for (const Separation& separation : separations)
+    for (const SeparatingRecording& recording : separation.recordings)
+      table.rows.push_back({separation.from.title(), sigmas_text(separation.now), recording.what,
+                            sigmas_text(recording.sigmas)});
+  return table;
+}
+
+std::string separation_text(const Term& accepted, std::span<const Separation> separations) {
+  constexpr double kTold = 5;
+  std::string text;
+  for (const Separation& separation : separations) {
+    text += fmt::format("{}{} ({} sigma", text.empty() ? "" : ", ", separation.from.title(),
+                        sigmas_text(separation.now));
+    if (!separation.recordings.empty()) {
+      const SeparatingRecording& best = separation.recordings.front();
+      text +=
+          best.sigmas < kTold
+              ? fmt::format("; at most {} in recordings that were tried", sigmas_text(best.sigmas))
+              : fmt::format("; {} sigma with: {}", sigmas_text(best.sigmas), best.what);
+    }
+    text += ")";
+  }
+  return accepted.title() + " cannot be told from " + text;
 }
 
 std::vector<ErrorsBeforeAfter> errors_before_after(const Diagnosis& diagnosis) {

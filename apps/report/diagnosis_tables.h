@@ -1,5 +1,7 @@
 #pragma once
 
+#include <span>
+
 #include "apps/report/fit_tables.h"
 #include "fit/diagnose.h"
 
@@ -22,6 +24,13 @@ Table plant_table(const Diagnosis& diagnosis);
 
 /// "named", "not found", or what was found instead.
 std::string outcome_text(const PlantOutcome& outcome);
+
+/// How far an accepted law is from each that is alike, now and in recordings that could be made.
+Table separation_table(std::span<const Separation> separations);
+
+/// "gravity_tilt cannot be told from world_tilt (0.0 sigma; 29 sigma with: twice as long)": the
+/// best recording for each law.
+std::string separation_text(const Term& accepted, std::span<const Separation> separations);
 
 /// Errors of one kind of observation of one recording, with the model as declared and as it was
 /// found.

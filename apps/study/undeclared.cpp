@@ -331,6 +331,7 @@ UndeclaredTrial undeclared_once(const UndeclaredOptions& options, int index, std
   UndeclaredOptions own = options;
   own.diagnosis.fit.seed = seed;
   own.diagnosis.fit.threads = 1;  // trials run side by side
+  own.diagnosis.separate = false;
   if (withheld)
     own.diagnosis.without.push_back(laws.front().effect);
   else

@@ -1,0 +1,345 @@
+#include "fit/diagnosis/separation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <utility>
+
+#include "fit/diagnosis/candidate_recording.h"
+#include "fit/diagnosis/discretisation.h"
+#include "fit/diagnosis/law_derivatives.h"
+#include "fit/diagnosis/projection.h"
+#include "fit/diagnosis/refit.h"
+#include "fit/parameterised_model.h"
+#include "model/stability.h"
+
+namespace clothfit {
+namespace {
+
+constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+constexpr size_t kKept = 3;  ///< recordings that are named
+
+/// Laws whose amplitudes together are one that a refit may turn to.
+using Refit = std::vector<Term>;
+
+/// The law at its shape and beside it; a harmonic at any phase.
+std::vector<Refit> refits_of(const Term& law) {
+  constexpr double kPart = 0.5;
+  LawShapes shapes = shapes_around(law, kPart);
+  shapes.insert(shapes.begin(), law);
+  if (!is_harmonic(law)) {
+    std::vector<Refit> refits;
+    for (const Term& shape : shapes) refits.push_back({shape});
+    return refits;
+  }
+  std::map<double, Refit> by_frequency;
+  for (const Term& shape : shapes) {
+    Refit& phases = by_frequency[shape.shape.at("frequency")];
+    if (!phases.empty()) continue;
+    for (const double phase : {0.0, 0.25}) {
+      phases.push_back(shape);
+      phases.back().shape["phase"] = phase;
+    }
+  }
+  std::vector<Refit> refits;
+  for (auto& [frequency, phases] : by_frequency) refits.push_back(std::move(phases));
+  return refits;
+}
+
+/// The parameters of a term in a problem's space: amplitudes, and shapes where they are fitted.
+std::vector<int> parameters_of(const Term& term, const ParameterSpace& space) {
+  std::vector<std::string> names = term.parameters();
+  if (term.fits_shape)
+    for (const auto& [name, value] : term.shape) names.push_back(term.effect + "." + name);
+  std::vector<int> parameters;
+  for (const std::string& name : names)
+    if (const int p = space.index(name); p >= 0) parameters.push_back(p);
+  return parameters;
+}
+
+/// The model as if it did not have a law, near where it stands with it.
+ModelFit without(ModelFit model, const Term& law) {
+  for (size_t n = 0; n < model.parts.size(); ++n)
+    for (const int p : parameters_of(law, model.problems[n]->space))
+      model.parts[n].linear.residual_by_coordinate.col(p).setZero();
+  return model;
+}
+
+/// What a law's amplitudes do to the residuals, D_a a: a column of each recording.
+Columns change_by(const ModelFit& model, const Term& law) {
+  const EffectDescription effect = describe_effect(law.effect);
+  Columns change;
+  for (size_t n = 0; n < model.parts.size(); ++n) {
+    const PooledPart& part = model.parts[n];
+    const ParameterSpace& space = model.problems[n]->space;
+    const Eigen::VectorXd slope = space.value_by_coordinate(part.values);
+    change.emplace_back(Eigen::MatrixXd::Zero(part.linear.residual.size(), 1));
+    for (const std::string& name : law.amplitudes) {
+      const int p = space.index(law.effect + "." + name);
+      if (p < 0) continue;
+      const double neutral =
+          std::ranges::find(effect.parameters, name, &EffectParameter::name)->neutral;
+      change.back() +=
+          (part.values[p] - neutral) / slope[p] * part.linear.residual_by_coordinate.col(p);
+    }
+  }
+  return change;
+}
+
+/// A law of the model, and one that may do the same.
+struct Pair {
+  size_t accepted = 0;
+  Term law, other;
+  std::vector<Refit> refits;  ///< of the other one
+};
+
+struct Distance {
+  double sigmas = kNone;
+  Refit nearest;  ///< of the other law; none where it cannot act
+};
+
+/// Of each pair: law_distance().
+std::vector<Distance> distances(const ModelFit& model, const std::vector<Pair>& pairs) {
+  std::vector<Term> laws;
+  for (const Pair& pair : pairs)
+    for (const Refit& refit : pair.refits) laws.insert(laws.end(), refit.begin(), refit.end());
+  const std::vector<Columns> columns = law_derivatives(model, laws);
+  std::vector<Distance> result;
+  std::optional<ModelProjection> projection;
+  Eigen::VectorXd change;
+  size_t next = 0;
+  for (size_t k = 0; k < pairs.size(); ++k) {
+    if (k == 0 || pairs[k].accepted != pairs[k - 1].accepted) {
+      // Noise is as it is stated: the number is one of the recording and not of its residuals.
+      projection.emplace(without(model, pairs[k].law), Loss::squared);
+      change = projection->columns(change_by(model, pairs[k].law));
+    }
+    Distance& distance = result.emplace_back();
+    for (const Refit& refit : pairs[k].refits) {
+      Eigen::MatrixXd can(change.size(), 0);
+      for (size_t n = 0; n < refit.size(); ++n, ++next) {
+        if (columns[next].empty()) continue;
+        const Eigen::MatrixXd own = projection->columns(columns[next]);
+        can.conservativeResize(Eigen::NoChange, can.cols() + own.cols());
+        can.rightCols(own.cols()) = own;
+      }
+      if (can.cols() == 0) continue;
+      const double left = 1 - squared_multiple_correlation(change, can);
+      const double sigmas = std::sqrt(std::max(0.0, left)) * change.norm();
+      if (!(sigmas >= distance.sigmas)) distance = {.sigmas = sigmas, .nearest = refit};
+    }
+  }
+  return result;
+}
+
+/// The pairs with the refits that have been found nearest, where any was.
+std::vector<Pair> narrowed(std::vector<Pair> pairs, const std::vector<Distance>& known) {
+  for (size_t k = 0; k < known.size(); ++k)
+    if (!known[k].nearest.empty()) pairs[k].refits = {known[k].nearest};
+  return pairs;
+}
+
+/// How a recording errs on another mesh, as discretisation_errors() has it: fitted there to what is
+/// seen here, with updated derivatives. Nothing where that does not run.
+std::optional<Eigen::VectorXd> mesh_direction(FitProblem other, const ModelFit& own) {
+  const PooledPart& here = own.parts.front();
+  const int cells = own.problems.front()->cloth.mesh.columns - 1;
+  const double factor = other.cloth.mesh.columns - 1 < cells ? 1.0 / 3 : 4.0 / 3;
+  other.observations = own.problems.front()->observations;
+  PooledPart part{.values = values_of(other, own.values().front()),
+                  .frames = here.frames,
+                  .linear = {},
+                  .correction = {},
+                  .directions = {},
+                  .amounts = {}};
+  part.steps = stable_time_steps(other.cloth, parameter_set(other, part.values))
+                   .times(1 / PooledOptions().stability_margin);
+  const TrajectoryObjective objective(other, part.frames, part.steps);
+  part.linear.residual = objective.residuals({part.values}).front();
+  part.linear.residual_by_coordinate = here.linear.residual_by_coordinate;
+  part.linear.usable = part.linear.residual.size() == here.linear.residual.size();
+  part.borrowed = true;
+  if (!part.linear.usable) return std::nullopt;
+  const FitProblem* problem = &other;
+  const PooledFit fitted = fit_pooled({&problem, 1}, {part},
+                                      {.iterations = 12,
+                                       .rounds = 1,
+                                       .least_fall = kRough * objective.residual_count(),
+                                       .kept_within = 0.02,
+                                       .updated_within = 0.1,
+                                       .rough = true},
+                                      {});
+  if (!fitted.usable) return std::nullopt;
+  return factor * fitted.parts.front().linear.residual;
+}
+
+/// The model found in a candidate recording. Not usable where it does not run. `other`: the first
+/// recording on the other mesh; null where that is not asked.
+ModelFit in_candidate(const CandidateRecording& candidate, const ModelFit& model,
+                      const FitProblem* other) {
+  const PooledPart& found = model.parts.front();
+  ModelFit result{.terms = model.terms, .problems = {}, .parts = {}};
+  FitProblem problem = *model.problems.front();
+  candidate.change(problem);
+  if (!observe(problem, found.values, found.steps)) return result;
+  result.parts.push_back({.values = found.values,
+                          .frames = problem.first_held_out,
+                          .steps = found.steps,
+                          .linear = {},
+                          .correction = {},
+                          .directions = {},
+                          .amounts = {}});
+  result.problems.push_back(std::make_shared<const FitProblem>(std::move(problem)));
+  linearise_model(result);
+  if (!result.usable) return result;
+
+  PooledPart& part = result.parts.front();
+  const Eigen::VectorXd& residual = part.linear.residual;
+  std::vector<Eigen::VectorXd> directions;
+  // The step's, half of what it is expected to be off by; as far as the model itself has it.
+  if (found.correction.size() > 0) {
+    const TrajectoryObjective half(*result.problems.front(), part.frames, part.steps.times(0.5));
+    const Eigen::VectorXd there = half.residuals({part.values}).front();
+    if (there.size() == residual.size()) directions.emplace_back(there - residual);
+  }
+  if (other != nullptr) {
+    FitProblem changed = *other;
+    candidate.change(changed);
+    if (auto direction = mesh_direction(std::move(changed), result))
+      directions.push_back(std::move(*direction));
+  }
+  part.directions.resize(residual.size(), static_cast<Eigen::Index>(directions.size()));
+  for (size_t k = 0; k < directions.size(); ++k)
+    part.directions.col(static_cast<Eigen::Index>(k)) = directions[k];
+  return result;
+}
+
+/// The model where it stands on a mesh of half the cells a side, where that is another one.
+std::optional<ModelFit> on_coarse_mesh(const DiagnosisSetup& setup, const ModelFit& model) {
+  constexpr int kSmallest = 9;
+  if (setup.options.spring_set != SpringSet::fabric) return std::nullopt;
+  DiagnosisSetup coarse = setup;
+  coarse.inputs = setup.inputs.first(1);
+  for (int* count : {&coarse.columns, &coarse.rows})
+    *count =
+        std::min(*count, std::max({kSmallest, setup.options.start_nodes + 1, (*count + 1) / 2}));
+  if (coarse.columns == setup.columns && coarse.rows == setup.rows) return std::nullopt;
+  return model_at(coarse, model.terms, {model.values().front()});
+}
+
+/// The first recording on the mesh that the model's directions are taken from; none where it has no
+/// direction of a mesh.
+std::optional<FitProblem> on_other_mesh(const DiagnosisSetup& setup, const ModelFit& model) {
+  const PooledPart& first = model.parts.front();
+  const Eigen::Index of_step = first.correction.size() > 0 ? 1 : 0;
+  if (first.directions.cols() <= of_step) return std::nullopt;
+  DiagnosisSetup other = with_other_mesh(setup, model);
+  other.inputs = setup.inputs.first(1);
+  return *problems_of(other, model.terms).front();
+}
+
+/// Of one candidate, how far the laws of each pair are apart; empty where it does not run.
+struct Recorded {
+  const CandidateRecording* candidate = nullptr;
+  std::vector<Distance> distances;
+};
+
+/// Of those that ran, by how far apart a pair is: the best of each kind, so that who cannot do one
+/// thing is told of another; as many as are kept.
+std::vector<const Recorded*> best_of(const std::vector<Recorded>& all, size_t pair) {
+  std::vector<const Recorded*> sorted, best;
+  for (const Recorded& one : all)
+    if (!one.distances.empty() && std::isfinite(one.distances[pair].sigmas)) sorted.push_back(&one);
+  std::ranges::stable_sort(sorted, std::greater<>(),
+                           [&](const Recorded* one) { return one->distances[pair].sigmas; });
+  for (const Recorded* one : sorted) {
+    const bool known = std::ranges::any_of(best, [&](const Recorded* better) {
+      return better->candidate->kind == one->candidate->kind;
+    });
+    if (!known && best.size() < kKept) best.push_back(one);
+  }
+  return best;
+}
+
+}  // namespace
+
+double law_distance(const ModelFit& model, const Term& law, const Term& other) {
+  return distances(model, {{.law = law, .other = other, .refits = refits_of(other)}})
+      .front()
+      .sigmas;
+}
+
+std::vector<std::vector<Separation>> separating_recordings(
+    const DiagnosisSetup& setup, const ModelFit& model, const std::vector<AcceptedEffect>& accepted,
+    const ProgressCallback& progress) {
+  std::vector<Pair> pairs;
+  for (size_t k = 0; k < accepted.size(); ++k)
+    for (const Term& other : accepted[k].alike)
+      if (std::ranges::none_of(model.terms, [&](const Term& own) { return own.same_law(other); }))
+        pairs.push_back({.accepted = k,
+                         .law = accepted[k].trial.term,
+                         .other = other,
+                         .refits = refits_of(other)});
+  if (pairs.empty()) return {};
+
+  // A coarser mesh chooses which refits and recordings are looked at, for a sixteenth of the work.
+  std::optional<ModelFit> coarse = on_coarse_mesh(setup, model);
+  if (coarse) linearise_model(*coarse);
+  if (coarse && !coarse->usable) coarse.reset();
+  ModelFit present = model;
+  linearise_model(present);
+  if (!present.usable) return {};
+  const std::vector<Distance> now =
+      distances(present, coarse ? narrowed(pairs, distances(*coarse, pairs)) : pairs);
+  const std::vector<CandidateRecording> candidates = candidate_recordings(*model.problems.front());
+  std::vector<Recorded> recorded;
+  for (const CandidateRecording& candidate : candidates)
+    recorded.push_back({.candidate = &candidate, .distances = {}});
+  // False when nobody waits for it.
+  const auto record = [&](const ModelFit& from, const FitProblem* other) {
+    for (size_t n = 0; n < recorded.size(); ++n) {
+      if (progress && !progress({.stage = "recordings that would tell laws apart",
+                                 .done = static_cast<double>(n),
+                                 .total = static_cast<double>(recorded.size()),
+                                 .unit = "recordings",
+                                 .note = ""}))
+        return false;
+      const ModelFit there = in_candidate(*recorded[n].candidate, from, other);
+      recorded[n].distances = there.usable
+                                  ? distances(there, narrowed(pairs, recorded[n].distances))
+                                  : std::vector<Distance>{};
+    }
+    return true;
+  };
+  // Nor is anything fitted on another mesh before it is chosen.
+  const std::optional<FitProblem> other = on_other_mesh(setup, model);
+  if (coarse || other) {
+    if (!record(coarse ? *coarse : model, nullptr)) return {};
+    std::vector<Recorded> chosen;
+    std::set<const Recorded*> best;
+    for (size_t k = 0; k < pairs.size(); ++k)
+      for (const Recorded* one : best_of(recorded, k)) best.insert(one);
+    for (const Recorded& one : recorded)
+      if (best.contains(&one)) chosen.push_back(one);
+    recorded = std::move(chosen);
+  }
+  if (!record(model, other ? &*other : nullptr)) return {};
+
+  std::vector<std::vector<Separation>> result(accepted.size());
+  for (size_t k = 0; k < pairs.size(); ++k) {
+    if (!std::isfinite(now[k].sigmas)) continue;
+    Separation& separation = result[pairs[k].accepted].emplace_back(
+        Separation{.from = pairs[k].other, .now = now[k].sigmas, .recordings = {}});
+    for (const Recorded* best : best_of(recorded, k))
+      separation.recordings.push_back(
+          {.what = best->candidate->what, .sigmas = best->distances[k].sigmas});
+  }
+  return result;
+}
+
+}  // namespace clothfit

@@ -1,0 +1,412 @@
+// How far two laws are apart in a recording, and in others that could be made. Not checked here:
+// the projection it is made of (projection_test.cpp), derivatives of laws (law_score_test.cpp), and
+// which laws a search says are alike (search_test.cpp).
+#include "fit/diagnosis/separation.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <set>
+#include <string>
+#include <utility>
+
+#include "fit/diagnose.h"
+#include "fit/diagnosis/candidate_recording.h"
+#include "fit/parameterised_model.h"
+#include "model/effects/registry.h"
+#include "tests/fit/diagnosis/true_model.h"
+#include "tests/fit/hidden_effect.h"
+#include "tests/fit/synthetic_cloth.h"
+
+namespace clothfit {
+namespace {
+
+FitOptions options_of(ObservationKind observations) {
+  FitOptions options;
+  options.loss = Loss::squared;
+  options.observations = observations;
+  return options;
+}
+
+const std::string kSeed = "seed " + std::to_string(SyntheticCloth().seed);
+
+const FitOptions kInSpace = options_of(ObservationKind::tracks3d);
+const FitOptions kInPixels = options_of(ObservationKind::tracks2d);
+
+DiagnosisSetup setup_of(const FitInput& input, const FitOptions& options) {
+  return {.inputs = {&input, 1}, .options = options, .columns = 9, .rows = 9};
+}
+
+const Term kGravityTilt{.effect = "gravity_tilt", .law = "", .amplitudes = {"about_x", "about_y"}};
+const Term kWorldTilt{.effect = "world_tilt", .law = "", .amplitudes = {"about_x", "about_y"}};
+const Term kGravityScale{.effect = "gravity_scale", .law = "", .amplitudes = {"excess"}};
+const Term kFrameRate{.effect = "frame_rate_error", .law = "", .amplitudes = {"excess"}};
+const Term kWind{.effect = "wind", .law = "pressure", .amplitudes = {"q_x", "q_y", "q_z"}};
+const Term kWindDrag{.effect = "wind", .law = "drag", .amplitudes = {"c"}};
+const Term kGust{.effect = "gust",
+                 .law = "",
+                 .amplitudes = {"q_x", "q_y", "q_z"},
+                 .shape = {{"frequency", 1.5}, {"phase", 0}},
+                 .shape_sigma = {{"frequency", 1.2}, {"phase", 0.125}}};
+
+/// Amplitudes at which each of these is found.
+const NamedValues kFound{{"gravity_tilt.about_x", 0.02},
+                         {"gravity_tilt.about_y", 0.01},
+                         {"gravity_scale.excess", 0.02},
+                         {"wind.q_x", 0.005},
+                         {"wind.q_y", 0.01},
+                         {"viscous_damping.rate", 0.2}};
+
+/// A model that has a law, with the true fabric; linearised.
+ModelFit model_with(const DiagnosisSetup& setup, const std::vector<Term>& terms) {
+  NamedValues values = named(SyntheticCloth().fabric);
+  values.insert(kFound.begin(), kFound.end());
+  ModelFit model = model_at(setup, terms, {values});
+  linearise_model(model);
+  EXPECT_TRUE(model.usable);
+  return model;
+}
+
+/// The model in a candidate, linearised; not usable where that does not run.
+ModelFit in(const CandidateRecording& candidate, const ModelFit& model) {
+  FitProblem problem = *model.problems.front();
+  candidate.change(problem);
+  ModelFit there = model;
+  PooledPart& part = there.parts.front();
+  there.usable = observe(problem, part.values, part.steps);
+  part.frames = problem.first_held_out;
+  there.problems = {std::make_shared<const FitProblem>(std::move(problem))};
+  if (there.usable) linearise_model(there);
+  return there;
+}
+
+/// How far apart two laws are in each candidate of some kinds.
+std::multimap<CandidateKind, double> distances(const ModelFit& model, const Term& law,
+                                               const Term& other,
+                                               const std::set<CandidateKind>& kinds) {
+  std::multimap<CandidateKind, double> result;
+  for (const CandidateRecording& candidate : candidate_recordings(*model.problems.front())) {
+    if (!kinds.contains(candidate.kind)) continue;
+    const ModelFit there = in(candidate, model);
+    EXPECT_TRUE(there.usable) << candidate.what;
+    if (there.usable) result.emplace(candidate.kind, law_distance(there, law, other));
+  }
+  return result;
+}
+
+double best(const std::multimap<CandidateKind, double>& distances, CandidateKind kind) {
+  double most = -std::numeric_limits<double>::infinity();
+  const auto [first, last] = distances.equal_range(kind);
+  for (auto at = first; at != last; ++at) most = std::max(most, at->second);
+  return most;
+}
+
+// By another route: all that is fitted, and a law that the model has too, at its neutral value.
+TEST(LawDistance, IsWhatLeastSquaresLeave) {
+  SCOPED_TRACE(kSeed);
+  const FitInput input = synthetic_input({});
+  const DiagnosisSetup setup = setup_of(input, kInSpace);
+  ModelFit both = model_with(setup, {kWind, drag_term()});
+  PooledPart& part = both.parts.front();
+  const ParameterSpace& space = both.problems.front()->space;
+  part.values[space.index("viscous_damping.rate")] = 0;
+  linearise_model(both);
+  ASSERT_TRUE(both.usable);
+  const Eigen::VectorXd slope = space.value_by_coordinate(part.values);
+  Eigen::VectorXd change = Eigen::VectorXd::Zero(part.linear.residual.size());
+  Eigen::MatrixXd others(change.size(), 0);
+  for (int p = 0; p < space.size(); ++p) {
+    const Eigen::VectorXd own = part.linear.residual_by_coordinate.col(p);
+    if (space.parameters[static_cast<size_t>(p)].name.starts_with("wind.q_")) {
+      change += part.values[p] / slope[p] * own;
+    } else {
+      others.conservativeResize(Eigen::NoChange, others.cols() + 1);
+      others.rightCols(1) = own.normalized();
+    }
+  }
+  const Eigen::VectorXd amount = others.colPivHouseholderQr().solve(change);
+  const double expected = (change - others * amount).norm();
+
+  const double found = law_distance(model_with(setup, {kWind}), kWind, drag_term());
+
+  EXPECT_GT(expected, 1);
+  // Time steps are those of either model's own stability, and a law's derivative is a difference.
+  EXPECT_NEAR(found, expected, 0.01 * expected);
+}
+
+TEST(LawDistance, IsNoneAlongWhatTheDiscretisationMayErrBy) {
+  SCOPED_TRACE(kSeed);
+  const FitInput input = synthetic_input({});
+  ModelFit model = model_with(setup_of(input, kInSpace), {kWind});
+  PooledPart& part = model.parts.front();
+  EXPECT_GT(law_distance(model, kWind, drag_term()), 2);
+
+  const ParameterSpace& space = model.problems.front()->space;
+  const Eigen::VectorXd slope = space.value_by_coordinate(part.values);
+  part.directions = Eigen::MatrixXd::Zero(part.linear.residual.size(), 1);
+  for (const std::string& name : kWind.parameters()) {
+    const int p = space.index(name);
+    part.directions += part.values[p] / slope[p] * part.linear.residual_by_coordinate.col(p);
+  }
+
+  // Of a length v along a direction of standard deviation v are left v / sqrt(1 + v^2).
+  EXPECT_LT(law_distance(model, kWind, drag_term()), 1);
+}
+
+TEST(LawDistance, IsOfNoLawThatCannotAct) {
+  SCOPED_TRACE(kSeed);
+  const FitInput input = synthetic_input({});
+  const Term focal{.effect = "focal_error", .law = "", .amplitudes = {"excess"}};
+  const ModelFit model = model_with(setup_of(input, kInSpace), {kWind});
+
+  EXPECT_TRUE(std::isnan(law_distance(model, kWind, focal)));
+}
+
+// A turn of gravity is one of all that is measured, and a wrong frame rate another gravity, where
+// the fabric is free: in whatever is let go from supports that stand still.
+TEST(Candidates, TellWhatIsTheSameByConstructionOnlyWhereSupportsMove) {
+  SCOPED_TRACE(kSeed);
+  const FitInput input = synthetic_input({});
+  struct Case {
+    Term law, other;
+    double same;  ///< sigmas: the scheme's own error of first order is another one
+  };
+  for (const Case& of :
+       {Case{kGravityTilt, kWorldTilt, 1e-3}, Case{kGravityScale, kFrameRate, 1}}) {
+    SCOPED_TRACE(of.law.title());
+    const ModelFit model = model_with(setup_of(input, kInSpace), {of.law});
+    EXPECT_GT(law_distance(model, of.law, drag_term()), 5);
+    EXPECT_LT(law_distance(model, of.law, of.other), of.same);
+
+    const std::set<CandidateKind> still{CandidateKind::duration, CandidateKind::frame_rate,
+                                        CandidateKind::attitude, CandidateKind::turned};
+    std::set<CandidateKind> all = still;
+    all.insert(CandidateKind::shaken);
+    const std::multimap<CandidateKind, double> then = distances(model, of.law, of.other, all);
+
+    for (const CandidateKind kind : still) {
+      ASSERT_TRUE(then.contains(kind));
+      EXPECT_LT(best(then, kind), of.same) << static_cast<int>(kind);
+    }
+    EXPECT_GT(best(then, CandidateKind::shaken), 10);
+  }
+}
+
+// More is seen of the same run, and nothing more can be adjusted.
+TEST(Candidates, OfMoreFramesOrCamerasTellNoWorse) {
+  SCOPED_TRACE(kSeed);
+  const FitInput input = synthetic_input({});
+  for (const FitOptions* options : {&kInSpace, &kInPixels}) {
+    const bool in_pixels = options == &kInPixels;
+    for (const auto& [law, other] : {std::pair(kWind, kGust), std::pair(kWind, kWindDrag),
+                                     std::pair(drag_term(), kWindDrag)}) {
+      SCOPED_TRACE(law.title() + " and " + other.title() + (in_pixels ? ", pixels" : ""));
+      const ModelFit model = model_with(setup_of(input, *options), {law});
+      const double now = law_distance(model, law, other);
+
+      const std::multimap<CandidateKind, double> then =
+          distances(model, law, other,
+                    {CandidateKind::duration, CandidateKind::frame_rate, CandidateKind::camera});
+
+      constexpr double kRounding = 1 - 1e-6;
+      EXPECT_GT(best(then, CandidateKind::duration), kRounding * now);
+      // Frames between cut time anew.
+      EXPECT_GT(best(then, CandidateKind::frame_rate), 0.99 * now);
+      EXPECT_EQ(then.contains(CandidateKind::camera), in_pixels);
+      if (in_pixels) {
+        EXPECT_GT(best(then, CandidateKind::camera), kRounding * now);
+      }
+    }
+  }
+}
+
+TEST(Candidates, AreSeenWhereTheModelHasThem) {
+  SCOPED_TRACE(kSeed);
+  const FitInput input = synthetic_input({});
+  const ModelFit model = model_with(setup_of(input, kInPixels), {kWind});
+  const auto rows = [](const ModelFit& of) { return of.parts.front().linear.residual.size(); };
+  for (const CandidateRecording& candidate : candidate_recordings(*model.problems.front())) {
+    SCOPED_TRACE(candidate.what);
+    const ModelFit there = in(candidate, model);
+    ASSERT_TRUE(there.usable);
+    // Sums of a simulation with derivatives have other roundings than those of one without.
+    EXPECT_LT(there.parts.front().linear.residual.lpNorm<Eigen::Infinity>(), 1e-6);
+    const int frames = there.parts.front().frames, now = model.parts.front().frames;
+    switch (candidate.kind) {
+      case CandidateKind::duration:
+        EXPECT_EQ(frames, 2 * now);
+        EXPECT_EQ(rows(there), 2 * rows(model));
+        break;
+      case CandidateKind::frame_rate:
+        EXPECT_EQ(frames, 2 * now - 1);
+        break;
+      case CandidateKind::camera:
+        EXPECT_EQ(rows(there), 2 * rows(model));
+        break;
+      default:
+        EXPECT_EQ(frames, now);
+    }
+  }
+}
+
+// The supports stay where they are, and the sheet is the sheet.
+TEST(Candidates, HoldTheClothWhereItWasHeld) {
+  SCOPED_TRACE(kSeed);
+  const FitInput input = synthetic_input({});
+  const ModelFit model = model_with(setup_of(input, kInSpace), {});
+  const FitProblem& now = *model.problems.front();
+  const auto held_at = [](const FitProblem& problem, size_t h) {
+    Eigen::Vector3d place = Eigen::Vector3d::Zero();
+    for (const HeldVertexWeights::Weight& at : problem.cloth.held[h].weights)
+      place += at.weight * problem.placed_sheet_m.col(at.vertex);
+    return place;
+  };
+  std::set<CandidateKind> kinds;
+  for (const CandidateRecording& candidate : candidate_recordings(now)) {
+    SCOPED_TRACE(candidate.what);
+    kinds.insert(candidate.kind);
+    FitProblem then = now;
+    candidate.change(then);
+
+    ASSERT_EQ(then.cloth.held.size(), now.cloth.held.size());
+    for (size_t h = 0; h < now.cloth.held.size(); ++h)
+      EXPECT_LT((held_at(then, h) - held_at(now, h)).norm(), 1e-9);
+    for (const auto& [a, b] : {std::pair(0, 8), std::pair(0, 72), std::pair(8, 72)})
+      EXPECT_NEAR((then.placed_sheet_m.col(a) - then.placed_sheet_m.col(b)).norm(),
+                  (now.placed_sheet_m.col(a) - now.placed_sheet_m.col(b)).norm(), 1e-9);
+  }
+  EXPECT_EQ(kinds.size(), 5u);  // all but a camera
+}
+
+// Held by one point, by none, by its corners; and what may touch something is not turned.
+TEST(Candidates, AreThoseThatCanBeMade) {
+  SCOPED_TRACE(kSeed);
+  const auto kinds_of = [](const FitInput& input, const auto& change) {
+    FitProblem problem = make_problem(input, kInSpace, 9, 9);
+    change(problem);
+    std::set<CandidateKind> kinds;
+    for (const CandidateRecording& candidate : candidate_recordings(problem)) {
+      kinds.insert(candidate.kind);
+      FitProblem changed = problem;
+      candidate.change(changed);
+      EXPECT_TRUE(changed.placed_sheet_m.allFinite()) << candidate.what;
+    }
+    return kinds;
+  };
+  FitInput input = synthetic_input({});
+  const auto nothing = [](FitProblem&) {};
+
+  EXPECT_FALSE(kinds_of(input, [](FitProblem& problem) {
+                 problem.cloth.add_effect("contact_plane", "test");
+                 problem.effects.emplace_back(
+                     problem.cloth.effect_descriptions.back().parameters.size());
+               }).contains(CandidateKind::attitude));
+  input.recording.start = StartKind::at_rest;
+  EXPECT_EQ(kinds_of(input, nothing).count(CandidateKind::attitude), 0u);
+  EXPECT_EQ(kinds_of(input, nothing).count(CandidateKind::shaken), 1u);
+  input.recording.start = StartKind::released_flat;
+  input.recording.held.resize(1);
+  EXPECT_TRUE(kinds_of(input, nothing).contains(CandidateKind::attitude));
+  EXPECT_TRUE(kinds_of(input, nothing).contains(CandidateKind::shaken));
+  input.recording.held = {{.at_m = {0, 0}}, {.at_m = {0.4, 0}}, {.at_m = {0.2, 0.4}}};
+  EXPECT_FALSE(kinds_of(input, nothing).contains(CandidateKind::attitude));
+  input.recording.held.clear();
+  EXPECT_EQ(kinds_of(input, nothing),
+            (std::set{CandidateKind::duration, CandidateKind::frame_rate}));
+}
+
+TEST(SeparatingRecordings, AreTheBestOfEachKindBesideTheNumberOfThePresentOne) {
+  SCOPED_TRACE(kSeed);
+  const FitInput input = synthetic_input({});
+  const DiagnosisSetup setup = setup_of(input, kInSpace);
+  const ModelFit model = model_with(setup, {kGravityScale, drag_term()});
+  const std::vector<AcceptedEffect> accepted{
+      {.trial = {.term = drag_term()}, .alike = {kWindDrag}},
+      {.trial = {.term = kGravityScale}, .alike = {kFrameRate, drag_term()}}};
+
+  const std::vector<std::vector<Separation>> found =
+      separating_recordings(setup, model, accepted, {});
+
+  ASSERT_EQ(found.size(), 2u);
+  for (size_t n = 0; n < 2; ++n) {
+    // Drag is in the model: nothing is to be told from it.
+    ASSERT_EQ(found[n].size(), 1u);
+    const Separation& one = found[n].front();
+    EXPECT_TRUE(one.from.same_law(accepted[n].alike.front()));
+    EXPECT_EQ(one.now, law_distance(model, accepted[n].trial.term, one.from));
+    ASSERT_EQ(one.recordings.size(), 3u);
+    for (size_t k = 1; k < 3; ++k)
+      EXPECT_LE(one.recordings[k].sigmas, one.recordings[k - 1].sigmas);
+    EXPECT_GT(one.recordings.front().sigmas, one.now);
+  }
+  EXPECT_TRUE(found[1].front().recordings.front().what.starts_with("held points shaken"));
+
+  EXPECT_TRUE(
+      separating_recordings(setup, model, {{.trial = {.term = kGravityScale}}}, {}).empty());
+  int calls = 0;
+  EXPECT_TRUE(separating_recordings(setup, model, accepted, [&](const Progress&) {
+                return ++calls < 3;
+              }).empty());
+  EXPECT_EQ(calls, 3);
+}
+
+TEST(SeparatingRecordings, ErrAsTheModelDoes) {
+  SCOPED_TRACE(kSeed);
+  const FitInput input = synthetic_input({});
+  const DiagnosisSetup setup = setup_of(input, kInSpace);
+  const std::vector<AcceptedEffect> accepted{
+      {.trial = {.term = kGravityScale}, .alike = {kFrameRate}}};
+  const ModelFit exact = model_with(setup, {kGravityScale});
+  ModelFit errs = that_may_err(setup, exact);
+  errs.parts.front().correction = Eigen::VectorXd::Zero(exact.residual_count());
+
+  const auto best_of = [&](const ModelFit& model) {
+    return separating_recordings(setup, model, accepted, {})[0][0].recordings[0].sigmas;
+  };
+  const double with = best_of(errs), without = best_of(exact);
+
+  EXPECT_LT(with, 0.9 * without);
+  EXPECT_GT(with, 0.3 * without);
+}
+
+// From the tracks on: what is found cannot be told from another law, and would be if the supports
+// had moved.
+TEST(SeparatingRecordings, AreNamedByADiagnosis) {
+  SCOPED_TRACE(kSeed);
+  DiagnoseOptions options;
+  options.fit.mesh_columns = options.fit.mesh_rows = 9;
+  options.fit.generations = 10;
+  options.fit.population = 40;
+  options.fit.refine_best = 1;
+  options.refits = 3;
+  options.most_effects = 1;
+  options.law_terms = 0;
+  // Few laws are asked, for time's sake.
+  for (const EffectEntry& entry : effect_registry())
+    if (entry.name != kGravityTilt.effect && entry.name != kWind.effect)
+      options.without.push_back(entry.name);
+  const FitInput input =
+      moved_by({.name = "gravity_tilt", .parameters = {{"about_x", {0.01}}, {"about_y", {0.01}}}},
+               synthetic_input({}));
+
+  const Diagnosis diagnosis = diagnose(input, options, {});
+
+  ASSERT_EQ(diagnosis.accepted.size(), 1u);
+  ASSERT_FALSE(diagnosis.separation_of(0).empty());
+  const Separation& one = diagnosis.separation_of(0).front();
+  const std::set<std::string> names{diagnosis.accepted.front().trial.term.effect, one.from.effect};
+  EXPECT_EQ(names, (std::set<std::string>{"gravity_tilt", "world_tilt"}));
+  EXPECT_LT(one.now, 0.1);
+  ASSERT_FALSE(one.recordings.empty());
+  EXPECT_TRUE(one.recordings.front().what.starts_with("held points shaken"))
+      << one.recordings.front().what;
+  EXPECT_GT(one.recordings.front().sigmas, 5);
+  EXPECT_TRUE(diagnosis.separation_of(1).empty());
+}
+
+}  // namespace
+}  // namespace clothfit
