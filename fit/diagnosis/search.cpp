@@ -204,19 +204,20 @@ class Search {
     return worth_naming(model, threshold_, base_chi_square_ - model.chi_square(threshold_));
   }
 
-  /// Scores of all laws, each at its best shape. Harmonics are many and differ by when they act:
-  /// a coarser mesh chooses where among them is looked. A place on the cloth it may get wrong
-  /// altogether.
+  /// Scores of all laws, each at its best shape. A coarser mesh chooses frequencies and other
+  /// shapes, which are many; a place on the cloth it may get wrong altogether, so that all are
+  /// looked at on the mesh itself while nothing has been found yet.
   std::vector<LawScore> scored(const ModelFit& model, std::vector<LawShapes> laws) const {
     const ModelProjection projection(model, setup_.options.loss);
     if (coarse_.columns < setup_.columns || coarse_.rows < setup_.rows) {
-      std::vector<LawShapes> harmonics;
+      std::vector<LawShapes> elsewhere;
       for (const LawShapes& law : laws)
-        if (is_harmonic(law.front())) harmonics.push_back(law);
+        if (law.size() > 1 && (!model.terms.empty() || !is_over_cloth(law.front())))
+          elsewhere.push_back(law);
       const ModelFit rough = with_derivatives_of(coarse_, model);
       if (rough.usable) {
         const ModelProjection rough_projection(rough, setup_.options.loss);
-        const std::vector<LawScore> chosen = at_best_shapes(rough, rough_projection, harmonics);
+        const std::vector<LawScore> chosen = at_best_shapes(rough, rough_projection, elsewhere);
         for (LawShapes& law : laws)
           for (const LawScore& score : chosen)
             if (score.term.same_law(law.front())) law = {score.term};
@@ -225,7 +226,7 @@ class Search {
     return at_best_shapes(model, projection, laws);
   }
 
-  /// On the grid and then beside it.
+  /// Of those given, and then beside them; a law that comes with one shape keeps it.
   std::vector<LawScore> at_best_shapes(const ModelFit& model, const ModelProjection& projection,
                                        const std::vector<LawShapes>& laws) const {
     std::vector<LawScore> scores = score_laws(model, projection, laws, progress_);
@@ -235,9 +236,12 @@ class Search {
       double most = least_fall(1);
       for (const LawScore& score : scores) most = std::max(most, score.fall);
       std::vector<LawShapes> around;
-      for (const LawScore& score : scores)
-        if (score.fall > kSome * most && !score.term.shape.empty())
+      for (const LawScore& score : scores) {
+        const LawShapes& given = *std::ranges::find_if(
+            laws, [&](const LawShapes& law) { return score.term.same_law(law.front()); });
+        if (score.fall > kSome * most && given.size() > 1)
           around.push_back(shapes_around(score.term, part));
+      }
       for (LawScore& moved : score_laws(model, projection, around, progress_)) {
         LawScore& same = *std::ranges::find_if(
             scores, [&](const LawScore& known) { return known.term.same_law(moved.term); });
