@@ -19,6 +19,9 @@ DiagnoseOptions quick() {
   options.fit.generations = 10;
   options.fit.population = 40;
   options.fit.refine_best = 1;
+  options.lines = 1;
+  options.refits = 3;
+  options.separate = false;  // tests/fit/diagnosis/separation_test.cpp
   return options;
 }
 
@@ -64,10 +67,7 @@ TEST(Diagnose, SaysThatMarkersAreSeenElsewhereWhereNoLawPutsThemThere) {
     for (double& coordinate : where) coordinate += kOff_m * draws.normal();
     return where;
   };
-  DiagnoseOptions options = quick();
-  options.refits = 2;
-  options.lines = 1;
-  const Diagnosis diagnosis = diagnose(synthetic_input(cloth), options, {});
+  const Diagnosis diagnosis = diagnose(synthetic_input(cloth), quick(), {});
 
   ASSERT_TRUE(diagnosis.usable()) << diagnosis.message;
   ASSERT_TRUE(diagnosis.seen_elsewhere);
