@@ -5,10 +5,13 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <map>
+#include <numeric>
 #include <utility>
 
+#include "fit/diagnosis/free_forces.h"
 #include "fit/prior_cost.h"
 #include "fit/uncertainty.h"
 
@@ -20,8 +23,11 @@ double huber_square(double length, double threshold) {
   return length <= threshold ? length * length : threshold * (2 * length - threshold);
 }
 
-/// One recording's normal equations over its parameters, then the amounts of its directions, in
-/// all and of each stretch of frames.
+/// Stretches of free forces in each block of time that is left out.
+constexpr int kStretchesInBlock = 2;
+
+/// One recording's normal equations over its parameters, then the amounts of its directions, then
+/// free forces, in all and of each block of time. Without what is known of the forces beforehand.
 struct Normal {
   Eigen::MatrixXd information;
   Eigen::VectorXd gradient;
@@ -32,13 +38,14 @@ struct Normal {
 class Folds {
  public:
   Folds(const DiagnosisSetup& setup, const ModelFit& model, int blocks, double threshold,
-        bool whole)
+        bool whole, FreeForces forces)
       : model_(model),
         problems_(model.problem_pointers()),
         space_(problems_),
         whole_(whole),
         blocks_(whole ? static_cast<int>(model.parts.size()) : blocks),
-        threshold_(threshold) {
+        threshold_(threshold),
+        forces_(std::move(forces)) {
     for (size_t n = 0; n < model.parts.size(); ++n) {
       objectives_.push_back(model.objective(n));
       normals_.push_back(normal_of(n, setup.options.loss));
@@ -51,19 +58,38 @@ class Folds {
                   : row.frame * blocks_ / model_.parts[recording].frames;
   }
   const TrajectoryObjective& objective(size_t recording) const { return objectives_[recording]; }
+  bool has_forces() const { return forces_.usable(); }
 
   /// Residuals of all recordings where block `b` took no part.
   std::vector<Eigen::VectorXd> residuals_without(int b) const {
-    std::vector<Eigen::VectorXd> point(model_.parts.size()), amounts(model_.parts.size());
-    step_without(b, point, amounts);
+    const std::vector<Eigen::VectorXd> ways = ways_without(b, 0);
     std::vector<Eigen::VectorXd> result(model_.parts.size());
     for (size_t n = 0; n < model_.parts.size(); ++n) {
-      result[n] = objectives_[n].residuals({point[n]}).front();
+      const PooledPart& part = model_.parts[n];
+      result[n] = objectives_[n].residuals({values_after(n, ways[n])}).front();
       // Such a step led out of what is stable.
-      if (result[n].size() != objectives_[n].residual_count())
-        result[n] = model_.parts[n].linear.residual;
-      if (model_.parts[n].correction.size() > 0) result[n] += model_.parts[n].correction;
-      if (amounts[n].size() > 0) result[n] += model_.parts[n].directions * amounts[n];
+      if (result[n].size() != objectives_[n].residual_count()) result[n] = part.linear.residual;
+      if (part.correction.size() > 0) result[n] += part.correction;
+      const Eigen::Index amounts = part.amounts.size();
+      if (amounts > 0)
+        result[n] +=
+            part.directions * (part.amounts + ways[n].segment(part.values.size(), amounts));
+    }
+    return result;
+  }
+
+  /// The same to first order and with free forces, of which it is known that they are about
+  /// `sigma_m_per_s2`.
+  std::vector<Eigen::VectorXd> residuals_with_forces_without(int b, double sigma_m_per_s2) const {
+    const std::vector<Eigen::VectorXd> ways = ways_without(b, sigma_m_per_s2);
+    std::vector<Eigen::VectorXd> result(model_.parts.size());
+    for (size_t n = 0; n < model_.parts.size(); ++n) {
+      const PooledPart& part = model_.parts[n];
+      const Eigen::Index fitted = part.values.size(), amounts = part.directions.cols();
+      result[n] = residual_of(part);
+      result[n] += part.linear.residual_by_coordinate * ways[n].head(fitted);
+      if (amounts > 0) result[n] += part.directions * ways[n].segment(fitted, amounts);
+      result[n] += forces_.columns[n] * ways[n].tail(forces_.columns[n].cols());
     }
     return result;
   }
@@ -72,19 +98,22 @@ class Folds {
   Normal normal_of(size_t n, Loss loss) const {
     const PooledPart& part = model_.parts[n];
     const Eigen::VectorXd residual = residual_of(part);
-    const Eigen::VectorXd weight =
+    const Eigen::VectorXd root_weight =
         huber_weights(objectives_[n], residual,
-                      loss == Loss::huber ? threshold_ : std::numeric_limits<double>::infinity());
+                      loss == Loss::huber ? threshold_ : std::numeric_limits<double>::infinity())
+            .cwiseSqrt();
     const Eigen::Index fitted = part.linear.residual_by_coordinate.cols(),
-                       all = fitted + part.directions.cols();
+                       unforced = first_force(n, 0),
+                       all = unforced + (has_forces() ? forces_.columns[n].cols() : 0);
     const PriorCost prior = prior_cost(*problems_[n], part.values);
-    Normal normal{.information = Eigen::MatrixXd::Identity(all, all),
+    Normal normal{.information = Eigen::MatrixXd::Zero(all, all),
                   .gradient = Eigen::VectorXd::Zero(all),
                   .block_information = {},
                   .block_gradient = {}};
+    normal.information.topLeftCorner(unforced, unforced).setIdentity();
     normal.information.topLeftCorner(fitted, fitted) = prior.information;
     normal.gradient.head(fitted) = prior.gradient;
-    if (all > fitted) normal.gradient.tail(all - fitted) = part.amounts;
+    if (unforced > fitted) normal.gradient.segment(fitted, unforced - fitted) = part.amounts;
     const int stretches = whole_ ? 1 : blocks_;
     normal.block_information.assign(static_cast<size_t>(stretches),
                                     Eigen::MatrixXd::Zero(all, all));
@@ -94,22 +123,43 @@ class Folds {
       for (int c = 0; c < block.dimension; ++c)
         rows[whole_ ? 0 : static_cast<size_t>(block_of(n, block))].push_back(block.offset + c);
     for (size_t b = 0; b < rows.size(); ++b) {
+      if (rows[b].empty()) continue;
       Eigen::MatrixXd jacobian(static_cast<Eigen::Index>(rows[b].size()), all);
       jacobian.leftCols(fitted) = part.linear.residual_by_coordinate(rows[b], Eigen::all);
-      if (all > fitted) jacobian.rightCols(all - fitted) = part.directions(rows[b], Eigen::all);
-      const Eigen::MatrixXd weighted = weight(rows[b]).asDiagonal() * jacobian;
-      normal.block_information[b].noalias() = weighted.transpose() * jacobian;
-      normal.block_gradient[b].noalias() = weighted.transpose() * residual(rows[b]);
+      if (unforced > fitted)
+        jacobian.middleCols(fitted, unforced - fitted) = part.directions(rows[b], Eigen::all);
+      if (all > unforced)
+        jacobian.rightCols(all - unforced) = forces_.columns[n](rows[b], Eigen::all);
+      // Forces of later stretches do nothing yet.
+      Eigen::Index acting = all;
+      while (acting > unforced && jacobian.col(acting - 1).isZero(0)) --acting;
+      jacobian = root_weight(rows[b]).asDiagonal() * jacobian.leftCols(acting).eval();
+      const Eigen::VectorXd left = root_weight(rows[b]).cwiseProduct(residual(rows[b]));
+      auto information = normal.block_information[b].topLeftCorner(acting, acting);
+      information.selfadjointView<Eigen::Lower>().rankUpdate(jacobian.transpose());
+      information.triangularView<Eigen::StrictlyUpper>() = information.transpose();
+      normal.block_gradient[b].head(acting).noalias() = jacobian.transpose() * left;
       normal.information += normal.block_information[b];
       normal.gradient += normal.block_gradient[b];
     }
     return normal;
   }
 
-  /// The arrow of all recordings' equations: own unknowns go first, then the shared ones. A whole
-  /// recording that is left out says nothing of the shared ones, and its own ones follow them.
-  void step_without(int b, std::vector<Eigen::VectorXd>& point,
-                    std::vector<Eigen::VectorXd>& amounts) const {
+  /// The stretch of forces whose value is held in block `b`: the last one before it, or the first
+  /// after it.
+  static int held_in(int b) { return b > 0 ? kStretchesInBlock * b - 1 : kStretchesInBlock; }
+
+  /// Where the normal equations have a stretch's forces.
+  Eigen::Index first_force(size_t n, int stretch) const {
+    const PooledPart& part = model_.parts[n];
+    return part.values.size() + part.directions.cols() +
+           static_cast<Eigen::Index>(FreeForces::kInStretch) * stretch;
+  }
+
+  /// How far each recording's unknowns move: the arrow of all recordings' equations. Own unknowns
+  /// go first, then the shared ones. A whole recording that is left out says nothing of the shared
+  /// ones, and its own ones follow them. `sigma_m_per_s2`: of free forces; 0: there are none.
+  std::vector<Eigen::VectorXd> ways_without(int b, double sigma_m_per_s2) const {
     const auto shared = static_cast<Eigen::Index>(space_.shared());
     Eigen::MatrixXd reduced = Eigen::MatrixXd::Zero(shared, shared);
     Eigen::VectorXd right = Eigen::VectorXd::Zero(shared);
@@ -121,18 +171,22 @@ class Folds {
     };
     std::vector<Own> owns;
     for (size_t n = 0; n < normals_.size(); ++n) {
-      Eigen::MatrixXd information = normals_[n].information;
-      Eigen::VectorXd gradient = normals_[n].gradient;
+      const Eigen::Index unforced = first_force(n, 0),
+                         used = sigma_m_per_s2 > 0 ? normals_[n].gradient.size() : unforced;
+      Eigen::MatrixXd information = normals_[n].information.topLeftCorner(used, used);
+      Eigen::VectorXd gradient = normals_[n].gradient.head(used);
       const bool left_out = whole_ && static_cast<size_t>(b) == n;
       if (!whole_) {
-        information -= normals_[n].block_information[static_cast<size_t>(b)];
-        gradient -= normals_[n].block_gradient[static_cast<size_t>(b)];
+        const auto block = static_cast<size_t>(b);
+        information -= normals_[n].block_information[block].topLeftCorner(used, used);
+        gradient -= normals_[n].block_gradient[block].head(used);
       }
-      information.diagonal().array() += 1e-9 * std::max(1.0, information.diagonal().maxCoeff());
       const std::vector<int> common = space_.shared_of(n);
       std::vector<int> places = space_.own_of(n);
-      for (auto k = static_cast<int>(model_.parts[n].values.size()); k < information.rows(); ++k)
+      for (auto k = static_cast<int>(model_.parts[n].values.size()); k < unforced; ++k)
         places.push_back(k);
+      if (sigma_m_per_s2 > 0) add_forces(n, b, sigma_m_per_s2, information, gradient, places);
+      information.diagonal().array() += 1e-9 * std::max(1.0, information.diagonal().maxCoeff());
       Own own{.solver = Eigen::LDLT<Eigen::MatrixXd>(information(places, places)),
               .between = information(places, common),
               .gradient = gradient(places),
@@ -149,26 +203,53 @@ class Folds {
     }
     reduced.diagonal().array() += 1e-12 * std::max(1.0, reduced.diagonal().maxCoeff());
     const Eigen::VectorXd step = reduced.ldlt().solve(right);
+    std::vector<Eigen::VectorXd> ways(normals_.size());
     for (size_t n = 0; n < normals_.size(); ++n) {
-      const ParameterSpace& space = problems_[n]->space;
-      const PooledPart& part = model_.parts[n];
-      Eigen::VectorXd way = Eigen::VectorXd::Zero(normals_[n].gradient.size());
-      const std::vector<int> common = space_.shared_of(n);
-      way(common) = step;
+      ways[n] = Eigen::VectorXd::Zero(sigma_m_per_s2 > 0 ? normals_[n].gradient.size()
+                                                         : first_force(n, 0));
+      ways[n](space_.shared_of(n)) = step;
       if (!owns[n].places.empty()) {
         const Eigen::VectorXd pull = -owns[n].gradient - owns[n].between * step;
-        way(owns[n].places) = Eigen::VectorXd(owns[n].solver.solve(pull));
+        ways[n](owns[n].places) = Eigen::VectorXd(owns[n].solver.solve(pull));
       }
-      Eigen::VectorXd lower(space.size()), upper(space.size());
-      for (int p = 0; p < space.size(); ++p) {
-        lower[p] = space.parameters[static_cast<size_t>(p)].lower;
-        upper[p] = space.parameters[static_cast<size_t>(p)].upper;
-      }
-      const Eigen::VectorXd next = space.coordinates(part.values) + way.head(space.size());
-      point[n] =
-          space.values(next.cwiseMax(space.coordinates(lower)).cwiseMin(space.coordinates(upper)));
-      if (part.amounts.size() > 0) amounts[n] = part.amounts + way.tail(part.amounts.size());
+      if (sigma_m_per_s2 > 0)
+        for (int k = 0; k < kStretchesInBlock; ++k)
+          ways[n].segment<FreeForces::kInStretch>(first_force(n, kStretchesInBlock * b + k)) =
+              ways[n].segment<FreeForces::kInStretch>(first_force(n, held_in(b)));
     }
+    return ways;
+  }
+
+  /// Has a recording's forces among its own unknowns. In the block that is left out they are those
+  /// of another stretch: what asks for the former asks for the latter.
+  void add_forces(size_t n, int b, double sigma_m_per_s2, Eigen::MatrixXd& information,
+                  Eigen::VectorXd& gradient, std::vector<int>& places) const {
+    constexpr Eigen::Index kEach = FreeForces::kInStretch;
+    const Eigen::Index held = first_force(n, held_in(b));
+    for (int stretch = 0; stretch < forces_.stretches; ++stretch) {
+      const Eigen::Index first = first_force(n, stretch);
+      if (stretch / kStretchesInBlock == b) {
+        information.middleRows(held, kEach) += information.middleRows(first, kEach).eval();
+        information.middleCols(held, kEach) += information.middleCols(first, kEach).eval();
+        gradient.segment(held, kEach) += gradient.segment(first, kEach).eval();
+      } else {
+        for (Eigen::Index k = 0; k < kEach; ++k) places.push_back(static_cast<int>(first + k));
+      }
+    }
+    information.diagonal().tail(kEach * forces_.stretches).array() +=
+        1 / (sigma_m_per_s2 * sigma_m_per_s2);
+  }
+
+  /// A recording's parameters after that way, within their ranges.
+  Eigen::VectorXd values_after(size_t n, const Eigen::VectorXd& way) const {
+    const ParameterSpace& space = problems_[n]->space;
+    Eigen::VectorXd lower(space.size()), upper(space.size());
+    for (int p = 0; p < space.size(); ++p) {
+      lower[p] = space.parameters[static_cast<size_t>(p)].lower;
+      upper[p] = space.parameters[static_cast<size_t>(p)].upper;
+    }
+    const Eigen::VectorXd next = space.coordinates(model_.parts[n].values) + way.head(space.size());
+    return space.values(next.cwiseMax(space.coordinates(lower)).cwiseMin(space.coordinates(upper)));
   }
 
   const ModelFit& model_;
@@ -177,6 +258,7 @@ class Folds {
   bool whole_;
   int blocks_;
   double threshold_;
+  FreeForces forces_;
   std::vector<TrajectoryObjective> objectives_;
   std::vector<Normal> normals_;
 };
@@ -224,11 +306,45 @@ void add_block(const Folds& folds, size_t recording, int b, const Eigen::VectorX
   }
 }
 
+/// Squares of one block alone.
+double squares_in(const Folds& folds, size_t recording, int b, const Eigen::VectorXd& residual,
+                  double threshold) {
+  double sum = 0;
+  for (const Objective::Block& row : folds.objective(recording).blocks())
+    if (folds.block_of(recording, row) == b)
+      sum += huber_square(residual.segment(row.offset, row.dimension).norm(), threshold);
+  return sum;
+}
+
+/// Of all blocks, with free forces of the size that serves best.
+double squares_with_forces(const Folds& folds, double threshold) {
+  constexpr double kSigmas_m_per_s2[] = {0.01, 0.1, 1, 10};
+  constexpr int kSizes = std::size(kSigmas_m_per_s2);
+  std::vector<double> squares(static_cast<size_t>(kSizes * folds.blocks()));
+  tbb::parallel_for(0, kSizes * folds.blocks(), [&](int k) {
+    const int b = k % folds.blocks();
+    const std::vector<Eigen::VectorXd> residuals =
+        folds.residuals_with_forces_without(b, kSigmas_m_per_s2[k / folds.blocks()]);
+    for (size_t n = 0; n < residuals.size(); ++n)
+      squares[static_cast<size_t>(k)] += squares_in(folds, n, b, residuals[n], threshold);
+  });
+  double least = std::numeric_limits<double>::infinity();
+  for (int size = 0; size < kSizes; ++size) {
+    const auto first = squares.begin() + size * folds.blocks();
+    least = std::min(least, std::accumulate(first, first + folds.blocks(), 0.0));
+  }
+  return least;
+}
+
 }  // namespace
 
 CrossValidation cross_validate(const DiagnosisSetup& setup, const ModelFit& model, int blocks,
-                               double threshold, bool whole) {
-  const Folds folds(setup, model, blocks, threshold, whole && model.parts.size() > 1);
+                               double threshold, bool whole, const DiagnosisSetup* forces_mesh) {
+  whole = whole && model.parts.size() > 1;
+  FreeForces forces;
+  if (forces_mesh != nullptr && !whole && blocks > 1)
+    forces = free_forces(*forces_mesh, model, kStretchesInBlock * blocks);
+  const Folds folds(setup, model, blocks, threshold, whole, std::move(forces));
   std::vector<Sums> sums(static_cast<size_t>(folds.blocks()));
   tbb::parallel_for(0, folds.blocks(), [&](int b) {
     const std::vector<Eigen::VectorXd> residuals = folds.residuals_without(b);
@@ -248,6 +364,7 @@ CrossValidation cross_validate(const DiagnosisSetup& setup, const ModelFit& mode
   result.mean = all.own / total;
   result.constant_offset = all.offset / total;
   result.last_residual = all.last / total;
+  if (folds.has_forces()) result.free_forces = squares_with_forces(folds, threshold) / total;
   result.usable = std::isfinite(result.mean);
   return result;
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <vector>
 
 #include "fit/diagnosis/model_fit.h"
@@ -16,6 +17,10 @@ struct CrossValidation {
   /// was seen; the residual of the nearest seen frame before the block (after it for the first),
   /// held.
   double constant_offset = 0, last_residual = 0;
+  /// Or where forces without a law (FreeForces, two stretches to a block) are estimated along, the
+  /// last ones before a block (after it for the first) held throughout it; infinite where that was
+  /// not asked for.
+  double free_forces = std::numeric_limits<double>::infinity();
 };
 
 /// Leaves out each of `blocks` stretches of frames of equal length, of all recordings at once; or,
@@ -24,7 +29,14 @@ struct CrossValidation {
 /// to where the others' optimum lies, which is exact where the model is linear, and is run again;
 /// so do the amounts by which its discretisation errs. Squares beyond `threshold` sigmas count
 /// linearly (Huber).
+///
+/// Free forces are asked for by the mesh that their derivatives are taken from, the model's own or
+/// a coarser one. Together with all else they are what the same least squares makes of them to
+/// first order, each known to be of one size beforehand: of 0.01, 0.1, 1 and 10 m/s2 the one that
+/// foresees best. Forces are each recording's own, so that of one that is left out whole nothing
+/// can be known of them.
 CrossValidation cross_validate(const DiagnosisSetup& setup, const ModelFit& model, int blocks,
-                               double threshold, bool whole = false);
+                               double threshold, bool whole = false,
+                               const DiagnosisSetup* forces_mesh = nullptr);
 
 }  // namespace clothfit

@@ -353,7 +353,7 @@ class Search {
     std::vector<Line> children;
     std::vector<LawTrial> trials;
     CrossValidation before;
-    if (!tried.empty()) before = validated(line.model);
+    if (!tried.empty()) before = validated(line.model, &coarse_);
     for (Tried& child : tried) {
       LawTrial trial = judge(line.model, before, *child.score, child.model);
       if (trial.refused.empty() && child.model.rough) {
@@ -461,10 +461,21 @@ class Search {
     std::ranges::stable_sort(children, {}, &Line::cost);
   }
 
-  CrossValidation validated(const ModelFit& model) const {
+  /// `forces_mesh`: of free forces, where these are asked for.
+  CrossValidation validated(const ModelFit& model,
+                            const DiagnosisSetup* forces_mesh = nullptr) const {
     // A recording left out says most where there are enough others.
     constexpr size_t kEnough = 3;
-    return cross_validate(setup_, model, kTimeBlocks, threshold_, model.parts.size() >= kEnough);
+    return cross_validate(setup_, model, kTimeBlocks, threshold_, model.parts.size() >= kEnough,
+                          forces_mesh);
+  }
+
+  /// Whether a law takes something from what free forces leave. These take much of all that is
+  /// missing, and of several laws each one alone leaves more than they do.
+  bool helps_free_forces(const CrossValidation& without, const ModelFit& after) const {
+    constexpr double kLeastGain = 0.1;  ///< of what is above the noise
+    const double gain = without.free_forces - validated(after, &coarse_).free_forces;
+    return gain > kLeastGain * std::max(0.0, without.free_forces - 1);
   }
 
   LawTrial judge(const ModelFit& before, const CrossValidation& without, const LawScore& score,
@@ -488,15 +499,18 @@ class Search {
     const CrossValidation own = validated(after);
     trial.cross_validated = own.mean;
     trial.without_it = without.mean;
-    trial.best_trivial = std::min(without.constant_offset, without.last_residual);
+    const double trivial = std::min(without.constant_offset, without.last_residual);
+    trial.best_trivial = std::min(trivial, without.free_forces);
     trial.clear_of_neutral =
         clear_of_neutral(after, judge_adequacy(after, setup_.options.loss), threshold_);
     if (!own.usable || own.mean >= without.mean)
       trial.refused = "frames that were left out are predicted no better";
-    else if (own.mean >= trial.best_trivial)
+    else if (own.mean >= trivial)
       trial.refused = "a correction without physics does as well";
     else if (trial.clear_of_neutral < 5)
       trial.refused = "not clear of its neutral value";
+    else if (own.mean >= without.free_forces && !helps_free_forces(without, after))
+      trial.refused = "free forces do as well, and no better beside it";
     return trial;
   }
 
