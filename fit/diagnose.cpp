@@ -265,11 +265,9 @@ class Run {
     analysis.found = search_laws(analysis.setup, analysis.base, analysis.search, progress_);
   }
 
-  /// The constants that markers are off by, where nothing explains all and these would mend some of
-  /// the rest on blocks that are left out. A model that had to bend to do without them shows only a
-  /// part.
+  /// The constants that markers are off by, where nothing explains all and these would mend a good
+  /// part of the rest on blocks that are left out.
   std::optional<SeenElsewhere> offsets_to_try(const Analysis& analysis) const {
-    constexpr double kSomePart = 0.1;
     const ModelFit& model = analysis.found.model;
     const bool in_space = std::ranges::all_of(model.problems, [](const auto& problem) {
       return problem->observations.front().dimension == 3;
@@ -280,7 +278,7 @@ class Run {
     const CrossValidation left_out =
         cross_validate(analysis.setup, model, kTimeBlocks, analysis.search.threshold);
     if (!left_out.usable ||
-        left_out.mean - left_out.constant_offset < kSomePart * (left_out.mean - 1))
+        left_out.mean - left_out.constant_offset < kGoodPart * (left_out.mean - 1))
       return std::nullopt;
     return SeenElsewhere{.rms_m = mean_residual_rms_m(),
                          .cross_validated = left_out.mean,
@@ -310,7 +308,6 @@ class Run {
   /// Fits and searches anew beside such constants. False where that does not work out, or does not
   /// mend a good part.
   bool mend(Analysis& analysis) {
-    constexpr double kGoodPart = 0.25;
     if (!fit_base(analysis).empty() || cancelled_) return false;
     search_for_laws(analysis);
     if (cancelled_) return false;
@@ -486,6 +483,8 @@ class Run {
   }
 
   static constexpr int kLeastFitted = 2;
+  /// Of what is above the noise.
+  static constexpr double kGoodPart = 0.25;
 
   std::span<const FitInput> fitted_, held_out_;
   const DiagnoseOptions& options_;

@@ -135,7 +135,8 @@ TEST(LawDerivatives, AreThoseOfAModelThatHasTheLawAtItsNeutralValue) {
       const Eigen::VectorXd expected = part.linear.residual_by_coordinate.col(p) / slope[p];
       const Eigen::VectorXd found = columns[k].front().col(static_cast<Eigen::Index>(a));
       EXPECT_GT(expected.norm(), 0) << names[a];
-      // A law is a difference over 1e-5 of a typical change, and a force is carried on between steps.
+      // A law is a difference over 1e-5 of a typical change, and a force is carried on between
+      // steps.
       EXPECT_LT((found - expected).norm(), 1e-3 * expected.norm()) << names[a];
     }
   }
