@@ -38,7 +38,7 @@ std::shared_ptr<const Effect> make_free_force(const Cloth& cloth, int waves_alon
                                               int waves_along_t, double from_s, double until_s);
 
 /// Of the model where it stands, at no force, with the derivatives of a mesh that may be coarser
-/// than its own.
+/// than its own. Where a stretch begins and ends is known to kEmergingInterval_s.
 FreeForces free_forces(const DiagnosisSetup& mesh, const ModelFit& model, int stretches);
 
 }  // namespace clothfit
