@@ -203,6 +203,16 @@ void linearise_model(ModelFit& model) {
   }
 }
 
+DiagnosisSetup with_coarse_mesh(const DiagnosisSetup& setup) {
+  constexpr int kSmallest = 9;
+  DiagnosisSetup coarse = setup;
+  if (setup.options.spring_set != SpringSet::fabric) return coarse;
+  const int smallest = std::max(kSmallest, setup.options.start_nodes + 1);
+  for (int* count : {&coarse.columns, &coarse.rows})
+    *count = std::min(*count, std::max(smallest, (*count + 1) / 2));
+  return coarse;
+}
+
 ModelFit with_derivatives_of(const DiagnosisSetup& other_mesh, const ModelFit& model) {
   ModelFit result = model_at(other_mesh, model.terms, model.values());
   for (size_t n = 0; n < result.parts.size(); ++n) {

@@ -81,6 +81,10 @@ void refine_model(ModelFit& model, const DiagnosisSetup& setup, const StageOptio
 /// Has exact derivatives where the model stands.
 void linearise_model(ModelFit& model);
 
+/// On a mesh of half the cells a side, for derivatives that only choose; not below 9 x 9 vertices
+/// or what a start in motion has nodes. The same mesh where natural lengths are those of one.
+DiagnosisSetup with_coarse_mesh(const DiagnosisSetup& setup);
+
 /// The model where it stands with the derivatives of another mesh: what they foresee hardly
 /// differs, and of a mesh of half the cells a side they cost a sixteenth. The residuals are the
 /// model's. Not usable where the other mesh does not run.

@@ -111,23 +111,13 @@ class Search {
   Search(const DiagnosisSetup& setup, const SearchOptions& options,
          const ProgressCallback& progress)
       : setup_(setup),
-        coarse_(setup),
+        coarse_(with_coarse_mesh(setup)),
         options_(options),
         threshold_(options.threshold),
         progress_([this, &progress](const Progress& now) {
           stopped_ = stopped_ || (progress && !progress(now));
           return !stopped_;
-        }) {
-    // Twice as coarse; a start in motion has corrections on nodes of its own.
-    constexpr int kSmallest = 9;
-    const auto half = [&](int count) {
-      return std::min(count, std::max({kSmallest, setup.options.start_nodes + 1, (count + 1) / 2}));
-    };
-    if (setup.options.spring_set == SpringSet::fabric) {
-      coarse_.columns = half(setup.columns);
-      coarse_.rows = half(setup.rows);
-    }
-  }
+        }) {}
 
   /// Always the best line is led on, until nothing leads on from it, or from as many as are
   /// followed.

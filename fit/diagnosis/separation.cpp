@@ -221,13 +221,8 @@ ModelFit in_candidate(const CandidateRecording& candidate, const ModelFit& model
 
 /// The model where it stands on a mesh of half the cells a side, where that is another one.
 std::optional<ModelFit> on_coarse_mesh(const DiagnosisSetup& setup, const ModelFit& model) {
-  constexpr int kSmallest = 9;
-  if (setup.options.spring_set != SpringSet::fabric) return std::nullopt;
-  DiagnosisSetup coarse = setup;
+  DiagnosisSetup coarse = with_coarse_mesh(setup);
   coarse.inputs = setup.inputs.first(1);
-  for (int* count : {&coarse.columns, &coarse.rows})
-    *count =
-        std::min(*count, std::max({kSmallest, setup.options.start_nodes + 1, (*count + 1) / 2}));
   if (coarse.columns == setup.columns && coarse.rows == setup.rows) return std::nullopt;
   return model_at(coarse, model.terms, {model.values().front()});
 }
