@@ -281,7 +281,7 @@ class Run {
         left_out.mean - left_out.constant_offset < kGoodPart * (left_out.mean - 1))
       return std::nullopt;
     return SeenElsewhere{.rms_m = mean_residual_rms_m(),
-                         .cross_validated = left_out.mean,
+                         .cross_validated = left_out.constant_offset,
                          .without_it = left_out.mean};
   }
 
@@ -306,14 +306,14 @@ class Run {
   }
 
   /// Fits and searches anew beside such constants. False where that does not work out, or does not
-  /// mend a good part.
+  /// mend a good part. (What is left out had its say in the constants there: that they foresee it
+  /// has been asked before.)
   bool mend(Analysis& analysis) {
     if (!fit_base(analysis).empty() || cancelled_) return false;
     search_for_laws(analysis);
     if (cancelled_) return false;
     const CrossValidation left_out = cross_validate(analysis.setup, analysis.found.model,
                                                     kTimeBlocks, analysis.search.threshold);
-    result_.seen_elsewhere->cross_validated = left_out.mean;
     const double without_it = result_.seen_elsewhere->without_it;
     return left_out.usable && without_it - left_out.mean > kGoodPart * (without_it - 1);
   }
