@@ -105,7 +105,7 @@ std::string what_to_record(std::span<const Separation> separations) {
                     "How far this law, as it was found, is from what the other one can do in its "
                     "place, all else fitted again, in standard deviations of the noise: now, and "
                     "in recordings that could be made, each by itself, simulated with the model "
-                    "found. The best three that differ in kind; linear, from the derivatives.");
+                    "found. The best that differ in kind; linear, from the derivatives.");
 }
 
 std::string what_was_missing(const Diagnosis& diagnosis) {

@@ -111,11 +111,13 @@ Table plant_table(const Diagnosis& diagnosis) {
 }
 
 Table separation_table(std::span<const Separation> separations) {
+  constexpr double kSomething = 1;  // sigmas; the best one is shown even so
   Table table{{"law", "now, sigma", "in a recording", "then, sigma"}, {}};
   for (const Separation& separation : separations)
     for (const SeparatingRecording& recording : separation.recordings)
-      table.rows.push_back({separation.from.title(), sigmas_text(separation.now), recording.what,
-                            sigmas_text(recording.sigmas)});
+      if (recording.sigmas > kSomething || &recording == &separation.recordings.front())
+        table.rows.push_back({separation.from.title(), sigmas_text(separation.now), recording.what,
+                              sigmas_text(recording.sigmas)});
   return table;
 }
 
