@@ -31,6 +31,9 @@ constexpr double kHorizonShares[] = {0.4, 0.7};
 constexpr double kFineShares[] = {kSearchShare, 0.7};
 /// A given start may be far off, and nothing has been simulated yet.
 constexpr double kGivenShares[] = {0.1, 0.2, 0.4};
+/// Where an optimum may be a local one: over so few frames there is but one, and it is followed by
+/// steps so short that a horizon's optimum lies in the next one's valley.
+constexpr double kSecondLookShares[] = {0.2, 0.25, 0.3, 0.36, 0.45, 0.7, 1};
 /// Closer than this factor to an end of its range a logarithmic parameter is at that end.
 constexpr double kEnd = 1.5;
 constexpr int kFewestFrames = 8;
@@ -240,23 +243,32 @@ Eigen::VectorXd away_from_ends(const FitProblem& problem, const Eigen::VectorXd&
 
 /// Whether residuals are no larger than the noise makes them: the sum of n squares is n, give or
 /// take sqrt(2 n).
-bool is_noise_alone(const RefineResult& result) {
-  const auto residuals = static_cast<double>(result.residual_by_coordinate.rows());
+bool is_noise_alone(const FitProblem& problem, const RefineResult& result) {
+  // Not of the derivatives' rows: a fit that did not settle has none.
+  const TrajectoryObjective whole(problem, problem.first_held_out,
+                                  std::numeric_limits<double>::infinity());
+  const auto residuals = static_cast<double>(whole.residual_count());
   return 2 * result.cost < 1 + kNoiseDeviations * std::sqrt(2 / residuals);
 }
 
 /// Where the optimum leaves more than noise, the model may be wrong, or the optimum a local one:
-/// over fewer frames the cost has fewer of them. The better of the two.
+/// over fewer frames the cost has fewer of them, and over growing horizons the one over a fifth is
+/// led to all frames. The better of the two.
 RefineResult second_look(const FitProblem& problem, const FitOptions& options,
                          const RefineResult& first, const ProgressCallback& progress,
                          FitReport& report) {
-  if (!first.usable || first.cancelled || is_noise_alone(first)) return first;
+  if (!first.usable || first.cancelled || is_noise_alone(problem, first)) return first;
+  // Of a start in motion there are hundreds of numbers, which few frames do not determine.
+  if (problem.start == StartKind::unknown) return first;
   const auto look = [&](double share, const Effort& effort, const Eigen::VectorXd& start) {
     return refine_stage({.problem = problem, .share = share, .effort = effort}, options, start,
                         progress, report);
   };
   RefineResult second = first;
-  for (const double share : {kSearchShare, 1.0}) {
+  int frames = 0;
+  for (const double share : kSecondLookShares) {
+    if (horizon_frames(problem, share) == frames) continue;
+    frames = horizon_frames(problem, share);
     second = look(share, kSecondLookEffort, second.values);
     if (second.cancelled || !second.usable) return second.cancelled ? second : first;
   }
