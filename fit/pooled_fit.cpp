@@ -97,6 +97,9 @@ class Pool {
     return std::ranges::all_of(exact_, [](bool exact) { return exact; });
   }
 
+  /// Springs times time steps of all runs with derivatives so far.
+  double spring_steps() const { return spring_steps_; }
+
   /// Time steps and Huber's threshold anew, and exact derivatives where there are none. False where
   /// a recording cannot be simulated.
   bool begin_round(bool first) {
@@ -223,13 +226,17 @@ class Pool {
   /// Where there are no derivatives. Residuals are the same.
   bool linearise() {
     std::vector<char> usable(parts_.size(), 1);
+    std::vector<double> spring_steps(parts_.size(), 0);
     tbb::parallel_for(size_t{0}, parts_.size(), [&](size_t n) {
       if (parts_[n].linear.usable) return;
-      parts_[n].linear = objective_of(*problems_[n], parts_[n]).linearise(parts_[n].values);
+      const TrajectoryObjective objective = objective_of(*problems_[n], parts_[n]);
+      parts_[n].linear = objective.linearise(parts_[n].values);
+      spring_steps[n] = parts_[n].linear.runs * objective.spring_steps_per_run();
       usable[n] = parts_[n].linear.usable;
       parts_[n].borrowed = false;
       exact_[n] = true;
     });
+    for (const double own : spring_steps) spring_steps_ += own;
     return std::ranges::find(usable, 0) == usable.end();
   }
 
@@ -238,6 +245,7 @@ class Pool {
   std::vector<PooledPart> parts_;
   std::vector<char> exact_;  ///< whether the derivatives are those of where the recording stands
   double threshold_ = kInfinite, cost_ = 0;
+  double spring_steps_ = 0;
 };
 
 }  // namespace
@@ -319,7 +327,8 @@ PooledFit fit_pooled(std::span<const FitProblem* const> problems, std::vector<Po
     bool settled = false;
     // A step that is refused costs a run, one that is taken ten of them.
     constexpr int kRefusals = 4;
-    while (!settled && result.iterations < options.iterations &&
+    const auto out_of_work = [&] { return pool.spring_steps() >= options.most_spring_steps; };
+    while (!settled && !out_of_work() && result.iterations < options.iterations &&
            refusals < kRefusals * options.iterations) {
       if (progress && !progress({.stage = "pooled fit",
                                  .done = static_cast<double>(result.iterations),
@@ -376,7 +385,9 @@ PooledFit fit_pooled(std::span<const FitProblem* const> problems, std::vector<Po
     constexpr double kStill = 1e-4;
     const bool still = looked_at(x - began) < kStill;
     result.converged = settled && (still || (options.least_fall > 0 && pool.is_settled()));
-    if (result.converged || options.rough || result.iterations >= options.iterations) break;
+    if (result.converged || options.rough || result.iterations >= options.iterations ||
+        out_of_work())
+      break;
   }
   result.message = result.converged ? "converged" : "not converged";
   result.parts = pool.release();

@@ -50,6 +50,8 @@ struct PooledOptions {
   /// Derivatives that a fit begins with are updated and never had anew: near the optimum for the
   /// price of some runs. One round; `updated_within` must be more than 0.
   bool rough = false;
+  /// Springs times time steps of the runs with derivatives: looked at after each iteration.
+  double most_spring_steps = 1e18;
 };
 
 struct PooledFit {

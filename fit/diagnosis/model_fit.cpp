@@ -178,6 +178,8 @@ ModelFit shortened(const ModelFit& model, double share) {
 
 void refine_model(ModelFit& model, const DiagnosisSetup& setup, const StageOptions& options,
                   const ProgressCallback& progress) {
+  // Where a model cannot follow the cloth a fit is led on and on, at ever shorter time steps.
+  constexpr double kMostSpringSteps = 2e10;
   const PooledOptions pooled{.iterations = options.iterations,
                              .rounds = options.rounds,
                              .least_fall = options.least_fall,
@@ -185,7 +187,9 @@ void refine_model(ModelFit& model, const DiagnosisSetup& setup, const StageOptio
                              .kept_within = kKeptWithin,
                              .updated_within = kUpdatedWithin,
                              .own_only = options.own_only,
-                             .rough = options.rough};
+                             .rough = options.rough,
+                             .most_spring_steps = setup.options.work * kMostSpringSteps *
+                                                  static_cast<double>(model.parts.size())};
   const std::vector<const FitProblem*> problems = model.problem_pointers();
   PooledFit fitted = fit_pooled(problems, model.parts, pooled, progress);
   model.cancelled = fitted.cancelled;

@@ -268,6 +268,24 @@ TEST(PooledFit, RecoversTheTruthFromTwoRecordingsWithoutNoise) {
   }
 }
 
+TEST(PooledFit, EndsAfterTheWorkThatItIsAllowed) {
+  FitProblem problem = make_problem(synthetic_input(tiny(1)), {}, 5, 5);
+  make_exact(problem, 1);
+  const FitProblem* const problems[] = {&problem};
+  std::map<std::string, double> start = truth();
+  for (auto& [name, value] : start) value *= 1.3;
+  PooledOptions options;
+  options.most_spring_steps = 1;  // the first derivatives cost far more
+
+  const PooledFit found = fit_pooled(problems, start, options, {});
+
+  ASSERT_TRUE(found.usable);
+  EXPECT_FALSE(found.converged);
+  EXPECT_EQ(found.iterations, 0);
+  options.most_spring_steps = 1e18;
+  EXPECT_GT(fit_pooled(problems, start, options, {}).iterations, 1);
+}
+
 TEST(PooledFit, OfTheRecordingsOwnAloneLeavesThePhysicsWhereItIs) {
   FitProblem problem = make_problem(synthetic_input(tiny(1)), {}, 5, 5);
   make_exact(problem, 1);
