@@ -91,6 +91,13 @@ std::vector<DiscretisationError> discretisation_errors(const DiagnosisSetup& set
 void refine_with_discretisation(ModelFit& model, const DiagnosisSetup& setup,
                                 const ProgressCallback& progress) {
   constexpr double kBelievable = 3;
+  /// Chi-square per residual beyond which no discretisation is what a model lacks.
+  constexpr double kFarOff = 30;
+  if (model.usable &&
+      model.residual().squaredNorm() > kFarOff * static_cast<double>(model.residual_count())) {
+    refine_model(model, setup, {}, progress);
+    return;
+  }
   std::vector<DiscretisationError> errors = discretisation_errors(setup, model);
   for (size_t n = 0; n < errors.size(); ++n) {
     model.parts[n].amounts = Eigen::VectorXd::Zero(errors[n].directions.cols());

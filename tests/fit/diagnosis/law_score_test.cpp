@@ -306,5 +306,18 @@ TEST(Discretisation, OfATrueModelIsBelieved) {
   EXPECT_LT(part.amounts.cwiseAbs().maxCoeff(), 3);
 }
 
+TEST(Discretisation, IsNotWhatAModelLacksThatIsFarOff) {
+  const SyntheticCloth cloth{.drag_rate_per_s = 2, .noise_m = 1e-4};
+  const FitInput input = synthetic_input(cloth);
+  const DiagnosisSetup setup = setup_of({&input, 1});
+  ModelFit model = true_model(setup, cloth);
+  ASSERT_GT(model.residual().squaredNorm(), 30 * static_cast<double>(model.residual_count()));
+
+  refine_with_discretisation(model, setup, {});
+
+  ASSERT_TRUE(model.usable);
+  EXPECT_EQ(model.parts.front().directions.cols(), 0);
+}
+
 }  // namespace
 }  // namespace clothfit
