@@ -93,10 +93,17 @@ void refine_with_discretisation(ModelFit& model, const DiagnosisSetup& setup,
   constexpr double kBelievable = 3;
   /// Chi-square per residual beyond which no discretisation is what a model lacks.
   constexpr double kFarOff = 30;
-  if (model.usable &&
-      model.residual().squaredNorm() > kFarOff * static_cast<double>(model.residual_count())) {
+  const auto is_far_off = [&] {
+    return model.residual().squaredNorm() > kFarOff * static_cast<double>(model.residual_count());
+  };
+  if (model.usable && is_far_off()) {
+    for (PooledPart& part : model.parts) {
+      part.correction.resize(0);
+      part.directions.resize(part.linear.residual.size(), 0);
+      part.amounts.resize(0);
+    }
     refine_model(model, setup, {}, progress);
-    return;
+    if (!model.usable || is_far_off()) return;
   }
   std::vector<DiscretisationError> errors = discretisation_errors(setup, model);
   for (size_t n = 0; n < errors.size(); ++n) {

@@ -31,8 +31,8 @@ ModelFit fit_on_mesh(const DiagnosisSetup& other, const ModelFit& model,
 /// Refines a model together with the amounts by which its discretisation errs, in the directions of
 /// where it stands first. A direction that is asked for by several times what it may be is no error
 /// of that discretisation: something else is missing, by which the two meshes were led to different
-/// optima. It is left out, and what was expected along it. Of a model that leaves thirty times what
-/// noise makes nobody asks, which would cost most where it says least.
+/// optima. It is left out, and what was expected along it. A model that leaves more than thirty
+/// times what noise makes, once refined, has none: they cost most where they say least.
 void refine_with_discretisation(ModelFit& model, const DiagnosisSetup& setup,
                                 const ProgressCallback& progress);
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <tuple>
 
+#include "fit/identify.h"
 #include "fit/measurement_effects/measurement_effect.h"
 #include "fit/measurement_effects/registry.h"
 #include "fit/parameterised_model.h"
@@ -179,7 +180,9 @@ ModelFit shortened(const ModelFit& model, double share) {
 void refine_model(ModelFit& model, const DiagnosisSetup& setup, const StageOptions& options,
                   const ProgressCallback& progress) {
   // Where a model cannot follow the cloth a fit is led on and on, at ever shorter time steps.
-  constexpr double kMostSpringSteps = 2e10;
+  double most_spring_steps = 0;
+  for (const auto& problem : model.problems)
+    most_spring_steps += final_refinement(*problem, setup.options).most_spring_steps;
   const PooledOptions pooled{.iterations = options.iterations,
                              .rounds = options.rounds,
                              .least_fall = options.least_fall,
@@ -188,8 +191,7 @@ void refine_model(ModelFit& model, const DiagnosisSetup& setup, const StageOptio
                              .updated_within = kUpdatedWithin,
                              .own_only = options.own_only,
                              .rough = options.rough,
-                             .most_spring_steps = setup.options.work * kMostSpringSteps *
-                                                  static_cast<double>(model.parts.size())};
+                             .most_spring_steps = most_spring_steps};
   const std::vector<const FitProblem*> problems = model.problem_pointers();
   PooledFit fitted = fit_pooled(problems, model.parts, pooled, progress);
   model.cancelled = fitted.cancelled;
