@@ -81,7 +81,7 @@ struct FitOptions {
   /// optimum, and what has none starts where it would.
   std::optional<std::map<std::string, double>> start;
   Loss loss = Loss::huber;
-  int start_nodes = 6;  ///< per side, of the corrections of a start that is unknown
+  int start_nodes = 8;  ///< per side, of the corrections of a start that is unknown
   /// Standard deviation of constant offsets of the markers (fit/marker_offsets.h); 0: none.
   double marker_offset_sigma_m = 0;
   /// Knots of the corrections of tracked held points (fit/drive_correction.h), 4 to 1000; 0: the

@@ -28,7 +28,7 @@ struct StartState {
 };
 
 struct StartStateOptions {
-  int nodes = 6;                      ///< per side of the cloth, >= 2; more follow finer folds
+  int nodes = 8;                      ///< per side of the cloth, >= 2; more follow finer folds
   double position_sigma_m = 0.03;     ///< of the correction at a node, for what is guessed well
   double velocity_sigma_m_per_s = 1;  ///< the same
 };
