@@ -16,9 +16,6 @@ constexpr double kUndeterminedRangeShare = 0.25;
 /// Parameters more strongly correlated than this do the same to the motion, about.
 constexpr double kAlike = 0.95;
 
-/// A cost whose local derivative is this many times that over two per cent is rough.
-constexpr double kRough = 3;
-
 ParameterEstimate estimate(const FitParameter& parameter, const std::string& name, double value,
                            double sigma, double roughness) {
   ParameterEstimate result{.name = name, .unit = parameter.unit, .value = value, .sigma = sigma};
@@ -36,7 +33,7 @@ ParameterEstimate estimate(const FitParameter& parameter, const std::string& nam
     result.reason = fmt::format("the motion hardly depends on it (sigma {:.0f} % of its range)",
                                 100 * std::min(sigma / (parameter.upper - parameter.lower), 1e4));
     result.sigma = std::min(sigma, 1e4 * (parameter.upper - parameter.lower));
-  } else if (roughness > kRough) {
+  } else if (roughness > kRoughSlope) {
     result.state = ParameterState::undetermined;
     result.reason = fmt::format(
         "the cost is rough here (its slope over 0.01 % is {:.0f} times that over 2 %), as where "

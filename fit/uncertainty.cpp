@@ -74,30 +74,6 @@ void add_bootstrap(const ParameterSpace& space, const Eigen::VectorXd& values,
              result.bootstrap_upper);
 }
 
-/// See Uncertainty::roughness. Only physics makes folds.
-Eigen::VectorXd roughness(const Objective& objective, const Eigen::VectorXd& values,
-                          const LinearisedFit& linear) {
-  constexpr double kWideStep = 0.02;
-  const ParameterSpace& space = objective.problem().space;
-  Eigen::VectorXd result = Eigen::VectorXd::Ones(space.size());
-  std::vector<int> moved;
-  std::vector<Eigen::VectorXd> points;
-  for (int p = 0; p < space.size(); ++p) {
-    if (!is_physical(space.parameters[static_cast<size_t>(p)].role)) continue;
-    Eigen::VectorXd coordinates = space.coordinates(values);
-    coordinates[p] += kWideStep;
-    points.push_back(space.values(coordinates));
-    moved.push_back(p);
-  }
-  const std::vector<Eigen::VectorXd> residuals = objective.residuals(points);
-  for (size_t n = 0; n < moved.size(); ++n) {
-    if (residuals[n].size() != linear.residual.size()) continue;
-    const double wide = (residuals[n] - linear.residual).norm() / kWideStep;
-    result[moved[n]] = linear.jacobian.col(moved[n]).norm() / std::max(wide, 1e-300);
-  }
-  return result;
-}
-
 /// From standard deviations and the shift of coordinates.
 void add_interval(const ParameterSpace& space, const Eigen::VectorXd& values,
                   const Eigen::VectorXd& noise, const Eigen::VectorXd& robust,
@@ -114,6 +90,35 @@ void add_interval(const ParameterSpace& space, const Eigen::VectorXd& values,
 }
 
 }  // namespace
+
+Trend trend_of(const Objective& objective, const Eigen::VectorXd& values,
+               const Eigen::MatrixXd& residual_by_coordinate) {
+  constexpr double kWideStep = 0.01;  // to both sides
+  const ParameterSpace& space = objective.problem().space;
+  std::vector<int> moved;
+  std::vector<Eigen::VectorXd> points;
+  for (int p = 0; p < space.size(); ++p) {
+    if (!is_physical(space.parameters[static_cast<size_t>(p)].role)) continue;
+    for (const double step : {kWideStep, -kWideStep}) {
+      Eigen::VectorXd coordinates = space.coordinates(values);
+      coordinates[p] += step;
+      points.push_back(space.values(coordinates));
+    }
+    moved.push_back(p);
+  }
+  const std::vector<Eigen::VectorXd> residuals = objective.residuals(points);
+  Trend result{.roughness = Eigen::VectorXd::Ones(space.size()),
+               .residual_by_coordinate = residual_by_coordinate};
+  for (size_t n = 0; n < moved.size(); ++n) {
+    const Eigen::VectorXd &above = residuals[2 * n], &below = residuals[2 * n + 1];
+    if (above.size() != below.size() || above.size() != residual_by_coordinate.rows()) continue;
+    const Eigen::VectorXd difference = (above - below) / (2 * kWideStep);
+    auto column = result.residual_by_coordinate.col(moved[n]);
+    result.roughness[moved[n]] = column.norm() / std::max(difference.norm(), 1e-300);
+    if (result.roughness[moved[n]] > kRoughSlope) column = difference;
+  }
+  return result;
+}
 
 Eigen::VectorXd huber_weights(const Objective& objective, const Eigen::VectorXd& residual,
                               double threshold) {
@@ -143,7 +148,7 @@ Uncertainty estimate_uncertainty(const TrajectoryObjective& objective,
   const TrajectoryObjective half(problem, objective.frames(), objective.steps().times(0.5));
   const Eigen::VectorXd half_step_residual = half.residuals({values}).front();
   if (half_step_residual.size() != fit.residual.size()) return result;
-  result.roughness = roughness(objective, values, fit);
+  result.roughness = trend_of(objective, values, fit.jacobian).roughness;
 
   const double threshold = options.loss == Loss::huber ? kHuberScales * robust_scale(fit.residual)
                                                        : std::numeric_limits<double>::infinity();

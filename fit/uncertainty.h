@@ -70,6 +70,19 @@ Uncertainty estimate_uncertainty(const TrajectoryObjective& objective,
                                  const UncertaintyOptions& options = {},
                                  Eigen::MatrixXd residual_by_coordinate = {});
 
+/// A derivative this many times steeper than the trend over two per cent says nothing of it.
+inline constexpr double kRoughSlope = 3;
+
+/// Derivatives, held against differences over two per cent.
+struct Trend {
+  Eigen::VectorXd roughness;  ///< see Uncertainty; 1 for what is no physics: that makes no folds
+  Eigen::MatrixXd residual_by_coordinate;  ///< the differences where it is above kRoughSlope
+};
+
+/// Two runs for each parameter of the physics. `residual_by_coordinate`: derivatives at `values`.
+Trend trend_of(const Objective& objective, const Eigen::VectorXd& values,
+               const Eigen::MatrixXd& residual_by_coordinate);
+
 /// Huber's weights of residuals beyond `threshold`, by the length of their observation's.
 Eigen::VectorXd huber_weights(const Objective& objective, const Eigen::VectorXd& residual,
                               double threshold);

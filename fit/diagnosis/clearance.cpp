@@ -4,8 +4,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "data/median.h"
 #include "fit/diagnosis/refit.h"
 #include "fit/pooled_space.h"
+#include "fit/uncertainty.h"
 
 namespace clothfit {
 namespace {
@@ -46,11 +48,15 @@ Eigen::MatrixXd covariance(const PooledSpace& space, const std::vector<Quadratic
       Eigen::MatrixXd::Identity(information.rows(), information.cols()));
 }
 
-/// Empty where a recording has no derivatives.
+/// By the residuals' trend where derivatives are rough. Empty where a recording has none.
 std::vector<Quadratic> quadratics_of(const ModelFit& model, double threshold) {
   std::vector<Quadratic> quadratics;
   for (size_t n = 0; n < model.parts.size(); ++n) {
-    quadratics.push_back(quadratic_of(*model.problems[n], model.parts[n], threshold));
+    PooledPart part = model.parts[n];
+    if (!part.linear.usable) return {};
+    Eigen::MatrixXd& jacobian = part.linear.residual_by_coordinate;
+    jacobian = trend_of(model.objective(n), part.values, jacobian).residual_by_coordinate;
+    quadratics.push_back(quadratic_of(*model.problems[n], part, threshold));
     if (!quadratics.back().usable) return {};
   }
   return quadratics;
@@ -115,6 +121,20 @@ std::vector<NamedValues> sigma_of(const ModelFit& model, const Adequacy& structu
       add(own[k], pooled.first_own(n) + static_cast<Eigen::Index>(k));
   }
   return result;
+}
+
+double typical_roughness(const ModelFit& model) {
+  std::vector<double> all;
+  for (size_t n = 0; n < model.parts.size(); ++n) {
+    const PooledPart& part = model.parts[n];
+    const ParameterSpace& space = model.problems[n]->space;
+    const Eigen::VectorXd roughness =
+        trend_of(model.objective(n), part.values, part.linear.residual_by_coordinate).roughness;
+    for (int p = 0; p < space.size(); ++p)
+      if (is_physical(space.parameters[static_cast<size_t>(p)].role)) all.push_back(roughness[p]);
+  }
+  const double typical = all.empty() ? 1 : median(all);
+  return typical > kRoughSlope ? typical : 1;
 }
 
 }  // namespace clothfit

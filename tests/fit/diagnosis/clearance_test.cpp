@@ -138,6 +138,28 @@ TEST(ClearOfNeutral, CountsSeveralAmplitudesAsOneNumberThatIsAsUnlikely) {
   EXPECT_NEAR(clear_of_neutral(model, kWhite, kInfinite), 5, 1e-3);
 }
 
+// Derivatives of cloth that folds and unfolds are steeper than what the residuals do over any
+// distance.
+TEST(ClearOfNeutral, GoesByTheTrendWhereDerivativesExplode) {
+  const ModelFit& model = of_drag();
+  ASSERT_TRUE(model.usable);
+  ModelFit rough = model;
+  rough.parts.front().linear.residual_by_coordinate *= 1000;
+
+  const double smooth = clear_of_neutral(model, kWhite, kInfinite);
+  EXPECT_NEAR(clear_of_neutral(rough, kWhite, kInfinite), smooth, 0.1 * smooth);
+  EXPECT_EQ(typical_roughness(model), 1);
+  EXPECT_NEAR(typical_roughness(rough), 1000, 100);
+  const NamedValues sigma = sigma_of(model, kWhite, kInfinite).front();
+  const NamedValues by_trend = sigma_of(rough, kWhite, kInfinite).front();
+  ASSERT_EQ(by_trend.size(), sigma.size());
+  for (const FitParameter& parameter : model.problems.front()->space.parameters) {
+    if (!is_physical(parameter.role)) continue;
+    const double value = sigma.at(parameter.name);
+    EXPECT_NEAR(by_trend.at(parameter.name), value, 0.1 * value) << parameter.name;
+  }
+}
+
 TEST(ClearOfNeutral, GrowsWithTheRecordingsThatShareAnAmplitude) {
   const ModelFit& model = of_drag();
   ASSERT_TRUE(model.usable);
