@@ -53,6 +53,13 @@ class Folds {
   }
 
   int blocks() const { return blocks_; }
+  /// A start in motion is what the first frames show. Without them it would have to be told from
+  /// what became of it, through hundreds of numbers.
+  int first_left_out() const {
+    const bool starts_unknown = std::ranges::any_of(
+        problems_, [](const FitProblem* problem) { return problem->start == StartKind::unknown; });
+    return starts_unknown && !whole_ ? 1 : 0;
+  }
   int block_of(size_t recording, const Objective::Block& row) const {
     return whole_ ? static_cast<int>(recording)
                   : row.frame * blocks_ / model_.parts[recording].frames;
@@ -323,6 +330,7 @@ double squares_with_forces(const Folds& folds, double threshold) {
   std::vector<double> squares(static_cast<size_t>(kSizes * folds.blocks()));
   tbb::parallel_for(0, kSizes * folds.blocks(), [&](int k) {
     const int b = k % folds.blocks();
+    if (b < folds.first_left_out()) return;
     const std::vector<Eigen::VectorXd> residuals =
         folds.residuals_with_forces_without(b, kSigmas_m_per_s2[k / folds.blocks()]);
     for (size_t n = 0; n < residuals.size(); ++n)
@@ -346,14 +354,15 @@ CrossValidation cross_validate(const DiagnosisSetup& setup, const ModelFit& mode
     forces = free_forces(*forces_mesh, model, kStretchesInBlock * blocks);
   const Folds folds(setup, model, blocks, threshold, whole, std::move(forces));
   std::vector<Sums> sums(static_cast<size_t>(folds.blocks()));
-  tbb::parallel_for(0, folds.blocks(), [&](int b) {
+  tbb::parallel_for(folds.first_left_out(), folds.blocks(), [&](int b) {
     const std::vector<Eigen::VectorXd> residuals = folds.residuals_without(b);
     for (size_t n = 0; n < residuals.size(); ++n)
       add_block(folds, n, b, residuals[n], threshold, sums[static_cast<size_t>(b)]);
   });
   CrossValidation result;
   Sums all;
-  for (const Sums& own : sums) {
+  for (auto b = static_cast<size_t>(folds.first_left_out()); b < sums.size(); ++b) {
+    const Sums& own = sums[b];
     result.block.push_back(own.own / std::max(1, own.count));
     all.own += own.own;
     all.offset += own.offset;

@@ -11,7 +11,7 @@ namespace clothfit {
 /// per observation there.
 struct CrossValidation {
   bool usable = false;
-  std::vector<double> block;  ///< of each block
+  std::vector<double> block;  ///< of each block that was left out
   double mean = 0;            ///< over all observations
   /// The same where predictions are mended without physics: a constant offset per marker, from what
   /// was seen; the residual of the nearest seen frame before the block (after it for the first),
@@ -23,7 +23,8 @@ struct CrossValidation {
   double free_forces = std::numeric_limits<double>::infinity();
 };
 
-/// Leaves out each of `blocks` stretches of frames of equal length, of all recordings at once; or,
+/// Leaves out each of `blocks` stretches of frames of equal length, of all recordings at once (not
+/// the first one where a start is unknown, for those frames show it); or,
 /// of several recordings, each whole one (`whole`), whose own parameters then follow the shared
 /// ones as its observations ask. Each time the model takes one Gauss-Newton step from its optimum
 /// to where the others' optimum lies, which is exact where the model is linear, and is run again;

@@ -220,6 +220,27 @@ TEST(CrossValidation, OfATrueModelForeseesAnotherRecordingToTheNoise) {
   EXPECT_NEAR(validated.mean, 1, 0.07);  // 7644 residuals: 4 of its sigmas
 }
 
+// The first frames are what shows a start in motion: without them it would be told, through 54
+// numbers, from what became of it.
+TEST(CrossValidation, KeepsTheFramesThatShowAStartInMotion) {
+  FitInput input = synthetic_input({.frames = 46, .held_out_from = 40});
+  input.recording.start = StartKind::unknown;
+  FitOptions options = kOptions;
+  options.start_nodes = 3;
+  const DiagnosisSetup setup{.inputs = {&input, 1}, .options = options, .columns = 9, .rows = 9};
+  ModelFit model = model_at(setup, {}, {named(SyntheticCloth().fabric)});
+  refine_model(model, setup, {}, {});
+  ASSERT_TRUE(model.usable);
+  linearise_model(model);
+
+  const CrossValidation validated = cross_validate(setup, model, 5, 1e300);
+
+  ASSERT_TRUE(validated.usable);
+  ASSERT_EQ(validated.block.size(), 4u);
+  const double seen = model.residual().squaredNorm() / static_cast<double>(model.residual_count());
+  for (const double block : validated.block) EXPECT_LT(block, 2 * seen);
+}
+
 TEST(Discretisation, ShowsWhatTheStepAndTheMeshAreWorth) {
   const SyntheticCloth cloth;
   const FitInput input = synthetic_input(cloth);
