@@ -93,16 +93,19 @@ void add_interval(const ParameterSpace& space, const Eigen::VectorXd& values,
 
 Trend trend_of(const Objective& objective, const Eigen::VectorXd& values,
                const Eigen::MatrixXd& residual_by_coordinate) {
-  constexpr double kWideStep = 0.01;  // to both sides
+  constexpr double kWideStep = 0.01;  // to both sides, as far as ranges go
   const ParameterSpace& space = objective.problem().space;
+  const Eigen::VectorXd here = space.coordinates(values);
   std::vector<int> moved;
   std::vector<Eigen::VectorXd> points;
   for (int p = 0; p < space.size(); ++p) {
-    if (!is_physical(space.parameters[static_cast<size_t>(p)].role)) continue;
+    const FitParameter& parameter = space.parameters[static_cast<size_t>(p)];
+    if (!is_physical(parameter.role)) continue;
     for (const double step : {kWideStep, -kWideStep}) {
-      Eigen::VectorXd coordinates = space.coordinates(values);
+      Eigen::VectorXd coordinates = here;
       coordinates[p] += step;
       points.push_back(space.values(coordinates));
+      points.back()[p] = std::clamp(points.back()[p], parameter.lower, parameter.upper);
     }
     moved.push_back(p);
   }
@@ -112,7 +115,10 @@ Trend trend_of(const Objective& objective, const Eigen::VectorXd& values,
   for (size_t n = 0; n < moved.size(); ++n) {
     const Eigen::VectorXd &above = residuals[2 * n], &below = residuals[2 * n + 1];
     if (above.size() != below.size() || above.size() != residual_by_coordinate.rows()) continue;
-    const Eigen::VectorXd difference = (above - below) / (2 * kWideStep);
+    const double way =
+        space.coordinates(points[2 * n])[moved[n]] - space.coordinates(points[2 * n + 1])[moved[n]];
+    if (!(way > 0)) continue;
+    const Eigen::VectorXd difference = (above - below) / way;
     auto column = result.residual_by_coordinate.col(moved[n]);
     result.roughness[moved[n]] = column.norm() / std::max(difference.norm(), 1e-300);
     if (result.roughness[moved[n]] > kRoughSlope) column = difference;

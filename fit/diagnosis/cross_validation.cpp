@@ -58,7 +58,7 @@ class Folds {
   int first_left_out() const {
     const bool starts_unknown = std::ranges::any_of(
         problems_, [](const FitProblem* problem) { return problem->start == StartKind::unknown; });
-    return starts_unknown && !whole_ ? 1 : 0;
+    return starts_unknown && !whole_ && blocks_ > 1 ? 1 : 0;
   }
   int block_of(size_t recording, const Objective::Block& row) const {
     return whole_ ? static_cast<int>(recording)
