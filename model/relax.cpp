@@ -26,9 +26,13 @@ std::array<double, kSpringTypes> calm(const std::array<double, kSpringTypes>& st
   return damping_ns_per_m;
 }
 
-/// A cloth with calm springs in heavy air: that of `cloth`, its own effects but those that shift
-/// supports (they shift in time, and time stands still here). The air takes a share of all
-/// velocities before each step.
+/// Whether an effect shifts supports in time, which stands still while a cloth relaxes.
+bool moves_supports(const Effect& effect) {
+  return effect.shifts_supports() && !effect.shifts_supports_at_rest();
+}
+
+/// A cloth with calm springs in heavy air: that of `cloth`, its own effects but those that move
+/// supports. The air takes a share of all velocities before each step.
 struct HeavyAir {
   Cloth cloth;
   std::vector<size_t> kept;  ///< effects of the cloth, in the order they have here
@@ -49,7 +53,7 @@ struct HeavyAir {
     cloth.effects.clear();
     cloth.effect_descriptions.clear();
     for (size_t e = 0; e < light.effects.size(); ++e) {
-      if (light.effects[e]->shifts_supports()) continue;
+      if (moves_supports(*light.effects[e])) continue;
       kept.push_back(e);
       cloth.effects.push_back(light.effects[e]);
       cloth.effect_descriptions.push_back(light.effect_descriptions[e]);
@@ -77,7 +81,7 @@ struct HeavyAir {
     direction.start_velocity_m_per_s.resize(3, 0);
     if (direction.emerging) {
       direction.emerging->start_memory.resize(0);
-      if (direction.emerging->effect->shifts_supports()) direction.emerging.reset();
+      if (moves_supports(*direction.emerging->effect)) direction.emerging.reset();
     }
     return direction;
   }

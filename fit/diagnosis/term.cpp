@@ -60,6 +60,15 @@ std::vector<EffectLaw> laws_of(const EffectDescription& effect) {
   return {all};
 }
 
+/// Whether a recording has what an effect of motion acts on.
+bool acts_on(const Recording& recording, const std::string& effect) {
+  const auto driven = std::ranges::count_if(
+      recording.held, [](const HeldPoint& point) { return point.motion != HeldMotion::fixed; });
+  if (effect == "support_offset") return driven > 0;
+  if (effect == "rigid_support") return driven == 2;
+  return true;
+}
+
 /// Effects that a model has anyway.
 std::vector<std::string> present_effects(const FitInput& input, const FitOptions& options) {
   std::vector<std::string> present = options.effects;
@@ -168,7 +177,8 @@ std::vector<LawShapes> laws_to_test(const FitInput& input, const FitOptions& opt
   const std::vector<std::string> present = present_effects(input, options);
   std::vector<std::string> names;
   for (const EffectEntry& entry : effect_registry())
-    if (!is_empirical(entry.name)) names.emplace_back(entry.name);
+    if (!is_empirical(entry.name) && acts_on(input.recording, entry.name))
+      names.emplace_back(entry.name);
   if (!follows_markers(input.recording))
     for (const MeasurementEffectEntry& entry : measurement_effect_registry())
       names.emplace_back(entry.name);

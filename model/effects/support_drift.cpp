@@ -7,6 +7,7 @@ namespace clothfit::support_drift {
 namespace {
 struct Law {
   static constexpr int kParameters = 3, kMemory = 0;
+  static constexpr bool kAtRest = false, kOfTwo = false;
 
   template <class Real>
   static Vector3<Real> shift(const SupportSight<Real>& at, const std::array<Real, 3>& p,

@@ -14,22 +14,75 @@ namespace clothfit {
 /// What a law sees of a held point.
 template <class Real>
 struct SupportSight {
-  Vector3<Real> pull_n;   ///< of the cloth, its weight included
-  int number = 0;         ///< which held point
+  Vector3<Real> pull_n;  ///< of the cloth, its weight included
+  int number = 0;        ///< which held point
+  bool driven = false;   ///< whether that follows a motion of its own, or rests where it started
+  /// To the only other driven point, where there is just one, as their motions have them then
+  /// (world, m), and over the flat cloth; for laws that ask for it, nothing for others.
+  Eigen::Vector3d to_partner_m = Eigen::Vector3d::Zero();
+  double partner_over_cloth_m = 0;
   double end_time_s = 0;  ///< when it will be where the law places it
   double time_step_s = 0;
 };
 
 /// An effect on the places of the held points. A Law has
 ///   static constexpr int kParameters, kMemory;   // kMemory numbers are remembered per held point
+///   static constexpr bool kAtRest;               // whether it shifts before anything moves, too
+///   static constexpr bool kOfTwo;                // whether it asks for the partner
 ///   template <class Real> static Vector3<Real> shift(const SupportSight<Real>&,
 ///       const std::array<Real, kParameters>&, std::array<Real, kMemory>& memory);  // m
 ///   static EffectRates rates(const Cloth&, const SpringParameters&, const std::vector<double>&);
 /// Lanes, tangents and the adjoint follow from these.
 template <class Law>
 class SupportLawEffect final : public LawEffect<SupportLawEffect<Law>, Law> {
+  static bool is_driven(const Cloth& cloth, int held) {
+    return static_cast<bool>(cloth.held[static_cast<size_t>(held)].motion);
+  }
+
+  /// The only other driven point; -1 where there is none, or more than one.
+  static int partner_of(const Cloth& cloth, int held) {
+    int partner = -1;
+    for (int h = 0; h < static_cast<int>(cloth.held.size()); ++h) {
+      if (h == held || !is_driven(cloth, h)) continue;
+      if (partner >= 0) return -1;
+      partner = h;
+    }
+    return partner;
+  }
+
+  static Eigen::Vector2d over_cloth_m(const Cloth& cloth, int held) {
+    Eigen::Vector2d at = Eigen::Vector2d::Zero();
+    for (const auto& [vertex, weight] : cloth.held[static_cast<size_t>(held)].weights)
+      at += weight * Eigen::Vector2d(vertex % cloth.mesh.columns * cloth.mesh.spacing_s_m(),
+                                     vertex / cloth.mesh.columns * cloth.mesh.spacing_t_m());
+    return at;
+  }
+
+  template <class L, class Real>
+  static SupportSight<Real> sight(const EffectScene<L>& scene, int held,
+                                  const Vector3<Real>& pull_n) {
+    const Cloth& cloth = scene.cloth;
+    SupportSight<Real> sight{.pull_n = pull_n,
+                             .number = held,
+                             .driven = is_driven(cloth, held),
+                             .end_time_s = scene.time_s + scene.time_step_s,
+                             .time_step_s = scene.time_step_s};
+    if constexpr (Law::kOfTwo) {
+      const int partner = partner_of(cloth, held);
+      if (!sight.driven || partner < 0) return sight;
+      const auto place_m = [&](int h) {
+        return cloth.held[static_cast<size_t>(h)].motion(sight.end_time_s);
+      };
+      sight.to_partner_m = place_m(partner) - place_m(held);
+      sight.partner_over_cloth_m =
+          (over_cloth_m(cloth, partner) - over_cloth_m(cloth, held)).norm();
+    }
+    return sight;
+  }
+
  public:
   bool shifts_supports() const override { return true; }
+  bool shifts_supports_at_rest() const override { return Law::kAtRest; }
   int memory_size(const Cloth& cloth) const override {
     return Law::kMemory * static_cast<int>(cloth.held.size());
   }
@@ -46,11 +99,7 @@ class SupportLawEffect final : public LawEffect<SupportLawEffect<Law>, Law> {
         remembered[static_cast<size_t>(m)] =
             real_of<L>(LaneValue<L>(memory.col(h * Law::kMemory + m)));
       add_at<L>(target_m, h,
-                Law::shift(SupportSight<Real>{.pull_n = vector_at<L>(support_force_n, h),
-                                              .number = h,
-                                              .end_time_s = scene.time_s + scene.time_step_s,
-                                              .time_step_s = scene.time_step_s},
-                           p, remembered));
+                Law::shift(sight(scene, h, vector_at<L>(support_force_n, h)), p, remembered));
       for (int m = 0; m < Law::kMemory; ++m)
         set_real<L>(memory, h * Law::kMemory + m, remembered[static_cast<size_t>(m)]);
     }
@@ -73,11 +122,8 @@ class SupportLawEffect final : public LawEffect<SupportLawEffect<Law>, Law> {
       for (int m = 0; m < Law::kMemory; ++m)
         remembered[static_cast<size_t>(m)] = Dual(memory(0, first + m), kMemory + m);
       const Vector3<Dual> shift = Law::shift(
-          SupportSight<Dual>{.pull_n = {Dual(pull.x, 0), Dual(pull.y, 1), Dual(pull.z, 2)},
-                             .number = h,
-                             .end_time_s = scene.time_s + scene.time_step_s,
-                             .time_step_s = scene.time_step_s},
-          p, remembered);
+          sight(scene, h, Vector3<Dual>{Dual(pull.x, 0), Dual(pull.y, 1), Dual(pull.z, 2)}), p,
+          remembered);
       Eigen::Matrix<double, 3, kCount> j;
       j << shift.x.v.transpose(), shift.y.v.transpose(), shift.z.v.transpose();
       derivatives.by_force.push_back({h, j.template leftCols<3>()});

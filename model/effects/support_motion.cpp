@@ -7,6 +7,7 @@ namespace clothfit::support_motion {
 namespace {
 struct Law {
   static constexpr int kParameters = Harmonic::kParameters, kMemory = 0;
+  static constexpr bool kAtRest = false, kOfTwo = false;
 
   template <class Real>
   static Vector3<Real> shift(const SupportSight<Real>& at, const Harmonic::Parameters<Real>& p,

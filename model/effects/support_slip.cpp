@@ -6,6 +6,7 @@ namespace clothfit::support_slip {
 namespace {
 struct Law {
   static constexpr int kParameters = 2, kMemory = 3;
+  static constexpr bool kAtRest = false, kOfTwo = false;
 
   template <class Real>
   static Vector3<Real> shift(const SupportSight<Real>& at, const std::array<Real, 2>& p,

@@ -56,7 +56,7 @@ void expect_a_complete_description(const EffectEntry& entry) {
 void expect_nothing_at_neutral(const EffectEntry& entry, Uniform& uniform) {
   // Given a swinging cloth with the effect and one without,
   Cloth plain = touched_cloth(6);
-  plain.held = {held_at(plain.mesh, 0, 0), held_at(plain.mesh, 0.31, 0.02)};
+  plain.held = drifting_points(plain.mesh);
   Cloth with = plain;
   with.add_effect(entry.name, "test");
   ParameterSet set{.springs = spring_parameters(cotton(), plain.mesh),
@@ -108,7 +108,7 @@ void expect_every_kind_of_lanes_to_agree(const EffectEntry& entry, Uniform& unif
 void expect_lanes_to_know_nothing_of_each_other(const EffectEntry& entry, Uniform& uniform) {
   const EffectDescription effect = entry.describe();
   Cloth cloth = touched_cloth(5);
-  cloth.held = {held_at(cloth.mesh, 0, 0)};
+  cloth.held = drifting_points(cloth.mesh);
   cloth.add_effect(entry.name, "test");
   std::vector<ParameterSet> sets;
   for (int l = 0; l < kLanes; ++l)

@@ -32,7 +32,7 @@ std::string derivative_mismatch(const EffectMap& map, const Eigen::VectorXd& in,
 std::string derivative_mismatch(const Effect& effect, const EffectDescription& description,
                                 const std::vector<double>& own, Uniform& uniform) {
   Cloth cloth = touched_cloth(5);
-  cloth.held = {held_at(cloth.mesh, 0, 0), held_at(cloth.mesh, 0.31, 0.02)};
+  cloth.held = drifting_points(cloth.mesh);
   const int vertices = cloth.mesh.vertex_count();
   const SpringParameters springs = spring_parameters(cotton(), cloth.mesh);
 

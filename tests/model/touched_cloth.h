@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "tests/model/random_cloth.h"
 
@@ -32,6 +33,17 @@ inline Cloth touched_cloth(int vertices_per_side) {
   Cloth cloth = square_cloth(vertices_per_side);
   cloth.obstacle = std::make_shared<const Obstacle>(hilly_ground());
   return cloth;
+}
+
+/// Two points of the cloth that drift, each its own way, from where the flat cloth has them: for
+/// effects that act on driven points.
+inline std::vector<HeldVertexWeights> drifting_points(const Mesh& mesh) {
+  std::vector<HeldVertexWeights> held = {held_at(mesh, 0, 0), held_at(mesh, 0.31, 0.02)};
+  held[0].motion = [](double time_s) { return Eigen::Vector3d(0.05 * time_s, 0.02 * time_s, 0); };
+  held[1].motion = [](double time_s) {
+    return Eigen::Vector3d(0.31 - 0.1 * time_s, 0.02, 0.03 * time_s);
+  };
+  return held;
 }
 
 /// The flat cloth folded in two along t, layers `gap_m` apart.

@@ -1,0 +1,51 @@
+#include "model/effects/rigid_support.h"
+
+#include "model/effects/support_law.h"
+
+namespace clothfit::rigid_support {
+namespace {
+struct Law {
+  static constexpr int kParameters = 2, kMemory = 0;
+  static constexpr bool kAtRest = true, kOfTwo = true;
+
+  template <class Real>
+  static Vector3<Real> shift(const SupportSight<Real>& at, const std::array<Real, 2>& p,
+                             std::array<Real, 0>&) {
+    const Eigen::Vector3d& d = at.to_partner_m;
+    const double distance_m = d.norm();
+    if (distance_m == 0) return {Real(0.0), Real(0.0), Real(0.0)};
+    const Real longer = (Real(1.0) + p[1]) * Real(at.partner_over_cloth_m / distance_m) - Real(1.0);
+    const Real part = Real(-0.5) * p[0] * longer;
+    return {part * Real(d.x()), part * Real(d.y()), part * Real(d.z())};
+  }
+
+  static EffectRates rates(const Cloth&, const SpringParameters&, const std::vector<double>&) {
+    return {};
+  }
+};
+
+}  // namespace
+
+EffectDescription describe() {
+  return {
+      .name = "rigid_support",
+      .summary = "two driven points at one distance, shift = -+ share/2 [(1 + slack) L D/|D| - D]",
+      .parameters =
+          {{.name = "share", .unit = "1", .neutral = 0, .lower = 0, .upper = 1.2, .typical = 0.1},
+           {.name = "slack",
+            .unit = "1",
+            .neutral = 0,
+            .lower = -0.15,
+            .upper = 0.05,
+            .typical = 0.01}},
+      .test = EffectTest::profiled,
+      .laws = {{.name = "",
+                .amplitudes = {"share"},
+                .shapes = {{.parameter = "slack", .values = {-0.08, -0.04, -0.02, 0}}}}}};
+}
+
+std::unique_ptr<Effect> make() {
+  return std::make_unique<SupportLawEffect<Law>>();
+}
+
+}  // namespace clothfit::rigid_support
