@@ -228,7 +228,7 @@ class Run {
       FitOptions with_offsets = options_.fit;
       with_offsets.marker_offset_sigma_m = result_.seen_elsewhere->rms_m;
       mended.emplace(fitted_, with_offsets);
-      if (!mend(*mended)) {
+      if (!mend(*mended, declared)) {
         mended.reset();
         result_.seen_elsewhere.reset();
       }
@@ -305,17 +305,41 @@ class Run {
     return std::sqrt(squares / static_cast<double>(std::max<Eigen::Index>(1, count)));
   }
 
-  /// Fits and searches anew beside such constants. False where that does not work out, or does not
-  /// mend a good part. (What is left out had its say in the constants there: that they foresee it
-  /// has been asked before.)
-  bool mend(Analysis& analysis) {
-    if (!fit_base(analysis).empty() || cancelled_) return false;
+  /// Searches anew beside such constants: from a fit of its own, or, where laws were accepted
+  /// without them, from these. False where that does not work out, or does not mend a good part.
+  /// (What is left out had its say in the constants there: that they foresee it has been asked
+  /// before.)
+  bool mend(Analysis& analysis, const Analysis& declared) {
+    if (declared.found.accepted.empty()) {
+      if (!fit_base(analysis).empty() || cancelled_) return false;
+    } else if (!go_on_from(declared, analysis)) {
+      return false;
+    }
     search_for_laws(analysis);
     if (cancelled_) return false;
     const CrossValidation left_out = cross_validate(analysis.setup, analysis.found.model,
                                                     kTimeBlocks, analysis.search.threshold);
     const double without_it = result_.seen_elsewhere->without_it;
-    return left_out.usable && without_it - left_out.mean > kGoodPart * (without_it - 1);
+    if (!left_out.usable || without_it - left_out.mean < kGoodPart * (without_it - 1)) return false;
+    analysis.found.accepted.insert(analysis.found.accepted.begin(), declared.found.accepted.begin(),
+                                   declared.found.accepted.end());
+    return true;
+  }
+
+  /// The model that `from` has found, refined under the options of another analysis, which begins
+  /// there.
+  bool go_on_from(const Analysis& from, Analysis& analysis) {
+    const ModelFit& model = from.found.model;
+    analysis.setup.columns = from.setup.columns;
+    analysis.setup.rows = from.setup.rows;
+    analysis.base = model_at(analysis.setup, model.terms, model.values());
+    for (size_t n = 0; n < model.parts.size(); ++n) {
+      analysis.base.parts[n].frames = model.parts[n].frames;
+      analysis.base.parts[n].steps = model.parts[n].steps;
+    }
+    linearise_model(analysis.base);
+    refine_with_discretisation(analysis.base, analysis.setup, progress_);
+    return analysis.base.usable && !cancelled_;
   }
 
   /// Reports what was found, and what else would have been.

@@ -35,6 +35,7 @@ ordered_json trial_json(const LawTrial& trial) {
   json["cross_validated_trivial"] = trial.best_trivial;
   json["clear_of_neutral"] = trial.clear_of_neutral;
   json["refused"] = trial.refused;
+  if (trial.with_later_ones) json["with_later_ones"] = true;
   return json;
 }
 

@@ -140,6 +140,10 @@ std::string what_was_missing(const Diagnosis& diagnosis) {
         significant(trial.fall, 3), significant(trial.foreseen_fall, 3),
         significant(trial.cross_validated, 4), significant(trial.without_it, 4),
         significant(trial.best_trivial, 4), trial.clear_of_neutral));
+    if (trial.with_later_ones)
+      content += paragraph(
+          "That correction did as well as this effect alone, and not as well as it and those below "
+          "together.");
     if (!accepted.alike.empty()) {
       std::string names;
       for (const Term& term : accepted.alike) names += (names.empty() ? "" : ", ") + term.title();

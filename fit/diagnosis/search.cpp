@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <limits>
 
 #include "fit/diagnosis/adequacy.h"
 #include "fit/diagnosis/clearance.h"
@@ -40,9 +42,14 @@ struct Line {
   ModelFit model;
   std::vector<AcceptedEffect> accepted;
   double cost = 0;
+  /// What its laws still have to beat: chi-square, cross-validated, of corrections without physics
+  /// that did as well as one of them; infinite: nothing.
+  double owes = std::numeric_limits<double>::infinity();
   bool finished = false;       ///< no law more leads on from here
   std::vector<LawScore> last;  ///< what its model would still show, over all frames
   std::vector<LawTrial> refused;
+
+  bool sound() const { return std::isinf(owes); }
 };
 
 std::vector<LawScore> without_columns(std::vector<LawScore> scores) {
@@ -99,11 +106,24 @@ void drop_repeated(std::vector<Line>& lines) {
   }
 }
 
-/// Of sorted lines, those that have gained far less than the best one.
-void drop_hopeless(std::vector<Line>& lines, double base_cost) {
+/// Moves those of the sorted lines that are not followed any further to `dropped`: what gained far
+/// less than the best one, and more than `most`.
+void drop_hopeless(std::vector<Line>& lines, double base_cost, size_t most,
+                   std::vector<Line>& dropped) {
   constexpr double kFarLess = 0.5;
   const double enough = kFarLess * (base_cost - lines.front().cost);
-  std::erase_if(lines, [&](const Line& line) { return base_cost - line.cost < enough; });
+  size_t kept = 1;
+  while (kept < std::min(most, lines.size()) && base_cost - lines[kept].cost >= enough) ++kept;
+  const auto first = lines.begin() + static_cast<std::ptrdiff_t>(std::min(kept, lines.size()));
+  std::move(first, lines.end(), std::back_inserter(dropped));
+  lines.erase(first, lines.end());
+}
+
+/// The line of least cost that owes nothing, of two lists of which one has such.
+Line best_sound(std::vector<Line> lines, std::vector<Line> more) {
+  std::ranges::move(more, std::back_inserter(lines));
+  std::erase_if(lines, [](const Line& line) { return !line.sound(); });
+  return std::move(*std::ranges::min_element(lines, {}, &Line::cost));
 }
 
 class Search {
@@ -127,7 +147,7 @@ class Search {
       result.cancelled = true;
       return result;
     };
-    std::vector<Line> lines;
+    std::vector<Line> lines, dropped;
     lines.push_back({.model = std::move(base), .accepted = {}, .refused = {}});
     base_chi_square_ = lines.front().model.chi_square(threshold_);
     const double base_cost = cost(lines.front().model);
@@ -140,7 +160,14 @@ class Search {
       const auto next = std::ranges::find_if(lines, [&](const Line& line) {
         return !line.finished && line.model.terms.size() < options_.most_effects;
       });
-      if (next == lines.end()) break;
+      if (next == lines.end()) {
+        if (lines.front().sound()) break;
+        Line sound = best_sound(std::move(lines), std::move(dropped));
+        lines.clear();
+        dropped.clear();
+        lines.push_back(std::move(sound));
+        continue;
+      }
       if (!next->accepted.empty()) {
         refine_with_discretisation(next->model, setup_, progress_);
         if (stopped_) return cancelled();
@@ -157,14 +184,18 @@ class Search {
       std::vector<Line> children = extend(*next, list);
       if (stopped_) return cancelled();
       for (Line& child : children) child.accepted.back().alike = alike(children, child);
-      const bool is_end = children.empty() && next == lines.begin();
+      const bool is_end = children.empty() && next == lines.begin() && next->sound();
       if (is_end && judge_adequacy(lines.front().model, setup_.options.loss).adequate) break;
       std::ranges::move(children, std::back_inserter(lines));
       std::ranges::stable_sort(lines, {}, &Line::cost);
       drop_repeated(lines);
-      drop_hopeless(lines, base_cost);
-      if (lines.size() > static_cast<size_t>(options_.lines))
-        lines.erase(lines.begin() + options_.lines, lines.end());
+      drop_hopeless(lines, base_cost, static_cast<size_t>(options_.lines), dropped);
+      // Of those, the best that owes nothing is enough to fall back on.
+      if (std::ranges::any_of(dropped, &Line::sound)) {
+        Line sound = best_sound(std::move(dropped), {});
+        dropped.clear();
+        dropped.push_back(std::move(sound));
+      }
     }
     Line& best = lines.front();
     prune(best);
@@ -346,18 +377,22 @@ class Search {
     if (!tried.empty()) before = validated(line.model, &coarse_);
     for (Tried& child : tried) {
       LawTrial trial = judge(line.model, before, *child.score, child.model);
-      if (trial.refused.empty() && child.model.rough) {
+      if ((trial.refused.empty() || trial.with_later_ones) && child.model.rough) {
         refine_model(child.model, setup_, {}, progress_);
         if (stopped_) return {};
         trial = judge(line.model, before, *child.score, child.model);
       }
       trials.push_back(trial);
-      if (!trial.refused.empty()) {
-        line.refused.push_back(std::move(trial));
-        continue;
-      }
+      if (!trial.refused.empty()) line.refused.push_back(trial);
+      if (!trial.refused.empty() && !trial.with_later_ones) continue;
       children.push_back({.model = std::move(child.model), .accepted = line.accepted});
-      children.back().cost = cost(children.back().model);
+      Line& led = children.back();
+      led.cost = cost(led.model);
+      if (trial.with_later_ones)
+        led.owes = std::min(line.owes, without_physics(before));
+      else if (trial.cross_validated >= line.owes)
+        led.owes = line.owes;
+      trial.refused.clear();
       children.back().accepted.push_back({.trial = std::move(trial), .alike = {}, .refused = {}});
     }
     std::ranges::stable_sort(children, {}, &Line::cost);
@@ -468,6 +503,11 @@ class Search {
     return gain > kLeastGain * std::max(0.0, without.free_forces - 1);
   }
 
+  /// What is left of a model that is mended without physics.
+  static double without_physics(const CrossValidation& of) {
+    return std::min(of.constant_offset, of.last_residual);
+  }
+
   LawTrial judge(const ModelFit& before, const CrossValidation& without, const LawScore& score,
                  const ModelFit& after) const {
     LawTrial trial{.term = score.term, .foreseen_fall = score.fall, .refused = {}};
@@ -489,18 +529,21 @@ class Search {
     const CrossValidation own = validated(after);
     trial.cross_validated = own.mean;
     trial.without_it = without.mean;
-    const double trivial = std::min(without.constant_offset, without.last_residual);
+    const double trivial = without_physics(without);
     trial.best_trivial = std::min(trivial, without.free_forces);
     trial.clear_of_neutral =
         clear_of_neutral(after, judge_adequacy(after, setup_.options.loss), threshold_);
-    if (!own.usable || own.mean >= without.mean)
+    if (!own.usable || own.mean >= without.mean) {
       trial.refused = "frames that were left out are predicted no better";
-    else if (own.mean >= trivial)
-      trial.refused = "a correction without physics does as well";
-    else if (trial.clear_of_neutral < 5)
+    } else if (trial.clear_of_neutral < 5) {
       trial.refused = "not clear of its neutral value";
-    else if (own.mean >= without.free_forces && !helps_free_forces(without, after))
+    } else if (own.mean >= without.free_forces && !helps_free_forces(without, after)) {
       trial.refused = "free forces do as well, and no better beside it";
+    } else if (own.mean >= trivial) {
+      constexpr double kGoodPart = 0.25;  ///< of what is above the noise
+      trial.refused = "a correction without physics does as well";
+      trial.with_later_ones = without.mean - own.mean > kGoodPart * (without.mean - 1);
+    }
     return trial;
   }
 

@@ -21,6 +21,9 @@ struct LawTrial {
   double best_trivial = kNotAsked;      ///< the same of the model without it, mended
   double clear_of_neutral = kNotAsked;  ///< standard deviations, clustered
   std::string refused;                  ///< why it is not accepted; empty: it is
+  /// Accepted, though corrections without physics did as well as it alone: together with laws
+  /// accepted after it, it beat them.
+  bool with_later_ones = false;
 };
 
 /// One effect that was accepted, with what speaks for it.
@@ -64,6 +67,11 @@ struct LawSearch {
 /// with the best, and keeps what predicts observations left out. Several lines are followed, always
 /// the one that is best; a line costs what its model leaves, and a price for each number more
 /// (Bayesian information criterion). `base` is linearised and has its directions.
+///
+/// Where several causes are at work, corrections without physics may do as well as each one alone,
+/// and not as well as all of them. So a law that mends a good part of the rest is followed all the
+/// same, and its line owes to leave less, in the end, than those corrections did. A line that still
+/// owes it when nothing leads on from it is given up for the best one that does not.
 LawSearch search_laws(const DiagnosisSetup& setup, ModelFit base, const SearchOptions& options,
                       const ProgressCallback& progress);
 

@@ -5,6 +5,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <map>
+#include <string>
 
 #include "data/input_error.h"
 #include "fit/draws.h"
@@ -79,6 +81,65 @@ TEST(Diagnose, SaysThatMarkersAreSeenElsewhereWhereNoLawPutsThemThere) {
   const ObservationErrors& after = diagnosis.found().result.errors.front();
   EXPECT_GT(before.held_out.rms, 4 * before.noise);
   EXPECT_LT(after.held_out.rms, 1.1 * after.noise);
+}
+
+constexpr double kTurn_rad = 0.05, kTooLarge = 0.02;
+
+/// A pattern that is turned on the cloth, in a world that is measured too large: constants of the
+/// markers do most of either.
+FitInput with_two_causes() {
+  SyntheticCloth cloth{.mesh = 7,
+                       .markers = 5,
+                       .marker_margin_m = 0.03,
+                       .frames = 30,
+                       .held_out_from = 22,
+                       .scale = 1 + kTooLarge};
+  cloth.seen = [](const SyntheticMotion& motion, double time_s, const Eigen::Vector2d& place_m) {
+    const Eigen::Vector2d middle_m(0.2, 0.2);
+    return motion(time_s, middle_m + Eigen::Rotation2Dd(kTurn_rad) * (place_m - middle_m));
+  };
+  return synthetic_input(cloth);
+}
+
+DiagnoseOptions quick_of_two_causes() {
+  DiagnoseOptions options = quick();
+  options.fit.mesh_columns = options.fit.mesh_rows = 7;
+  options.fit.work = 0.1;
+  options.refits = 2;
+  return options;
+}
+
+TEST(Diagnose, NamesCausesThatConstantsMatchOneByOneButNotTogether) {
+  DiagnoseOptions options = quick_of_two_causes();
+  options.most_effects = 2;
+  const Diagnosis diagnosis = diagnose(with_two_causes(), options, {});
+
+  ASSERT_TRUE(diagnosis.usable()) << diagnosis.message;
+  ASSERT_EQ(diagnosis.accepted.size(), 2u);
+  const LawTrial& first = diagnosis.accepted[0].trial;
+  const LawTrial& second = diagnosis.accepted[1].trial;
+  EXPECT_EQ(first.term.effect, "scale");
+  EXPECT_EQ(second.term.title(), "marker_placement (turn)");
+  EXPECT_GT(first.cross_validated, first.best_trivial);
+  EXPECT_TRUE(first.with_later_ones);
+  EXPECT_LT(second.cross_validated, first.best_trivial);
+  EXPECT_FALSE(second.with_later_ones);
+  EXPECT_EQ(diagnosis.verdict, DiagnosisVerdict::explained);
+  EXPECT_FALSE(diagnosis.seen_elsewhere);
+  const std::map<std::string, double>& found = diagnosis.found().values;
+  EXPECT_NEAR(found.at("scale.factor"), 1 + kTooLarge, 2e-3);
+  EXPECT_NEAR(std::abs(found.at("marker_placement.turn")), kTurn_rad, 1e-3);
+}
+
+TEST(Diagnose, GivesUpACauseThatConstantsMatchWhereNoOtherMayBeNamedWithIt) {
+  DiagnoseOptions options = quick_of_two_causes();
+  options.most_effects = 1;
+  const Diagnosis diagnosis = diagnose(with_two_causes(), options, {});
+
+  ASSERT_TRUE(diagnosis.usable()) << diagnosis.message;
+  EXPECT_TRUE(diagnosis.seen_elsewhere);
+  for (const AcceptedEffect& accepted : diagnosis.accepted)
+    EXPECT_NE(accepted.trial.term.effect, "scale");
 }
 
 TEST(Diagnose, DoesNotNameWhatItWasNotToTest) {
