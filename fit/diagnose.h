@@ -76,7 +76,8 @@ struct Diagnosis {
   std::vector<LawScore> scores;  ///< of the base model, the most telling first
   int columns = 0, rows = 0;     ///< of the mesh that was analysed
   int score_frames = 0;          ///< horizon of these, of the first recording
-  /// Where no law did as well as constants for the markers: what follows was found beside them.
+  /// Where constants for the markers mended what laws had left: laws accepted after that were found
+  /// beside them.
   std::optional<SeenElsewhere> seen_elsewhere;
   std::vector<AcceptedEffect> accepted;  ///< in the order in which they were
   /// Of each accepted effect, what would tell it from each law that is alike; or empty.

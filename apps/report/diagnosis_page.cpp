@@ -116,8 +116,8 @@ std::string what_was_missing(const Diagnosis& diagnosis) {
     content += paragraph(
         "Each marker is seen beside where the model has it by about a constant: it sits elsewhere "
         "on the cloth, the tracker misplaces it, or the cloth rests in folds that no parameter "
-        "describes. No law explains as much, and the constants found in the fitted frames are "
-        "added wherever else the cloth is foreseen.");
+        "describes. Laws alone leave more, and the constants found in the fitted frames are added "
+        "wherever else the cloth is foreseen.");
     content += fmt::format("<p class=\"found\"><strong>{}</strong></p>\n",
                            escape_xml(seen_elsewhere_text(seen)));
     content += paragraph(fmt::format(
@@ -142,8 +142,9 @@ std::string what_was_missing(const Diagnosis& diagnosis) {
         significant(trial.best_trivial, 4), trial.clear_of_neutral));
     if (trial.with_later_ones)
       content += paragraph(
-          "That correction did as well as this effect alone, and not as well as it and those below "
-          "together.");
+          "A constant for each marker, or the last residual held, did as well as this effect "
+          "alone, "
+          "and not as well as it and those below together.");
     if (!accepted.alike.empty()) {
       std::string names;
       for (const Term& term : accepted.alike) names += (names.empty() ? "" : ", ") + term.title();

@@ -87,22 +87,25 @@ std::vector<Term> alike(const std::vector<Line>& children, const Line& best) {
   return result;
 }
 
-/// The same laws in another order are the same line.
+/// The same laws in another order are the same line, and what they have beaten in one of them they
+/// have beaten.
 void drop_repeated(std::vector<Line>& lines) {
   const auto has = [](const ModelFit& model, const Term& term) {
     return std::ranges::any_of(model.terms, [&](const Term& own) { return own.same_law(term); });
   };
   for (size_t n = 1; n < lines.size();) {
-    const bool repeated = std::any_of(
-        lines.begin(), lines.begin() + static_cast<std::ptrdiff_t>(n), [&](const Line& known) {
-          return known.model.terms.size() == lines[n].model.terms.size() &&
-                 std::ranges::all_of(known.model.terms,
-                                     [&](const Term& term) { return has(lines[n].model, term); });
-        });
-    if (repeated)
-      lines.erase(lines.begin() + static_cast<std::ptrdiff_t>(n));
-    else
+    const auto own = lines.begin() + static_cast<std::ptrdiff_t>(n);
+    const auto same = std::find_if(lines.begin(), own, [&](const Line& known) {
+      return known.model.terms.size() == own->model.terms.size() &&
+             std::ranges::all_of(known.model.terms,
+                                 [&](const Term& term) { return has(own->model, term); });
+    });
+    if (same == own) {
       ++n;
+      continue;
+    }
+    same->owes = std::max(same->owes, own->owes);
+    lines.erase(own);
   }
 }
 
