@@ -267,7 +267,7 @@ class Run {
 
   /// The constants that markers are off by, where nothing explains all and these would mend a good
   /// part of the rest on blocks that are left out.
-  std::optional<SeenElsewhere> offsets_to_try(const Analysis& analysis) const {
+  std::optional<SeenElsewhere> offsets_to_try(const Analysis& analysis) {
     const ModelFit& model = analysis.found.model;
     const bool in_space = std::ranges::all_of(model.problems, [](const auto& problem) {
       return problem->observations.front().dimension == 3;
@@ -280,19 +280,24 @@ class Run {
     if (!left_out.usable ||
         left_out.mean - left_out.constant_offset < kGoodPart * (left_out.mean - 1))
       return std::nullopt;
-    return SeenElsewhere{.rms_m = mean_residual_rms_m(),
-                         .cross_validated = left_out.constant_offset,
-                         .without_it = left_out.mean};
+    // (The report of the last model takes this one's place.)
+    if (!model.terms.empty() && !report_fitted(analysis.setup, model, &DiagnosedRecording::after))
+      return std::nullopt;
+    return SeenElsewhere{
+        .rms_m = mean_residual_rms_m(model.terms.empty() ? &DiagnosedRecording::before
+                                                         : &DiagnosedRecording::after),
+        .cross_validated = left_out.constant_offset,
+        .without_it = left_out.mean};
   }
 
-  /// Of the markers' mean residuals in the fitted frames, per coordinate, by the model as declared.
-  double mean_residual_rms_m() const {
+  /// Of the markers' mean residuals in the fitted frames, per coordinate, by a model's report.
+  double mean_residual_rms_m(Report report) const {
     double squares = 0;
     Eigen::Index count = 0;
     for (size_t n = 0; n < fitted_.size(); ++n) {
       std::map<int, std::pair<Eigen::Vector3d, int>> of_marker;
       for (const FitReport::Residuals::Row& row :
-           result_.recordings[n].before.residuals.front().rows) {
+           (result_.recordings[n].*report).residuals.front().rows) {
         if (row.held_out) continue;
         auto& [sum, rows] =
             of_marker.try_emplace(row.marker, Eigen::Vector3d::Zero(), 0).first->second;

@@ -162,6 +162,7 @@ ShootingObjective::Model ShootingObjective::model_at(const Eigen::VectorXd& valu
     if (held[h].motion) continue;
     const Eigen::Vector3d place = model.fixed_place_m.col(static_cast<Eigen::Index>(h));
     held[h].motion = [place](double) { return place; };
+    held[h].rests = true;
     if (!model.set.held_shift.empty()) model.set.held_shift[h] = nullptr;
   }
   for (const Direction& direction : model.along) {

@@ -23,6 +23,8 @@ struct HeldVertexWeights {
   std::vector<Weight> weights;  ///< sum to 1
   /// Where the point is at a time (world, m); empty: it stays where the start shape has it.
   std::function<Eigen::Vector3d(double time_s)> motion;
+  /// That motion only says where the start shape has the point: nothing drives it.
+  bool rests = false;
 };
 
 /// The point of `mesh` at material coordinates (s, t), which must lie on the cloth.

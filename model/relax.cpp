@@ -31,8 +31,9 @@ bool moves_supports(const Effect& effect) {
   return effect.shifts_supports() && !effect.shifts_supports_at_rest();
 }
 
-/// A cloth with calm springs in heavy air: that of `cloth`, its own effects but those that move
-/// supports. The air takes a share of all velocities before each step.
+/// A cloth with calm springs in heavy air: that of `cloth`, held where motions have its points at
+/// one time, with its own effects but those that move supports. The air takes a share of all
+/// velocities before each step.
 struct HeavyAir {
   Cloth cloth;
   std::vector<size_t> kept;  ///< effects of the cloth, in the order they have here
@@ -40,7 +41,8 @@ struct HeavyAir {
   double time_step_s = 0;
   int steps = 0;
 
-  HeavyAir(const Cloth& light, double pendulum_gravity_m_per_s2, double longest_step_s)
+  HeavyAir(const Cloth& light, double pendulum_gravity_m_per_s2, double time_s,
+           double longest_step_s)
       : cloth(light) {
     constexpr double kPendulumTimes = 7;  // (1 + 7) exp(-7) is left of the distance: 0.7 %
     const double pendulum_rate =
@@ -50,6 +52,8 @@ struct HeavyAir {
     time_step_s = duration_s / steps;
     slowing = std::exp(-2 * pendulum_rate * time_step_s);
 
+    for (HeldVertexWeights& point : cloth.held)
+      if (point.motion) point.motion = [place_m = point.motion(time_s)](double) { return place_m; };
     cloth.effects.clear();
     cloth.effect_descriptions.clear();
     for (size_t e = 0; e < light.effects.size(); ++e) {
@@ -87,7 +91,8 @@ struct HeavyAir {
   }
 
   /// Held points glide from where they are to where they belong over the first fifth: a jump would
-  /// hit the cloth like a hammer. The share of the way after step `n`.
+  /// hit the cloth like a hammer. What effects shift them by, centimetres at most, is there from
+  /// the first step on. The share of the way after step `n`.
   double way(int n) const { return std::min(1.0, 5.0 * (n + 1) / steps); }
 };
 
@@ -207,7 +212,7 @@ std::vector<RelaxedCloth> relax(const Cloth& cloth, std::span<const ParameterSet
                                 double pendulum_gravity_m_per_s2, double time_s,
                                 double time_step_s) {
   if (parameters.empty()) return {};
-  const HeavyAir heavy(cloth, pendulum_gravity_m_per_s2, time_step_s);
+  const HeavyAir heavy(cloth, pendulum_gravity_m_per_s2, time_s, time_step_s);
   std::vector<ParameterSet> sets;
   for (const ParameterSet& set : parameters) sets.push_back(heavy.in_it(set));
   std::vector<RelaxedCloth> relaxed(sets.size());
@@ -240,7 +245,7 @@ void start_at_rest(const Cloth& cloth, std::span<ParameterSet> parameters,
 void start_at_rest_with_tangents(const Cloth& cloth, ParameterSet& set,
                                  std::span<Direction> directions, double pendulum_gravity_m_per_s2,
                                  double time_s, double time_step_s) {
-  const HeavyAir heavy(cloth, pendulum_gravity_m_per_s2, time_step_s);
+  const HeavyAir heavy(cloth, pendulum_gravity_m_per_s2, time_s, time_step_s);
   const ParameterSet damped = heavy.in_it(set);
   std::vector<Direction> moved;
   for (const Direction& direction : directions) moved.push_back(heavy.in_it(direction));

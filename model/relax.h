@@ -42,8 +42,8 @@ TimeSteps time_steps_of_run(const Cloth& cloth, const ParameterSet& parameters, 
 /// number of steps follow from `pendulum_gravity_m_per_s2`, a length that all sets share (at least
 /// 0.001), so that a shape depends on its own set alone, and smoothly. Of the pendulum's distance
 /// to equilibrium less than a percent is left, of slower motions (folds that open, a cloth that
-/// turns about a single support) more. Supports are where they are without effects that shift them
-/// in time, which remember nothing.
+/// turns about a single support) more, and of what effects shift supports by a twentieth. Supports
+/// are where they are without effects that shift them in time, which remember nothing.
 std::vector<RelaxedCloth> relax(const Cloth& cloth, std::span<const ParameterSet> parameters,
                                 double pendulum_gravity_m_per_s2, double time_s,
                                 double time_step_s);

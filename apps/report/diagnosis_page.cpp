@@ -143,8 +143,7 @@ std::string what_was_missing(const Diagnosis& diagnosis) {
     if (trial.with_later_ones)
       content += paragraph(
           "A constant for each marker, or the last residual held, did as well as this effect "
-          "alone, "
-          "and not as well as it and those below together.");
+          "alone, and not as well as it and those below together.");
     if (!accepted.alike.empty()) {
       std::string names;
       for (const Term& term : accepted.alike) names += (names.empty() ? "" : ", ") + term.title();
@@ -233,8 +232,9 @@ std::string words() {
          "and each is predicted by a fit of the others.</dd>\n"
          "<dt>mended without physics</dt><dd>The best of: a constant offset for every marker; the "
          "last residual, held; forces that follow no law, the last ones held. An effect that does "
-         "not beat the first two is refused; one that does not beat such forces is refused unless "
-         "it takes a tenth of what they leave beside them.</dd>\n"
+         "not beat the first two is refused, unless those accepted after it and it beat them "
+         "together; one that does not beat such forces is refused unless it takes a tenth of what "
+         "they leave beside them.</dd>\n"
          "<dt>would have been seen from</dt><dd>Five standard deviations, or as many as it takes "
          "to "
          "be worth a name. A smaller amplitude may be there, and this recording does not show "

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <iterator>
 #include <limits>
+#include <utility>
 
 #include "fit/diagnosis/adequacy.h"
 #include "fit/diagnosis/clearance.h"
@@ -385,17 +386,19 @@ class Search {
         if (stopped_) return {};
         trial = judge(line.model, before, *child.score, child.model);
       }
+      const bool on_credit = std::exchange(trial.with_later_ones, false);
       trials.push_back(trial);
       if (!trial.refused.empty()) line.refused.push_back(trial);
-      if (!trial.refused.empty() && !trial.with_later_ones) continue;
+      if (!trial.refused.empty() && !on_credit) continue;
       children.push_back({.model = std::move(child.model), .accepted = line.accepted});
       Line& led = children.back();
       led.cost = cost(led.model);
-      if (trial.with_later_ones)
+      if (on_credit)
         led.owes = std::min(line.owes, without_physics(before));
       else if (trial.cross_validated >= line.owes)
         led.owes = line.owes;
       trial.refused.clear();
+      trial.with_later_ones = on_credit;
       children.back().accepted.push_back({.trial = std::move(trial), .alike = {}, .refused = {}});
     }
     std::ranges::stable_sort(children, {}, &Line::cost);
@@ -414,10 +417,17 @@ class Search {
   };
 
   /// Drops laws that those accepted after them make needless: the model without one fits as well,
-  /// by what counts as a gain.
+  /// by what counts as a gain. What made up for a law on credit stays.
   void prune(Line& line) const {
     const size_t given = line.model.terms.size() - line.accepted.size();
     for (size_t k = 0; k + 1 < line.accepted.size();) {
+      const auto own = line.accepted.begin() + static_cast<std::ptrdiff_t>(k);
+      if (std::any_of(line.accepted.begin(), own, [](const AcceptedEffect& earlier) {
+            return earlier.trial.with_later_ones;
+          })) {
+        ++k;
+        continue;
+      }
       std::vector<Term> terms = line.model.terms;
       terms.erase(terms.begin() + static_cast<std::ptrdiff_t>(given + k));
       ModelFit without = with_terms(setup_, line.model, terms, {});

@@ -21,8 +21,8 @@ struct LawTrial {
   double best_trivial = kNotAsked;      ///< the same of the model without it, mended
   double clear_of_neutral = kNotAsked;  ///< standard deviations, clustered
   std::string refused;                  ///< why it is not accepted; empty: it is
-  /// Accepted, though corrections without physics did as well as it alone: together with laws
-  /// accepted after it, it beat them.
+  /// Corrections without physics did as well as it alone: it is accepted for what it does together
+  /// with laws accepted after it, with which it beat them.
   bool with_later_ones = false;
 };
 

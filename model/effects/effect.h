@@ -132,8 +132,8 @@ class Effect : public EffectInLanes<ExactLanes, FastLanes, SingleLane> {
   virtual bool changes_force() const { return false; }
   virtual bool shifts_supports() const { return false; }
 
-  /// Whether it shifts supports by what does not depend on time or memory: cloth that starts at
-  /// rest hangs from where they are then.
+  /// Whether it shifts supports before anything moves, too, by what depends on no memory: cloth
+  /// that starts at rest hangs from where they are then.
   virtual bool shifts_supports_at_rest() const { return false; }
 
   /// How many numbers it remembers of one simulation.

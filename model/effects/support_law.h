@@ -36,7 +36,8 @@ struct SupportSight {
 template <class Law>
 class SupportLawEffect final : public LawEffect<SupportLawEffect<Law>, Law> {
   static bool is_driven(const Cloth& cloth, int held) {
-    return static_cast<bool>(cloth.held[static_cast<size_t>(held)].motion);
+    const HeldVertexWeights& point = cloth.held[static_cast<size_t>(held)];
+    return point.motion && !point.rests;
   }
 
   /// The only other driven point; -1 where there is none, or more than one.

@@ -6,6 +6,7 @@
 
 #include <cmath>
 
+#include "model/relax.h"
 #include "tests/model/cloth_with_effect.h"
 
 namespace clothfit {
@@ -50,6 +51,20 @@ TEST(RigidSupport, KeepsTheDistanceTheMiddleAndTheDirection) {
   });
 }
 
+TEST(RigidSupport, KeepsThemFromTheRestBeforeTheStartOn) {
+  const Pair pair;
+  const double slack = -0.03, start_s = 0.04;  // when they come closer fast
+  ClothWithEffect hung = pair.with(1, slack);
+  start_at_rest(hung.cloth, {&hung.set, 1}, 9.81, start_s,
+                0.9 * stable_rest_step_s(hung.cloth, hung.set));
+  const Eigen::Vector3d left = hung.set.start_position_m.col(0);
+  const Eigen::Vector3d right = hung.set.start_position_m.col(5);
+  EXPECT_NEAR((right - left).norm(), (1 + slack) * pair.cloth.mesh.width_m, 1e-14);
+  EXPECT_LT((left + right - pair.cloth.held[0].motion(start_s) - pair.cloth.held[1].motion(start_s))
+                .norm(),
+            1e-14);
+}
+
 TEST(RigidSupport, GoesAShareOfTheWay) {
   const Pair pair;
   const double h = 1e-3;
@@ -70,6 +85,14 @@ TEST(RigidSupport, IsOfExactlyTwoDrivenPoints) {
       cloth.held.back().motion = [at = Eigen::Vector3d(pair.start_m.col(30))](double) {
         return at;
       };
+    }
+    // (nor of a point that a fit holds where it started by a motion that stands still)
+    if (driven == 3) {
+      Cloth resting = cloth;
+      resting.held.back().rests = true;
+      const ClothWithEffect two(resting, "rigid_support", {1, 0}, pair.start_m);
+      const ClothWithEffect none(resting, "rigid_support", {0, 0}, pair.start_m);
+      EXPECT_NE(two.after(30, 1e-3).position_m, none.after(30, 1e-3).position_m);
     }
     const ClothWithEffect bound(cloth, "rigid_support", {1, 0}, pair.start_m);
     const ClothWithEffect free(cloth, "rigid_support", {0, 0}, pair.start_m);
