@@ -161,7 +161,8 @@ std::vector<double> shares_from(double first) {
 ModelFit with_terms(const DiagnosisSetup& setup, const ModelFit& model,
                     const std::vector<Term>& terms, const Columns& columns) {
   ModelFit result = model_at(setup, terms, model.values());
-  const std::vector<std::string> added = terms.back().parameters();
+  const std::vector<std::string> added =
+      terms.empty() ? std::vector<std::string>() : terms.back().parameters();
   for (size_t n = 0; n < result.parts.size(); ++n) {
     const PooledPart& from = model.parts[n];
     PooledPart& part = result.parts[n];

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <iterator>
 #include <limits>
 #include <utility>
@@ -46,11 +47,13 @@ struct Line {
   /// What its laws still have to beat: chi-square, cross-validated, of corrections without physics
   /// that did as well as one of them; infinite: nothing.
   double owes = std::numeric_limits<double>::infinity();
+  bool anew = false;           ///< its model was identified from scratch
   bool finished = false;       ///< no law more leads on from here
   std::vector<LawScore> last;  ///< what its model would still show, over all frames
   std::vector<LawTrial> refused;
 
-  bool sound() const { return std::isinf(owes); }
+  /// Whether the search may end with it.
+  bool sound() const { return model.usable && std::isinf(owes); }
 };
 
 std::vector<LawScore> without_columns(std::vector<LawScore> scores) {
@@ -123,7 +126,7 @@ void drop_hopeless(std::vector<Line>& lines, double base_cost, size_t most,
   lines.erase(first, lines.end());
 }
 
-/// The line of least cost that owes nothing, of two lists of which one has such.
+/// The sound line of least cost, of two lists of which one has such.
 Line best_sound(std::vector<Line> lines, std::vector<Line> more) {
   std::ranges::move(more, std::back_inserter(lines));
   std::erase_if(lines, [](const Line& line) { return !line.sound(); });
@@ -175,7 +178,7 @@ class Search {
       if (!next->accepted.empty()) {
         refine_with_discretisation(next->model, setup_, progress_);
         if (stopped_) return cancelled();
-        if (next == lines.begin()) leave_valley(next->model);
+        if (next == lines.begin() && !next->anew) leave_valley(next->model);
         if (stopped_) return cancelled();
         if (!next->model.usable) {
           next->finished = true;
@@ -373,6 +376,8 @@ class Search {
     std::vector<Tried> tried;
     for (size_t k = 0; k < scores.size(); ++k)
       tried.push_back({.score = scores[k], .model = std::move(fitted[k])});
+    look_elsewhere(tried, line);
+    if (stopped_) return {};
     let_best_err(tried, line.model);
     if (stopped_) return {};
     std::vector<Line> children;
@@ -392,6 +397,7 @@ class Search {
       if (!trial.refused.empty() && !on_credit) continue;
       children.push_back({.model = std::move(child.model), .accepted = line.accepted});
       Line& led = children.back();
+      led.anew = child.anew;
       led.cost = cost(led.model);
       if (on_credit)
         led.owes = std::min(line.owes, without_physics(before));
@@ -414,6 +420,7 @@ class Search {
   struct Tried {
     const LawScore* score = nullptr;
     ModelFit model;
+    bool anew = false;  ///< identified from scratch
   };
 
   /// Drops laws that those accepted after them make needless: the model without one fits as well,
@@ -456,6 +463,38 @@ class Search {
     if (!anew.usable || anew.chi_square(threshold_) >= model.chi_square(threshold_)) return;
     refine_with_discretisation(anew, setup_, progress_);
     if (anew.usable) model = std::move(anew);
+  }
+
+  /// Where even the best of them is far off, its law may be right in another valley of the cost
+  /// than the one that the line stands in: each is identified from scratch. What is owed to the
+  /// valley is no merit of the law, so that the line is moved there too, where it leaves less.
+  void look_elsewhere(std::vector<Tried>& tried, Line& line) const {
+    const auto left = [&](const ModelFit& model) {
+      return model.usable ? model.chi_square(threshold_) : std::numeric_limits<double>::infinity();
+    };
+    const auto best = [&]() -> Tried& {
+      return *std::ranges::min_element(tried, {},
+                                       [&](const Tried& child) { return left(child.model); });
+    };
+    if (tried.empty() || !best().model.usable ||
+        left(best().model) < kHardlyBiased * static_cast<double>(best().model.residual_count()))
+      return;
+    for (Tried& child : tried) {
+      if (!child.model.usable) continue;
+      ModelFit anew = fitted_anew(setup_, child.model.terms, progress_);
+      if (stopped_) return;
+      if (left(anew) >= left(child.model)) continue;
+      child.model = std::move(anew);
+      child.anew = true;
+    }
+    if (!best().anew) return;
+    ModelFit there = with_terms(setup_, best().model, line.model.terms, {});
+    refine_model(there, setup_, {}, progress_);
+    if (left(there) >= left(line.model)) return;
+    refine_with_discretisation(there, setup_, progress_);
+    if (!there.usable) return;
+    line.model = std::move(there);
+    line.cost = cost(line.model);
   }
 
   /// Directions of their own for the models that leave least, of those that stand far from where
@@ -521,6 +560,19 @@ class Search {
     return std::min(of.constant_offset, of.last_residual);
   }
 
+  /// Whether a law takes much of what a model leaves, of observations left out, above the noise.
+  static bool is_good_part(const CrossValidation& without, const CrossValidation& own) {
+    constexpr double kGoodPart = 0.25;
+    return without.mean - own.mean > kGoodPart * (without.mean - 1);
+  }
+
+  /// Where a model is far off, what else it lacks makes the sigmas of any amplitude, and they say
+  /// little of this one. A law that foresees each block left out better is sure without them.
+  static bool is_sure_by_blocks(const CrossValidation& without, const CrossValidation& own) {
+    return without.mean > kHardlyBiased &&
+           std::ranges::equal(own.block, without.block, std::less_equal<>());
+  }
+
   LawTrial judge(const ModelFit& before, const CrossValidation& without, const LawScore& score,
                  const ModelFit& after) const {
     LawTrial trial{.term = score.term, .foreseen_fall = score.fall, .refused = {}};
@@ -546,16 +598,17 @@ class Search {
     trial.best_trivial = std::min(trivial, without.free_forces);
     trial.clear_of_neutral =
         clear_of_neutral(after, judge_adequacy(after, setup_.options.loss), threshold_);
+    const bool good_part = is_good_part(without, own);
     if (!own.usable || own.mean >= without.mean) {
       trial.refused = "frames that were left out are predicted no better";
-    } else if (trial.clear_of_neutral < 5) {
+    } else if (trial.clear_of_neutral < LawTrial::kClear &&
+               !(good_part && is_sure_by_blocks(without, own))) {
       trial.refused = "not clear of its neutral value";
     } else if (own.mean >= without.free_forces && !helps_free_forces(without, after)) {
       trial.refused = "free forces do as well, and no better beside it";
     } else if (own.mean >= trivial) {
-      constexpr double kGoodPart = 0.25;  ///< of what is above the noise
       trial.refused = "a correction without physics does as well";
-      trial.with_later_ones = without.mean - own.mean > kGoodPart * (without.mean - 1);
+      trial.with_later_ones = good_part;
     }
     return trial;
   }

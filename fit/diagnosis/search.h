@@ -14,6 +14,10 @@ namespace clothfit {
 /// was asked.
 struct LawTrial {
   static constexpr double kNotAsked = std::numeric_limits<double>::quiet_NaN();
+  /// Standard deviations from neutral that make a law sure. One that is not may be accepted where
+  /// the model without it is far off, so that sigmas say little: if it foresees a good part of what
+  /// is left, and each block that was left out better.
+  static constexpr double kClear = 5;
   Term term;
   double foreseen_fall = 0;                                    ///< of chi-square, by the score
   double fall = kNotAsked;                                     ///< by the fit

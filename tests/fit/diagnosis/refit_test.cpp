@@ -75,5 +75,26 @@ TEST(WithTerms, HandsOnWhatTheModelIsExpectedToErrBy) {
   EXPECT_EQ(early.residual(), model.residual().head(rows));
 }
 
+TEST(WithTerms, WithoutTheOnlyLawIsTheModelBeforeIt) {
+  const SyntheticCloth cloth{.drag_rate_per_s = 0.1};
+  const FitInput input = synthetic_input(cloth);
+  const DiagnosisSetup setup{.inputs = {&input, 1}, .options = kOptions, .columns = 9, .rows = 9};
+  const ModelFit with_drag = true_model(setup, cloth, {drag_term()});
+
+  ModelFit without = with_terms(setup, with_drag, {}, {});
+  EXPECT_TRUE(without.terms.empty());
+  // Its derivatives are of another run.
+  EXPECT_FALSE(without.parts.front().linear.usable);
+  refine_model(without, setup, {}, {});
+  ModelFit base = true_model(setup, cloth);
+  refine_model(base, setup, {}, {});
+  ASSERT_TRUE(without.usable && base.usable);
+  const auto count = static_cast<double>(base.residual_count());
+  const double scatter = std::sqrt(2 * count);
+  // Time steps are chosen anew.
+  EXPECT_NEAR(without.residual().squaredNorm(), base.residual().squaredNorm(), 0.05 * count);
+  EXPECT_GT(without.residual().squaredNorm(), with_drag.residual().squaredNorm() + 5 * scatter);
+}
+
 }  // namespace
 }  // namespace clothfit
