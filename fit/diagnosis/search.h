@@ -70,7 +70,9 @@ struct LawSearch {
 /// Adds laws to a model, one after the other: each round scores all of them, fits the model again
 /// with the best, and keeps what predicts observations left out. Several lines are followed, always
 /// the one that is best; a line costs what its model leaves, and a price for each number more
-/// (Bayesian information criterion). `base` is linearised and has its directions.
+/// (Bayesian information criterion). `base` is linearised and has its directions. Where even the
+/// best law leaves a model far off, laws are identified from scratch; a line that leaves less in
+/// the valley of its best law moves there, with or without laws of its own.
 ///
 /// Where several causes are at work, corrections without physics may do as well as each one alone,
 /// and not as well as all of them. So a law that mends a good part of the rest is followed all the
