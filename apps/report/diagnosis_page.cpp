@@ -142,8 +142,9 @@ std::string what_was_missing(const Diagnosis& diagnosis) {
         significant(trial.best_trivial, 4), trial.clear_of_neutral));
     if (trial.clear_of_neutral < LawTrial::kClear)
       content += paragraph(
-          "That is little, because all else that the model lacks counts as error here. The effect "
-          "is accepted because every block that was left out is predicted better with it.");
+          "That is less than five, the usual bar; all else that the model lacks counts as error "
+          "here. The effect is accepted because it takes a good part of what is left, and nothing "
+          "that was left out is predicted worse with it.");
     if (trial.with_later_ones)
       content += paragraph(
           "A constant for each marker, or the last residual held, did as well as this effect "

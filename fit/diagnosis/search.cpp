@@ -24,6 +24,10 @@ constexpr double kVisible = 1.2;  ///< chi-square per residual there
 constexpr double kHardlyBiased = 3;
 constexpr size_t kScoreHorizons = 3;
 
+/// Chi-square per number of a model that is so far off that its valley may be the wrong one, and
+/// that sigmas are those of all it lacks.
+constexpr double kFarOff = 3;
+
 /// What a model must gain for each number more (Bayesian information criterion).
 double price(const ModelFit& model) {
   double amplitudes = 0;
@@ -52,8 +56,7 @@ struct Line {
   std::vector<LawScore> last;  ///< what its model would still show, over all frames
   std::vector<LawTrial> refused;
 
-  /// Whether the search may end with it.
-  bool sound() const { return model.usable && std::isinf(owes); }
+  bool sound() const { return std::isinf(owes); }
 };
 
 std::vector<LawScore> without_columns(std::vector<LawScore> scores) {
@@ -126,7 +129,7 @@ void drop_hopeless(std::vector<Line>& lines, double base_cost, size_t most,
   lines.erase(first, lines.end());
 }
 
-/// The sound line of least cost, of two lists of which one has such.
+/// The line of least cost that owes nothing, of two lists of which one has such.
 Line best_sound(std::vector<Line> lines, std::vector<Line> more) {
   std::ranges::move(more, std::back_inserter(lines));
   std::erase_if(lines, [](const Line& line) { return !line.sound(); });
@@ -176,14 +179,16 @@ class Search {
         continue;
       }
       if (!next->accepted.empty()) {
-        refine_with_discretisation(next->model, setup_, progress_);
+        ModelFit refined = next->model;
+        refine_with_discretisation(refined, setup_, progress_);
         if (stopped_) return cancelled();
-        if (next == lines.begin() && !next->anew) leave_valley(next->model);
+        if (next == lines.begin() && !next->anew) leave_valley(refined);
         if (stopped_) return cancelled();
-        if (!next->model.usable) {
+        if (!refined.usable) {
           next->finished = true;
           continue;
         }
+        next->model = std::move(refined);
         next->cost = cost(next->model);
         list = shortlist(next->model);
         if (stopped_) return cancelled();
@@ -376,20 +381,21 @@ class Search {
     std::vector<Tried> tried;
     for (size_t k = 0; k < scores.size(); ++k)
       tried.push_back({.score = scores[k], .model = std::move(fitted[k])});
-    look_elsewhere(tried, line);
+    const ModelFit elsewhere = look_elsewhere(tried, line.model);
     if (stopped_) return {};
+    const ModelFit& without_law = elsewhere.usable ? elsewhere : line.model;
     let_best_err(tried, line.model);
     if (stopped_) return {};
     std::vector<Line> children;
     std::vector<LawTrial> trials;
     CrossValidation before;
-    if (!tried.empty()) before = validated(line.model, &coarse_);
+    if (!tried.empty()) before = validated(without_law, &coarse_);
     for (Tried& child : tried) {
-      LawTrial trial = judge(line.model, before, *child.score, child.model);
+      LawTrial trial = judge(without_law, before, *child.score, child.model, elsewhere.usable);
       if ((trial.refused.empty() || trial.with_later_ones) && child.model.rough) {
         refine_model(child.model, setup_, {}, progress_);
         if (stopped_) return {};
-        trial = judge(line.model, before, *child.score, child.model);
+        trial = judge(without_law, before, *child.score, child.model, elsewhere.usable);
       }
       const bool on_credit = std::exchange(trial.with_later_ones, false);
       trials.push_back(trial);
@@ -466,9 +472,12 @@ class Search {
   }
 
   /// Where even the best of them is far off, its law may be right in another valley of the cost
-  /// than the one that the line stands in: each is identified from scratch. What is owed to the
-  /// valley is no merit of the law, so that the line is moved there too, where it leaves less.
-  void look_elsewhere(std::vector<Tried>& tried, Line& line) const {
+  /// than the one that the line stands in: those foreseen to take half as much as the best are
+  /// identified from scratch (of one recording whose start is known). What is owed to the valley is
+  /// no merit of the law: returns the line's model there, which laws are to be judged against,
+  /// where that leaves less; otherwise one that is not usable.
+  ModelFit look_elsewhere(std::vector<Tried>& tried, const ModelFit& line) const {
+    constexpr double kOfBest = 0.5;
     const auto left = [&](const ModelFit& model) {
       return model.usable ? model.chi_square(threshold_) : std::numeric_limits<double>::infinity();
     };
@@ -477,24 +486,25 @@ class Search {
                                        [&](const Tried& child) { return left(child.model); });
     };
     if (tried.empty() || !best().model.usable ||
-        left(best().model) < kHardlyBiased * static_cast<double>(best().model.residual_count()))
-      return;
+        left(best().model) < kFarOff * static_cast<double>(best().model.residual_count()))
+      return {};
+    double foreseen = 0;
+    for (const Tried& child : tried) foreseen = std::max(foreseen, child.score->fall);
     for (Tried& child : tried) {
-      if (!child.model.usable) continue;
+      if (!child.model.usable || child.score->fall < kOfBest * foreseen) continue;
       ModelFit anew = fitted_anew(setup_, child.model.terms, progress_);
-      if (stopped_) return;
+      if (!stopped_ && anew.usable) refine_with_discretisation(anew, setup_, progress_);
+      if (stopped_) return {};
       if (left(anew) >= left(child.model)) continue;
       child.model = std::move(anew);
       child.anew = true;
     }
-    if (!best().anew) return;
-    ModelFit there = with_terms(setup_, best().model, line.model.terms, {});
+    if (!best().anew) return {};
+    ModelFit there = with_terms(setup_, best().model, line.terms, {});
     refine_model(there, setup_, {}, progress_);
-    if (left(there) >= left(line.model)) return;
-    refine_with_discretisation(there, setup_, progress_);
-    if (!there.usable) return;
-    line.model = std::move(there);
-    line.cost = cost(line.model);
+    if (!stopped_ && there.usable) refine_with_discretisation(there, setup_, progress_);
+    if (stopped_ || left(there) >= left(line)) return {};
+    return there;
   }
 
   /// Directions of their own for the models that leave least, of those that stand far from where
@@ -567,14 +577,18 @@ class Search {
   }
 
   /// Where a model is far off, what else it lacks makes the sigmas of any amplitude, and they say
-  /// little of this one. A law that foresees each block left out better is sure without them.
-  static bool is_sure_by_blocks(const CrossValidation& without, const CrossValidation& own) {
-    return without.mean > kHardlyBiased &&
+  /// little of this one. A law that foresees no block left out worse is sure without them.
+  bool is_sure_by_blocks(const ModelFit& before, const CrossValidation& without,
+                         const CrossValidation& own) const {
+    const auto count = static_cast<double>(before.residual_count());
+    return before.chi_square(threshold_) > kFarOff * count && without.mean > kFarOff &&
+           own.block.size() >= static_cast<size_t>(kTimeBlocks) &&
            std::ranges::equal(own.block, without.block, std::less_equal<>());
   }
 
+  /// `elsewhere`: the model without it stands in another valley than where the law was scored.
   LawTrial judge(const ModelFit& before, const CrossValidation& without, const LawScore& score,
-                 const ModelFit& after) const {
+                 const ModelFit& after, bool elsewhere) const {
     LawTrial trial{.term = score.term, .foreseen_fall = score.fall, .refused = {}};
     if (!after.usable) {
       trial.refused = "others leave far less over the first frames, or no fit worked out";
@@ -583,7 +597,7 @@ class Search {
     trial.term = after.terms.back();
     trial.fall = before.chi_square(threshold_) - after.chi_square(threshold_);
     const double least = least_fall(score.amount.size());
-    if (trial.fall < std::max(least, 0.5 * score.fall)) {
+    if (trial.fall < std::max(least, elsewhere ? 0 : 0.5 * score.fall)) {
       trial.refused = "the fit gains less than half of what was foreseen";
       return trial;
     }
@@ -602,7 +616,8 @@ class Search {
     if (!own.usable || own.mean >= without.mean) {
       trial.refused = "frames that were left out are predicted no better";
     } else if (trial.clear_of_neutral < LawTrial::kClear &&
-               !(good_part && is_sure_by_blocks(without, own))) {
+               !(trial.clear_of_neutral > 0 && good_part &&
+                 is_sure_by_blocks(before, without, own))) {
       trial.refused = "not clear of its neutral value";
     } else if (own.mean >= without.free_forces && !helps_free_forces(without, after)) {
       trial.refused = "free forces do as well, and no better beside it";

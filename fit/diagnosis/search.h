@@ -15,8 +15,8 @@ namespace clothfit {
 struct LawTrial {
   static constexpr double kNotAsked = std::numeric_limits<double>::quiet_NaN();
   /// Standard deviations from neutral that make a law sure. One that is not may be accepted where
-  /// the model without it is far off, so that sigmas say little: if it foresees a good part of what
-  /// is left, and each block that was left out better.
+  /// the model without it is far off, so that sigmas say little: if it takes a good part of what is
+  /// left, and foresees no block that was left out worse.
   static constexpr double kClear = 5;
   Term term;
   double foreseen_fall = 0;                                    ///< of chi-square, by the score
@@ -71,8 +71,8 @@ struct LawSearch {
 /// with the best, and keeps what predicts observations left out. Several lines are followed, always
 /// the one that is best; a line costs what its model leaves, and a price for each number more
 /// (Bayesian information criterion). `base` is linearised and has its directions. Where even the
-/// best law leaves a model far off, laws are identified from scratch; a line that leaves less in
-/// the valley of its best law moves there, with or without laws of its own.
+/// best law leaves a model far off, laws are identified from scratch, and judged against the line's
+/// model in the valley of the best one where that leaves less.
 ///
 /// Where several causes are at work, corrections without physics may do as well as each one alone,
 /// and not as well as all of them. So a law that mends a good part of the rest is followed all the
