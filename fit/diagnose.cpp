@@ -358,7 +358,8 @@ class Run {
     const double explained = analysis.base.chi_square(analysis.search.threshold) -
                              model.chi_square(analysis.search.threshold);
     const double worth = worth_naming(model, analysis.search.threshold, explained);
-    const double clear = 5 * std::sqrt(std::max(1.0, result_.after.chi_square_per_dof));
+    const double clear =
+        LawTrial::kClear * std::sqrt(std::max(1.0, result_.after.chi_square_per_dof));
     result_.limits = limits_of(analysis.found.last,
                                typical_roughness(model) * std::max(clear, std::sqrt(worth)));
     const bool adequate = result_.after.adequate;
