@@ -213,6 +213,10 @@ class Run {
 
     search_for_laws(declared);
     if (cancelled_) return;
+    if (declared.found.base.usable) {
+      if (!report_model(declared.setup, declared.base, &DiagnosedRecording::before)) return;
+      result_.before = judge_adequacy(declared.base, options_.fit.loss);
+    }
     const double share = declared.found.first_share;
     result_.score_frames = frames_of_share(*declared.base.problems.front(), share);
     result_.scores = std::move(declared.found.first);
@@ -263,6 +267,7 @@ class Run {
                        .most_effects = static_cast<size_t>(options_.most_effects),
                        .threshold = threshold(analysis.base)};
     analysis.found = search_laws(analysis.setup, analysis.base, analysis.search, progress_);
+    if (analysis.found.base.usable) analysis.base = analysis.found.base;
   }
 
   /// The constants that markers are off by, where nothing explains all and these would mend a good

@@ -62,9 +62,14 @@ std::vector<Quadratic> quadratics_of(const ModelFit& model, double threshold) {
   return quadratics;
 }
 
-}  // namespace
+/// How far a law's amplitudes are from neutral.
+struct FromNeutral {
+  double square = 0;  ///< of the distance, in standard deviations of independent residuals
+  Eigen::Index amplitudes = 1;
+};
 
-double clear_of_neutral(const ModelFit& model, const Adequacy& structure, double threshold) {
+/// Of the last term. Nothing where derivatives are missing.
+FromNeutral from_neutral(const ModelFit& model, double threshold) {
   const std::vector<const FitProblem*> problems = model.problem_pointers();
   const PooledSpace pooled(problems);
   const Term& term = model.terms.back();
@@ -72,7 +77,7 @@ double clear_of_neutral(const ModelFit& model, const Adequacy& structure, double
   std::vector<Eigen::Index> indices;
   std::vector<double> away;
   const std::vector<Quadratic> quadratics = quadratics_of(model, threshold);
-  if (quadratics.empty()) return 0;
+  if (quadratics.empty()) return {};
   for (size_t n = 0; n < problems.size(); ++n) {
     const ParameterSpace& space = problems[n]->space;
     const Eigen::VectorXd slope = space.value_by_coordinate(model.parts[n].values);
@@ -92,11 +97,20 @@ double clear_of_neutral(const ModelFit& model, const Adequacy& structure, double
     }
   }
   const Eigen::Map<const Eigen::VectorXd> way(away.data(), static_cast<Eigen::Index>(away.size()));
-  const Eigen::MatrixXd own =
-      (inflation(structure) * covariance(pooled, quadratics))(indices, indices);
+  const Eigen::MatrixXd own = covariance(pooled, quadratics)(indices, indices);
   const double square = way.dot(own.ldlt().solve(way));
-  if (!std::isfinite(square) || square < 0) return 0;
-  return 5 * std::sqrt(square / least_fall(way.size()));
+  return {.square = std::isfinite(square) ? std::max(0.0, square) : 0, .amplitudes = way.size()};
+}
+
+}  // namespace
+
+double clear_of_neutral(const ModelFit& model, const Adequacy& structure, double threshold) {
+  const FromNeutral own = from_neutral(model, threshold);
+  return 5 * std::sqrt(own.square / inflation(structure) / least_fall(own.amplitudes));
+}
+
+double rise_without_last(const ModelFit& model, double threshold) {
+  return from_neutral(model, threshold).square;
 }
 
 std::vector<NamedValues> sigma_of(const ModelFit& model, const Adequacy& structure,

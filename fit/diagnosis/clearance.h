@@ -15,6 +15,10 @@ namespace clothfit {
 /// (`trend_of`, fit/uncertainty.h). `threshold` is Huber's.
 double clear_of_neutral(const ModelFit& model, const Adequacy& structure, double threshold);
 
+/// By how much chi-square is foreseen to rise where the last term is dropped and all else follows,
+/// to second order where the model stands.
+double rise_without_last(const ModelFit& model, double threshold);
+
 /// Standard deviations of each recording's parameters in their units, by name, with errors of that
 /// structure, by the trend where the cost is rough.
 std::vector<NamedValues> sigma_of(const ModelFit& model, const Adequacy& structure,

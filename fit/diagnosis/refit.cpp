@@ -4,6 +4,8 @@
 #include <limits>
 #include <numeric>
 
+#include "fit/diagnosis/discretisation.h"
+
 namespace clothfit {
 namespace {
 
@@ -228,16 +230,20 @@ std::vector<ModelFit> fit_with_laws(const DiagnosisSetup& setup, const ModelFit&
 
 ModelFit fitted_anew(const DiagnosisSetup& setup, const std::vector<Term>& terms,
                      const ProgressCallback& progress) {
-  if (setup.inputs.size() != 1) return {};
   // Of a start in motion there are hundreds of numbers more: minutes, where a fit from a known
   // model takes seconds.
-  if (setup.inputs.front().recording.start == StartKind::unknown) return {};
+  if (std::ranges::any_of(setup.inputs, [](const FitInput& input) {
+        return input.recording.start == StartKind::unknown;
+      }))
+    return {};
   FitOptions options = options_with(setup, terms, 0);
   options.mesh_columns = setup.columns;
   options.mesh_rows = setup.rows;
-  const FitReport report = fit(with_terms(setup.inputs.front(), terms), options, progress);
-  if (!report.usable()) return {};
-  ModelFit fitted = model_at(setup, terms, {report.values});
+  const FitReport first = fit(with_terms(setup.inputs.front(), terms), options, progress);
+  if (!first.usable()) return {};
+  ModelFit fitted =
+      model_at(setup, terms, std::vector<NamedValues>(setup.inputs.size(), first.values));
+  if (setup.inputs.size() > 1) return fit_on_mesh(setup, fitted, progress);
   linearise_model(fitted);
   return fitted;
 }

@@ -38,8 +38,8 @@ std::vector<ModelFit> fit_with_laws(const DiagnosisSetup& setup, const ModelFit&
                                     double threshold, const ProgressCallback& progress);
 
 /// The model with these laws identified from scratch, as if nothing were known of its parameters
-/// (fit/fit.h), linearised. Not usable where that leads nowhere, nor for several recordings, nor
-/// for one that begins in motion.
+/// (fit/fit.h), linearised: from the first recording, and then, from there, of all of them. Not
+/// usable where that leads nowhere, nor where a recording begins in motion.
 ModelFit fitted_anew(const DiagnosisSetup& setup, const std::vector<Term>& terms,
                      const ProgressCallback& progress);
 

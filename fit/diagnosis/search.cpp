@@ -52,6 +52,7 @@ struct Line {
   /// that did as well as one of them; infinite: nothing.
   double owes = std::numeric_limits<double>::infinity();
   bool anew = false;           ///< its model was identified from scratch
+  bool moved = false;          ///< to another valley, by a law that was identified from scratch
   bool finished = false;       ///< no law more leads on from here
   std::vector<LawScore> last;  ///< what its model would still show, over all frames
   std::vector<LawTrial> refused;
@@ -159,9 +160,7 @@ class Search {
     };
     std::vector<Line> lines, dropped;
     lines.push_back({.model = std::move(base), .accepted = {}, .refused = {}});
-    base_chi_square_ = lines.front().model.chi_square(threshold_);
-    const double base_cost = cost(lines.front().model);
-    lines.front().cost = base_cost;
+    begin_at(lines.front());
     Shortlist list = shortlist(lines.front().model);
     if (stopped_) return cancelled();
     result.first = list.merged();
@@ -195,13 +194,25 @@ class Search {
       }
       std::vector<Line> children = extend(*next, list);
       if (stopped_) return cancelled();
+      if (next->moved && children.empty()) {
+        // In its own valley other laws may show.
+        list = shortlist(next->model);
+        if (stopped_) return cancelled();
+        children = extend(*next, list);
+        if (stopped_) return cancelled();
+      }
+      if (next->moved && next->accepted.empty()) {
+        result.base = next->model;
+        result.first = list.merged();
+        result.first_share = list.share;
+      }
       for (Line& child : children) child.accepted.back().alike = alike(children, child);
       const bool is_end = children.empty() && next == lines.begin() && next->sound();
       if (is_end && judge_adequacy(lines.front().model, setup_.options.loss).adequate) break;
       std::ranges::move(children, std::back_inserter(lines));
       std::ranges::stable_sort(lines, {}, &Line::cost);
       drop_repeated(lines);
-      drop_hopeless(lines, base_cost, static_cast<size_t>(options_.lines), dropped);
+      drop_hopeless(lines, base_cost_, static_cast<size_t>(options_.lines), dropped);
       // Of those, the best that owes nothing is enough to fall back on.
       if (std::ranges::any_of(dropped, &Line::sound)) {
         Line sound = best_sound(std::move(dropped), {});
@@ -232,6 +243,12 @@ class Search {
     return result;
   }
   double cost(const ModelFit& model) const { return model.chi_square(threshold_) + price(model); }
+
+  /// The line that has found nothing yet.
+  void begin_at(Line& line) {
+    base_chi_square_ = line.model.chi_square(threshold_);
+    base_cost_ = line.cost = cost(line.model);
+  }
 
   double worth(const ModelFit& model) const {
     return worth_naming(model, threshold_, base_chi_square_ - model.chi_square(threshold_));
@@ -364,6 +381,8 @@ class Search {
   /// Lines that a law more leads to, of those on the list.
   std::vector<Line> extend(Line& line, const Shortlist& list) {
     line.finished = true;
+    line.refused.clear();
+    line.last.clear();
     if (list.share == 1) line.last = list.scores;
     std::vector<const LawScore*> scores;
     const double least_gain = worth(line.model);
@@ -381,21 +400,25 @@ class Search {
     std::vector<Tried> tried;
     for (size_t k = 0; k < scores.size(); ++k)
       tried.push_back({.score = scores[k], .model = std::move(fitted[k])});
-    const ModelFit elsewhere = look_elsewhere(tried, line.model);
+    look_elsewhere(tried);
     if (stopped_) return {};
-    const ModelFit& without_law = elsewhere.usable ? elsewhere : line.model;
     let_best_err(tried, line.model);
     if (stopped_) return {};
+    ModelFit elsewhere;
+    if (!tried.empty()) elsewhere = in_valley_of(best_of(tried), line.model);
+    if (stopped_) return {};
+    const bool moves = elsewhere.usable;
+    if (moves) move(line, std::move(elsewhere));
     std::vector<Line> children;
     std::vector<LawTrial> trials;
     CrossValidation before;
-    if (!tried.empty()) before = validated(without_law, &coarse_);
+    if (!tried.empty()) before = validated(line.model, &coarse_);
     for (Tried& child : tried) {
-      LawTrial trial = judge(without_law, before, *child.score, child.model, elsewhere.usable);
+      LawTrial trial = judge(line.model, before, *child.score, child.model, moves);
       if ((trial.refused.empty() || trial.with_later_ones) && child.model.rough) {
         refine_model(child.model, setup_, {}, progress_);
         if (stopped_) return {};
-        trial = judge(without_law, before, *child.score, child.model, elsewhere.usable);
+        trial = judge(line.model, before, *child.score, child.model, moves);
       }
       const bool on_credit = std::exchange(trial.with_later_ones, false);
       trials.push_back(trial);
@@ -421,6 +444,15 @@ class Search {
         if (!trial.term.same_law(child.accepted.back().trial.term))
           child.accepted.back().refused.push_back(trial);
     return children;
+  }
+
+  /// To a valley where it leaves less; what was scored where it stood says nothing of it there.
+  void move(Line& line, ModelFit there) {
+    line.model = std::move(there);
+    line.moved = true;
+    line.last.clear();
+    line.cost = cost(line.model);
+    if (line.accepted.empty()) begin_at(line);
   }
 
   struct Tried {
@@ -471,40 +503,54 @@ class Search {
     if (anew.usable) model = std::move(anew);
   }
 
+  double left_by(const ModelFit& model) const {
+    return model.usable ? model.chi_square(threshold_) : std::numeric_limits<double>::infinity();
+  }
+
+  bool is_far_off(const ModelFit& model) const {
+    return left_by(model) > kFarOff * static_cast<double>(model.residual_count());
+  }
+
+  const Tried& best_of(const std::vector<Tried>& tried) const {
+    return *std::ranges::min_element(tried, {},
+                                     [&](const Tried& child) { return left_by(child.model); });
+  }
+
   /// Where even the best of them is far off, its law may be right in another valley of the cost
   /// than the one that the line stands in: those foreseen to take half as much as the best are
-  /// identified from scratch (of one recording whose start is known). What is owed to the valley is
-  /// no merit of the law: returns the line's model there, which laws are to be judged against,
-  /// where that leaves less; otherwise one that is not usable.
-  ModelFit look_elsewhere(std::vector<Tried>& tried, const ModelFit& line) const {
+  /// identified from scratch (where starts are known).
+  void look_elsewhere(std::vector<Tried>& tried) const {
     constexpr double kOfBest = 0.5;
-    const auto left = [&](const ModelFit& model) {
-      return model.usable ? model.chi_square(threshold_) : std::numeric_limits<double>::infinity();
-    };
-    const auto best = [&]() -> Tried& {
-      return *std::ranges::min_element(tried, {},
-                                       [&](const Tried& child) { return left(child.model); });
-    };
-    if (tried.empty() || !best().model.usable ||
-        left(best().model) < kFarOff * static_cast<double>(best().model.residual_count()))
-      return {};
+    if (tried.empty() || !best_of(tried).model.usable || !is_far_off(best_of(tried).model)) return;
     double foreseen = 0;
     for (const Tried& child : tried) foreseen = std::max(foreseen, child.score->fall);
     for (Tried& child : tried) {
       if (!child.model.usable || child.score->fall < kOfBest * foreseen) continue;
       ModelFit anew = fitted_anew(setup_, child.model.terms, progress_);
       if (!stopped_ && anew.usable) refine_with_discretisation(anew, setup_, progress_);
-      if (stopped_) return {};
-      if (left(anew) >= left(child.model)) continue;
+      if (stopped_) return;
+      if (left_by(anew) >= left_by(child.model)) continue;
       child.model = std::move(anew);
       child.anew = true;
     }
-    if (!best().anew) return {};
-    ModelFit there = with_terms(setup_, best().model, line.terms, {});
-    refine_model(there, setup_, {}, progress_);
-    if (!stopped_ && there.usable) refine_with_discretisation(there, setup_, progress_);
-    if (stopped_ || left(there) >= left(line)) return {};
-    return there;
+  }
+
+  /// What a valley is worth is no merit of the law that led there: the line's model led to the
+  /// valley of the best law, or identified from scratch. Not usable where it does not leave less
+  /// than the line's own, nor where the law is foreseen to be worth all that it took.
+  ModelFit in_valley_of(const Tried& best, const ModelFit& line) const {
+    if (!best.model.usable || !is_far_off(line)) return {};
+    const double taken = left_by(line) - left_by(best.model);
+    if (taken <= 0 || (!best.anew && rise_without_last(best.model, threshold_) > taken)) return {};
+    ModelFit led = with_terms(setup_, best.model, line.terms, {});
+    refine_model(led, setup_, {}, progress_);
+    ModelFit anew = fitted_anew(setup_, line.terms, progress_);
+    for (ModelFit* there : {&led, &anew})
+      if (!stopped_ && there->usable) refine_with_discretisation(*there, setup_, progress_);
+    if (stopped_) return {};
+    ModelFit& there = left_by(led) <= left_by(anew) ? led : anew;
+    if (left_by(there) >= left_by(line)) return {};
+    return std::move(there);
   }
 
   /// Directions of their own for the models that leave least, of those that stand far from where
@@ -632,8 +678,8 @@ class Search {
   DiagnosisSetup coarse_;
   const SearchOptions& options_;
   double threshold_;
-  double base_chi_square_ = 0;
-  bool stopped_ = false;  ///< set by `progress_` once it has said so
+  double base_chi_square_ = 0, base_cost_ = 0;  ///< of the model that has found nothing
+  bool stopped_ = false;                        ///< set by `progress_` once it has said so
   ProgressCallback progress_;
 };
 

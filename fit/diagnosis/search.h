@@ -59,7 +59,10 @@ double worth_naming(const ModelFit& model, double threshold, double explained = 
 
 struct LawSearch {
   bool cancelled = false;
-  ModelFit model;                        ///< the best line's
+  ModelFit model;  ///< the best line's
+  /// What the search began with where that was moved to another valley, where it leaves less;
+  /// otherwise not usable.
+  ModelFit base;
   std::vector<AcceptedEffect> accepted;  ///< in the order in which they were
   std::vector<LawTrial> refused;         ///< the last round's
   std::vector<LawScore> first;           ///< scores in the model that the search began with
@@ -71,8 +74,8 @@ struct LawSearch {
 /// with the best, and keeps what predicts observations left out. Several lines are followed, always
 /// the one that is best; a line costs what its model leaves, and a price for each number more
 /// (Bayesian information criterion). `base` is linearised and has its directions. Where even the
-/// best law leaves a model far off, laws are identified from scratch, and judged against the line's
-/// model in the valley of the best one where that leaves less.
+/// best law leaves a model far off, laws are identified from scratch; a line whose own model leaves
+/// less in the valley that this finds moves there, and laws are judged against it.
 ///
 /// Where several causes are at work, corrections without physics may do as well as each one alone,
 /// and not as well as all of them. So a law that mends a good part of the rest is followed all the

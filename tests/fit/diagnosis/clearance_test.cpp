@@ -188,6 +188,22 @@ double chance_beyond(int numbers, double square) {
          (numbers == 1 ? 0 : 2 * std::sqrt(half / M_PI) * std::exp(-half));
 }
 
+TEST(RiseWithoutLast, IsThatOfAFitWithout) {
+  const SyntheticCloth cloth{.drag_rate_per_s = 0.02};
+  const FitInput input = synthetic_input(cloth);
+  const DiagnosisSetup setup{.inputs = {&input, 1}, .options = kOptions, .columns = 9, .rows = 9};
+  ModelFit with = true_model(setup, cloth, {drag_term()});
+  with.parts.front().linear = {};  // at time steps as those of the other fit
+  refine_model(with, setup, {}, {});
+  ModelFit without = with_terms(setup, with, {}, {});
+  refine_model(without, setup, {}, {});
+  ASSERT_TRUE(with.usable && without.usable);
+  const double rise = without.chi_square(kInfinite) - with.chi_square(kInfinite);
+  ASSERT_GT(rise, 25);
+
+  EXPECT_NEAR(rise_without_last(with, kInfinite), rise, 0.1 * rise);
+}
+
 TEST(LeastFall, IsAsUnlikelyAsFiveSigmas) {
   const double five_sigmas = std::erfc(5 / std::sqrt(2.0));
   for (const int amplitudes : {1, 2, 3, 4}) {

@@ -40,12 +40,25 @@ TEST(FittedAnew, IsTheOptimumWhateverIsKnown) {
   EXPECT_NEAR(anew.values().front().at("viscous_damping.rate"), 1.2, 0.05);
 }
 
-TEST(FittedAnew, IsOfOneRecording) {
-  const SyntheticCloth cloth;
-  const std::vector<FitInput> inputs(2, synthetic_input(cloth));
+TEST(FittedAnew, IsOfAllRecordings) {
+  SyntheticCloth cloth{.drag_rate_per_s = 1.2};
+  std::vector<FitInput> inputs{synthetic_input(cloth)};
+  cloth.seed = 2;
+  inputs.push_back(synthetic_input(cloth));
   const DiagnosisSetup setup{.inputs = inputs, .options = kOptions, .columns = 9, .rows = 9};
 
-  EXPECT_FALSE(fitted_anew(setup, {}, {}).usable);
+  const ModelFit anew = fitted_anew(setup, {drag_term()}, {});
+
+  ASSERT_TRUE(anew.usable);
+  ModelFit near = true_model(setup, cloth, {drag_term()});
+  refine_model(near, setup, {}, {});
+  ASSERT_TRUE(near.usable);
+  const auto count = static_cast<double>(near.residual_count());
+  EXPECT_LT(anew.residual().squaredNorm(),
+            near.residual().squaredNorm() + 0.2 * std::sqrt(2 * count));
+  const std::vector<NamedValues> values = anew.values();
+  EXPECT_NEAR(values[0].at("viscous_damping.rate"), 1.2, 0.04);
+  EXPECT_EQ(values[0].at("viscous_damping.rate"), values[1].at("viscous_damping.rate"));
 }
 
 TEST(FittedAnew, IsOfAKnownStart) {

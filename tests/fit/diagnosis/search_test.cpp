@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "fit/diagnosis/discretisation.h"
 #include "tests/fit/diagnosis/true_model.h"
 
 namespace clothfit {
@@ -68,6 +69,72 @@ TEST(WorthNaming, CountsLargeResidualsAsTheFitDoes) {
   const double blocks = static_cast<double>(model.residual_count()) / 3;
   EXPECT_NEAR(worth_naming(model, threshold),
               0.05 * (blocks * threshold * (2 * length - threshold) + prior), 1e-9 * blocks);
+}
+
+/// A cloth that bounces a few times, so that a stiffer one fits it in a valley of its own.
+const SyntheticCloth kBouncing{.mesh = 7, .markers = 5, .frames = 60, .held_out_from = 48};
+
+FitOptions quick() {
+  FitOptions options;
+  options.generations = 10;
+  options.population = 40;
+  options.refine_best = 1;
+  return options;
+}
+
+/// The model without laws in that valley.
+ModelFit stiffer(const DiagnosisSetup& setup, SyntheticCloth cloth) {
+  constexpr double kStiffer = 6;
+  for (double* stiffness : {&cloth.fabric.tension_warp_n_per_m, &cloth.fabric.tension_weft_n_per_m,
+                            &cloth.fabric.shear_n_per_m})
+    *stiffness *= kStiffer;
+  ModelFit model = true_model(setup, cloth);
+  refine_model(model, setup, {}, {});
+  refine_with_discretisation(model, setup, {});
+  return model;
+}
+
+SearchOptions only(const Term& law) {
+  return {.laws = {{law}}, .lines = 1, .most_effects = 1, .threshold = kSquares};
+}
+
+TEST(SearchLaws, LeavesAValleyRatherThanNameALawForIt) {
+  const FitInput input = synthetic_input(kBouncing);
+  const FitOptions options = quick();
+  const DiagnosisSetup setup{.inputs = {&input, 1}, .options = options, .columns = 7, .rows = 7};
+  const ModelFit base = stiffer(setup, kBouncing);
+  ASSERT_TRUE(base.usable);
+  const auto count = static_cast<double>(base.residual_count());
+  ASSERT_GT(base.chi_square(kSquares), 20 * count);
+
+  const Term tilt{.effect = "gravity_tilt", .law = "", .amplitudes = {"about_x", "about_y"}};
+  const LawSearch found = search_laws(setup, base, only(tilt), {});
+
+  EXPECT_TRUE(found.accepted.empty());
+  ASSERT_TRUE(found.base.usable);
+  EXPECT_LT(found.base.chi_square(kSquares), 1.2 * count);
+  EXPECT_LT(found.model.chi_square(kSquares), 1.2 * count);
+}
+
+TEST(SearchLaws, CreditsALawWithWhatItExplainsAndNotWithTheValley) {
+  SyntheticCloth cloth = kBouncing;
+  cloth.drag_rate_per_s = 1.5;
+  const FitInput input = synthetic_input(cloth);
+  const FitOptions options = quick();
+  const DiagnosisSetup setup{.inputs = {&input, 1}, .options = options, .columns = 7, .rows = 7};
+  const ModelFit base = stiffer(setup, cloth);
+  ASSERT_TRUE(base.usable);
+
+  const LawSearch found = search_laws(setup, base, only(drag_term()), {});
+
+  ASSERT_EQ(found.accepted.size(), 1u);
+  const LawTrial& drag = found.accepted.front().trial;
+  EXPECT_EQ(drag.term.effect, "viscous_damping");
+  EXPECT_NEAR(found.model.values().front().at("viscous_damping.rate"), 1.5, 0.1);
+  ASSERT_TRUE(found.base.usable);
+  const double without = found.base.chi_square(kSquares);
+  EXPECT_LT(without, 0.5 * base.chi_square(kSquares));
+  EXPECT_NEAR(drag.fall, without - found.model.chi_square(kSquares), 0.05 * without);
 }
 
 }  // namespace
