@@ -518,8 +518,6 @@ class Run {
   }
 
   static constexpr int kLeastFitted = 2;
-  /// Of what is above the noise.
-  static constexpr double kGoodPart = 0.25;
 
   std::span<const FitInput> fitted_, held_out_;
   const DiagnoseOptions& options_;

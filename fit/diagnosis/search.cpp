@@ -400,7 +400,7 @@ class Search {
     std::vector<Tried> tried;
     for (size_t k = 0; k < scores.size(); ++k)
       tried.push_back({.score = scores[k], .model = std::move(fitted[k])});
-    look_elsewhere(tried);
+    look_elsewhere(tried, line.model);
     if (stopped_) return {};
     let_best_err(tried, line.model);
     if (stopped_) return {};
@@ -516,12 +516,15 @@ class Search {
                                      [&](const Tried& child) { return left_by(child.model); });
   }
 
-  /// Where even the best of them is far off, its law may be right in another valley of the cost
-  /// than the one that the line stands in: those foreseen to take half as much as the best are
-  /// identified from scratch (where starts are known).
-  void look_elsewhere(std::vector<Tried>& tried) const {
+  /// Where even the best of them is far off, and leaves a good part of what the line leaves, its
+  /// law may be right in another valley of the cost than the one that the line stands in: those
+  /// foreseen to take half as much as the best are identified from scratch (where starts are
+  /// known).
+  void look_elsewhere(std::vector<Tried>& tried, const ModelFit& line) const {
     constexpr double kOfBest = 0.5;
-    if (tried.empty() || !best_of(tried).model.usable || !is_far_off(best_of(tried).model)) return;
+    if (tried.empty() || !best_of(tried).model.usable || !is_far_off(best_of(tried).model) ||
+        left_by(best_of(tried).model) < kGoodPart * left_by(line))
+      return;
     double foreseen = 0;
     for (const Tried& child : tried) foreseen = std::max(foreseen, child.score->fall);
     for (Tried& child : tried) {
@@ -536,21 +539,25 @@ class Search {
   }
 
   /// What a valley is worth is no merit of the law that led there: the line's model led to the
-  /// valley of the best law, or identified from scratch. Not usable where it does not leave less
-  /// than the line's own, nor where the law is foreseen to be worth all that it took.
+  /// valley of the best law; where that leaves less than the line's own but much, or the law was
+  /// identified from scratch, identified so too. Not usable where neither leaves less, nor where
+  /// the law is foreseen to be worth all that it took.
   ModelFit in_valley_of(const Tried& best, const ModelFit& line) const {
     if (!best.model.usable || !is_far_off(line)) return {};
     const double taken = left_by(line) - left_by(best.model);
     if (taken <= 0 || (!best.anew && rise_without_last(best.model, threshold_) > taken)) return {};
-    ModelFit led = with_terms(setup_, best.model, line.terms, {});
-    refine_model(led, setup_, {}, progress_);
-    ModelFit anew = fitted_anew(setup_, line.terms, progress_);
-    for (ModelFit* there : {&led, &anew})
-      if (!stopped_ && there->usable) refine_with_discretisation(*there, setup_, progress_);
+    ModelFit there = with_terms(setup_, best.model, line.terms, {});
+    refine_model(there, setup_, {}, progress_);
+    if (!stopped_ && there.usable) refine_with_discretisation(there, setup_, progress_);
     if (stopped_) return {};
-    ModelFit& there = left_by(led) <= left_by(anew) ? led : anew;
+    if (best.anew || (left_by(there) < left_by(line) && is_far_off(there))) {
+      ModelFit anew = fitted_anew(setup_, line.terms, progress_);
+      if (!stopped_ && anew.usable) refine_with_discretisation(anew, setup_, progress_);
+      if (stopped_) return {};
+      if (left_by(anew) < left_by(there)) there = std::move(anew);
+    }
     if (left_by(there) >= left_by(line)) return {};
-    return std::move(there);
+    return there;
   }
 
   /// Directions of their own for the models that leave least, of those that stand far from where
@@ -618,7 +625,6 @@ class Search {
 
   /// Whether a law takes much of what a model leaves, of observations left out, above the noise.
   static bool is_good_part(const CrossValidation& without, const CrossValidation& own) {
-    constexpr double kGoodPart = 0.25;
     return without.mean - own.mean > kGoodPart * (without.mean - 1);
   }
 

@@ -49,6 +49,9 @@ struct SearchOptions {
 /// Of the cross-validation, where one recording is fitted.
 inline constexpr int kTimeBlocks = 5;
 
+/// Of what a model leaves above the noise, what is too much to be passed over.
+inline constexpr double kGoodPart = 0.25;
+
 /// What a law must take of a model's chi-square to be worth a name, however sure it is. Noise is
 /// known to three tenths of a per cent at best. And a model whose own numerics err leaves structure
 /// that many laws follow a little: what is missing takes a third of all that is surely above the
