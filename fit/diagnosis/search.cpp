@@ -28,6 +28,10 @@ constexpr size_t kScoreHorizons = 3;
 /// that sigmas are those of all it lacks.
 constexpr double kFarOff = 3;
 
+/// Chi-square per residual of a model that lacks so much that any mesh shows what. Its time steps
+/// are often short: what it lacks is made up for by far too much damping.
+constexpr double kHopeless = 30;
+
 /// What a model must gain for each number more (Bayesian information criterion).
 double price(const ModelFit& model) {
   double amplitudes = 0;
@@ -52,7 +56,7 @@ struct Line {
   /// that did as well as one of them; infinite: nothing.
   double owes = std::numeric_limits<double>::infinity();
   bool anew = false;           ///< its model was identified from scratch
-  bool moved = false;          ///< to another valley, by a law that was identified from scratch
+  bool moved = false;          ///< to another valley, that a law led to
   bool finished = false;       ///< no law more leads on from here
   std::vector<LawScore> last;  ///< what its model would still show, over all frames
   std::vector<LawTrial> refused;
@@ -67,6 +71,9 @@ std::vector<LawScore> without_columns(std::vector<LawScore> scores) {
 
 /// What a line's next law may be.
 struct Shortlist {
+  /// The line's model on the coarse mesh, where it is so far off that this one does for the round;
+  /// otherwise not usable.
+  ModelFit coarse;
   double share = 1;              ///< the shortest horizon
   ModelFit early;                ///< the model fitted over that
   std::vector<LawScore> scores;  ///< of all laws there
@@ -224,7 +231,7 @@ class Search {
     prune(best);
     if (stopped_) return cancelled();
     // Of laws that are not in the model, over all frames.
-    if (best.last.empty()) best.last = scored(best.model, untested(best.model));
+    if (best.last.empty()) best.last = scored(setup_, best.model, untested(best.model));
     if (stopped_) return cancelled();
     result.model = std::move(best.model);
     result.accepted = std::move(best.accepted);
@@ -254,12 +261,17 @@ class Search {
     return worth_naming(model, threshold_, base_chi_square_ - model.chi_square(threshold_));
   }
 
+  bool is_coarser_than(const DiagnosisSetup& setup) const {
+    return coarse_.columns < setup.columns || coarse_.rows < setup.rows;
+  }
+
   /// Scores of all laws, each at its best shape. A coarser mesh chooses frequencies and other
   /// shapes, which are many; a place on the cloth it may get wrong altogether, so that all are
   /// looked at on the mesh itself while nothing has been found yet.
-  std::vector<LawScore> scored(const ModelFit& model, std::vector<LawShapes> laws) const {
+  std::vector<LawScore> scored(const DiagnosisSetup& setup, const ModelFit& model,
+                               std::vector<LawShapes> laws) const {
     const ModelProjection projection(model, setup_.options.loss);
-    if (coarse_.columns < setup_.columns || coarse_.rows < setup_.rows) {
+    if (is_coarser_than(setup)) {
       std::vector<LawShapes> elsewhere;
       for (const LawShapes& law : laws)
         if (law.size() > 1 && (!model.terms.empty() || !is_over_cloth(law.front())))
@@ -303,10 +315,19 @@ class Search {
   }
 
   Shortlist shortlist(const ModelFit& model) {
-    if (model.residual().squaredNorm() >
-        kHardlyBiased * static_cast<double>(model.residual_count()))
-      return shortlist_from(model, kScoreShares[0], kVisible);
-    Shortlist list = shortlist_from(model, 1, kVisible);
+    const double left =
+        model.residual().squaredNorm() / static_cast<double>(model.residual_count());
+    if (left > kHopeless && is_coarser_than(setup_)) {
+      ModelFit coarse = fit_on_mesh(coarse_, model, progress_);
+      if (stopped_) return {};
+      if (coarse.usable) {
+        Shortlist list = shortlist_from(coarse_, coarse, kScoreShares[0], kVisible);
+        list.coarse = std::move(coarse);
+        return list;
+      }
+    }
+    if (left > kHardlyBiased) return shortlist_from(setup_, model, kScoreShares[0], kVisible);
+    Shortlist list = shortlist_from(setup_, model, 1, kVisible);
     if (stopped_) return {};
     // What its other numbers have taken up of a missing law shows least over all frames.
     constexpr double kMostOfIt = 0.5, kSure = 4;
@@ -317,13 +338,14 @@ class Search {
         judge_adequacy(model, setup_.options.loss).adequate)
       return list;
     const double scatter = std::sqrt(2 / static_cast<double>(model.residual_count()));
-    Shortlist over_few = shortlist_from(model, kScoreShares[0], 1 + kSure * scatter);
+    Shortlist over_few = shortlist_from(setup_, model, kScoreShares[0], 1 + kSure * scatter);
     return over_few.share < 1 ? over_few : list;
   }
 
   /// Over shares of the frames from `first` on at which chi-square per residual is `visible`, or
   /// all.
-  Shortlist shortlist_from(const ModelFit& model, double first, double visible_from) {
+  Shortlist shortlist_from(const DiagnosisSetup& setup, const ModelFit& model, double first,
+                           double visible_from) {
     std::vector<ModelFit> shorter;
     Shortlist list;
     for (const double share : kScoreShares) {
@@ -331,9 +353,11 @@ class Search {
       ModelFit fitted = model;
       if (share < 1) {
         fitted = shortened(model, share);
-        refine_model(fitted, setup_, {.rounds = 1}, progress_);
+        refine_model(fitted, setup, {.rounds = 1}, progress_);
         if (stopped_) return {};
-        if (fitted.usable) refine_with_discretisation(fitted, setup_, progress_);
+        // The coarse mesh errs, and is to choose alone.
+        if (fitted.usable && &setup == &setup_)
+          refine_with_discretisation(fitted, setup, progress_);
       }
       if (stopped_) return {};
       if (!fitted.usable) continue;
@@ -348,7 +372,7 @@ class Search {
     for (size_t k = 0; k < shorter.size(); ++k) {
       const ModelFit& at = shorter[k];
       if (k == 0) {
-        list.best = scored(at, untested(model));
+        list.best = scored(setup, at, untested(model));
         for (LawScore& score : list.best) {
           score.share /= horizons;
           if (list.share < 1) score.columns.clear();
@@ -383,7 +407,7 @@ class Search {
     line.finished = true;
     line.refused.clear();
     line.last.clear();
-    if (list.share == 1) line.last = list.scores;
+    if (list.share == 1 && !list.coarse.usable) line.last = list.scores;
     std::vector<const LawScore*> scores;
     const double least_gain = worth(line.model);
     for (const LawScore& score : list.best) {
@@ -395,7 +419,11 @@ class Search {
       scores.push_back(&score);
     }
     std::vector<ModelFit> fitted =
-        fit_with_laws(setup_, line.model, list.early, scores, list.share, threshold_, progress_);
+        list.coarse.usable
+            ? on_analysed_mesh(fit_with_laws(coarse_, list.coarse, list.early, scores, list.share,
+                                             threshold_, progress_))
+            : fit_with_laws(setup_, line.model, list.early, scores, list.share, threshold_,
+                            progress_);
     if (stopped_) return {};
     std::vector<Tried> tried;
     for (size_t k = 0; k < scores.size(); ++k)
@@ -444,6 +472,30 @@ class Search {
         if (!trial.term.same_law(child.accepted.back().trial.term))
           child.accepted.back().refused.push_back(trial);
     return children;
+  }
+
+  /// The models of the coarse mesh that leave least, fitted on the analysed one; others are not
+  /// usable.
+  std::vector<ModelFit> on_analysed_mesh(std::vector<ModelFit> models) const {
+    // What is left above the noise: times the best one's, or times a share of the noise.
+    constexpr double kMore = 2, kOfNoise = 0.2;
+    const auto above = [&](const ModelFit& model) {
+      return left_by(model) - static_cast<double>(model.residual_count());
+    };
+    double least = std::numeric_limits<double>::infinity();
+    for (const ModelFit& model : models)
+      if (model.usable)
+        least = std::min(
+            least, std::max(above(model), kOfNoise * static_cast<double>(model.residual_count())));
+    for (ModelFit& model : models) {
+      if (stopped_) break;
+      if (!model.usable) continue;
+      if (above(model) > kMore * least)
+        model.usable = false;
+      else
+        model = fit_on_mesh(setup_, model, progress_);
+    }
+    return models;
   }
 
   /// To a valley where it leaves less; what was scored where it stood says nothing of it there.
@@ -540,8 +592,8 @@ class Search {
 
   /// What a valley is worth is no merit of the law that led there: the line's model led to the
   /// valley of the best law; where that leaves less than the line's own but much, or the law was
-  /// identified from scratch, identified so too. Not usable where neither leaves less, nor where
-  /// the law is foreseen to be worth all that it took.
+  /// identified from scratch, identified so too. Not usable where neither leaves clearly less,
+  /// nor where the law is foreseen to be worth all that it took.
   ModelFit in_valley_of(const Tried& best, const ModelFit& line) const {
     if (!best.model.usable || !is_far_off(line)) return {};
     const double taken = left_by(line) - left_by(best.model);
@@ -550,13 +602,16 @@ class Search {
     refine_model(there, setup_, {}, progress_);
     if (!stopped_ && there.usable) refine_with_discretisation(there, setup_, progress_);
     if (stopped_) return {};
-    if (best.anew || (left_by(there) < left_by(line) && is_far_off(there))) {
+    // What a fit gains that is begun anew in the same valley is none of the law's.
+    constexpr double kOtherValley = 0.1;
+    const double enough = left_by(line) - kOtherValley * taken;
+    if (best.anew || (left_by(there) < enough && is_far_off(there))) {
       ModelFit anew = fitted_anew(setup_, line.terms, progress_);
       if (!stopped_ && anew.usable) refine_with_discretisation(anew, setup_, progress_);
       if (stopped_) return {};
       if (left_by(anew) < left_by(there)) there = std::move(anew);
     }
-    if (left_by(there) >= left_by(line)) return {};
+    if (left_by(there) >= enough) return {};
     return there;
   }
 
