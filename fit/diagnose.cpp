@@ -34,7 +34,8 @@ ModelFit on_analysed_mesh(ModelFit own, DiagnosisSetup& setup, const ProgressCal
   const DiagnosisSetup other = with_other_mesh(setup, own);
   if (other.columns < setup.columns) return own;
   // From where the declared mesh's optimum lies a fit can end in another valley.
-  ModelFit finer = fitted_anew(other, {}, progress);
+  ModelFit finer;
+  if (other.inputs.size() == 1) finer = fitted_anew(other, {}, progress);
   if (!finer.usable) {
     finer = fit_on_mesh(other, own, progress);
     if (finer.usable && finer.rough) {
@@ -267,7 +268,9 @@ class Run {
                        .most_effects = static_cast<size_t>(options_.most_effects),
                        .threshold = threshold(analysis.base)};
     analysis.found = search_laws(analysis.setup, analysis.base, analysis.search, progress_);
-    if (analysis.found.base.usable) analysis.base = analysis.found.base;
+    if (!analysis.found.base.usable) return;
+    analysis.base = analysis.found.base;
+    analysis.search.threshold = analysis.found.threshold;
   }
 
   /// The constants that markers are off by, where nothing explains all and these would mend a good
@@ -320,7 +323,7 @@ class Run {
   /// (What is left out had its say in the constants there: that they foresee it has been asked
   /// before.)
   bool mend(Analysis& analysis, const Analysis& declared) {
-    if (declared.found.accepted.empty()) {
+    if (declared.found.accepted.empty() && !declared.found.base.usable) {
       if (!fit_base(analysis).empty() || cancelled_) return false;
     } else if (!go_on_from(declared, analysis)) {
       return false;

@@ -11,6 +11,7 @@
 #include "fit/diagnosis/clearance.h"
 #include "fit/diagnosis/discretisation.h"
 #include "fit/diagnosis/refit.h"
+#include "fit/refine.h"
 
 namespace clothfit {
 namespace {
@@ -201,17 +202,19 @@ class Search {
       }
       std::vector<Line> children = extend(*next, list);
       if (stopped_) return cancelled();
-      if (next->moved && children.empty()) {
-        // In its own valley other laws may show.
-        list = shortlist(next->model);
+      if (children.empty() && (next->moved || list.coarse.usable)) {
+        // In its own valley other laws may show, and on its own mesh.
+        list = shortlist(next->model, next->moved);
         if (stopped_) return cancelled();
         children = extend(*next, list);
         if (stopped_) return cancelled();
       }
       if (next->moved && next->accepted.empty()) {
         result.base = next->model;
-        result.first = list.merged();
-        result.first_share = list.share;
+        result.threshold = threshold_;
+        result.first = without_columns(scored(setup_, next->model, untested(next->model)));
+        result.first_share = 1;
+        if (stopped_) return cancelled();
       }
       for (Line& child : children) child.accepted.back().alike = alike(children, child);
       const bool is_end = children.empty() && next == lines.begin() && next->sound();
@@ -228,8 +231,13 @@ class Search {
       }
     }
     Line& best = lines.front();
+    const bool found = !best.accepted.empty();
     prune(best);
     if (stopped_) return cancelled();
+    if (found && best.accepted.empty()) {
+      result.base = best.model;
+      result.threshold = threshold_;
+    }
     // Of laws that are not in the model, over all frames.
     if (best.last.empty()) best.last = scored(setup_, best.model, untested(best.model));
     if (stopped_) return cancelled();
@@ -314,13 +322,14 @@ class Search {
     return scores;
   }
 
-  Shortlist shortlist(const ModelFit& model) {
+  Shortlist shortlist(const ModelFit& model, bool may_be_coarse = true) {
     const double left =
         model.residual().squaredNorm() / static_cast<double>(model.residual_count());
-    if (left > kHopeless && is_coarser_than(setup_)) {
+    if (left > kHopeless && may_be_coarse && is_coarser_than(setup_)) {
       ModelFit coarse = fit_on_mesh(coarse_, model, progress_);
       if (stopped_) return {};
-      if (coarse.usable) {
+      if (coarse.usable && coarse.residual().squaredNorm() >
+                               kHopeless * static_cast<double>(coarse.residual_count())) {
         Shortlist list = shortlist_from(coarse_, coarse, kScoreShares[0], kVisible);
         list.coarse = std::move(coarse);
         return list;
@@ -414,14 +423,15 @@ class Search {
       if (score.fall < least_fall(score.amount.size())) continue;
       // Where little is left over all frames, a fit gains about what was foreseen.
       constexpr double kMoreThanForeseen = 1.25;
-      if (list.share == 1 && kMoreThanForeseen * score.fall < least_gain) continue;
+      if (list.share == 1 && !list.coarse.usable && kMoreThanForeseen * score.fall < least_gain)
+        continue;
       if (scores.size() == static_cast<size_t>(options_.refits)) break;
       scores.push_back(&score);
     }
     std::vector<ModelFit> fitted =
         list.coarse.usable
-            ? on_analysed_mesh(fit_with_laws(coarse_, list.coarse, list.early, scores, list.share,
-                                             threshold_, progress_))
+            ? on_analysed_mesh(line.model, fit_with_laws(coarse_, list.coarse, list.early, scores,
+                                                         list.share, threshold_, progress_))
             : fit_with_laws(setup_, line.model, list.early, scores, list.share, threshold_,
                             progress_);
     if (stopped_) return {};
@@ -432,21 +442,22 @@ class Search {
     if (stopped_) return {};
     let_best_err(tried, line.model);
     if (stopped_) return {};
-    ModelFit elsewhere;
-    if (!tried.empty()) elsewhere = in_valley_of(best_of(tried), line.model);
+    ModelFit there;
+    if (!tried.empty()) there = in_valley_of(best_of(tried), line.model);
     if (stopped_) return {};
-    const bool moves = elsewhere.usable;
-    if (moves) move(line, std::move(elsewhere));
+    const bool moves = there.usable, elsewhere = moves || list.coarse.usable;
+    if (moves) move(line, std::move(there));
     std::vector<Line> children;
     std::vector<LawTrial> trials;
     CrossValidation before;
     if (!tried.empty()) before = validated(line.model, &coarse_);
+    if (moves && !line.sound()) line.owes = without_physics(before);
     for (Tried& child : tried) {
-      LawTrial trial = judge(line.model, before, *child.score, child.model, moves);
+      LawTrial trial = judge(line.model, before, *child.score, child.model, elsewhere);
       if ((trial.refused.empty() || trial.with_later_ones) && child.model.rough) {
         refine_model(child.model, setup_, {}, progress_);
         if (stopped_) return {};
-        trial = judge(line.model, before, *child.score, child.model, moves);
+        trial = judge(line.model, before, *child.score, child.model, elsewhere);
       }
       const bool on_credit = std::exchange(trial.with_later_ones, false);
       trials.push_back(trial);
@@ -474,9 +485,9 @@ class Search {
     return children;
   }
 
-  /// The models of the coarse mesh that leave least, fitted on the analysed one; others are not
-  /// usable.
-  std::vector<ModelFit> on_analysed_mesh(std::vector<ModelFit> models) const {
+  /// The models of the coarse mesh that leave least, fitted on the analysed one: from there, and
+  /// where that leaves more than the line's model does, from this. Others are not usable.
+  std::vector<ModelFit> on_analysed_mesh(const ModelFit& line, std::vector<ModelFit> models) const {
     // What is left above the noise: times the best one's, or times a share of the noise.
     constexpr double kMore = 2, kOfNoise = 0.2;
     const auto above = [&](const ModelFit& model) {
@@ -490,10 +501,15 @@ class Search {
     for (ModelFit& model : models) {
       if (stopped_) break;
       if (!model.usable) continue;
-      if (above(model) > kMore * least)
+      if (above(model) > kMore * least) {
         model.usable = false;
-      else
-        model = fit_on_mesh(setup_, model, progress_);
+        continue;
+      }
+      const std::vector<Term> terms = model.terms;
+      model = fit_on_mesh(setup_, model, progress_);
+      if (stopped_ || left_by(model) < left_by(line)) continue;
+      model = with_terms(setup_, line, terms, {});
+      refine_model(model, setup_, {}, progress_);
     }
     return models;
   }
@@ -503,8 +519,12 @@ class Search {
     line.model = std::move(there);
     line.moved = true;
     line.last.clear();
+    if (line.accepted.empty()) {
+      if (std::isfinite(threshold_))
+        threshold_ = kHuberScales * robust_scale(line.model.residual());
+      begin_at(line);
+    }
     line.cost = cost(line.model);
-    if (line.accepted.empty()) begin_at(line);
   }
 
   struct Tried {
@@ -514,10 +534,12 @@ class Search {
   };
 
   /// Drops laws that those accepted after them make needless: the model without one fits as well,
-  /// by what counts as a gain. What made up for a law on credit stays.
+  /// by what counts as a gain. What made up for a law on credit stays. The last one has just been
+  /// found to be needed, unless the line has moved to another valley since.
   void prune(Line& line) const {
     const size_t given = line.model.terms.size() - line.accepted.size();
-    for (size_t k = 0; k + 1 < line.accepted.size();) {
+    const size_t kept = line.moved ? 0 : 1;
+    for (size_t k = 0; k + kept < line.accepted.size();) {
       const auto own = line.accepted.begin() + static_cast<std::ptrdiff_t>(k);
       if (std::any_of(line.accepted.begin(), own, [](const AcceptedEffect& earlier) {
             return earlier.trial.with_later_ones;
@@ -549,6 +571,7 @@ class Search {
   /// than the one that it was led into.
   void leave_valley(ModelFit& model) const {
     if (!model.usable || surely_above(model, threshold_) == 0) return;
+    if (model.parts.size() > 1 && !is_far_off(model)) return;
     ModelFit anew = fitted_anew(setup_, model.terms, progress_);
     if (!anew.usable || anew.chi_square(threshold_) >= model.chi_square(threshold_)) return;
     refine_with_discretisation(anew, setup_, progress_);
@@ -693,12 +716,13 @@ class Search {
            std::ranges::equal(own.block, without.block, std::less_equal<>());
   }
 
-  /// `elsewhere`: the model without it stands in another valley than where the law was scored.
+  /// `elsewhere`: the law was scored in another valley, or on another mesh, than where the model
+  /// without it stands.
   LawTrial judge(const ModelFit& before, const CrossValidation& without, const LawScore& score,
                  const ModelFit& after, bool elsewhere) const {
     LawTrial trial{.term = score.term, .foreseen_fall = score.fall, .refused = {}};
     if (!after.usable) {
-      trial.refused = "others leave far less over the first frames, or no fit worked out";
+      trial.refused = "others leave far less, or no fit worked out";
       return trial;
     }
     trial.term = after.terms.back();

@@ -66,6 +66,7 @@ struct LawSearch {
   /// What the search began with where that was moved to another valley, where it leaves less;
   /// otherwise not usable.
   ModelFit base;
+  double threshold = 0;                  ///< there, as SearchOptions::threshold
   std::vector<AcceptedEffect> accepted;  ///< in the order in which they were
   std::vector<LawTrial> refused;         ///< the last round's
   std::vector<LawScore> first;           ///< scores in the model that the search began with
