@@ -275,7 +275,7 @@ class Search {
 
   /// Scores of all laws, each at its best shape. A coarser mesh chooses frequencies and other
   /// shapes, which are many; a place on the cloth it may get wrong altogether, so that all are
-  /// looked at on the mesh itself while nothing has been found yet.
+  /// looked at on `setup`'s mesh itself while nothing has been found yet.
   std::vector<LawScore> scored(const DiagnosisSetup& setup, const ModelFit& model,
                                std::vector<LawShapes> laws) const {
     const ModelProjection projection(model, setup_.options.loss);
@@ -568,7 +568,8 @@ class Search {
   }
 
   /// Identifies a model that leaves more than noise anew: its optimum may lie in another valley
-  /// than the one that it was led into.
+  /// than the one that it was led into. Of several recordings, which costs more, only one that is
+  /// far off.
   void leave_valley(ModelFit& model) const {
     if (!model.usable || surely_above(model, threshold_) == 0) return;
     if (model.parts.size() > 1 && !is_far_off(model)) return;

@@ -79,7 +79,8 @@ struct LawSearch {
 /// the one that is best; a line costs what its model leaves, and a price for each number more
 /// (Bayesian information criterion). `base` is linearised and has its directions. Where even the
 /// best law leaves a model far off, laws are identified from scratch; a line whose own model leaves
-/// less in the valley that this finds moves there, and laws are judged against it.
+/// less in the valley that this finds moves there, and laws are judged against it. Laws for a model
+/// that is hopelessly far off are chosen on a mesh of half the cells a side.
 ///
 /// Where several causes are at work, corrections without physics may do as well as each one alone,
 /// and not as well as all of them. So a law that mends a good part of the rest is followed all the
