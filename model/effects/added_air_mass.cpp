@@ -6,6 +6,7 @@ namespace clothfit::added_air_mass {
 namespace {
 struct Law {
   static constexpr int kParameters = 1;
+  static constexpr LooksAt kLooksAt{.area = true, .gravity = true, .mass = true};
 
   template <class Real>
   static Vector3<Real> change(const VertexSight<Real>& at, const Vector3<Real>& force_n,

@@ -7,6 +7,7 @@ namespace clothfit::contact_plane {
 namespace {
 struct Law {
   static constexpr int kParameters = Contact::kParameters + 4;
+  static constexpr LooksAt kLooksAt{.position = true, .velocity = true, .mass = true};
 
   template <class Real>
   static Vector3<Real> force(const VertexSight<Real>& at, const std::array<Real, kParameters>& p) {

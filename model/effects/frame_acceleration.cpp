@@ -7,6 +7,7 @@ namespace clothfit::frame_acceleration {
 namespace {
 struct Law {
   static constexpr int kParameters = Harmonic::kParameters;
+  static constexpr LooksAt kLooksAt{.mass = true};
 
   template <class Real>
   static Vector3<Real> at_moment(const Harmonic::Parameters<Real>& p, double time_s) {

@@ -6,6 +6,7 @@ namespace clothfit::gravity_scale {
 namespace {
 struct Law {
   static constexpr int kParameters = 1;
+  static constexpr LooksAt kLooksAt{.gravity = true, .mass = true};
 
   template <class Real>
   static Vector3<Real> force(const VertexSight<Real>& at, const std::array<Real, 1>& excess) {

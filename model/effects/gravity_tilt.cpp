@@ -6,6 +6,7 @@ namespace clothfit::gravity_tilt {
 namespace {
 struct Law {
   static constexpr int kParameters = 2;
+  static constexpr LooksAt kLooksAt{.gravity = true, .mass = true};
 
   template <class Real>
   static Vector3<Real> force(const VertexSight<Real>& at, const std::array<Real, 2>& angle_rad) {

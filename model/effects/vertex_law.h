@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <array>
+#include <span>
+#include <vector>
 
 #include "model/cloth.h"
 #include "model/effects/law_effect.h"
@@ -86,28 +88,73 @@ void for_vertices(const EffectScene<L>& scene, const Visit& visit) {
   }
 }
 
-/// Dual numbers over what a vertex law depends on: position, velocity, area, gravity, then
-/// `more` numbers, then the effect's parameters. The mass stands apart (MassDual): many laws do not
-/// look at it, and a vector of derivatives of odd length costs a third more.
-template <int more, int parameters>
+/// What a law looks at, of what it sees: derivatives by anything else are not taken.
+struct LooksAt {
+  bool position = false, velocity = false, area = false, gravity = false, mass = false;
+};
+
+/// As a law says it, kLooksAt, or everything.
+template <class Law>
+constexpr LooksAt looks_at() {
+  if constexpr (requires { Law::kLooksAt; })
+    return Law::kLooksAt;
+  else
+    return {.position = true, .velocity = true, .area = true, .gravity = true, .mass = true};
+}
+
+/// What a law sees, and parameters, as numbers that derivatives are not taken by.
+template <class Number>
+Vector3<Number> constant(const Vector3<double>& v) {
+  return {Number(v.x), Number(v.y), Number(v.z)};
+}
+template <class Number>
+VertexSight<Number> constant(const VertexSight<double>& at) {
+  return {.position_m = constant<Number>(at.position_m),
+          .velocity_m_per_s = constant<Number>(at.velocity_m_per_s),
+          .area_m2 = constant<Number>(at.area_m2),
+          .gravity_m_per_s2 = constant<Number>(at.gravity_m_per_s2),
+          .mass_kg = Number(at.mass_kg),
+          .flat_area_m2 = at.flat_area_m2,
+          .s = at.s,
+          .t = at.t,
+          .mesh = at.mesh,
+          .time_s = at.time_s};
+}
+template <class Number, size_t count>
+std::array<Number, count> constants(const EffectValues<SingleLane>& values) {
+  std::array<Number, count> result;
+  for (size_t p = 0; p < count; ++p) result[p] = Number(values[p][0]);
+  return result;
+}
+
+/// Dual numbers over what a vertex law looks at: position, velocity, area, gravity, then `more`
+/// numbers, then the effect's parameters. The mass stands apart (MassDual).
+template <LooksAt at, int more, int parameters>
 struct VertexDual {
-  static constexpr int kMore = 12, kParameters = 12 + more, kCount = kParameters + parameters;
+  static constexpr int kPosition = 0, kVelocity = kPosition + (at.position ? 3 : 0),
+                       kArea = kVelocity + (at.velocity ? 3 : 0),
+                       kGravity = kArea + (at.area ? 3 : 0),
+                       kMore = kGravity + (at.gravity ? 3 : 0), kParameters = kMore + more,
+                       kCount = kParameters + parameters;
   using Number = ceres::Jet<double, kCount>;
 
   static Vector3<Number> vector(const Vector3<double>& v, int first) {
     return {Number(v.x, first), Number(v.y, first + 1), Number(v.z, first + 2)};
   }
-  static VertexSight<Number> sight(const VertexSight<double>& at) {
-    return {.position_m = vector(at.position_m, 0),
-            .velocity_m_per_s = vector(at.velocity_m_per_s, 3),
-            .area_m2 = vector(at.area_m2, 6),
-            .gravity_m_per_s2 = vector(at.gravity_m_per_s2, 9),
-            .mass_kg = Number(at.mass_kg),
-            .flat_area_m2 = at.flat_area_m2,
-            .s = at.s,
-            .t = at.t,
-            .mesh = at.mesh,
-            .time_s = at.time_s};
+  static VertexSight<Number> sight(const VertexSight<double>& of) {
+    const auto dual = [](bool looked_at, const Vector3<double>& v, int first) {
+      return looked_at ? vector(v, first) : constant<Number>(v);
+    };
+    return {.position_m = dual(at.position, of.position_m, kPosition),
+            .velocity_m_per_s = dual(at.velocity, of.velocity_m_per_s, kVelocity),
+            .area_m2 = dual(at.area, of.area_m2, kArea),
+            .gravity_m_per_s2 = dual(at.gravity, of.gravity_m_per_s2, kGravity),
+            .mass_kg = Number(of.mass_kg),
+            .flat_area_m2 = of.flat_area_m2,
+            .s = of.s,
+            .t = of.t,
+            .mesh = of.mesh,
+            .time_s = of.time_s};
   }
   static std::array<Number, parameters> parameters_of(const EffectValues<SingleLane>& values) {
     std::array<Number, parameters> result;
@@ -126,9 +173,14 @@ struct VertexDual {
   /// Splits the derivative at vertex `k` into blocks by vertex and columns by parameter.
   static void add_blocks(int k, const AreaStencil& area, const LaneVectors<SingleLane>& position_m,
                          const Jacobian& j, EffectLinearisation& derivatives) {
-    derivatives.by_motion.push_back(
-        {k, k, j.template middleCols<3>(0), j.template middleCols<3>(3)});
-    const Eigen::Matrix3d by_area = 0.25 * j.template middleCols<3>(6);
+    const Eigen::Matrix3d none = Eigen::Matrix3d::Zero();
+    const auto by = [&](bool looked_at, int first) {
+      return looked_at ? Eigen::Matrix3d(j.middleCols(first, 3)) : none;
+    };
+    if (at.position || at.velocity)
+      derivatives.by_motion.push_back(
+          {k, k, by(at.position, kPosition), by(at.velocity, kVelocity)});
+    const Eigen::Matrix3d by_area = 0.25 * by(at.area, kArea);
     if (!by_area.isZero(0)) {
       // d(s x t) = ds x t + s x dt
       const auto along = [&](int to, int from) {
@@ -143,7 +195,6 @@ struct VertexDual {
       };
       const Eigen::Matrix3d by_s = -by_area * cross_matrix(along(area.below, area.above));
       const Eigen::Matrix3d by_t = by_area * cross_matrix(along(area.right, area.left));
-      const Eigen::Matrix3d none = Eigen::Matrix3d::Zero();
       derivatives.by_motion.push_back({k, area.right, by_s, none});
       derivatives.by_motion.push_back({k, area.left, -by_s, none});
       derivatives.by_motion.push_back({k, area.below, by_t, none});
@@ -153,7 +204,8 @@ struct VertexDual {
       if (derivatives.asks_for(parameter) && !j.col(column).isZero(0))
         derivatives.by_parameter.push_back({k, parameter, j.col(column)});
     };
-    for (int axis = 0; axis < 3; ++axis) add_column(ParameterNumber::gravity(axis), 9 + axis);
+    for (int axis = 0; at.gravity && axis < 3; ++axis)
+      add_column(ParameterNumber::gravity(axis), kGravity + axis);
     for (int p = 0; p < parameters; ++p) add_column(ParameterNumber::own(p), kParameters + p);
   }
 };
@@ -162,26 +214,10 @@ struct VertexDual {
 struct MassDual {
   using Number = ceres::Jet<double, 1>;
 
-  static Vector3<Number> constant(const Vector3<double>& v) {
-    return {Number(v.x), Number(v.y), Number(v.z)};
-  }
   static VertexSight<Number> sight(const VertexSight<double>& at) {
-    return {.position_m = constant(at.position_m),
-            .velocity_m_per_s = constant(at.velocity_m_per_s),
-            .area_m2 = constant(at.area_m2),
-            .gravity_m_per_s2 = constant(at.gravity_m_per_s2),
-            .mass_kg = Number(at.mass_kg, 0),
-            .flat_area_m2 = at.flat_area_m2,
-            .s = at.s,
-            .t = at.t,
-            .mesh = at.mesh,
-            .time_s = at.time_s};
-  }
-  template <int parameters>
-  static std::array<Number, parameters> parameters_of(const EffectValues<SingleLane>& values) {
-    std::array<Number, parameters> result;
-    for (size_t p = 0; p < parameters; ++p) result[p] = Number(values[p][0]);
-    return result;
+    VertexSight<Number> sight = constant<Number>(at);
+    sight.mass_kg = Number(at.mass_kg, 0);
+    return sight;
   }
   static void add_block(int k, const Vector3<Number>& v, EffectLinearisation& derivatives) {
     const Eigen::Vector3d derivative(v.x.v[0], v.y.v[0], v.z.v[0]);
@@ -207,6 +243,8 @@ auto at_moment(const std::array<Real, count>& parameters, double time_s) {
 /// Where the parameters act through something that changes with time alone, it may have that too,
 /// which `force` is then given in their place:
 ///   template <class Real> static T at_moment(const std::array<Real, kParameters>&, double time_s);
+/// And so that derivatives are taken only by what it looks at, it may say what that is:
+///   static constexpr LooksAt kLooksAt;
 /// Lanes, tangents and the adjoint follow from these.
 template <class Law>
 class VertexLawEffect final : public LawEffect<VertexLawEffect<Law>, Law> {
@@ -223,16 +261,67 @@ class VertexLawEffect final : public LawEffect<VertexLawEffect<Law>, Law> {
   void linearise_force(const EffectScene<SingleLane>& scene,
                        const EffectValues<SingleLane>& parameters, const EffectMemory<SingleLane>&,
                        EffectLinearisation& derivatives) const override {
-    using Dual = VertexDual<0, Law::kParameters>;
-    const auto p = at_moment<Law>(Dual::parameters_of(parameters), scene.time_s);
-    const auto fixed =
-        at_moment<Law>(MassDual::parameters_of<Law::kParameters>(parameters), scene.time_s);
+    constexpr int kFew = 10;
+    if constexpr (Law::kParameters > kFew) {
+      linearise_by_many(scene, parameters, derivatives);
+    } else {
+      using Dual = VertexDual<kAt, 0, Law::kParameters>;
+      const auto p = at_moment<Law>(Dual::parameters_of(parameters), scene.time_s);
+      for_vertices<SingleLane>(
+          scene, [&](int k, const AreaStencil& area, const VertexSight<double>& sight) {
+            Dual::add_blocks(k, area, scene.position_m,
+                             Dual::jacobian(Law::force(Dual::sight(sight), p)), derivatives);
+          });
+    }
+    if (!kAt.mass) return;
+    const auto fixed = at_moment<Law>(
+        constants<MassDual::Number, size_t{Law::kParameters}>(parameters), scene.time_s);
     for_vertices<SingleLane>(
-        scene, [&](int k, const AreaStencil& area, const VertexSight<double>& sight) {
-          Dual::add_blocks(k, area, scene.position_m,
-                           Dual::jacobian(Law::force(Dual::sight(sight), p)), derivatives);
+        scene, [&](int k, const AreaStencil&, const VertexSight<double>& sight) {
           MassDual::add_block(k, Law::force(MassDual::sight(sight), fixed), derivatives);
         });
+  }
+
+ private:
+  static constexpr LooksAt kAt = looks_at<Law>();
+
+  /// By what is seen, then by a few parameters at a time, of those that are asked for: of many,
+  /// hardly any are.
+  static void linearise_by_many(const EffectScene<SingleLane>& scene,
+                                const EffectValues<SingleLane>& parameters,
+                                EffectLinearisation& derivatives) {
+    constexpr size_t kCount = Law::kParameters;
+    using Seen = VertexDual<kAt, 0, 0>;
+    const auto fixed =
+        at_moment<Law>(constants<typename Seen::Number, kCount>(parameters), scene.time_s);
+    for_vertices<SingleLane>(
+        scene, [&](int k, const AreaStencil& area, const VertexSight<double>& sight) {
+          Seen::add_blocks(k, area, scene.position_m,
+                           Seen::jacobian(Law::force(Seen::sight(sight), fixed)), derivatives);
+        });
+    constexpr int kAtOnce = 4;
+    using Some = ceres::Jet<double, kAtOnce>;
+    std::vector<int> asked;
+    for (int p = 0; p < Law::kParameters; ++p)
+      if (derivatives.asks_for(ParameterNumber::own(p))) asked.push_back(p);
+    for (size_t first = 0; first < asked.size(); first += kAtOnce) {
+      const std::span<const int> some =
+          std::span(asked).subspan(first, std::min<size_t>(kAtOnce, asked.size() - first));
+      std::array<Some, kCount> of = constants<Some, kCount>(parameters);
+      for (size_t c = 0; c < some.size(); ++c)
+        of[static_cast<size_t>(some[c])].v[static_cast<Eigen::Index>(c)] = 1;
+      const auto p = at_moment<Law>(of, scene.time_s);
+      for_vertices<SingleLane>(
+          scene, [&](int k, const AreaStencil&, const VertexSight<double>& sight) {
+            const Vector3<Some> force = Law::force(constant<Some>(sight), p);
+            for (size_t c = 0; c < some.size(); ++c) {
+              const auto n = static_cast<Eigen::Index>(c);
+              const Eigen::Vector3d derivative(force.x.v[n], force.y.v[n], force.z.v[n]);
+              if (!derivative.isZero(0))
+                derivatives.by_parameter.push_back({k, ParameterNumber::own(some[c]), derivative});
+            }
+          });
+    }
   }
 };
 
@@ -240,7 +329,8 @@ class VertexLawEffect final : public LawEffect<VertexLawEffect<Law>, Law> {
 ///   static constexpr int kParameters;
 ///   template <class Real> static Vector3<Real> change(const VertexSight<Real>&,
 ///       const Vector3<Real>& force_n, const std::array<Real, kParameters>&);  // N
-///   static EffectRates rates(...);  // as above
+///   static EffectRates rates(...);      // as above
+///   static constexpr LooksAt kLooksAt;  // may be left out
 template <class Law>
 class InertiaLawEffect final : public LawEffect<InertiaLawEffect<Law>, Law> {
  public:
@@ -259,19 +349,22 @@ class InertiaLawEffect final : public LawEffect<InertiaLawEffect<Law>, Law> {
                         const EffectValues<SingleLane>& parameters,
                         const LaneVectors<SingleLane>& force_n,
                         EffectLinearisation& derivatives) const override {
-    using Dual = VertexDual<3, Law::kParameters>;
+    constexpr LooksAt kAt = looks_at<Law>();
+    using Dual = VertexDual<kAt, 3, Law::kParameters>;
     const auto p = Dual::parameters_of(parameters);
-    const auto fixed = MassDual::parameters_of<Law::kParameters>(parameters);
-    for_vertices<SingleLane>(scene, [&](int k, const AreaStencil& area,
-                                        const VertexSight<double>& sight) {
-      const Vector3<double> force_at = vector_at<SingleLane>(force_n, k);
-      const auto force = Dual::vector(force_at, Dual::kMore);
-      const auto j = Dual::jacobian(Law::change(Dual::sight(sight), force, p));
-      MassDual::add_block(
-          k, Law::change(MassDual::sight(sight), MassDual::constant(force_at), fixed), derivatives);
-      Dual::add_blocks(k, area, scene.position_m, j, derivatives);
-      derivatives.by_force.push_back({k, j.template middleCols<3>(Dual::kMore)});
-    });
+    const auto fixed = constants<MassDual::Number, size_t{Law::kParameters}>(parameters);
+    for_vertices<SingleLane>(
+        scene, [&](int k, const AreaStencil& area, const VertexSight<double>& sight) {
+          const Vector3<double> force_at = vector_at<SingleLane>(force_n, k);
+          const auto force = Dual::vector(force_at, Dual::kMore);
+          const auto j = Dual::jacobian(Law::change(Dual::sight(sight), force, p));
+          if (kAt.mass)
+            MassDual::add_block(
+                k, Law::change(MassDual::sight(sight), constant<MassDual::Number>(force_at), fixed),
+                derivatives);
+          Dual::add_blocks(k, area, scene.position_m, j, derivatives);
+          derivatives.by_force.push_back({k, j.template middleCols<3>(Dual::kMore)});
+        });
   }
 };
 

@@ -7,6 +7,7 @@ namespace {
 
 struct Law {
   static constexpr int kParameters = 1;
+  static constexpr LooksAt kLooksAt{.velocity = true, .mass = true};
 
   template <class Real>
   static Vector3<Real> force(const VertexSight<Real>& at, const std::array<Real, 1>& rate_per_s) {

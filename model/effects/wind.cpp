@@ -7,6 +7,7 @@ namespace {
 
 struct Law {
   static constexpr int kParameters = 4;
+  static constexpr LooksAt kLooksAt{.velocity = true, .area = true};
 
   template <class Real>
   static Vector3<Real> force(const VertexSight<Real>& at, const std::array<Real, 4>& p) {
