@@ -7,6 +7,7 @@
 #include <cmath>
 #include <utility>
 
+#include "data/shared_progress.h"
 #include "fit/diagnosis/refit.h"
 #include "fit/uncertainty.h"
 #include "model/effects/force_law.h"
@@ -78,7 +79,10 @@ class Pursuit {
  public:
   Pursuit(const DiagnosisSetup& setup, const ModelFit& model, const ProposalOptions& options,
           const ProgressCallback& progress)
-      : setup_(setup), options_(options), own_terms_(model.terms.size()), progress_(progress) {
+      : setup_(setup),
+        options_(options),
+        own_terms_(model.terms.size()),
+        progress_(for_threads(progress)) {
     law_.model = model;
     law_.before = law_.after = cross_validate(setup, model, options.blocks, options.threshold);
   }
@@ -131,13 +135,30 @@ class Pursuit {
       }
       if (++horizons == kHorizons) break;
     }
-    // What a fit over all frames starts with.
-    const ModelProjection projection(law_.model, setup_.options.loss);
-    for (LawScore& score : score_laws(law_.model, projection, terms, progress_))
-      for (LawScore& known : list)
-        if (known.term.same_law(score.term)) known.columns = std::move(score.columns);
     std::ranges::stable_sort(list, std::greater<>(), &LawScore::share);
     return list;
+  }
+
+  /// Those of a shortlist that are worth a fit, with the columns over all frames that it starts
+  /// with.
+  std::vector<LawScore> worth_a_fit(const std::vector<LawScore>& list, double first_share) const {
+    std::vector<LawScore> worth;
+    std::vector<LawShapes> terms;
+    for (const LawScore& score : list) {
+      if (std::ssize(worth) == options_.fits || score.share < kWorthAFit * list.front().share)
+        break;
+      if (score.fall < least_fall(score.amount.size())) continue;
+      worth.push_back(score);
+      terms.push_back({score.term});
+    }
+    if (first_share == 1) return worth;
+    for (LawScore& score : worth) score.columns.clear();
+    const ModelProjection projection(law_.model, setup_.options.loss);
+    for (LawScore& whole : score_laws(law_.model, projection, terms, progress_))
+      for (LawScore& score : worth)
+        if (score.term.same_law(whole.term)) score.columns = std::move(whole.columns);
+    std::erase_if(worth, [](const LawScore& score) { return score.columns.empty(); });
+    return worth;
   }
 
   std::vector<LawShapes> terms_to_test() const {
@@ -155,25 +176,24 @@ class Pursuit {
     double first_share = 1;
     ModelFit early;
     const std::vector<LawScore> list = shortlist(first_share, early);
-    if (law_.trials.empty()) law_.scores = list;
+    if (law_.trials.empty()) {
+      law_.scores = list;
+      for (LawScore& score : law_.scores) score.columns.clear();
+    }
     ModelFit best;
     CrossValidation best_validated = law_.after;
     size_t best_trial = 0;
-    std::vector<const LawScore*> worth_a_fit;
-    for (const LawScore& score : list) {
-      if (std::ssize(worth_a_fit) == options_.fits || score.share < kWorthAFit * list.front().share)
-        break;
-      if (score.fall >= least_fall(score.amount.size()) && !score.columns.empty())
-        worth_a_fit.push_back(&score);
-    }
-    std::vector<ModelFit> models = fit_with_laws(setup_, law_.model, early, worth_a_fit,
-                                                 first_share, options_.threshold, progress_);
+    const std::vector<LawScore> worth = worth_a_fit(list, first_share);
+    std::vector<const LawScore*> to_fit;
+    for (const LawScore& score : worth) to_fit.push_back(&score);
+    std::vector<ModelFit> models = fit_with_laws(setup_, law_.model, early, to_fit, first_share,
+                                                 options_.threshold, progress_);
     for (size_t k = 0; k < models.size(); ++k) {
       ModelFit& fitted = models[k];
       law_.cancelled = law_.cancelled || fitted.cancelled;
       if (law_.cancelled) return false;
-      TermTrial trial{.term = worth_a_fit[k]->term,
-                      .foreseen_fall = worth_a_fit[k]->fall,
+      TermTrial trial{.term = worth[k].term,
+                      .foreseen_fall = worth[k].fall,
                       .without_it = law_.after.mean,
                       .refused = {}};
       CrossValidation validated;
@@ -255,7 +275,7 @@ class Pursuit {
   const DiagnosisSetup& setup_;
   const ProposalOptions& options_;
   size_t own_terms_;
-  const ProgressCallback& progress_;
+  ProgressCallback progress_;
   ProposedLaw law_;
 };
 

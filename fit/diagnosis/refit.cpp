@@ -1,5 +1,7 @@
 #include "fit/diagnosis/refit.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <limits>
 #include <numeric>
@@ -86,8 +88,11 @@ std::vector<ModelFit> race(const DiagnosisSetup& setup, const ModelFit& model,
   std::iota(running.begin(), running.end(), size_t{0});
   for (const double share : shares_from(first_share)) {
     double least = std::numeric_limits<double>::infinity();
-    for (const size_t k : running) {
+    tbb::parallel_for(size_t{0}, running.size(), [&](size_t n) {
+      const size_t k = running[n];
       fitted[k] = refined_over(setup, whole[k], model, share, progress);
+    });
+    for (const size_t k : running) {
       if (fitted[k].cancelled) return fitted;
       if (fitted[k].usable) least = std::min(least, fitted[k].chi_square(threshold));
     }
@@ -129,21 +134,18 @@ std::vector<ModelFit> fit_near(const DiagnosisSetup& setup, const ModelFit& mode
                                const ProgressCallback& progress) {
   constexpr double kOfBest = 0.5;
   const double without = model.chi_square(threshold);
-  std::vector<ModelFit> fitted;
-  std::vector<double> fall;
-  for (const LawScore* score : scores) {
-    fitted.push_back(fit_from_here(setup, model, *score, {.rounds = 1, .rough = true}, progress));
-    if (fitted.back().cancelled) break;
-    fall.push_back(fitted.back().usable ? without - fitted.back().chi_square(threshold) : 0);
-  }
-  fitted.resize(scores.size());
-  if (fall.size() < scores.size() || fall.empty()) return fitted;
+  std::vector<ModelFit> fitted(scores.size());
+  std::vector<double> fall(scores.size(), 0);
+  tbb::parallel_for(size_t{0}, scores.size(), [&](size_t k) {
+    fitted[k] = fit_from_here(setup, model, *scores[k], {.rounds = 1, .rough = true}, progress);
+    if (fitted[k].usable) fall[k] = without - fitted[k].chi_square(threshold);
+  });
+  if (fitted.empty() || std::ranges::any_of(fitted, &ModelFit::cancelled)) return fitted;
   const double enough = kOfBest * *std::ranges::max_element(fall);
-  for (size_t k = 0; k < scores.size(); ++k) {
-    if (fall[k] < enough && fall[k] > kKeptPromise * scores[k]->fall) continue;
+  tbb::parallel_for(size_t{0}, scores.size(), [&](size_t k) {
+    if (fall[k] < enough && fall[k] > kKeptPromise * scores[k]->fall) return;
     fitted[k] = fit_from_rough(setup, model, *scores[k], std::move(fitted[k]), threshold, progress);
-    if (fitted[k].cancelled) break;
-  }
+  });
   return fitted;
 }
 

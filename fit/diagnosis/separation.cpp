@@ -1,6 +1,9 @@
 #include "fit/diagnosis/separation.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -10,6 +13,7 @@
 #include <set>
 #include <utility>
 
+#include "data/shared_progress.h"
 #include "fit/diagnosis/candidate_recording.h"
 #include "fit/diagnosis/discretisation.h"
 #include "fit/diagnosis/law_derivatives.h"
@@ -295,21 +299,26 @@ std::vector<std::vector<Separation>> separating_recordings(
   std::vector<Recorded> recorded;
   for (const CandidateRecording& candidate : candidates)
     recorded.push_back({.candidate = &candidate, .distances = {}});
+  const ProgressCallback asked = for_threads(progress);
   // False when nobody waits for it.
   const auto record = [&](const ModelFit& from, const FitProblem* other) {
-    for (size_t n = 0; n < recorded.size(); ++n) {
-      if (progress && !progress({.stage = "recordings that would tell laws apart",
-                                 .done = static_cast<double>(n),
-                                 .total = static_cast<double>(recorded.size()),
-                                 .unit = "recordings",
-                                 .note = ""}))
-        return false;
+    std::atomic<size_t> begun = 0;
+    std::atomic<bool> stopped = false;
+    tbb::parallel_for(size_t{0}, recorded.size(), [&](size_t n) {
+      if (asked && !asked({.stage = "recordings that would tell laws apart",
+                           .done = static_cast<double>(begun++),
+                           .total = static_cast<double>(recorded.size()),
+                           .unit = "recordings",
+                           .note = ""})) {
+        stopped = true;
+        return;
+      }
       const ModelFit there = in_candidate(*recorded[n].candidate, from, other);
       recorded[n].distances = there.usable
                                   ? distances(there, narrowed(pairs, recorded[n].distances))
                                   : std::vector<Distance>{};
-    }
-    return true;
+    });
+    return !stopped.load();
   };
   // Nor is anything fitted on another mesh before it is chosen.
   const std::optional<FitProblem> other = on_other_mesh(setup, model);
