@@ -31,7 +31,7 @@ constexpr double kForceShare = 0.28;
 ModelFit on_analysed_mesh(ModelFit own, DiagnosisSetup& setup, const ProgressCallback& progress) {
   constexpr double kClearlyLess = 0.05;  // of chi-square, per residual
   if (setup.options.spring_set != SpringSet::fabric) return own;
-  const DiagnosisSetup other = with_other_mesh(setup, own);
+  const DiagnosisSetup other = with_other_mesh(setup);
   if (other.columns < setup.columns) return own;
   // From where the declared mesh's optimum lies a fit can end in another valley.
   ModelFit finer;
@@ -205,7 +205,7 @@ class Run {
     result_.columns = declared.setup.columns;
     result_.rows = declared.setup.rows;
     // A fit of its own says more of how sure it is.
-    if (fitted_.size() == 1 && declared.is_on_own_mesh())
+    if (fitted_.size() == 1 && declared.is_on_own_mesh() && !declared.base.rough)
       result_.recordings.front().before = std::move(declared.first);
     else if (!report_fitted(declared.setup, declared.base, &DiagnosedRecording::before))
       return;
@@ -248,14 +248,22 @@ class Run {
     constexpr double kFirstWork = 0.2;
     FitOptions options = analysis.options;
     options.work *= kFirstWork;
+    const ClothDescription& cloth = fitted_.front().recording.cloth;
+    DiagnosisSetup& setup = analysis.setup;
+    setup.columns = options.mesh_columns > 0 ? options.mesh_columns : cloth.mesh_columns;
+    setup.rows = options.mesh_rows > 0 ? options.mesh_rows : cloth.mesh_rows;
+    // Where a finer mesh may be analysed optima are compared.
+    const bool coarse_will_do =
+        is_coarser(with_coarse_mesh(setup), setup) && is_coarser(with_other_mesh(setup), setup);
+    if (coarse_will_do) options.coarse_beyond = kHopeless;
     analysis.first = fit(fitted_.front(), options, progress_);
     if (!analysis.first.usable()) return analysis.first.message;
-    analysis.setup.columns = analysis.first.result.mesh_columns;
-    analysis.setup.rows = analysis.first.result.mesh_rows;
-    ModelFit base = base_model(analysis.setup, analysis.first);
+    ModelFit base = base_model(setup, analysis.first);
     if (!base.usable) return "the derivatives at the optimum could not be computed";
-    base = on_analysed_mesh(std::move(base), analysis.setup, progress_);
-    refine_with_discretisation(base, analysis.setup, progress_);
+    base = on_analysed_mesh(std::move(base), setup, progress_);
+    // Left for later, where a coarser mesh may show what is missing.
+    base.rough = coarse_will_do && base.is_hopeless();
+    if (!base.rough) refine_with_discretisation(base, setup, progress_);
     if (!base.usable) return "the fit went astray where it was to be refined";
     analysis.base = std::move(base);
     return "";
@@ -323,7 +331,7 @@ class Run {
   /// (What is left out had its say in the constants there: that they foresee it has been asked
   /// before.)
   bool mend(Analysis& analysis, const Analysis& declared) {
-    if (declared.found.accepted.empty() && !declared.found.base.usable) {
+    if (declared.found.accepted.empty() && !declared.found.moved) {
       if (!fit_base(analysis).empty() || cancelled_) return false;
     } else if (!go_on_from(declared, analysis)) {
       return false;

@@ -270,6 +270,7 @@ void FitOptions::validate() const {
   require(drive_knots == 0 || (drive_knots >= 4 && drive_knots <= 1000), "drive-knots",
           "4 to 1000 knots, or 0 (none)");
   require(work > 0 && std::isfinite(work), "work", "more than 0");
+  require(coarse_beyond > 0, "coarse-beyond", "more than 0");
   require(bootstrap == 0 || (bootstrap >= 19 && bootstrap <= 100000), "bootstrap",
           "19 to 100000 replicates");
   const auto need_a_fit = [&](bool asked, const std::string& name) {

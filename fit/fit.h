@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <filesystem>
+#include <limits>
 #include <map>
 #include <optional>
 #include <string>
@@ -87,7 +88,10 @@ struct FitOptions {
   /// Knots of the corrections of tracked held points (fit/drive_correction.h), 4 to 1000; 0: the
   /// smoothed tracks are taken as exact. Each costs three directions of derivatives a point.
   int drive_knots = 0;
-  double work = 1;           ///< > 0; times the limits of work of the refinement's stages
+  double work = 1;  ///< > 0; times the limits of work of the refinement's stages
+  /// > 0; chi-square per residual beyond which the fit's own mesh only follows what the coarse one
+  /// finds: such a model lacks what any mesh shows. Infinite: never.
+  double coarse_beyond = std::numeric_limits<double>::infinity();
   double substep_scale = 1;  ///< >= 1; more cuts time finer than stability asks
   bool profile = false;      ///< intervals from the profiled cost where it is no parabola
   int bootstrap = 0;         ///< replicates of a bootstrap over blocks; 0: none, else 19 or more

@@ -251,6 +251,16 @@ bool is_noise_alone(const FitProblem& problem, const RefineResult& result) {
   return 2 * result.cost < 1 + kNoiseDeviations * std::sqrt(2 / residuals);
 }
 
+/// The residuals' mean square over all fitted frames; infinite where the model does not run.
+double mean_square(const FitProblem& problem, const Eigen::VectorXd& values) {
+  const TimeSteps stable = stable_time_steps(problem.cloth, parameter_set(problem, values))
+                               .times(1 / RefineOptions().stability_margin);
+  const TrajectoryObjective whole(problem, problem.first_held_out, stable);
+  const Eigen::VectorXd residual = whole.residuals({values}).front();
+  return residual.size() == 0 ? std::numeric_limits<double>::infinity()
+                              : residual.squaredNorm() / static_cast<double>(residual.size());
+}
+
 /// Where the optimum leaves more than noise, the model may be wrong, or the optimum a local one:
 /// over fewer frames the cost has fewer of them, and over growing horizons the one over a fifth is
 /// led to all frames. The better of the two.
@@ -276,6 +286,26 @@ RefineResult second_look(const FitProblem& problem, const FitOptions& options,
   second = look(1, kFinalEffort, second.values);
   const bool better = second.cancelled || (second.usable && second.cost < first.cost);
   return better ? second : first;
+}
+
+/// What the coarse mesh finds over all frames from `values`, which go there, and how far the fit's
+/// own mesh follows it along its derivatives. Not usable where the model is not as far off as that
+/// asks for on both, in the end.
+RefineResult follow_coarse(const FitProblem& coarse_problem, const FitProblem& problem,
+                           const FitOptions& options, Eigen::VectorXd& values,
+                           const ProgressCallback& progress, FitReport& report) {
+  RefineResult found = refine_stage({.problem = coarse_problem, .effort = kFinalEffort}, options,
+                                    values, progress, report);
+  found = second_look(coarse_problem, options, found, progress, report);
+  if (found.cancelled || !found.usable) return found;
+  values = found.values;
+  found.usable = mean_square(coarse_problem, values) > options.coarse_beyond;
+  if (!found.usable) return found;
+  RefineResult led = refine_stage(
+      {.problem = problem, .derivatives_of = &coarse_problem, .effort = kApproachEffort}, options,
+      away_from_ends(problem, values), progress, report);
+  led.usable = led.usable && mean_square(problem, led.values) > options.coarse_beyond;
+  return led;
 }
 
 /// How refinement comes to where it starts.
@@ -304,6 +334,12 @@ RefineResult refine_on(const FitProblem& coarse_problem, const FitProblem& probl
       if (share >= approach.least_share &&
           !improve({.problem = coarse_problem, .share = share, .effort = kTrendEffort}))
         return best;
+    if (std::isfinite(options.coarse_beyond) &&
+        mean_square(coarse_problem, best.values) > options.coarse_beyond) {
+      RefineResult followed =
+          follow_coarse(coarse_problem, problem, options, best.values, progress, report);
+      if (followed.cancelled || followed.usable) return followed;
+    }
     best.values = away_from_ends(problem, best.values);
     if (!improve({.problem = problem,
                   .derivatives_of = &coarse_problem,

@@ -10,10 +10,10 @@
 #include "fit/parameterised_model.h"
 
 namespace clothfit {
-DiagnosisSetup with_other_mesh(const DiagnosisSetup& setup, const ModelFit& model) {
+DiagnosisSetup with_other_mesh(const DiagnosisSetup& setup) {
   int least = kSmallestMesh;
-  for (const auto& problem : model.problems)
-    if (problem->start == StartKind::unknown)
+  for (const FitInput& input : setup.inputs)
+    if (input.recording.start == StartKind::unknown)
       least = std::max(least, setup.options.start_nodes + 1);
   DiagnosisSetup other = setup;
   std::tie(other.columns, other.rows) = other_mesh_of(setup.columns, setup.rows, least);
@@ -75,7 +75,7 @@ std::vector<DiscretisationError> discretisation_errors(const DiagnosisSetup& set
     add(n, kKnownTo * errors[n].expected);
   }
   if (setup.options.spring_set == SpringSet::fabric) {
-    const DiagnosisSetup other = with_other_mesh(setup, model);
+    const DiagnosisSetup other = with_other_mesh(setup);
     const double finer = static_cast<double>(other.columns - 1) / (setup.columns - 1);
     const ModelFit there = fit_on_mesh(other, model);
     for (size_t n = 0; there.usable && n < there.parts.size(); ++n) {
@@ -91,19 +91,14 @@ std::vector<DiscretisationError> discretisation_errors(const DiagnosisSetup& set
 void refine_with_discretisation(ModelFit& model, const DiagnosisSetup& setup,
                                 const ProgressCallback& progress) {
   constexpr double kBelievable = 3;
-  /// Chi-square per residual beyond which no discretisation is what a model lacks.
-  constexpr double kFarOff = 30;
-  const auto is_far_off = [&] {
-    return model.residual().squaredNorm() > kFarOff * static_cast<double>(model.residual_count());
-  };
-  if (model.usable && is_far_off()) {
+  if (model.usable && model.is_hopeless()) {
     for (PooledPart& part : model.parts) {
       part.correction.resize(0);
       part.directions.resize(part.linear.residual.size(), 0);
       part.amounts.resize(0);
     }
     refine_model(model, setup, {}, progress);
-    if (!model.usable || is_far_off()) return;
+    if (!model.usable || model.is_hopeless()) return;
   }
   std::vector<DiscretisationError> errors = discretisation_errors(setup, model);
   for (size_t n = 0; n < errors.size(); ++n) {

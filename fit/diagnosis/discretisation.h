@@ -19,7 +19,7 @@ std::vector<DiscretisationError> discretisation_errors(const DiagnosisSetup& set
                                                        const ModelFit& model);
 
 /// The setup with the mesh that directions are taken from.
-DiagnosisSetup with_other_mesh(const DiagnosisSetup& setup, const ModelFit& model);
+DiagnosisSetup with_other_mesh(const DiagnosisSetup& setup);
 
 /// The model fitted on another mesh, over growing horizons. It begins with the derivatives of the
 /// model's own mesh, where there are any, which serve for most of the way; where recordings begin

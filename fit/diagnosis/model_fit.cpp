@@ -87,6 +87,10 @@ Eigen::VectorXd ModelFit::residual() const {
   return all;
 }
 
+bool ModelFit::is_hopeless() const {
+  return residual().squaredNorm() > kHopeless * static_cast<double>(residual_count());
+}
+
 double ModelFit::chi_square(double threshold) const {
   double sum = 0;
   for (size_t n = 0; n < parts.size(); ++n) {
@@ -217,6 +221,10 @@ DiagnosisSetup with_coarse_mesh(const DiagnosisSetup& setup) {
   for (int* count : {&coarse.columns, &coarse.rows})
     *count = std::min(*count, std::max(smallest, (*count + 1) / 2));
   return coarse;
+}
+
+bool is_coarser(const DiagnosisSetup& mesh, const DiagnosisSetup& than) {
+  return mesh.columns < than.columns || mesh.rows < than.rows;
 }
 
 ModelFit with_derivatives_of(const DiagnosisSetup& other_mesh, const ModelFit& model) {

@@ -11,6 +11,9 @@
 
 namespace clothfit {
 
+/// Chi-square per residual beyond which a model is hopelessly far off.
+inline constexpr double kHopeless = 30;
+
 /// Parameters of one recording's problem by name.
 using NamedValues = std::map<std::string, double>;
 
@@ -28,7 +31,7 @@ struct ModelFit {
   std::vector<PooledPart> parts;                            ///< where each stands, linearised
   bool usable = false;
   bool cancelled = false;
-  bool rough = false;  ///< as StageOptions::rough left it
+  bool rough = false;  ///< as StageOptions::rough left it, or not refined on its mesh at all
 
   std::vector<const FitProblem*> problem_pointers() const;
   TrajectoryObjective objective(size_t recording) const;
@@ -36,6 +39,9 @@ struct ModelFit {
   Eigen::Index residual_count() const;
   /// Of all recordings, one after the other, with what the discretisation explains taken out.
   Eigen::VectorXd residual() const;
+  /// Whether it leaves so much that any mesh shows what it lacks, and a finer one is not it. Its
+  /// time steps are often short: what is missing is made up for by far too much damping.
+  bool is_hopeless() const;
   /// Twice the cost: the sum of squares, beyond `threshold` sigmas linear (Huber), and of priors.
   double chi_square(double threshold) const;
 };
@@ -84,6 +90,9 @@ void linearise_model(ModelFit& model);
 /// On a mesh of half the cells a side, for derivatives that only choose; not below 9 x 9 vertices
 /// or what a start in motion has nodes. The same mesh where natural lengths are those of one.
 DiagnosisSetup with_coarse_mesh(const DiagnosisSetup& setup);
+
+/// Whether a mesh has fewer vertices a side than another.
+bool is_coarser(const DiagnosisSetup& mesh, const DiagnosisSetup& than);
 
 /// The model where it stands with the derivatives of another mesh: what they foresee hardly
 /// differs, and of a mesh of half the cells a side they cost a sixteenth. The residuals are the

@@ -1,12 +1,16 @@
 #include "fit/diagnosis/search.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <functional>
 #include <iterator>
 #include <limits>
 #include <utility>
 
+#include "data/shared_progress.h"
 #include "fit/diagnosis/adequacy.h"
 #include "fit/diagnosis/clearance.h"
 #include "fit/diagnosis/discretisation.h"
@@ -28,10 +32,6 @@ constexpr size_t kScoreHorizons = 3;
 /// Chi-square per number of a model that is so far off that its valley may be the wrong one, and
 /// that sigmas are those of all it lacks.
 constexpr double kFarOff = 3;
-
-/// Chi-square per residual of a model that lacks so much that any mesh shows what. Its time steps
-/// are often short: what it lacks is made up for by far too much damping.
-constexpr double kHopeless = 30;
 
 /// What a model must gain for each number more (Bayesian information criterion).
 double price(const ModelFit& model) {
@@ -153,8 +153,8 @@ class Search {
         coarse_(with_coarse_mesh(setup)),
         options_(options),
         threshold_(options.threshold),
-        progress_([this, &progress](const Progress& now) {
-          stopped_ = stopped_ || (progress && !progress(now));
+        progress_([this, asked = for_threads(progress)](const Progress& now) {
+          if (asked && !asked(now)) stopped_ = true;
           return !stopped_;
         }) {}
 
@@ -171,6 +171,11 @@ class Search {
     begin_at(lines.front());
     Shortlist list = shortlist(lines.front().model);
     if (stopped_) return cancelled();
+    if (lines.front().model.rough && !list.coarse.usable) {
+      settle(lines.front());
+      list = shortlist(lines.front().model);
+      if (stopped_) return cancelled();
+    }
     result.first = list.merged();
     result.first_share = list.share;
     for (;;) {
@@ -204,14 +209,14 @@ class Search {
       if (stopped_) return cancelled();
       if (children.empty() && (next->moved || list.coarse.usable)) {
         // In its own valley other laws may show, and on its own mesh.
+        settle(*next);
+        if (stopped_) return cancelled();
         list = shortlist(next->model, next->moved);
         if (stopped_) return cancelled();
         children = extend(*next, list);
         if (stopped_) return cancelled();
       }
       if (next->moved && next->accepted.empty()) {
-        result.base = next->model;
-        result.threshold = threshold_;
         result.first = without_columns(scored(setup_, next->model, untested(next->model)));
         result.first_share = 1;
         if (stopped_) return cancelled();
@@ -231,13 +236,14 @@ class Search {
       }
     }
     Line& best = lines.front();
+    settle(best);
     const bool found = !best.accepted.empty();
     prune(best);
     if (stopped_) return cancelled();
-    if (found && best.accepted.empty()) {
-      result.base = best.model;
-      result.threshold = threshold_;
-    }
+    if (found && best.accepted.empty()) base_ = best.model;
+    result.base = std::move(base_);
+    result.moved = best.moved;
+    result.threshold = threshold_;
     // Of laws that are not in the model, over all frames.
     if (best.last.empty()) best.last = scored(setup_, best.model, untested(best.model));
     if (stopped_) return cancelled();
@@ -269,17 +275,13 @@ class Search {
     return worth_naming(model, threshold_, base_chi_square_ - model.chi_square(threshold_));
   }
 
-  bool is_coarser_than(const DiagnosisSetup& setup) const {
-    return coarse_.columns < setup.columns || coarse_.rows < setup.rows;
-  }
-
   /// Scores of all laws, each at its best shape. A coarser mesh chooses frequencies and other
   /// shapes, which are many; a place on the cloth it may get wrong altogether, so that all are
   /// looked at on `setup`'s mesh itself while nothing has been found yet.
   std::vector<LawScore> scored(const DiagnosisSetup& setup, const ModelFit& model,
                                std::vector<LawShapes> laws) const {
     const ModelProjection projection(model, setup_.options.loss);
-    if (is_coarser_than(setup)) {
+    if (is_coarser(coarse_, setup)) {
       std::vector<LawShapes> elsewhere;
       for (const LawShapes& law : laws)
         if (law.size() > 1 && (!model.terms.empty() || !is_over_cloth(law.front())))
@@ -325,11 +327,10 @@ class Search {
   Shortlist shortlist(const ModelFit& model, bool may_be_coarse = true) {
     const double left =
         model.residual().squaredNorm() / static_cast<double>(model.residual_count());
-    if (left > kHopeless && may_be_coarse && is_coarser_than(setup_)) {
+    if (model.is_hopeless() && may_be_coarse && is_coarser(coarse_, setup_)) {
       ModelFit coarse = fit_on_mesh(coarse_, model, progress_);
       if (stopped_) return {};
-      if (coarse.usable && coarse.residual().squaredNorm() >
-                               kHopeless * static_cast<double>(coarse.residual_count())) {
+      if (coarse.usable && coarse.is_hopeless()) {
         Shortlist list = shortlist_from(coarse_, coarse, kScoreShares[0], kVisible);
         list.coarse = std::move(coarse);
         return list;
@@ -438,6 +439,11 @@ class Search {
     std::vector<Tried> tried;
     for (size_t k = 0; k < scores.size(); ++k)
       tried.push_back({.score = scores[k], .model = std::move(fitted[k])});
+    // What a rough model leaves more than its optimum is nothing to a law that takes nearly all.
+    if (tried.empty() || leaves_good_part(best_of(tried), line.model) ||
+        !is_worth_all(best_of(tried), line.model))
+      settle(line);
+    if (stopped_) return {};
     look_elsewhere(tried, line.model);
     if (stopped_) return {};
     let_best_err(tried, line.model);
@@ -448,19 +454,26 @@ class Search {
     const bool moves = there.usable, elsewhere = moves || list.coarse.usable;
     if (moves) move(line, std::move(there));
     std::vector<Line> children;
-    std::vector<LawTrial> trials;
     CrossValidation before;
     if (!tried.empty()) before = validated(line.model, &coarse_);
     if (moves && !line.sound()) line.owes = without_physics(before);
-    for (Tried& child : tried) {
-      LawTrial trial = judge(line.model, before, *child.score, child.model, elsewhere);
-      if ((trial.refused.empty() || trial.with_later_ones) && child.model.rough) {
-        refine_model(child.model, setup_, {}, progress_);
-        if (stopped_) return {};
-        trial = judge(line.model, before, *child.score, child.model, elsewhere);
+    std::vector<LawTrial> trials(tried.size());
+    tbb::parallel_for(size_t{0}, tried.size(), [&](size_t k) {
+      ModelFit& model = tried[k].model;
+      const auto judged = [&] {
+        return judge(line.model, before, *tried[k].score, model, elsewhere);
+      };
+      trials[k] = judged();
+      if ((trials[k].refused.empty() || trials[k].with_later_ones) && model.rough) {
+        refine_model(model, setup_, {}, progress_);
+        if (!stopped_) trials[k] = judged();
       }
-      const bool on_credit = std::exchange(trial.with_later_ones, false);
-      trials.push_back(trial);
+    });
+    if (stopped_) return {};
+    for (size_t k = 0; k < tried.size(); ++k) {
+      Tried& child = tried[k];
+      const bool on_credit = std::exchange(trials[k].with_later_ones, false);
+      LawTrial trial = trials[k];
       if (!trial.refused.empty()) line.refused.push_back(trial);
       if (!trial.refused.empty() && !on_credit) continue;
       children.push_back({.model = std::move(child.model), .accepted = line.accepted});
@@ -498,28 +511,43 @@ class Search {
       if (model.usable)
         least = std::min(
             least, std::max(above(model), kOfNoise * static_cast<double>(model.residual_count())));
-    for (ModelFit& model : models) {
-      if (stopped_) break;
-      if (!model.usable) continue;
+    tbb::parallel_for(size_t{0}, models.size(), [&](size_t k) {
+      ModelFit& model = models[k];
+      if (!model.usable) return;
       if (above(model) > kMore * least) {
         model.usable = false;
-        continue;
+        return;
       }
       const std::vector<Term> terms = model.terms;
       model = fit_on_mesh(setup_, model, progress_);
-      if (stopped_ || left_by(model) < left_by(line)) continue;
+      if (stopped_ || left_by(model) < left_by(line)) return;
       model = with_terms(setup_, line, terms, {});
       refine_model(model, setup_, {}, progress_);
-    }
+    });
     return models;
   }
 
-  /// To a valley where it leaves less; what was scored where it stood says nothing of it there.
+  /// To a valley where it leaves less.
   void move(Line& line, ModelFit there) {
-    line.model = std::move(there);
+    stand_at(line, std::move(there));
     line.moved = true;
+  }
+
+  /// Refines a base model that was left rough. Where that does not work out it stands as it is.
+  void settle(Line& line) {
+    if (!line.model.rough || !line.accepted.empty()) return;
+    ModelFit settled = line.model;
+    refine_with_discretisation(settled, setup_, progress_);
+    line.model.rough = false;
+    if (!stopped_ && settled.usable) stand_at(line, std::move(settled));
+  }
+
+  /// What was scored where a line stood says nothing of it elsewhere.
+  void stand_at(Line& line, ModelFit there) {
+    line.model = std::move(there);
     line.last.clear();
     if (line.accepted.empty()) {
+      base_ = line.model;
       if (std::isfinite(threshold_))
         threshold_ = kHuberScales * robust_scale(line.model.residual());
       begin_at(line);
@@ -592,6 +620,10 @@ class Search {
                                      [&](const Tried& child) { return left_by(child.model); });
   }
 
+  bool leaves_good_part(const Tried& tried, const ModelFit& line) const {
+    return left_by(tried.model) >= kGoodPart * left_by(line);
+  }
+
   /// Where even the best of them is far off, and leaves a good part of what the line leaves, its
   /// law may be right in another valley of the cost than the one that the line stands in: those
   /// foreseen to take half as much as the best are identified from scratch (where starts are
@@ -599,7 +631,7 @@ class Search {
   void look_elsewhere(std::vector<Tried>& tried, const ModelFit& line) const {
     constexpr double kOfBest = 0.5;
     if (tried.empty() || !best_of(tried).model.usable || !is_far_off(best_of(tried).model) ||
-        left_by(best_of(tried).model) < kGoodPart * left_by(line))
+        !leaves_good_part(best_of(tried), line))
       return;
     double foreseen = 0;
     for (const Tried& child : tried) foreseen = std::max(foreseen, child.score->fall);
@@ -614,6 +646,12 @@ class Search {
     }
   }
 
+  /// Whether a law is foreseen to be worth all that it took from a line.
+  bool is_worth_all(const Tried& best, const ModelFit& line) const {
+    return best.model.usable &&
+           rise_without_last(best.model, threshold_) > left_by(line) - left_by(best.model);
+  }
+
   /// What a valley is worth is no merit of the law that led there: the line's model led to the
   /// valley of the best law; where that leaves less than the line's own but much, or the law was
   /// identified from scratch, identified so too. Not usable where neither leaves clearly less,
@@ -621,7 +659,7 @@ class Search {
   ModelFit in_valley_of(const Tried& best, const ModelFit& line) const {
     if (!best.model.usable || !is_far_off(line)) return {};
     const double taken = left_by(line) - left_by(best.model);
-    if (taken <= 0 || (!best.anew && rise_without_last(best.model, threshold_) > taken)) return {};
+    if (taken <= 0 || (!best.anew && is_worth_all(best, line))) return {};
     ModelFit there = with_terms(setup_, best.model, line.terms, {});
     refine_model(there, setup_, {}, progress_);
     if (!stopped_ && there.usable) refine_with_discretisation(there, setup_, progress_);
@@ -647,14 +685,12 @@ class Search {
     double best = 0;
     for (const Tried& child : tried)
       if (child.model.usable) best = std::max(best, from - child.model.chi_square(threshold_));
-    for (Tried& child : tried) {
-      ModelFit& model = child.model;
-      if (!model.usable || model.parts.front().directions.cols() > 0 ||
-          from - model.chi_square(threshold_) < kNear * best)
-        continue;
-      refine_with_discretisation(model, setup_, progress_);
-      if (stopped_) return;
-    }
+    tbb::parallel_for(size_t{0}, tried.size(), [&](size_t k) {
+      ModelFit& model = tried[k].model;
+      if (model.usable && model.parts.front().directions.cols() == 0 &&
+          from - model.chi_square(threshold_) >= kNear * best)
+        refine_with_discretisation(model, setup_, progress_);
+    });
   }
 
   /// Shapes between those of the grid, for laws that are near the best.
@@ -765,7 +801,8 @@ class Search {
   const SearchOptions& options_;
   double threshold_;
   double base_chi_square_ = 0, base_cost_ = 0;  ///< of the model that has found nothing
-  bool stopped_ = false;                        ///< set by `progress_` once it has said so
+  ModelFit base_;                               ///< that model, where it is not what was given
+  std::atomic<bool> stopped_ = false;           ///< set by `progress_` once it has said so
   ProgressCallback progress_;
 };
 

@@ -63,9 +63,10 @@ double worth_naming(const ModelFit& model, double threshold, double explained = 
 struct LawSearch {
   bool cancelled = false;
   ModelFit model;  ///< the best line's
-  /// What the search began with where that was moved to another valley, where it leaves less;
-  /// otherwise not usable.
+  /// What the search began with where that was refined, or moved to another valley, where it leaves
+  /// less; otherwise not usable.
   ModelFit base;
+  bool moved = false;                    ///< whether the best line has been, to another valley
   double threshold = 0;                  ///< there, as SearchOptions::threshold
   std::vector<AcceptedEffect> accepted;  ///< in the order in which they were
   std::vector<LawTrial> refused;         ///< the last round's
@@ -77,7 +78,8 @@ struct LawSearch {
 /// Adds laws to a model, one after the other: each round scores all of them, fits the model again
 /// with the best, and keeps what predicts observations left out. Several lines are followed, always
 /// the one that is best; a line costs what its model leaves, and a price for each number more
-/// (Bayesian information criterion). `base` is linearised and has its directions. Where even the
+/// (Bayesian information criterion). `base` is linearised and has its directions, or is hopelessly
+/// far off and rough: it is refined where no law takes nearly all of what it leaves. Where even the
 /// best law leaves a model far off, laws are identified from scratch; a line whose own model leaves
 /// less in the valley that this finds moves there, and laws are judged against it. Laws for a model
 /// that is hopelessly far off are chosen on a mesh of half the cells a side.

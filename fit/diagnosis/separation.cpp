@@ -237,7 +237,7 @@ std::optional<FitProblem> on_other_mesh(const DiagnosisSetup& setup, const Model
   const PooledPart& first = model.parts.front();
   const Eigen::Index of_step = first.correction.size() > 0 ? 1 : 0;
   if (first.directions.cols() <= of_step) return std::nullopt;
-  DiagnosisSetup other = with_other_mesh(setup, model);
+  DiagnosisSetup other = with_other_mesh(setup);
   other.inputs = setup.inputs.first(1);
   return *problems_of(other, model.terms).front();
 }

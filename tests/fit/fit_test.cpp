@@ -82,6 +82,29 @@ TEST(Fit, FindsDragWhenAskedForAndNeutralWhereThereIsNone) {
   }
 }
 
+// A cloth in thick air, of which the model knows nothing.
+TEST(Fit, OnlyFollowsTheCoarseMeshWhereTheModelIsHopeless) {
+  const FitInput input = synthetic_input(
+      {.drag_rate_per_s = 8, .mesh = 9, .markers = 5, .frames = 20, .held_out_from = 16});
+  FitOptions options = quick();
+  options.refine_best = 1;
+  options.work = 0.05;
+  const FitReport whole = fit(input, options, {});
+  options.coarse_beyond = 10;
+  const FitReport followed = fit(input, options, {});
+
+  ASSERT_TRUE(followed.usable()) << followed.message;
+  const auto on_its_own_mesh = [](const std::string& stage) {
+    return stage.starts_with("refinement on 9 x 9 over");
+  };
+  EXPECT_TRUE(std::ranges::any_of(whole.stages, on_its_own_mesh));
+  EXPECT_TRUE(std::ranges::none_of(followed.stages, on_its_own_mesh));
+  EXPECT_EQ(followed.result.mesh_columns, 9);
+  const double left = whole.result.errors.at(0).fitted.rms;
+  EXPECT_GT(left, std::sqrt(10) * 5e-4);
+  EXPECT_LT(followed.result.errors.at(0).fitted.rms, 1.2 * left);
+}
+
 TEST(Fit, GivesTheSameBitsForAnyNumberOfThreads) {
   const FitInput input =
       synthetic_input({.mesh = 5, .markers = 5, .frames = 16, .held_out_from = 12});

@@ -291,7 +291,7 @@ TEST(Discretisation, OfAStartInMotionStopsShortOnlyAlongTheParameters) {
   ModelFit model = model_at(setup, {}, {named(SyntheticCloth().fabric)});
   refine_model(model, setup, {}, {});
   ASSERT_TRUE(model.usable);
-  const DiagnosisSetup other = with_other_mesh(setup, model);
+  const DiagnosisSetup other = with_other_mesh(setup);
   ASSERT_EQ(other.columns, 7);
 
   const ModelFit there = fit_on_mesh(other, model);

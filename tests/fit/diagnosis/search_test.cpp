@@ -116,6 +116,48 @@ TEST(SearchLaws, LeavesAValleyRatherThanNameALawForIt) {
   EXPECT_LT(found.model.chi_square(kSquares), 1.2 * count);
 }
 
+// Of a cloth in thick air, what a coarse mesh finds that knows nothing of it.
+TEST(SearchLaws, ChoosesALawForAHopelessModelOnACoarserMesh) {
+  const SyntheticCloth cloth{
+      .drag_rate_per_s = 3, .mesh = 11, .markers = 5, .frames = 20, .held_out_from = 16};
+  const FitInput input = synthetic_input(cloth);
+  const FitOptions options = quick();
+  const DiagnosisSetup setup{.inputs = {&input, 1}, .options = options, .columns = 11, .rows = 11};
+  ModelFit coarse = true_model(with_coarse_mesh(setup), cloth);
+  refine_model(coarse, with_coarse_mesh(setup), {}, {});
+  ASSERT_TRUE(coarse.usable);
+  const auto rough = [&](const std::vector<NamedValues>& values) {
+    ModelFit model = model_at(setup, {}, values);
+    linearise_model(model);
+    model.rough = true;
+    EXPECT_TRUE(model.is_hopeless());
+    return model;
+  };
+  const ModelFit base = rough(coarse.values());
+
+  const LawSearch found = search_laws(setup, base, only(drag_term()), {});
+
+  ASSERT_EQ(found.accepted.size(), 1u);
+  EXPECT_NEAR(found.model.values().front().at("viscous_damping.rate"), 3, 0.1);
+  EXPECT_LT(found.model.chi_square(kSquares),
+            1.2 * static_cast<double>(found.model.residual_count()));
+  // Held against the model without it as it is reported.
+  const ModelFit& without = found.base.usable ? found.base : base;
+  EXPECT_NEAR(found.accepted.front().trial.fall,
+              without.chi_square(kSquares) - found.model.chi_square(kSquares),
+              0.01 * without.chi_square(kSquares));
+
+  // Where no law is found it is refined on its own mesh.
+  std::vector<NamedValues> elsewhere = coarse.values();
+  elsewhere.front().at("shear") *= 0.7;
+  const ModelFit off = rough(elsewhere);
+  const LawSearch refined = search_laws(setup, off, {.lines = 1, .threshold = kSquares}, {});
+
+  ASSERT_TRUE(refined.base.usable);
+  EXPECT_FALSE(refined.base.rough);
+  EXPECT_LT(refined.base.chi_square(kSquares), off.chi_square(kSquares));
+}
+
 TEST(SearchLaws, CreditsALawWithWhatItExplainsAndNotWithTheValley) {
   SyntheticCloth cloth = kBouncing;
   cloth.drag_rate_per_s = 1.5;
