@@ -240,9 +240,10 @@ class Search {
     const bool found = !best.accepted.empty();
     prune(best);
     if (stopped_) return cancelled();
-    if (found && best.accepted.empty()) base_ = best.model;
+    const bool came_back = found && best.accepted.empty();
+    if (came_back) base_ = best.model;
     result.base = std::move(base_);
-    result.moved = best.moved;
+    result.moved = best.moved || came_back;
     result.threshold = threshold_;
     // Of laws that are not in the model, over all frames.
     if (best.last.empty()) best.last = scored(setup_, best.model, untested(best.model));

@@ -66,7 +66,7 @@ struct LawSearch {
   /// What the search began with where that was refined, or moved to another valley, where it leaves
   /// less; otherwise not usable.
   ModelFit base;
-  bool moved = false;                    ///< whether the best line has been, to another valley
+  bool moved = false;                    ///< whether laws have led it to another valley
   double threshold = 0;                  ///< there, as SearchOptions::threshold
   std::vector<AcceptedEffect> accepted;  ///< in the order in which they were
   std::vector<LawTrial> refused;         ///< the last round's

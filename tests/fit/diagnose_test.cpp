@@ -15,9 +15,13 @@
 namespace clothfit {
 namespace {
 
+/// A cloth that is diagnosed soon, with drag that its recording does not declare.
+const SyntheticCloth kSmallWithDrag{
+    .drag_rate_per_s = 1.2, .mesh = 7, .markers = 5, .frames = 30, .held_out_from = 22};
+
 DiagnoseOptions quick() {
   DiagnoseOptions options;
-  options.fit.mesh_columns = options.fit.mesh_rows = 9;
+  options.fit.mesh_columns = options.fit.mesh_rows = 7;
   options.fit.generations = 10;
   options.fit.population = 40;
   options.fit.refine_best = 1;
@@ -28,7 +32,7 @@ DiagnoseOptions quick() {
 }
 
 TEST(Diagnose, NamesAHiddenDragAndItsAmount) {
-  const Diagnosis diagnosis = diagnose(synthetic_input({.drag_rate_per_s = 1.2}), quick(), {});
+  const Diagnosis diagnosis = diagnose(synthetic_input(kSmallWithDrag), quick(), {});
 
   ASSERT_TRUE(diagnosis.usable()) << diagnosis.message;
   ASSERT_EQ(diagnosis.accepted.size(), 1u);
@@ -46,7 +50,9 @@ TEST(Diagnose, NamesAHiddenDragAndItsAmount) {
 }
 
 TEST(Diagnose, FindsNothingWhereNothingIsHiddenAndSaysWhatItWouldHaveSeen) {
-  const Diagnosis diagnosis = diagnose(synthetic_input({}), quick(), {});
+  SyntheticCloth cloth = kSmallWithDrag;
+  cloth.drag_rate_per_s = 0;
+  const Diagnosis diagnosis = diagnose(synthetic_input(cloth), quick(), {});
 
   ASSERT_TRUE(diagnosis.usable()) << diagnosis.message;
   EXPECT_FALSE(diagnosis.changed());
@@ -61,7 +67,8 @@ TEST(Diagnose, FindsNothingWhereNothingIsHiddenAndSaysWhatItWouldHaveSeen) {
 
 TEST(Diagnose, SaysThatMarkersAreSeenElsewhereWhereNoLawPutsThemThere) {
   constexpr double kOff_m = 4e-3;  // a standard deviation, of each coordinate of each marker
-  SyntheticCloth cloth;
+  SyntheticCloth cloth = kSmallWithDrag;
+  cloth.drag_rate_per_s = 0;
   cloth.seen = [](const SyntheticMotion& motion, double time_s, const Eigen::Vector2d& place_m) {
     Eigen::Vector3d where = motion(time_s, place_m);
     Draws draws(5, static_cast<int>(std::lround(1e4 * place_m[0])),
@@ -103,7 +110,6 @@ FitInput with_two_causes() {
 
 DiagnoseOptions quick_of_two_causes() {
   DiagnoseOptions options = quick();
-  options.fit.mesh_columns = options.fit.mesh_rows = 7;
   options.fit.work = 0.1;
   options.refits = 2;
   return options;
@@ -146,14 +152,14 @@ TEST(Diagnose, DoesNotNameWhatItWasNotToTest) {
   DiagnoseOptions options = quick();
   options.without = {"viscous_damping"};
   options.most_effects = 1;
-  const Diagnosis diagnosis = diagnose(synthetic_input({.drag_rate_per_s = 1.2}), options, {});
+  const Diagnosis diagnosis = diagnose(synthetic_input(kSmallWithDrag), options, {});
 
   for (const LawScore& score : diagnosis.scores) EXPECT_NE(score.term.effect, "viscous_damping");
   EXPECT_NE(diagnosis.verdict, DiagnosisVerdict::adequate);
 }
 
 TEST(Diagnose, FitsTwoRecordingsTogetherAndJudgesAThird) {
-  const SyntheticCloth cloth{.drag_rate_per_s = 1.2};
+  const SyntheticCloth cloth = kSmallWithDrag;
   std::vector<FitInput> fitted;
   for (const unsigned seed : {1U, 2U}) {
     SyntheticCloth own = cloth;
@@ -193,14 +199,14 @@ TEST(Diagnose, ProposesNoLawWhereItIsToldNotTo) {
   DiagnoseOptions options = quick();
   options.most_effects = 0;  // the drag is left
   options.law_terms = 0;
-  const Diagnosis diagnosis = diagnose(synthetic_input({.drag_rate_per_s = 1.2}), options, {});
+  const Diagnosis diagnosis = diagnose(synthetic_input(kSmallWithDrag), options, {});
 
   EXPECT_EQ(diagnosis.verdict, DiagnosisVerdict::unexplained);
   EXPECT_TRUE(diagnosis.law.trials.empty());
   EXPECT_FALSE(diagnosis.law.found());
 
   options.law_terms = 1;
-  EXPECT_TRUE(diagnose(synthetic_input({.drag_rate_per_s = 1.2}), options, {}).law.found());
+  EXPECT_TRUE(diagnose(synthetic_input(kSmallWithDrag), options, {}).law.found());
 }
 
 TEST(Diagnose, EndsSoonWhenItIsToldTo) {
