@@ -441,9 +441,7 @@ class Search {
     for (size_t k = 0; k < scores.size(); ++k)
       tried.push_back({.score = scores[k], .model = std::move(fitted[k])});
     // What a rough model leaves more than its optimum is nothing to a law that takes nearly all.
-    if (tried.empty() || leaves_good_part(best_of(tried), line.model) ||
-        !is_worth_all(best_of(tried), line.model))
-      settle(line);
+    if (tried.empty() || leaves_good_part(best_of(tried), line.model)) settle(line);
     if (stopped_) return {};
     look_elsewhere(tried, line.model);
     if (stopped_) return {};
@@ -647,12 +645,6 @@ class Search {
     }
   }
 
-  /// Whether a law is foreseen to be worth all that it took from a line.
-  bool is_worth_all(const Tried& best, const ModelFit& line) const {
-    return best.model.usable &&
-           rise_without_last(best.model, threshold_) > left_by(line) - left_by(best.model);
-  }
-
   /// What a valley is worth is no merit of the law that led there: the line's model led to the
   /// valley of the best law; where that leaves less than the line's own but much, or the law was
   /// identified from scratch, identified so too. Not usable where neither leaves clearly less,
@@ -660,7 +652,7 @@ class Search {
   ModelFit in_valley_of(const Tried& best, const ModelFit& line) const {
     if (!best.model.usable || !is_far_off(line)) return {};
     const double taken = left_by(line) - left_by(best.model);
-    if (taken <= 0 || (!best.anew && is_worth_all(best, line))) return {};
+    if (taken <= 0 || (!best.anew && rise_without_last(best.model, threshold_) > taken)) return {};
     ModelFit there = with_terms(setup_, best.model, line.terms, {});
     refine_model(there, setup_, {}, progress_);
     if (!stopped_ && there.usable) refine_with_discretisation(there, setup_, progress_);
