@@ -71,7 +71,8 @@ struct Diagnosis {
   DiagnosisVerdict verdict = DiagnosisVerdict::adequate;
   /// Those that were fitted, then those held out: reports of the fit of all on the mesh that was
   /// analysed (report_at). Of a single recording on its own mesh `before` is its own fit, unless
-  /// the search for laws has found another valley where the model without any leaves less.
+  /// that only followed a coarser mesh, or the search for laws has found another valley where the
+  /// model without any leaves less.
   std::vector<DiagnosedRecording> recordings;
   Adequacy before, after;
   std::vector<LawScore> scores;  ///< of the base model, the most telling first

@@ -31,7 +31,8 @@ ModelFit with_terms(const DiagnosisSetup& setup, const ModelFit& model,
 /// stands, the model fitted over the first of them and not biased as much. Side by side then: after
 /// each horizon those fall out, and are not usable, that leave far more than the best one; over few
 /// frames the wrong laws show first. One that ends above the model without it is fitted from where
-/// that stands. `threshold`: of chi-square's squares, in sigmas.
+/// that stands. `threshold`: of chi-square's squares, in sigmas. `progress` is asked by several
+/// threads at once (data/shared_progress.h).
 std::vector<ModelFit> fit_with_laws(const DiagnosisSetup& setup, const ModelFit& model,
                                     const ModelFit& early,
                                     const std::vector<const LawScore*>& scores, double first_share,

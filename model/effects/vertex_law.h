@@ -102,6 +102,24 @@ constexpr LooksAt looks_at() {
     return {.position = true, .velocity = true, .area = true, .gravity = true, .mass = true};
 }
 
+/// A sight in another kind of number, with these vectors.
+template <class Number>
+VertexSight<Number> with_vectors(const VertexSight<double>& at, const Vector3<Number>& position_m,
+                                 const Vector3<Number>& velocity_m_per_s,
+                                 const Vector3<Number>& area_m2,
+                                 const Vector3<Number>& gravity_m_per_s2) {
+  return {.position_m = position_m,
+          .velocity_m_per_s = velocity_m_per_s,
+          .area_m2 = area_m2,
+          .gravity_m_per_s2 = gravity_m_per_s2,
+          .mass_kg = Number(at.mass_kg),
+          .flat_area_m2 = at.flat_area_m2,
+          .s = at.s,
+          .t = at.t,
+          .mesh = at.mesh,
+          .time_s = at.time_s};
+}
+
 /// What a law sees, and parameters, as numbers that derivatives are not taken by.
 template <class Number>
 Vector3<Number> constant(const Vector3<double>& v) {
@@ -109,16 +127,8 @@ Vector3<Number> constant(const Vector3<double>& v) {
 }
 template <class Number>
 VertexSight<Number> constant(const VertexSight<double>& at) {
-  return {.position_m = constant<Number>(at.position_m),
-          .velocity_m_per_s = constant<Number>(at.velocity_m_per_s),
-          .area_m2 = constant<Number>(at.area_m2),
-          .gravity_m_per_s2 = constant<Number>(at.gravity_m_per_s2),
-          .mass_kg = Number(at.mass_kg),
-          .flat_area_m2 = at.flat_area_m2,
-          .s = at.s,
-          .t = at.t,
-          .mesh = at.mesh,
-          .time_s = at.time_s};
+  return with_vectors(at, constant<Number>(at.position_m), constant<Number>(at.velocity_m_per_s),
+                      constant<Number>(at.area_m2), constant<Number>(at.gravity_m_per_s2));
 }
 template <class Number, size_t count>
 std::array<Number, count> constants(const EffectValues<SingleLane>& values) {
@@ -145,16 +155,10 @@ struct VertexDual {
     const auto dual = [](bool looked_at, const Vector3<double>& v, int first) {
       return looked_at ? vector(v, first) : constant<Number>(v);
     };
-    return {.position_m = dual(at.position, of.position_m, kPosition),
-            .velocity_m_per_s = dual(at.velocity, of.velocity_m_per_s, kVelocity),
-            .area_m2 = dual(at.area, of.area_m2, kArea),
-            .gravity_m_per_s2 = dual(at.gravity, of.gravity_m_per_s2, kGravity),
-            .mass_kg = Number(of.mass_kg),
-            .flat_area_m2 = of.flat_area_m2,
-            .s = of.s,
-            .t = of.t,
-            .mesh = of.mesh,
-            .time_s = of.time_s};
+    return with_vectors(of, dual(at.position, of.position_m, kPosition),
+                        dual(at.velocity, of.velocity_m_per_s, kVelocity),
+                        dual(at.area, of.area_m2, kArea),
+                        dual(at.gravity, of.gravity_m_per_s2, kGravity));
   }
   static std::array<Number, parameters> parameters_of(const EffectValues<SingleLane>& values) {
     std::array<Number, parameters> result;
@@ -261,7 +265,7 @@ class VertexLawEffect final : public LawEffect<VertexLawEffect<Law>, Law> {
   void linearise_force(const EffectScene<SingleLane>& scene,
                        const EffectValues<SingleLane>& parameters, const EffectMemory<SingleLane>&,
                        EffectLinearisation& derivatives) const override {
-    constexpr int kFew = 10;
+    constexpr int kFew = 10;  // Beside what is seen: a second look at the law costs as much
     if constexpr (Law::kParameters > kFew) {
       linearise_by_many(scene, parameters, derivatives);
     } else {
