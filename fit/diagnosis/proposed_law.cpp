@@ -1,6 +1,7 @@
 #include "fit/diagnosis/proposed_law.h"
 
 #include <fmt/format.h>
+#include <tbb/parallel_for.h>
 
 #include <Eigen/Cholesky>
 #include <algorithm>
@@ -84,7 +85,7 @@ class Pursuit {
         own_terms_(model.terms.size()),
         progress_(for_threads(progress)) {
     law_.model = model;
-    law_.before = law_.after = cross_validate(setup, model, options.blocks, options.threshold);
+    law_.before = law_.after = validation_of(model);
   }
 
   ProposedLaw run() {
@@ -99,6 +100,9 @@ class Pursuit {
   }
 
  private:
+  CrossValidation validation_of(const ModelFit& model) const {
+    return cross_validate(setup_, model, options_.blocks, options_.threshold);
+  }
   int terms_of_law() const { return static_cast<int>(law_.model.terms.size() - own_terms_); }
 
   /// What is foreseen of each term, the most telling first; the shortest horizon where something is
@@ -188,6 +192,10 @@ class Pursuit {
     for (const LawScore& score : worth) to_fit.push_back(&score);
     std::vector<ModelFit> models = fit_with_laws(setup_, law_.model, early, to_fit, first_share,
                                                  options_.threshold, progress_);
+    std::vector<CrossValidation> left_out(models.size());
+    tbb::parallel_for(size_t{0}, models.size(), [&](size_t k) {
+      if (models[k].usable) left_out[k] = validation_of(models[k]);
+    });
     for (size_t k = 0; k < models.size(); ++k) {
       ModelFit& fitted = models[k];
       law_.cancelled = law_.cancelled || fitted.cancelled;
@@ -196,11 +204,10 @@ class Pursuit {
                       .foreseen_fall = worth[k].fall,
                       .without_it = law_.after.mean,
                       .refused = {}};
-      CrossValidation validated;
+      const CrossValidation& validated = left_out[k];
       if (!fitted.usable) {
         trial.refused = "others leave far less over the first frames, or no fit worked out";
       } else {
-        validated = cross_validate(setup_, fitted, options_.blocks, options_.threshold);
         trial.cross_validated = validated.mean;
         if (!predicts_better(validated, law_.after))
           trial.refused = "frames that were left out are predicted no better";
@@ -211,7 +218,7 @@ class Pursuit {
       if (!trial.refused.empty()) continue;
       if (best.usable) law_.trials[best_trial].refused = "another term predicts them better";
       best = std::move(fitted);
-      best_validated = std::move(validated);
+      best_validated = validated;
       best_trial = law_.trials.size() - 1;
     }
     if (!best.usable) return false;
@@ -219,7 +226,7 @@ class Pursuit {
       refine_model(best, setup_, {}, progress_);
       law_.cancelled = best.cancelled;
       if (!best.usable) return false;
-      best_validated = cross_validate(setup_, best, options_.blocks, options_.threshold);
+      best_validated = validation_of(best);
     }
     law_.model = std::move(best);
     law_.after = std::move(best_validated);
@@ -234,7 +241,7 @@ class Pursuit {
     refine_model(fitted, setup_, {}, progress_);
     law_.cancelled = law_.cancelled || fitted.cancelled;
     if (law_.cancelled || !fitted.usable) return false;
-    CrossValidation validated = cross_validate(setup_, fitted, options_.blocks, options_.threshold);
+    CrossValidation validated = validation_of(fitted);
     if (predicts_better(law_.after, validated)) return false;
     law_.model = std::move(fitted);
     law_.after = std::move(validated);
