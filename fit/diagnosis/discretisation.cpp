@@ -20,35 +20,41 @@ DiagnosisSetup with_other_mesh(const DiagnosisSetup& setup) {
   return other;
 }
 
+ModelFit lead_to_mesh(const DiagnosisSetup& other, const ModelFit& model, double share,
+                      const ModelFit& shorter, const ProgressCallback& progress, bool own_only) {
+  const ModelFit own = share < 1 ? shortened(model, share) : model;
+  ModelFit fitted =
+      model_at(other, model.terms, shorter.parts.empty() ? model.values() : shorter.values());
+  StageOptions stage;
+  stage.rounds = 1;
+  stage.own_only = own_only;
+  if (share < 1) stage.least_fall = 0;
+  // Of a start in motion there are hundreds of directions: where parameters stand matters little,
+  // for what they change is fitted along, and updated derivatives lead near for some runs.
+  stage.rough = std::ranges::any_of(
+      fitted.problems, [](const auto& problem) { return problem->start == StartKind::unknown; });
+  for (size_t n = 0; n < fitted.parts.size(); ++n) {
+    PooledPart& part = fitted.parts[n];
+    part.frames = own.parts[n].frames;
+    const TrajectoryObjective objective = fitted.objective(n);
+    if (own.parts[n].linear.usable) {
+      part.linear.residual = objective.residuals({part.values}).front();
+      part.linear.residual_by_coordinate = own.parts[n].linear.residual_by_coordinate;
+      part.linear.usable = part.linear.residual.size() == objective.residual_count();
+      part.borrowed = true;
+    }
+    stage.rough = stage.rough && part.linear.usable;
+    if (share < 1) stage.least_fall += kRough * objective.residual_count();
+  }
+  refine_model(fitted, other, stage, progress);
+  return fitted;
+}
+
 ModelFit fit_on_mesh(const DiagnosisSetup& other, const ModelFit& model,
                      const ProgressCallback& progress, bool own_only) {
-  constexpr double kFirst = 0.28;
   ModelFit fitted;
-  for (const double share : shares_from(kFirst)) {
-    const ModelFit own = share < 1 ? shortened(model, share) : model;
-    fitted = model_at(other, model.terms, fitted.parts.empty() ? model.values() : fitted.values());
-    StageOptions stage;
-    stage.rounds = 1;
-    stage.own_only = own_only;
-    if (share < 1) stage.least_fall = 0;
-    // Of a start in motion there are hundreds of directions: where parameters stand matters little,
-    // for what they change is fitted along, and updated derivatives lead near for some runs.
-    stage.rough = std::ranges::any_of(
-        fitted.problems, [](const auto& problem) { return problem->start == StartKind::unknown; });
-    for (size_t n = 0; n < fitted.parts.size(); ++n) {
-      PooledPart& part = fitted.parts[n];
-      part.frames = own.parts[n].frames;
-      const TrajectoryObjective objective = fitted.objective(n);
-      if (own.parts[n].linear.usable) {
-        part.linear.residual = objective.residuals({part.values}).front();
-        part.linear.residual_by_coordinate = own.parts[n].linear.residual_by_coordinate;
-        part.linear.usable = part.linear.residual.size() == objective.residual_count();
-        part.borrowed = true;
-      }
-      stage.rough = stage.rough && part.linear.usable;
-      if (share < 1) stage.least_fall += kRough * objective.residual_count();
-    }
-    refine_model(fitted, other, stage, progress);
+  for (const double share : shares_from(kFirstOnMesh)) {
+    fitted = lead_to_mesh(other, model, share, fitted, progress, own_only);
     if (!fitted.usable) break;
   }
   return fitted;

@@ -21,12 +21,21 @@ std::vector<DiscretisationError> discretisation_errors(const DiagnosisSetup& set
 /// The setup with the mesh that directions are taken from.
 DiagnosisSetup with_other_mesh(const DiagnosisSetup& setup);
 
+/// The shortest share of the frames over which a model is fitted on another mesh.
+inline constexpr double kFirstOnMesh = 0.28;
+
 /// The model fitted on another mesh, over growing horizons. It begins with the derivatives of the
 /// model's own mesh, where there are any, which serve for most of the way; where recordings begin
 /// in motion all the way, and it ends near the optimum. `own_only`: what is shared by recordings
 /// stays.
 ModelFit fit_on_mesh(const DiagnosisSetup& other, const ModelFit& model,
                      const ProgressCallback& progress = {}, bool own_only = false);
+
+/// One of these horizons: over a share of the model's frames, from where the fit over the shorter
+/// one stands; from where the model stands if that has no parts.
+ModelFit lead_to_mesh(const DiagnosisSetup& other, const ModelFit& model, double share,
+                      const ModelFit& shorter, const ProgressCallback& progress,
+                      bool own_only = false);
 
 /// Refines a model together with the amounts by which its discretisation errs, in the directions of
 /// where it stands first. A direction that is asked for by several times what it may be is no error

@@ -3,6 +3,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <functional>
 #include <limits>
 #include <numeric>
 
@@ -77,20 +78,20 @@ ModelFit fit_from_here(const DiagnosisSetup& setup, const ModelFit& model, const
   return fitted;
 }
 
-std::vector<ModelFit> race(const DiagnosisSetup& setup, const ModelFit& model,
-                           const ModelFit& early, const std::vector<const LawScore*>& scores,
-                           double first_share, double threshold, const ProgressCallback& progress) {
+/// Models fitted side by side over growing horizons, by `fit_over` (model, share). Those that leave
+/// far more than the best one fall out, and are not usable.
+std::vector<ModelFit> race(size_t models, double first_share, double threshold,
+                           const std::function<ModelFit(size_t, double)>& fit_over) {
   // What is left above the noise: times the best one's, or times a share of the noise.
   constexpr double kFarMore = 10, kOfNoise = 0.2;
-  std::vector<ModelFit> whole, fitted(scores.size());
-  for (const LawScore* score : scores) whole.push_back(cautious_start(setup, early, *score));
-  std::vector<size_t> running(scores.size());
+  std::vector<ModelFit> fitted(models);
+  std::vector<size_t> running(models);
   std::iota(running.begin(), running.end(), size_t{0});
   for (const double share : shares_from(first_share)) {
     double least = std::numeric_limits<double>::infinity();
     tbb::parallel_for(size_t{0}, running.size(), [&](size_t n) {
       const size_t k = running[n];
-      fitted[k] = refined_over(setup, whole[k], model, share, progress);
+      fitted[k] = fit_over(k, share);
     });
     for (const size_t k : running) {
       if (fitted[k].cancelled) return fitted;
@@ -109,6 +110,18 @@ std::vector<ModelFit> race(const DiagnosisSetup& setup, const ModelFit& model,
   return fitted;
 }
 
+/// Laws beside a model, from where `early` stands.
+std::vector<ModelFit> race_laws(const DiagnosisSetup& setup, const ModelFit& model,
+                                const ModelFit& early, const std::vector<const LawScore*>& scores,
+                                double first_share, double threshold,
+                                const ProgressCallback& progress) {
+  std::vector<ModelFit> whole;
+  for (const LawScore* score : scores) whole.push_back(cautious_start(setup, early, *score));
+  return race(scores.size(), first_share, threshold, [&](size_t k, double share) {
+    return refined_over(setup, whole[k], model, share, progress);
+  });
+}
+
 /// From where a rough fit stands; where that does not bring what was foreseen, over growing
 /// horizons.
 ModelFit fit_from_rough(const DiagnosisSetup& setup, const ModelFit& model, const LawScore& score,
@@ -122,7 +135,8 @@ ModelFit fit_from_rough(const DiagnosisSetup& setup, const ModelFit& model, cons
         left < kHardlyMore * static_cast<double>(near.residual_count()))
       return near;
   }
-  ModelFit far = race(setup, model, model, {&score}, kShortHorizon, threshold, progress).front();
+  ModelFit far =
+      race_laws(setup, model, model, {&score}, kShortHorizon, threshold, progress).front();
   if (far.cancelled || !near.usable) return far;
   return far.usable && far.chi_square(threshold) < near.chi_square(threshold) ? far : near;
 }
@@ -219,7 +233,7 @@ std::vector<ModelFit> fit_with_laws(const DiagnosisSetup& setup, const ModelFit&
                                     double threshold, const ProgressCallback& progress) {
   if (first_share == 1) return fit_near(setup, model, scores, threshold, progress);
   std::vector<ModelFit> fitted =
-      race(setup, model, early, scores, first_share, threshold, progress);
+      race_laws(setup, model, early, scores, first_share, threshold, progress);
   // Growing horizons can lead astray where no single law brings the model near the cloth.
   const double without = model.chi_square(threshold);
   for (size_t k = 0; k < fitted.size(); ++k) {
@@ -228,6 +242,15 @@ std::vector<ModelFit> fit_with_laws(const DiagnosisSetup& setup, const ModelFit&
     fitted[k] = fit_from_here(setup, model, *scores[k], {}, progress);
   }
   return fitted;
+}
+
+std::vector<ModelFit> race_on_mesh(const DiagnosisSetup& other, const std::vector<ModelFit>& models,
+                                   double threshold, const ProgressCallback& progress) {
+  std::vector<ModelFit> shorter(models.size());
+  return race(models.size(), kFirstOnMesh, threshold, [&](size_t k, double share) {
+    shorter[k] = lead_to_mesh(other, models[k], share, shorter[k], progress);
+    return shorter[k];
+  });
 }
 
 ModelFit fitted_anew(const DiagnosisSetup& setup, const std::vector<Term>& terms,

@@ -38,6 +38,11 @@ std::vector<ModelFit> fit_with_laws(const DiagnosisSetup& setup, const ModelFit&
                                     const std::vector<const LawScore*>& scores, double first_share,
                                     double threshold, const ProgressCallback& progress);
 
+/// Models fitted on another mesh (fit_on_mesh), side by side: after each horizon those fall out,
+/// and are not usable, that leave far more than the best one.
+std::vector<ModelFit> race_on_mesh(const DiagnosisSetup& other, const std::vector<ModelFit>& models,
+                                   double threshold, const ProgressCallback& progress);
+
 /// The model with these laws identified from scratch, as if nothing were known of its parameters
 /// (fit/fit.h), linearised: from the first recording, and then, from there, of all of them. Not
 /// usable where that leads nowhere, nor where a recording begins in motion.

@@ -138,6 +138,16 @@ void drop_hopeless(std::vector<Line>& lines, double base_cost, size_t most,
   lines.erase(first, lines.end());
 }
 
+/// What is known of effects alone.
+std::vector<NamedValues> values_of_effects(const ModelFit& model) {
+  std::vector<NamedValues> values = model.values();
+  for (size_t n = 0; n < values.size(); ++n)
+    for (const FitParameter& parameter : model.problems[n]->space.parameters)
+      if (parameter.role != ParameterRole::effect && parameter.role != ParameterRole::measurement)
+        values[n].erase(parameter.name);
+  return values;
+}
+
 /// The line of least cost that owes nothing, of two lists of which one has such.
 Line best_sound(std::vector<Line> lines, std::vector<Line> more) {
   std::ranges::move(more, std::back_inserter(lines));
@@ -367,7 +377,10 @@ class Search {
         refine_model(fitted, setup, {.rounds = 1}, progress_);
         if (stopped_) return {};
         // The coarse mesh errs, and is to choose alone.
-        if (fitted.usable && &setup == &setup_)
+        if (&setup == &coarse_)
+          leave_bias(fitted, share,
+                     shorter.empty() ? values_of_effects(model) : shorter.back().values());
+        else if (fitted.usable)
           refine_with_discretisation(fitted, setup, progress_);
       }
       if (stopped_) return {};
@@ -411,6 +424,24 @@ class Search {
     }
     if (!shorter.empty()) list.early = std::move(shorter.front());
     return list;
+  }
+
+  /// Where a model is hopelessly far off over all frames, its springs and its place make up for
+  /// what is missing, and its optimum over few frames is not near. `fitted` to a share of them on
+  /// the coarse mesh is led there from `start` too, over half as many first, and stands where it
+  /// leaves less.
+  void leave_bias(ModelFit& fitted, double share, std::vector<NamedValues> start) const {
+    constexpr double kParts[] = {0.5, 1};
+    ModelFit other;
+    for (const double part : kParts) {
+      other = model_at(coarse_, fitted.terms, start);
+      for (size_t n = 0; n < other.parts.size(); ++n)
+        other.parts[n].frames = frames_of_share(*other.problems[n], part * share);
+      refine_model(other, coarse_, {}, progress_);
+      if (stopped_ || !other.usable) return;
+      start = other.values();
+    }
+    if (left_by(other) < left_by(fitted)) fitted = std::move(other);
   }
 
   /// Lines that a law more leads to, of those on the list.
@@ -497,8 +528,9 @@ class Search {
     return children;
   }
 
-  /// The models of the coarse mesh that leave least, fitted on the analysed one: from there, and
-  /// where that leaves more than the line's model does, from this. Others are not usable.
+  /// The models of the coarse mesh that leave least, fitted on the analysed one side by side: from
+  /// there, and where that leaves more than the line's model does, from this. Others are not
+  /// usable, nor those that fall out.
   std::vector<ModelFit> on_analysed_mesh(const ModelFit& line, std::vector<ModelFit> models) const {
     // What is left above the noise: times the best one's, or times a share of the noise.
     constexpr double kMore = 2, kOfNoise = 0.2;
@@ -510,17 +542,21 @@ class Search {
       if (model.usable)
         least = std::min(
             least, std::max(above(model), kOfNoise * static_cast<double>(model.residual_count())));
-    tbb::parallel_for(size_t{0}, models.size(), [&](size_t k) {
+    std::vector<size_t> best;
+    std::vector<ModelFit> coarse;
+    for (size_t k = 0; k < models.size(); ++k) {
       ModelFit& model = models[k];
-      if (!model.usable) return;
-      if (above(model) > kMore * least) {
-        model.usable = false;
-        return;
+      if (model.usable && above(model) <= kMore * least) {
+        best.push_back(k);
+        coarse.push_back(model);
       }
-      const std::vector<Term> terms = model.terms;
-      model = fit_on_mesh(setup_, model, progress_);
-      if (stopped_ || left_by(model) < left_by(line)) return;
-      model = with_terms(setup_, line, terms, {});
+      model.usable = false;
+    }
+    std::vector<ModelFit> fitted = race_on_mesh(setup_, coarse, threshold_, progress_);
+    tbb::parallel_for(size_t{0}, best.size(), [&](size_t k) {
+      ModelFit& model = models[best[k]] = std::move(fitted[k]);
+      if (stopped_ || !model.usable || left_by(model) < left_by(line)) return;
+      model = with_terms(setup_, line, coarse[k].terms, {});
       refine_model(model, setup_, {}, progress_);
     });
     return models;
