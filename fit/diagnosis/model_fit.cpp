@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <tuple>
 
 #include "fit/identify.h"
@@ -108,12 +109,16 @@ double ModelFit::chi_square(double threshold) const {
 FitOptions options_with(const DiagnosisSetup& setup, const std::vector<Term>& terms,
                         size_t recording) {
   FitOptions options = setup.options;
-  for (const Term& term : terms)
-    if (term.fits_shape)
-      for (const auto& [parameter, value] : term.shape)
-        options.priors.push_back({.name = term.effect + "." + parameter,
-                                  .mean = value,
-                                  .sigma = term.shape_sigma.at(parameter)});
+  std::set<std::string> fitted;
+  for (const Term& term : terms) {
+    if (!term.fits_shape) continue;
+    for (const auto& [parameter, value] : term.shape) {
+      const std::string name = term.effect + "." + parameter;
+      if (fitted.insert(name).second)
+        options.priors.push_back(
+            {.name = name, .mean = value, .sigma = term.shape_sigma.at(parameter)});
+    }
+  }
   if (recording > 0)
     std::erase_if(options.priors,
                   [](const ParameterPrior& prior) { return !is_of_measurement(prior.name); });

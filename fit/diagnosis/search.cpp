@@ -267,11 +267,12 @@ class Search {
 
  private:
   std::vector<LawShapes> untested(const ModelFit& model) const {
+    const NamedValues values = model.values().front();
     std::vector<LawShapes> result;
     for (const LawShapes& law : options_.laws)
       if (std::ranges::none_of(model.terms,
                                [&](const Term& term) { return term.same_law(law.front()); }))
-        result.push_back(law);
+        result.push_back(at_shapes_of(model.terms, values, law));
     return result;
   }
   double cost(const ModelFit& model) const { return model.chi_square(threshold_) + price(model); }
@@ -730,7 +731,13 @@ class Search {
     const double best = children.front().cost;
     for (Line& child : children) {
       std::vector<Term> terms = child.model.terms;
-      if (terms.back().shape.empty() || child.cost > best + reach) continue;
+      const NamedValues& shape = terms.back().shape;
+      const bool is_fitted = std::ranges::any_of(terms, [&](const Term& term) {
+        return term.fits_shape && term.effect == terms.back().effect &&
+               std::ranges::any_of(shape,
+                                   [&](const auto& one) { return term.shape.contains(one.first); });
+      });
+      if (shape.empty() || is_fitted || child.cost > best + reach) continue;
       terms.back().fits_shape = true;
       ModelFit with_shape = with_terms(setup_, child.model, terms, {});
       refine_model(with_shape, setup_, {.rounds = 1}, progress_);

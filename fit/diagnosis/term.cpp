@@ -114,13 +114,34 @@ FitInput with_terms(FitInput input, const std::vector<Term>& terms) {
       declared.push_back(std::move(neutral));
       effect = std::prev(declared.end());
     }
-    for (const auto& [parameter, value] : term.shape) {
-      effect->parameters[parameter] = {value};
-      if (term.fits_shape) effect->parameters.erase(parameter);
-    }
-    for (const std::string& amplitude : term.amplitudes) effect->parameters.erase(amplitude);
+    for (const auto& [parameter, value] : term.shape) effect->parameters[parameter] = {value};
+  }
+  for (const Term& term : terms) {
+    DeclaredEffect& effect =
+        *std::ranges::find(input.recording.declared, term.effect, &DeclaredEffect::name);
+    for (const std::string& amplitude : term.amplitudes) effect.parameters.erase(amplitude);
+    if (!term.fits_shape) continue;
+    for (const auto& [parameter, value] : term.shape) effect.parameters.erase(parameter);
   }
   return input;
+}
+
+LawShapes at_shapes_of(const std::vector<Term>& terms, const std::map<std::string, double>& values,
+                       const LawShapes& law) {
+  LawShapes result;
+  for (Term one : law) {
+    for (const Term& own : terms) {
+      if (own.effect != one.effect) continue;
+      for (const auto& [parameter, value] : own.shape) {
+        if (!one.shape.contains(parameter)) continue;
+        const auto fitted = values.find(own.effect + "." + parameter);
+        one.shape[parameter] = fitted == values.end() ? value : fitted->second;
+      }
+    }
+    if (std::ranges::find(result, one.shape, &Term::shape) == result.end())
+      result.push_back(std::move(one));
+  }
+  return result;
 }
 
 bool is_harmonic(const Term& law) {

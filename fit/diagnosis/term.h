@@ -29,7 +29,7 @@ struct Term {
 std::string title(const std::vector<Term>& terms);
 
 /// The recording as if it declared these effects. Two laws of one effect are that effect with the
-/// parameters of both.
+/// parameters of both; a shape that they share is the last one's, and is fitted if either fits it.
 FitInput with_terms(FitInput input, const std::vector<Term>& terms);
 
 /// An effect's description, of motion or of the measurement. Throws InputError for an unknown name.
@@ -37,6 +37,11 @@ EffectDescription describe_effect(const std::string& name);
 
 /// One law with every shape that it is tested with: the same term but for its shape.
 using LawShapes = std::vector<Term>;
+
+/// A law's shapes beside a model: an effect that the model has by another law has the shape that it
+/// has there, at `values` (EFFECT.PARAMETER) where that is fitted.
+LawShapes at_shapes_of(const std::vector<Term>& terms, const std::map<std::string, double>& values,
+                       const LawShapes& law);
 
 /// Whether a law is a sine of time, at any phase (Harmonic).
 bool is_harmonic(const Term& law);

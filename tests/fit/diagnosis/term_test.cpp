@@ -8,6 +8,7 @@
 #include <algorithm>
 
 #include "data/input_error.h"
+#include "fit/diagnosis/model_fit.h"
 #include "fit/problem.h"
 #include "tests/fit/synthetic_cloth.h"
 
@@ -15,6 +16,7 @@ namespace clothfit {
 namespace {
 
 using ::testing::Contains;
+using ::testing::ElementsAre;
 using ::testing::Not;
 
 const Term kDrag{.effect = "wind", .law = "drag", .amplitudes = {"c"}};
@@ -62,6 +64,46 @@ TEST(Term, FitsItsShapeOnlyWhereItSaysSo) {
   hem.fits_shape = true;
   EXPECT_THAT(fitted_names(with_terms(synthetic_input({}), {hem})),
               Contains("nonuniform_mass.hem_width"));
+}
+
+TEST(Term, FitsAShapeThatItsEffectsOtherLawFits) {
+  Term edges = kHem, hem = kHem;
+  edges.law = "edges";
+  edges.amplitudes = {"hem_left", "hem_right", "hem_top", "hem_bottom"};
+  edges.fits_shape = true;
+  const FitInput input = synthetic_input({});
+  const std::vector<FitInput> inputs = {input};
+  const FitOptions options;
+  const DiagnosisSetup setup{.inputs = inputs, .options = options, .columns = 9, .rows = 9};
+  for (const bool both : {false, true}) {
+    hem.fits_shape = both;
+    for (const std::vector<Term>& terms : {std::vector{edges, hem}, std::vector{hem, edges}}) {
+      const auto problems = problems_of(setup, terms);
+
+      EXPECT_GE(problems.front()->space.index("nonuniform_mass.hem_width"), 0);
+      EXPECT_EQ(options_with(setup, terms, 0).priors.size(), 1);
+    }
+  }
+}
+
+TEST(AtShapesOf, AreThoseOfTheEffectsOtherLaw) {
+  LawShapes hem(3, kHem);
+  for (size_t k = 0; k < hem.size(); ++k) hem[k].shape["hem_width"] = 0.01 * static_cast<double>(k);
+  Term edges = kHem;
+  edges.law = "edges";
+  const auto widths = [&](const std::vector<Term>& terms,
+                          const std::map<std::string, double>& values) {
+    std::vector<double> result;
+    for (const Term& shape : at_shapes_of(terms, values, hem))
+      result.push_back(shape.shape.at("hem_width"));
+    return result;
+  };
+
+  EXPECT_THAT(widths({kDrag}, {}), ElementsAre(0, 0.01, 0.02));
+  edges.shape["hem_width"] = 0.004;
+  EXPECT_THAT(widths({kDrag, edges}, {}), ElementsAre(0.004));
+  edges.fits_shape = true;
+  EXPECT_THAT(widths({edges}, {{"nonuniform_mass.hem_width", 0.003}}), ElementsAre(0.003));
 }
 
 TEST(LawsToTest, AreThoseOfEffectsThatAreNotThereAlready) {
