@@ -192,19 +192,19 @@ class Pursuit {
     for (const LawScore& score : worth) to_fit.push_back(&score);
     std::vector<ModelFit> models = fit_with_laws(setup_, law_.model, early, to_fit, first_share,
                                                  options_.threshold, progress_);
+    law_.cancelled = law_.cancelled || std::ranges::any_of(models, &ModelFit::cancelled);
+    if (law_.cancelled) return false;
     std::vector<CrossValidation> left_out(models.size());
     tbb::parallel_for(size_t{0}, models.size(), [&](size_t k) {
       if (models[k].usable) left_out[k] = validation_of(models[k]);
     });
     for (size_t k = 0; k < models.size(); ++k) {
       ModelFit& fitted = models[k];
-      law_.cancelled = law_.cancelled || fitted.cancelled;
-      if (law_.cancelled) return false;
       TermTrial trial{.term = worth[k].term,
                       .foreseen_fall = worth[k].fall,
                       .without_it = law_.after.mean,
                       .refused = {}};
-      const CrossValidation& validated = left_out[k];
+      CrossValidation& validated = left_out[k];
       if (!fitted.usable) {
         trial.refused = "others leave far less over the first frames, or no fit worked out";
       } else {
@@ -218,7 +218,7 @@ class Pursuit {
       if (!trial.refused.empty()) continue;
       if (best.usable) law_.trials[best_trial].refused = "another term predicts them better";
       best = std::move(fitted);
-      best_validated = validated;
+      best_validated = std::move(validated);
       best_trial = law_.trials.size() - 1;
     }
     if (!best.usable) return false;

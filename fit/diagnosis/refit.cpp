@@ -78,10 +78,13 @@ ModelFit fit_from_here(const DiagnosisSetup& setup, const ModelFit& model, const
   return fitted;
 }
 
-/// Models fitted side by side over growing horizons, by `fit_over` (model, share). Those that leave
-/// far more than the best one fall out, and are not usable.
+/// A model fitted over a share of the frames, after the fit over the shorter one.
+using FitOver = std::function<ModelFit(size_t model, double share, const ModelFit& shorter)>;
+
+/// Models fitted side by side over growing horizons. Those that leave far more than the best one
+/// fall out, and are not usable.
 std::vector<ModelFit> race(size_t models, double first_share, double threshold,
-                           const std::function<ModelFit(size_t, double)>& fit_over) {
+                           const FitOver& fit_over) {
   // What is left above the noise: times the best one's, or times a share of the noise.
   constexpr double kFarMore = 10, kOfNoise = 0.2;
   std::vector<ModelFit> fitted(models);
@@ -91,7 +94,7 @@ std::vector<ModelFit> race(size_t models, double first_share, double threshold,
     double least = std::numeric_limits<double>::infinity();
     tbb::parallel_for(size_t{0}, running.size(), [&](size_t n) {
       const size_t k = running[n];
-      fitted[k] = fit_over(k, share);
+      fitted[k] = fit_over(k, share, fitted[k]);
     });
     for (const size_t k : running) {
       if (fitted[k].cancelled) return fitted;
@@ -99,12 +102,11 @@ std::vector<ModelFit> race(size_t models, double first_share, double threshold,
     }
     if (share == 1) break;
     std::erase_if(running, [&](size_t k) {
+      if (!fitted[k].usable) return true;
       const auto count = static_cast<double>(fitted[k].residual_count());
       const double above = fitted[k].chi_square(threshold) - count;
-      const bool falls_out =
-          !fitted[k].usable || above > kFarMore * std::max(least - count, kOfNoise * count);
-      if (falls_out) fitted[k].usable = false;
-      return falls_out;
+      fitted[k].usable = above <= kFarMore * std::max(least - count, kOfNoise * count);
+      return !fitted[k].usable;
     });
   }
   return fitted;
@@ -117,7 +119,7 @@ std::vector<ModelFit> race_laws(const DiagnosisSetup& setup, const ModelFit& mod
                                 const ProgressCallback& progress) {
   std::vector<ModelFit> whole;
   for (const LawScore* score : scores) whole.push_back(cautious_start(setup, early, *score));
-  return race(scores.size(), first_share, threshold, [&](size_t k, double share) {
+  return race(scores.size(), first_share, threshold, [&](size_t k, double share, const ModelFit&) {
     return refined_over(setup, whole[k], model, share, progress);
   });
 }
@@ -246,11 +248,10 @@ std::vector<ModelFit> fit_with_laws(const DiagnosisSetup& setup, const ModelFit&
 
 std::vector<ModelFit> race_on_mesh(const DiagnosisSetup& other, const std::vector<ModelFit>& models,
                                    double threshold, const ProgressCallback& progress) {
-  std::vector<ModelFit> shorter(models.size());
-  return race(models.size(), kFirstOnMesh, threshold, [&](size_t k, double share) {
-    shorter[k] = lead_to_mesh(other, models[k], share, shorter[k], progress);
-    return shorter[k];
-  });
+  return race(models.size(), kFirstOnMesh, threshold,
+              [&](size_t k, double share, const ModelFit& shorter) {
+                return lead_to_mesh(other, models[k], share, shorter, progress);
+              });
 }
 
 ModelFit fitted_anew(const DiagnosisSetup& setup, const std::vector<Term>& terms,

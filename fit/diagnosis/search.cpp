@@ -6,6 +6,7 @@
 #include <atomic>
 #include <cmath>
 #include <functional>
+#include <initializer_list>
 #include <iterator>
 #include <limits>
 #include <utility>
@@ -377,12 +378,15 @@ class Search {
         fitted = shortened(model, share);
         refine_model(fitted, setup, {.rounds = 1}, progress_);
         if (stopped_) return {};
-        // The coarse mesh errs, and is to choose alone.
-        if (&setup == &coarse_)
-          leave_bias(fitted, share,
-                     shorter.empty() ? values_of_effects(model) : shorter.back().values());
-        else if (fitted.usable)
+        if (&setup == &coarse_) {
+          // (It errs, and is to choose alone: without directions.)
+          if (shorter.empty())
+            leave_bias(fitted, {0.5 * share, share}, values_of_effects(model));
+          else
+            leave_bias(fitted, {share}, shorter.back().values());
+        } else if (fitted.usable) {
           refine_with_discretisation(fitted, setup, progress_);
+        }
       }
       if (stopped_) return {};
       if (!fitted.usable) continue;
@@ -397,7 +401,7 @@ class Search {
     for (size_t k = 0; k < shorter.size(); ++k) {
       const ModelFit& at = shorter[k];
       if (k == 0) {
-        list.best = scored(setup, at, untested(model));
+        list.best = scored(setup, at, untested(at));
         for (LawScore& score : list.best) {
           score.share /= horizons;
           if (list.share < 1) score.columns.clear();
@@ -428,16 +432,20 @@ class Search {
   }
 
   /// Where a model is hopelessly far off over all frames, its springs and its place make up for
-  /// what is missing, and its optimum over few frames is not near. `fitted` to a share of them on
-  /// the coarse mesh is led there from `start` too, over half as many first, and stands where it
-  /// leaves less.
-  void leave_bias(ModelFit& fitted, double share, std::vector<NamedValues> start) const {
-    constexpr double kParts[] = {0.5, 1};
+  /// what is missing, and its optimum over few frames is not near. `fitted` to the last of these
+  /// shares on the coarse mesh is led there from `start` too, and stands where it leaves less. Not
+  /// of a start in motion, which has hundreds of numbers.
+  void leave_bias(ModelFit& fitted, std::initializer_list<double> shares,
+                  std::vector<NamedValues> start) const {
+    if (std::ranges::any_of(fitted.problems, [](const auto& problem) {
+          return problem->start == StartKind::unknown;
+        }))
+      return;
     ModelFit other;
-    for (const double part : kParts) {
+    for (const double share : shares) {
       other = model_at(coarse_, fitted.terms, start);
       for (size_t n = 0; n < other.parts.size(); ++n)
-        other.parts[n].frames = frames_of_share(*other.problems[n], part * share);
+        other.parts[n].frames = frames_of_share(*other.problems[n], share);
       refine_model(other, coarse_, {}, progress_);
       if (stopped_ || !other.usable) return;
       start = other.values();
@@ -530,8 +538,8 @@ class Search {
   }
 
   /// The models of the coarse mesh that leave least, fitted on the analysed one side by side: from
-  /// there, and where that leaves more than the line's model does, from this. Others are not
-  /// usable, nor those that fall out.
+  /// there, and where that leaves more than the line's model does, or none works out, from this.
+  /// Others are not usable, nor those that fall out.
   std::vector<ModelFit> on_analysed_mesh(const ModelFit& line, std::vector<ModelFit> models) const {
     // What is left above the noise: times the best one's, or times a share of the noise.
     constexpr double kMore = 2, kOfNoise = 0.2;
@@ -549,14 +557,15 @@ class Search {
       ModelFit& model = models[k];
       if (model.usable && above(model) <= kMore * least) {
         best.push_back(k);
-        coarse.push_back(model);
+        coarse.push_back(std::move(model));
       }
       model.usable = false;
     }
     std::vector<ModelFit> fitted = race_on_mesh(setup_, coarse, threshold_, progress_);
+    const bool none = std::ranges::none_of(fitted, &ModelFit::usable);
     tbb::parallel_for(size_t{0}, best.size(), [&](size_t k) {
       ModelFit& model = models[best[k]] = std::move(fitted[k]);
-      if (stopped_ || !model.usable || left_by(model) < left_by(line)) return;
+      if (stopped_ || (!model.usable && !none) || left_by(model) < left_by(line)) return;
       model = with_terms(setup_, line, coarse[k].terms, {});
       refine_model(model, setup_, {}, progress_);
     });
@@ -612,7 +621,13 @@ class Search {
         continue;
       }
       std::vector<Term> terms = line.model.terms;
+      const Term dropped = terms[given + k];
       terms.erase(terms.begin() + static_cast<std::ptrdiff_t>(given + k));
+      for (Term& term : terms) {
+        if (!share_shape(term, dropped)) continue;
+        term = at_shapes_of({dropped}, line.model.values().front(), {term}).front();
+        term.fits_shape = term.fits_shape || dropped.fits_shape;
+      }
       ModelFit without = with_terms(setup_, line.model, terms, {});
       refine_model(without, setup_, {}, progress_);
       if (stopped_) return;
@@ -731,13 +746,10 @@ class Search {
     const double best = children.front().cost;
     for (Line& child : children) {
       std::vector<Term> terms = child.model.terms;
-      const NamedValues& shape = terms.back().shape;
       const bool is_fitted = std::ranges::any_of(terms, [&](const Term& term) {
-        return term.fits_shape && term.effect == terms.back().effect &&
-               std::ranges::any_of(shape,
-                                   [&](const auto& one) { return term.shape.contains(one.first); });
+        return term.fits_shape && share_shape(term, terms.back());
       });
-      if (shape.empty() || is_fitted || child.cost > best + reach) continue;
+      if (terms.back().shape.empty() || is_fitted || child.cost > best + reach) continue;
       terms.back().fits_shape = true;
       ModelFit with_shape = with_terms(setup_, child.model, terms, {});
       refine_model(with_shape, setup_, {.rounds = 1}, progress_);

@@ -126,6 +126,12 @@ FitInput with_terms(FitInput input, const std::vector<Term>& terms) {
   return input;
 }
 
+bool share_shape(const Term& one, const Term& other) {
+  return one.effect == other.effect && std::ranges::any_of(one.shape, [&](const auto& number) {
+           return other.shape.contains(number.first);
+         });
+}
+
 LawShapes at_shapes_of(const std::vector<Term>& terms, const std::map<std::string, double>& values,
                        const LawShapes& law) {
   LawShapes result;

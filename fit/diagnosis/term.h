@@ -38,6 +38,9 @@ EffectDescription describe_effect(const std::string& name);
 /// One law with every shape that it is tested with: the same term but for its shape.
 using LawShapes = std::vector<Term>;
 
+/// Whether two laws are of one effect and a number of their shapes is the same.
+bool share_shape(const Term& one, const Term& other);
+
 /// A law's shapes beside a model: an effect that the model has by another law has the shape that it
 /// has there, at `values` (EFFECT.PARAMETER) where that is fitted.
 LawShapes at_shapes_of(const std::vector<Term>& terms, const std::map<std::string, double>& values,
