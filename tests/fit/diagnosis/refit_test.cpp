@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "tests/fit/diagnosis/true_model.h"
@@ -67,6 +68,28 @@ TEST(FittedAnew, IsOfAKnownStart) {
   const DiagnosisSetup setup{.inputs = {&input, 1}, .options = kOptions, .columns = 9, .rows = 9};
 
   EXPECT_FALSE(fitted_anew(setup, {}, {}).usable);
+}
+
+TEST(RaceOnMesh, LeavesWhatIsNotFarBehindAndRuns) {
+  const SyntheticCloth cloth{.drag_rate_per_s = 1.2};
+  const FitInput input = synthetic_input(cloth);
+  const DiagnosisSetup setup{.inputs = {&input, 1}, .options = kOptions, .columns = 9, .rows = 9};
+  DiagnosisSetup coarse = setup;
+  coarse.columns = coarse.rows = 7;
+  const Term drift{.effect = "support_drift", .law = "", .amplitudes = {"velocity_x"}};
+  const ModelFit with_drag = true_model(coarse, cloth, {drag_term()});
+  const ModelFit with_drift = true_model(coarse, cloth, {drift});
+  ModelFit lost = with_drag;
+  lost.parts.front().values.setConstant(std::numeric_limits<double>::quiet_NaN());
+
+  const std::vector<ModelFit> fitted = race_on_mesh(setup, {with_drift, lost, with_drag},
+                                                    std::numeric_limits<double>::infinity(), {});
+
+  EXPECT_FALSE(fitted[0].usable);
+  EXPECT_FALSE(fitted[1].usable);
+  ASSERT_TRUE(fitted[2].usable);
+  EXPECT_EQ(fitted[2].problems.front()->cloth.mesh.columns, 9);
+  ASSERT_NO_FATAL_FAILURE(expect_optimum(fitted[2], setup, cloth));
 }
 
 TEST(WithTerms, HandsOnWhatTheModelIsExpectedToErrBy) {
