@@ -138,27 +138,27 @@ int run_calibrate(const CalibrateVerbOptions& options) {
 
 }  // namespace
 
-void add_calibrate_verb(CLI::App& program, VerbAction& action) {
+void add_calibrate_verb(Verb program) {
   const auto options = std::make_shared<CalibrateVerbOptions>();
-  CLI::App* verb = program.add_subcommand(
+  Verb verb = program.add_verb(
       "calibrate", "Find a camera's focal length, centre and distortion from stills of a board");
-  verb->add_option("input", options->input, "Folder of stills, or a recording that names them")
-      ->required()
-      ->type_name("STILLS|RECORDING");
-  verb->add_option("--board", options->board,
-                   "Board on the stills: chessboard:COLUMNSxROWS:SQUARE, inner corners and metres")
-      ->check(check_board);
-  verb->add_option("--name", options->name, "Name of the camera")->check(check_name);
-  verb->add_option("--model", options->model, "Camera model")
-      ->check(CLI::IsMember({"pinhole", "brown_conrady", "kannala_brandt"}))
-      ->capture_default_str();
-  verb->add_option("--distortion", options->distortion_count,
-                   "Distortion coefficients of brown_conrady")
-      ->check(CLI::IsMember({4, 5, 8}))
-      ->capture_default_str();
-  add_out_option(*verb, options->out, "NAME.calibration");
-  verb->footer("Example:\n  clothfit calibrate stills/ --board chessboard:9x6:0.025 --name front");
-  verb->callback([options, &action] { action = [options] { return run_calibrate(*options); }; });
+  verb.add_option("input", &options->input, "Folder of stills, or a recording that names them")
+      .required()
+      .type_name("STILLS|RECORDING");
+  verb.add_option("--board", &options->board,
+                  "Board on the stills: chessboard:COLUMNSxROWS:SQUARE, inner corners and metres")
+      .check(check_board);
+  verb.add_option("--name", &options->name, "Name of the camera").check(check_name);
+  verb.add_option("--model", &options->model, "Camera model")
+      .one_of({"pinhole", "brown_conrady", "kannala_brandt"})
+      .shows_default();
+  verb.add_option("--distortion", &options->distortion_count,
+                  "Distortion coefficients of brown_conrady")
+      .one_of({"4", "5", "8"})
+      .shows_default();
+  add_out_option(verb, options->out, "NAME.calibration");
+  verb.footer("Example:\n  clothfit calibrate stills/ --board chessboard:9x6:0.025 --name front");
+  verb.runs([options] { return run_calibrate(*options); });
 }
 
 }  // namespace clothfit

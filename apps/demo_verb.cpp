@@ -8,20 +8,18 @@
 
 namespace clothfit {
 
-void add_demo_verb(CLI::App& program, VerbAction& action) {
+void add_demo_verb(Verb program) {
   const auto options = std::make_shared<FitVerbOptions>();
-  CLI::App* verb = program.add_subcommand(
+  Verb verb = program.add_verb(
       "demo", "Calibrate, track and fit the bundled recording: from pictures to parameters");
-  add_out_option(*verb, options->out, "demo.fit");
-  verb->footer("Example:\n  clothfit demo");
-  verb->callback([options, &action] {
-    action = [options] {
-      options->recording = bundled_recording("tags_onecam");
-      if (options->out.empty()) options->out = "demo.fit";
-      options->command = "clothfit demo";
-      fmt::print("Fitting the bundled recording in {}\n", shown_path(options->recording));
-      return run_fit(*options);
-    };
+  add_out_option(verb, options->out, "demo.fit");
+  verb.footer("Example:\n  clothfit demo");
+  verb.runs([options] {
+    options->recording = bundled_recording("tags_onecam");
+    if (options->out.empty()) options->out = "demo.fit";
+    options->command = "clothfit demo";
+    fmt::print("Fitting the bundled recording in {}\n", shown_path(options->recording));
+    return run_fit(*options);
   });
 }
 

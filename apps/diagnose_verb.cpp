@@ -71,36 +71,6 @@ std::vector<Recording> read_recordings(const DiagnoseFlags& flags) {
   return recordings;
 }
 
-/// What diagnosis.json keeps of the command line: the options that shape the result.
-std::string command_text(const DiagnoseFlags& flags) {
-  const DiagnoseOptions defaults;
-  std::string text = "clothfit diagnose";
-  for (const fs::path& recording : flags.recordings) text += " " + recording.string();
-  for (const fs::path& recording : flags.held_out) text += " --held-out " + recording.string();
-  if (flags.whole) text += " --whole";
-  for (const std::string& effect : flags.options.fit.effects) text += " --effect " + effect;
-  for (const std::string& effect : flags.options.without) text += " --without " + effect;
-  for (const std::string& prior : flags.priors) text += " --prior " + prior;
-  if (flags.observations != "automatic") text += " --observations " + flags.observations;
-  if (!flags.mesh.empty()) text += " --mesh " + flags.mesh;
-  if (flags.loss != "huber") text += " --loss " + flags.loss;
-  const auto add = [&](const char* flag, const auto& value, const auto& default_value) {
-    if (value != default_value) text += fmt::format(" {} {}", flag, value);
-  };
-  add("--seed", flags.options.fit.seed, defaults.fit.seed);
-  add("--start-nodes", flags.options.fit.start_nodes, defaults.fit.start_nodes);
-  add("--marker-offsets", flags.options.fit.marker_offset_sigma_m,
-      defaults.fit.marker_offset_sigma_m);
-  add("--drive-knots", flags.options.fit.drive_knots, defaults.fit.drive_knots);
-  add("--work", flags.options.fit.work, defaults.fit.work);
-  add("--lines", flags.options.lines, defaults.lines);
-  add("--refits", flags.options.refits, defaults.refits);
-  add("--most-effects", flags.options.most_effects, defaults.most_effects);
-  add("--law-terms", flags.options.law_terms, defaults.law_terms);
-  if (flags.plant != "10") text += " --plant " + flags.plant;
-  return text;
-}
-
 void write_results(const Diagnosis& diagnosis, std::span<const Recording> recordings,
                    const std::string& command, const fs::path& folder) {
   write_diagnosis(diagnosis, command, folder / "diagnosis.json");
@@ -150,7 +120,7 @@ void print_result(const Diagnosis& diagnosis, const fs::path& folder) {
   fmt::print("Report: {}\n", shown_path(folder / "report.html"));
 }
 
-int run_diagnose(DiagnoseFlags flags) {
+int run_diagnose(DiagnoseFlags flags, const std::string& command) {
   FitOptions& fit = flags.options.fit;
   fit.observations = parse_observations(flags.observations);
   if (const auto mesh = parse_mesh(flags.mesh)) {
@@ -165,7 +135,6 @@ int run_diagnose(DiagnoseFlags flags) {
   if (flags.whole && flags.held_out.empty())
     throw InputError("--whole", "no recording judges", "recordings behind --held-out",
                      "name some, or leave --whole out");
-  const std::string command = command_text(flags);
   std::vector<Recording> recordings = read_recordings(flags);
 
   OutputFolder out(out_folder(flags.out, recordings.front().name + ".diagnosis"));
@@ -201,76 +170,77 @@ int run_diagnose(DiagnoseFlags flags) {
 
 }  // namespace
 
-void add_diagnose_verb(CLI::App& program, VerbAction& action) {
+void add_diagnose_verb(Verb program) {
   const auto flags = std::make_shared<DiagnoseFlags>();
   DiagnoseOptions& options = flags->options;
-  CLI::App* verb = program.add_subcommand(
+  Verb verb = program.add_verb(
       "diagnose", "Find out what the model of a recording lacks, with the error before and after");
-  verb->add_option("recordings", flags->recordings,
-                   "Folder of the recording, or of several of one cloth")
-      ->required()
-      ->type_name("RECORDING");
-  verb->add_option("--held-out", flags->held_out,
-                   "Further recordings of the cloth, which nothing sees until the end")
-      ->type_name("RECORDING");
-  verb->add_flag("--whole", flags->whole,
-                 "Fit recordings whole, the frames that they hold out included: those behind "
-                 "--held-out judge");
-  verb->add_option("--effect", options.fit.effects,
-                   "Effect that is known to act, fitted from the beginning; may be repeated")
-      ->type_name("NAME");
-  verb->add_option("--without", options.without, "Effect not to test; may be repeated")
-      ->type_name("NAME");
-  add_prior_option(*verb, flags->priors);
-  verb->add_option("--observations", flags->observations,
-                   "What to look at: 3D tracks where there are any, unless told otherwise")
-      ->check(CLI::IsMember({"automatic", "tracks3d", "tracks2d"}))
-      ->capture_default_str();
-  verb->add_option("--mesh", flags->mesh, "Columns and rows of the mesh (default: the recording's)")
-      ->type_name("CxR")
-      ->check(check_mesh);
-  verb->add_option("--seed", options.fit.seed, "Seed of the search")
-      ->check(check_seed)
-      ->capture_default_str();
-  verb->add_option("--start-nodes", options.fit.start_nodes,
-                   "Nodes per side of the corrections of a start in motion (start: unknown)")
-      ->capture_default_str();
-  verb->add_option("--loss", flags->loss,
-                   "What large residuals weigh: less than others, or as much")
-      ->check(CLI::IsMember({"huber", "squared"}))
-      ->capture_default_str();
-  verb->add_option("--marker-offsets", options.fit.marker_offset_sigma_m,
-                   "Standard deviation of constants by which markers lie elsewhere than stated, "
-                   "such as 10mm")
-      ->transform(length_in_metres());
-  verb->add_option("--drive-knots", options.fit.drive_knots,
-                   "Knots by which tracked held points are corrected; 0: not at all")
-      ->capture_default_str();
-  verb->add_option("--work", options.fit.work,
-                   "Times as much work as refinement is allowed before it ends unconverged")
-      ->capture_default_str();
-  verb->add_option("--lines", options.lines, "Lines of search that are followed side by side")
-      ->capture_default_str();
-  verb->add_option("--refits", options.refits, "Laws of each line that are fitted in one round")
-      ->capture_default_str();
-  verb->add_option("--most-effects", options.most_effects, "Effects to add, at most")
-      ->capture_default_str();
-  verb->add_option("--law-terms", options.law_terms,
-                   "Terms of a law that is proposed for what remains, at most; 0: none is")
-      ->capture_default_str();
-  verb->add_option("--plant", flags->plant,
-                   "Laws that are planted on twins of the recording at 1.6 times their limit, to "
-                   "see whether they are named: a number, or all")
-      ->capture_default_str();
-  verb->add_option("--threads", options.fit.threads, "Threads; 0 for as many as the machine has")
-      ->capture_default_str();
-  add_out_option(*verb, flags->out, "NAME.diagnosis");
-  verb->footer(
+  verb.add_option("recordings", &flags->recordings,
+                  "Folder of the recording, or of several of one cloth")
+      .required()
+      .type_name("RECORDING");
+  verb.add_option("--held-out", &flags->held_out,
+                  "Further recordings of the cloth, which nothing sees until the end")
+      .type_name("RECORDING");
+  verb.add_flag("--whole", flags->whole,
+                "Fit recordings whole, the frames that they hold out included: those behind "
+                "--held-out judge");
+  verb.add_option("--effect", &options.fit.effects,
+                  "Effect that is known to act, fitted from the beginning; may be repeated")
+      .type_name("NAME");
+  verb.add_option("--without", &options.without, "Effect not to test; may be repeated")
+      .type_name("NAME");
+  add_prior_option(verb, flags->priors);
+  verb.add_option("--observations", &flags->observations,
+                  "What to look at: 3D tracks where there are any, unless told otherwise")
+      .one_of({"automatic", "tracks3d", "tracks2d"})
+      .shows_default();
+  verb.add_option("--mesh", &flags->mesh, "Columns and rows of the mesh (default: the recording's)")
+      .type_name("CxR")
+      .check(check_mesh);
+  verb.add_option("--seed", &options.fit.seed, "Seed of the search")
+      .check(check_seed)
+      .shows_default();
+  verb.add_option("--start-nodes", &options.fit.start_nodes,
+                  "Nodes per side of the corrections of a start in motion (start: unknown)")
+      .shows_default();
+  verb.add_option("--loss", &flags->loss,
+                  "What large residuals weigh: less than others, or as much")
+      .one_of({"huber", "squared"})
+      .shows_default();
+  verb.add_option("--marker-offsets", &options.fit.marker_offset_sigma_m,
+                  "Standard deviation of constants by which markers lie elsewhere than stated, "
+                  "such as 10mm")
+      .is_length();
+  verb.add_option("--drive-knots", &options.fit.drive_knots,
+                  "Knots by which tracked held points are corrected; 0: not at all")
+      .shows_default();
+  verb.add_option("--work", &options.fit.work,
+                  "Times as much work as refinement is allowed before it ends unconverged")
+      .shows_default();
+  verb.add_option("--lines", &options.lines, "Lines of search that are followed side by side")
+      .shows_default();
+  verb.add_option("--refits", &options.refits, "Laws of each line that are fitted in one round")
+      .shows_default();
+  verb.add_option("--most-effects", &options.most_effects, "Effects to add, at most")
+      .shows_default();
+  verb.add_option("--law-terms", &options.law_terms,
+                  "Terms of a law that is proposed for what remains, at most; 0: none is")
+      .shows_default();
+  verb.add_option("--plant", &flags->plant,
+                  "Laws that are planted on twins of the recording at 1.6 times their limit, to "
+                  "see whether they are named: a number, or all")
+      .shows_default();
+  verb.add_option("--threads", &options.fit.threads, "Threads; 0 for as many as the machine has")
+      .shows_default()
+      .shapes_no_result();
+  add_out_option(verb, flags->out, "NAME.diagnosis");
+  verb.footer(
       "Examples:\n"
       "  clothfit diagnose data/recordings/swing_breeze\n"
       "  clothfit diagnose data/recordings/tags_onecam --without self_contact\n"
       "  clothfit diagnose MONDAY TUESDAY --held-out WEDNESDAY THURSDAY");
-  verb->callback([flags, &action] { action = [flags] { return run_diagnose(*flags); }; });
+  verb.runs([flags, verb] { return run_diagnose(*flags, verb.command_text()); });
 }
 
 }  // namespace clothfit

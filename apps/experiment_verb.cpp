@@ -25,16 +25,6 @@ namespace fs = std::filesystem;
 
 constexpr const char* kDefaultFolder = "louchet1995.experiment";
 
-/// What the report keeps of the command line: the options that shape the result.
-std::string command_text(const Louchet1995Options& options) {
-  const Louchet1995Options defaults;
-  std::string text = "clothfit experiment louchet1995";
-  if (options.seeds != defaults.seeds) text += fmt::format(" --seeds {}", options.seeds);
-  if (options.seed != defaults.seed) text += fmt::format(" --seed {}", options.seed);
-  if (options.quick) text += " --quick";
-  return text;
-}
-
 /// "louchet1995.experiment.journal" for that folder.
 fs::path journal_beside(const fs::path& folder) {
   fs::path whole = fs::absolute(folder).lexically_normal();
@@ -42,13 +32,13 @@ fs::path journal_beside(const fs::path& folder) {
   return whole.parent_path() / (whole.filename().string() + ".journal");
 }
 
-void write_results(const Louchet1995Study& study, const Louchet1995Options& options,
+void write_results(const Louchet1995Study& study, const ExperimentVerbOptions& options,
                    const fs::path& folder) {
   for (const StudyTable& one : louchet1995_files(study))
     write_csv_table(one.table.header, one.table.rows, folder / one.file);
   const StudyTable timing = louchet1995_timing(study);
   write_csv_table(timing.table.header, timing.table.rows, folder / timing.file);
-  write_text(louchet1995_page_html(study, options, command_text(options), program_version()),
+  write_text(louchet1995_page_html(study, options.study, options.command, program_version()),
              folder / "report.html");
 }
 
@@ -80,7 +70,7 @@ int run_louchet1995(const ExperimentVerbOptions& options) {
                  shown_path(journal_file));
     throw Cancelled();
   }
-  write_results(study, options.study, out.path());
+  write_results(study, options, out.path());
   out.publish();
   if (own_journal) fs::remove(journal_file);
   print_targets(study);
@@ -88,42 +78,46 @@ int run_louchet1995(const ExperimentVerbOptions& options) {
   return kExitGood;
 }
 
-void add_experiment_verb(CLI::App& program, VerbAction& action) {
-  CLI::App* verb = program.add_subcommand(
-      "experiment", "Run an experiment of the literature or of our own, with a report");
-  verb->require_subcommand(1);
-  verb->footer(
+void add_experiment_verb(Verb program) {
+  Verb verb = program.add_verb("experiment",
+                               "Run an experiment of the literature or of our own, with a report");
+  verb.requires_verb();
+  verb.footer(
       "Example:\n"
       "  clothfit experiment louchet1995 --help");
 
-  add_identification_experiment(*verb, action);
+  add_identification_experiment(verb);
   const auto options = std::make_shared<ExperimentVerbOptions>();
-  CLI::App* louchet1995 = verb->add_subcommand(
+  Verb louchet1995 = verb.add_verb(
       "louchet1995", "The founding paper's identification of a simulated cloth, section 3");
   louchet1995
-      ->add_option("--seeds", options->study.seeds,
-                   "Seeds of the recoveries; comparisons take a fifth")
-      ->capture_default_str();
-  louchet1995->add_option("--seed", options->study.seed, "The first of the seeds")
-      ->capture_default_str();
+      .add_option("--seeds", &options->study.seeds,
+                  "Seeds of the recoveries; comparisons take a fifth")
+      .shows_default();
+  louchet1995.add_option("--seed", &options->study.seed, "The first of the seeds").shows_default();
   louchet1995
-      ->add_option("--threads", options->study.threads, "Threads; 0 for as many as the machine has")
-      ->capture_default_str();
-  louchet1995->add_flag("--quick", options->study.quick,
-                        "Coarse grids and short searches: to see what the report looks like");
+      .add_option("--threads", &options->study.threads, "Threads; 0 for as many as the machine has")
+      .shows_default()
+      .shapes_no_result();
+  louchet1995.add_flag("--quick", options->study.quick,
+                       "Coarse grids and short searches: to see what the report looks like");
   louchet1995
-      ->add_option("--journal", options->journal,
-                   "File that keeps finished pieces, and stays (default: beside the results, gone "
-                   "with success)")
-      ->type_name("FILE");
-  louchet1995->add_flag("--resume", options->resume, "Go on where the journal ends");
-  add_out_option(*louchet1995, options->out, kDefaultFolder);
-  louchet1995->footer(
+      .add_option("--journal", &options->journal,
+                  "File that keeps finished pieces, and stays (default: beside the results, gone "
+                  "with success)")
+      .shapes_no_result()
+      .type_name("FILE");
+  louchet1995.add_flag("--resume", options->resume, "Go on where the journal ends")
+      .shapes_no_result();
+  add_out_option(louchet1995, options->out, kDefaultFolder);
+  louchet1995.footer(
       "Examples:\n"
       "  clothfit experiment louchet1995\n"
       "  clothfit experiment louchet1995 --quick --seeds 2 --out look");
-  louchet1995->callback(
-      [options, &action] { action = [options] { return run_louchet1995(*options); }; });
+  louchet1995.runs([options, louchet1995] {
+    options->command = louchet1995.command_text();
+    return run_louchet1995(*options);
+  });
 }
 
 }  // namespace clothfit

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 
 #include "apps/study/louchet1995.h"
 
@@ -11,6 +12,7 @@ struct ExperimentVerbOptions {
   std::filesystem::path out;      ///< empty: louchet1995.experiment
   std::filesystem::path journal;  ///< empty: beside the output folder, gone with success
   bool resume = false;
+  std::string command;  ///< verb and options as the report keeps them
 };
 
 /// Runs the founding paper's experiment, writes the result folder, prints the targets. Returns an

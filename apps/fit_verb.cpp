@@ -85,40 +85,6 @@ std::string how_to_go_on(const FitOptions& options) {
                      options.checkpoint.string(), options.resume ? "" : " with --resume");
 }
 
-/// What fit.json keeps of the command line: the options that shape the result, in fixed order.
-std::string command_text(const FitVerbOptions& options, const FitFlags& flags) {
-  const FitOptions defaults;
-  std::string text = "clothfit fit " + options.recording.string();
-  for (const std::string& effect : options.fit.effects) text += " --effect " + effect;
-  for (const std::string& prior : flags.priors) text += " --prior " + prior;
-  if (flags.observations != "automatic") text += " --observations " + flags.observations;
-  if (!flags.mesh.empty()) text += " --mesh " + flags.mesh;
-  if (!flags.forecast.empty()) text += " --forecast " + flags.forecast.string();
-  if (!flags.start.empty()) text += " --start " + flags.start.string();
-  if (!flags.springs.empty()) text += " --springs " + flags.springs;
-  if (flags.cost != "trajectory") text += " --cost " + flags.cost;
-  if (flags.search != "paper") text += " --search " + flags.search;
-  if (flags.loss != "huber") text += " --loss " + flags.loss;
-  const auto add = [&](const char* flag, const auto& value, const auto& default_value) {
-    if (value != default_value) text += fmt::format(" {} {}", flag, value);
-  };
-  add("--seed", options.fit.seed, defaults.seed);
-  add("--population", options.fit.population, defaults.population);
-  add("--generations", options.fit.generations, defaults.generations);
-  add("--refine-best", options.fit.refine_best, defaults.refine_best);
-  if (options.fit.stop_cost) text += fmt::format(" --stop-cost {}", *options.fit.stop_cost);
-  add("--search-share", options.fit.search_share, defaults.search_share);
-  add("--marker-offsets", options.fit.marker_offset_sigma_m, defaults.marker_offset_sigma_m);
-  add("--drive-knots", options.fit.drive_knots, defaults.drive_knots);
-  add("--start-nodes", options.fit.start_nodes, defaults.start_nodes);
-  add("--work", options.fit.work, defaults.work);
-  add("--substep-scale", options.fit.substep_scale, defaults.substep_scale);
-  add("--bootstrap", options.fit.bootstrap, defaults.bootstrap);
-  if (options.fit.profile) text += " --profile";
-  if (options.fit.two_meshes) text += " --two-meshes";
-  return text;
-}
-
 void write_results(const FitReport& report, const Recording& recording, const fs::path& folder) {
   write_fit_result(report.result, folder / "fit.json");
   write_model(report.model, folder);
@@ -179,131 +145,132 @@ int run_fit(const FitVerbOptions& options) {
   return kExitGood;
 }
 
-void add_fit_verb(CLI::App& program, VerbAction& action) {
+void add_fit_verb(Verb program) {
   const auto options = std::make_shared<FitVerbOptions>();
   const auto flags = std::make_shared<FitFlags>();
-  CLI::App* verb = program.add_subcommand(
+  Verb verb = program.add_verb(
       "fit", "Identify the cloth's parameters, with their uncertainty and the held-out error");
-  verb->add_option("recording", options->recording, "Folder of the recording")
-      ->required()
-      ->type_name("RECORDING");
-  verb->add_option("--effect", options->fit.effects,
-                   "Effect to fit beside those the recording declares, of motion or of the "
-                   "measurement; may be repeated")
-      ->type_name("NAME");
-  add_prior_option(*verb, flags->priors);
-  verb->add_option("--observations", flags->observations,
-                   "What to fit to: 3D tracks where there are any, unless told otherwise")
-      ->check(CLI::IsMember({"automatic", "tracks3d", "tracks2d"}))
-      ->capture_default_str();
-  verb->add_option("--mesh", flags->mesh, "Columns and rows of the mesh (default: the recording's)")
-      ->type_name("CxR")
-      ->check(check_mesh);
-  verb->add_option("--seed", options->fit.seed,
-                   "Seed of the search; the same one gives the same result")
-      ->check(check_seed)
-      ->capture_default_str();
-  verb->add_option("--forecast", flags->forecast,
-                   "Take the parameters of this fit.json, fit nothing, forecast the recording from "
-                   "its own first frame")
-      ->type_name("FIT.json");
-  verb->add_option("--start", flags->start,
-                   "Begin with the parameters of this fit.json; search only if they lead nowhere")
-      ->type_name("FIT.json")
-      ->excludes("--forecast");
-  verb->add_option("--springs", flags->springs,
-                   "Parameter set of the springs: fabric (default), or the founding paper's 5 or "
-                   "18 numbers with its strain limit")
-      ->check(CLI::IsMember({"fabric", "louchet5", "louchet18"}));
-  verb->add_option("--start-nodes", options->fit.start_nodes,
-                   "Nodes per side of the corrections of a start in motion (start: unknown)")
-      ->capture_default_str();
-  verb->add_option("--loss", flags->loss,
-                   "What large residuals weigh: less than others, or as much")
-      ->check(CLI::IsMember({"huber", "squared"}))
-      ->capture_default_str();
-  verb->add_option("--marker-offsets", options->fit.marker_offset_sigma_m,
-                   "Let every marker be seen beside its place by a constant, with this standard "
-                   "deviation: 0.01 or 10mm; 0 for none")
-      ->transform(length_in_metres());
-  verb->add_option("--drive-knots", options->fit.drive_knots,
-                   "Fit what the measured motion of tracked held points is off by, at so many "
-                   "knots over the fitted frames; 0 takes the smoothed tracks as exact")
-      ->type_name("N")
-      ->capture_default_str();
-  verb->add_option(
-          "--cost", flags->cost,
+  verb.add_option("recording", &options->recording, "Folder of the recording")
+      .required()
+      .type_name("RECORDING");
+  verb.add_option("--effect", &options->fit.effects,
+                  "Effect to fit beside those the recording declares, of motion or of the "
+                  "measurement; may be repeated")
+      .type_name("NAME");
+  add_prior_option(verb, flags->priors);
+  verb.add_option("--observations", &flags->observations,
+                  "What to fit to: 3D tracks where there are any, unless told otherwise")
+      .one_of({"automatic", "tracks3d", "tracks2d"})
+      .shows_default();
+  verb.add_option("--mesh", &flags->mesh, "Columns and rows of the mesh (default: the recording's)")
+      .type_name("CxR")
+      .check(check_mesh);
+  verb.add_option("--seed", &options->fit.seed,
+                  "Seed of the search; the same one gives the same result")
+      .check(check_seed)
+      .shows_default();
+  verb.add_option("--forecast", &flags->forecast,
+                  "Take the parameters of this fit.json, fit nothing, forecast the recording from "
+                  "its own first frame")
+      .type_name("FIT.json");
+  verb.add_option("--start", &flags->start,
+                  "Begin with the parameters of this fit.json; search only if they lead nowhere")
+      .type_name("FIT.json")
+      .excludes(verb.option("--forecast"));
+  verb.add_option("--springs", &flags->springs,
+                  "Parameter set of the springs: fabric (default), or the founding paper's 5 or "
+                  "18 numbers with its strain limit")
+      .one_of({"fabric", "louchet5", "louchet18"});
+  verb.add_option("--start-nodes", &options->fit.start_nodes,
+                  "Nodes per side of the corrections of a start in motion (start: unknown)")
+      .shows_default();
+  verb.add_option("--loss", &flags->loss,
+                  "What large residuals weigh: less than others, or as much")
+      .one_of({"huber", "squared"})
+      .shows_default();
+  verb.add_option("--marker-offsets", &options->fit.marker_offset_sigma_m,
+                  "Let every marker be seen beside its place by a constant, with this standard "
+                  "deviation: 0.01 or 10mm; 0 for none")
+      .is_length();
+  verb.add_option("--drive-knots", &options->fit.drive_knots,
+                  "Fit what the measured motion of tracked held points is off by, at so many "
+                  "knots over the fitted frames; 0 takes the smoothed tracks as exact")
+      .type_name("N")
+      .shows_default();
+  verb.add_option(
+          "--cost", &flags->cost,
           "What leads to where the trajectory's cost takes over: the trajectory's own after "
           "a search, shooting, or the founding paper's over states from 3D tracks")
-      ->check(CLI::IsMember({"trajectory", "shooting", "full", "small"}))
-      ->capture_default_str();
-  verb->add_option("--search", flags->search,
-                   "The founding paper's evolutionary strategy, or CMA-ES with restarts and as "
-                   "many simulations")
-      ->check(CLI::IsMember({"paper", "cma"}))
-      ->capture_default_str();
-  verb->add_option("--population", options->fit.population, "Individuals of the search")
-      ->capture_default_str();
-  verb->add_option("--generations", options->fit.generations, "Generations of the search, at most")
-      ->capture_default_str();
-  verb->add_option("--search-share", options->fit.search_share,
-                   "Share of the fitted frames that the search looks at")
-      ->capture_default_str();
-  verb->add_option("--refine-best", options->fit.refine_best, "Individuals that go to refinement")
-      ->capture_default_str();
-  verb->add_option("--stop-cost", options->fit.stop_cost,
-                   "End the search once the mean error over its window is this low, in sigmas");
-  CLI::Option* checkpoint = verb->add_option("--checkpoint", options->fit.checkpoint,
-                                             "Save the search here after each generation")
-                                ->type_name("FILE");
-  verb->add_flag("--resume", options->fit.resume, "Go on from the checkpoint, to the same result")
-      ->needs(checkpoint);
-  verb->add_option("--work", options->fit.work,
-                   "Times as much work as refinement is allowed before it ends unconverged")
-      ->capture_default_str();
-  verb->add_option("--substep-scale", options->fit.substep_scale,
-                   "Above 1: smaller time steps than stability asks for")
-      ->capture_default_str();
-  verb->add_flag("--profile", options->fit.profile,
-                 "Intervals from the profiled cost where it is no parabola");
-  verb->add_option("--bootstrap", options->fit.bootstrap,
-                   "Intervals from so many replicates of a bootstrap over blocks of the cloth, "
-                   "beside the others")
-      ->type_name("N");
-  verb->add_flag("--two-meshes", options->fit.two_meshes,
-                 "Fit again on a mesh of other resolution, and show the difference");
-  verb->add_option("--threads", options->fit.threads, "Threads; 0 for as many as the machine has")
-      ->capture_default_str();
-  add_out_option(*verb, options->out, "NAME.fit");
-  verb->footer(
+      .one_of({"trajectory", "shooting", "full", "small"})
+      .shows_default();
+  verb.add_option("--search", &flags->search,
+                  "The founding paper's evolutionary strategy, or CMA-ES with restarts and as "
+                  "many simulations")
+      .one_of({"paper", "cma"})
+      .shows_default();
+  verb.add_option("--population", &options->fit.population, "Individuals of the search")
+      .shows_default();
+  verb.add_option("--generations", &options->fit.generations, "Generations of the search, at most")
+      .shows_default();
+  verb.add_option("--search-share", &options->fit.search_share,
+                  "Share of the fitted frames that the search looks at")
+      .shows_default();
+  verb.add_option("--refine-best", &options->fit.refine_best, "Individuals that go to refinement")
+      .shows_default();
+  verb.add_option("--stop-cost", &options->fit.stop_cost,
+                  "End the search once the mean error over its window is this low, in sigmas");
+  const Option checkpoint = verb.add_option("--checkpoint", &options->fit.checkpoint,
+                                            "Save the search here after each generation")
+                                .shapes_no_result()
+                                .type_name("FILE");
+  verb.add_flag("--resume", options->fit.resume, "Go on from the checkpoint, to the same result")
+      .shapes_no_result()
+      .needs(checkpoint);
+  verb.add_option("--work", &options->fit.work,
+                  "Times as much work as refinement is allowed before it ends unconverged")
+      .shows_default();
+  verb.add_option("--substep-scale", &options->fit.substep_scale,
+                  "Above 1: smaller time steps than stability asks for")
+      .shows_default();
+  verb.add_flag("--profile", options->fit.profile,
+                "Intervals from the profiled cost where it is no parabola");
+  verb.add_option("--bootstrap", &options->fit.bootstrap,
+                  "Intervals from so many replicates of a bootstrap over blocks of the cloth, "
+                  "beside the others")
+      .type_name("N");
+  verb.add_flag("--two-meshes", options->fit.two_meshes,
+                "Fit again on a mesh of other resolution, and show the difference");
+  verb.add_option("--threads", &options->fit.threads, "Threads; 0 for as many as the machine has")
+      .shows_default()
+      .shapes_no_result();
+  add_out_option(verb, options->out, "NAME.fit");
+  verb.footer(
       "Examples:\n"
       "  clothfit fit data/recordings/tags_onecam\n"
       "  clothfit fit data/recordings/swing_breeze --effect wind --seed 7\n"
       "  clothfit fit data/recordings/swing_plain --search cma --checkpoint search.txt\n"
       "  clothfit fit OTHER_RECORDING --forecast swing_plain.fit/fit.json");
-  verb->callback([options, flags, &action] {
-    action = [options, flags] {
-      options->fit.observations = parse_observations(flags->observations);
-      if (const auto mesh = parse_mesh(flags->mesh)) {
-        options->fit.mesh_columns = mesh->columns;
-        options->fit.mesh_rows = mesh->rows;
-      }
-      const bool starts = !flags->start.empty();
-      const fs::path& file = starts ? flags->start : flags->forecast;
-      std::optional<FitResult> earlier;
-      if (!file.empty()) earlier = read_fit_result(file);
-      options->fit.spring_set = chosen_springs(flags->springs, starts ? "--start" : "--forecast",
-                                               earlier ? &*earlier : nullptr);
-      if (starts) options->fit.start = known_values(*earlier);
-      if (!starts) options->fit.forecast = std::move(earlier);
-      for (const std::string& prior : flags->priors)
-        options->fit.priors.push_back(parse_prior(prior));
-      options->fit.cost = *leading_cost_named(flags->cost);
-      options->fit.search = flags->search == "cma" ? SearchMethod::cma : SearchMethod::paper;
-      options->fit.loss = flags->loss == "squared" ? Loss::squared : Loss::huber;
-      options->command = command_text(*options, *flags);
-      return run_fit(*options);
-    };
+  verb.runs([options, flags, verb] {
+    options->fit.observations = parse_observations(flags->observations);
+    if (const auto mesh = parse_mesh(flags->mesh)) {
+      options->fit.mesh_columns = mesh->columns;
+      options->fit.mesh_rows = mesh->rows;
+    }
+    const bool starts = !flags->start.empty();
+    const fs::path& file = starts ? flags->start : flags->forecast;
+    std::optional<FitResult> earlier;
+    if (!file.empty()) earlier = read_fit_result(file);
+    options->fit.spring_set = chosen_springs(flags->springs, starts ? "--start" : "--forecast",
+                                             earlier ? &*earlier : nullptr);
+    if (starts) options->fit.start = known_values(*earlier);
+    if (!starts) options->fit.forecast = std::move(earlier);
+    for (const std::string& prior : flags->priors)
+      options->fit.priors.push_back(parse_prior(prior));
+    options->fit.cost = *leading_cost_named(flags->cost);
+    options->fit.search = flags->search == "cma" ? SearchMethod::cma : SearchMethod::paper;
+    options->fit.loss = flags->loss == "squared" ? Loss::squared : Loss::huber;
+    options->command = verb.command_text();
+    return run_fit(*options);
   });
 }
 

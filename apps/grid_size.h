@@ -18,7 +18,7 @@ std::optional<GridSize> parse_grid_size(std::string_view text);
 /// The mesh that --mesh names. Nothing where the text is not one that a fit takes.
 std::optional<GridSize> parse_mesh(std::string_view text);
 
-/// For CLI11: empty, or what is wrong with the text of --mesh.
+/// Empty, or what is wrong with the text of --mesh.
 std::string check_mesh(const std::string& text);
 
 }  // namespace clothfit

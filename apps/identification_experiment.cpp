@@ -124,35 +124,35 @@ int run_identification(const IdentificationOptions& options) {
   return kExitGood;
 }
 
-void add_identification_experiment(CLI::App& experiment, VerbAction& action) {
+void add_identification_experiment(Verb experiment) {
   const auto options = std::make_shared<IdentificationOptions>();
-  CLI::App* verb = experiment.add_subcommand(
-      "identification", "What identification is meant to reach: every target, measured");
-  verb->add_option("--share", options->targets.share,
-                   "Share of the trials that the targets ask for (all take hours)")
-      ->capture_default_str();
-  verb->add_option(
-          "--only", options->targets.only,
+  Verb verb = experiment.add_verb("identification",
+                                  "What identification is meant to reach: every target, measured");
+  verb.add_option("--share", &options->targets.share,
+                  "Share of the trials that the targets ask for (all take hours)")
+      .shows_default();
+  verb.add_option(
+          "--only", &options->targets.only,
           "Studies to do: tracks3d, one_camera, spoiled, clean, drag (or drag_1, drag_5, drag_20), "
           "drag_fitted, seconds")
-      ->type_name("NAME");
-  verb->add_option("--seed", options->targets.seed, "Seed of all studies")->capture_default_str();
-  verb->add_option("--threads", options->targets.threads,
-                   "Threads; 0 for as many as the machine has")
-      ->capture_default_str();
-  verb->add_option(
-          "--journals", options->journals,
-          "Folder that keeps finished trials, and stays (default: beside the results, gone "
-          "with success)")
-      ->type_name("FOLDER");
-  verb->add_flag("--resume", options->resume, "Go on where the journals end");
-  add_out_option(*verb, options->out, kDefaultFolder);
-  verb->footer(
+      .type_name("NAME");
+  verb.add_option("--seed", &options->targets.seed, "Seed of all studies").shows_default();
+  verb.add_option("--threads", &options->targets.threads,
+                  "Threads; 0 for as many as the machine has")
+      .shows_default()
+      .shapes_no_result();
+  verb.add_option("--journals", &options->journals,
+                  "Folder that keeps finished trials, and stays (default: beside the results, gone "
+                  "with success)")
+      .shapes_no_result()
+      .type_name("FOLDER");
+  verb.add_flag("--resume", options->resume, "Go on where the journals end").shapes_no_result();
+  add_out_option(verb, options->out, kDefaultFolder);
+  verb.footer(
       "Examples:\n"
       "  clothfit experiment identification\n"
       "  clothfit experiment identification --share 0.05 --only tracks3d seconds");
-  verb->callback(
-      [options, &action] { action = [options] { return run_identification(*options); }; });
+  verb.runs([options] { return run_identification(*options); });
 }
 
 }  // namespace clothfit

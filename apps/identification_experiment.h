@@ -19,6 +19,6 @@ struct IdentificationOptions {
 int run_identification(const IdentificationOptions& options);
 
 /// `clothfit experiment identification`.
-void add_identification_experiment(CLI::App& experiment, VerbAction& action);
+void add_identification_experiment(Verb experiment);
 
 }  // namespace clothfit

@@ -1,56 +1,41 @@
-#include <fmt/format.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
-#include <CLI/CLI.hpp>
-#include <algorithm>
 #include <exception>
 #include <string>
-#include <vector>
 
 #include "apps/exit_code.h"
 #include "apps/interrupt.h"
+#include "apps/terminal/command_line.h"
 #include "apps/verb.h"
 #include "apps/version.h"
 #include "data/input_error.h"
-#include "data/nearest_name.h"
 
 namespace {
 
 /// Parses the command line, runs the verb, turns what it throws into messages and exit codes.
 int run(int argc, char** argv) {
-  CLI::App program{"Measures a moving cloth and identifies the simulator that moves the same way.",
-                   "clothfit"};
-  program.set_version_flag("--version", std::string("clothfit ") + clothfit::program_version());
-  program.require_subcommand(1);
+  clothfit::CommandLine line(
+      "Measures a moving cloth and identifies the simulator that moves the same way.", "clothfit",
+      std::string("clothfit ") + clothfit::program_version());
+  clothfit::Verb program = line.program();
+  program.requires_verb();
   program.footer("Each verb explains itself: clothfit fit --help");
-
-  clothfit::VerbAction action;
-  clothfit::add_demo_verb(program, action);
-  clothfit::add_calibrate_verb(program, action);
-  clothfit::add_track_verb(program, action);
-  clothfit::add_fit_verb(program, action);
-  clothfit::add_diagnose_verb(program, action);
-  clothfit::add_simulate_verb(program, action);
-  clothfit::add_recover_verb(program, action);
-  clothfit::add_experiment_verb(program, action);
-  clothfit::add_study_verb(program, action);
-  std::vector<std::string> verbs;
-  for (const CLI::App* verb : program.get_subcommands({})) verbs.push_back(verb->get_name());
-  const std::string first = argc > 1 ? argv[1] : "-";
-  if (!first.starts_with('-') && std::find(verbs.begin(), verbs.end(), first) == verbs.end()) {
-    fmt::print(stderr, "There is no verb `{}`; {}\n", first, clothfit::known_names(first, verbs));
-    return clothfit::kExitWrongUsage;
-  }
-  try {
-    program.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return program.exit(error) == 0 ? clothfit::kExitGood : clothfit::kExitWrongUsage;
-  }
+  clothfit::add_demo_verb(program);
+  clothfit::add_calibrate_verb(program);
+  clothfit::add_track_verb(program);
+  clothfit::add_fit_verb(program);
+  clothfit::add_diagnose_verb(program);
+  clothfit::add_simulate_verb(program);
+  clothfit::add_recover_verb(program);
+  clothfit::add_experiment_verb(program);
+  clothfit::add_study_verb(program);
+  const clothfit::CommandLine::Parsed parsed = line.parse(argc, argv);
+  if (parsed.exit_code) return *parsed.exit_code;
 
   try {
     clothfit::catch_interrupts();
-    return action();
+    return parsed.action();
   } catch (const clothfit::InputError& error) {
     spdlog::error("{}", error.what());
     return clothfit::kExitBadInput;

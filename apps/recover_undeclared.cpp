@@ -75,34 +75,34 @@ UndeclaredOptions options_of(const UndeclaredFlags& flags, const UndeclaredRun& 
 
 }  // namespace
 
-void add_undeclared_options(CLI::App& verb, UndeclaredFlags& flags) {
-  CLI::Option* undeclared = verb.add_flag("--undeclared", flags.undeclared,
+void add_undeclared_options(Verb verb, UndeclaredFlags& flags) {
+  const Option undeclared = verb.add_flag("--undeclared", flags.undeclared,
                                           "Hide effects that the recordings do not declare, and "
                                           "diagnose them; --trials is of each law");
   const auto add_flag = [&](const char* name, bool& value, const char* what) {
-    return verb.add_flag(name, value, what)->needs(undeclared);
+    return verb.add_flag(name, value, what).needs(undeclared);
   };
   const auto add = [&](const char* name, auto& value, const char* what) {
-    return verb.add_option(name, value, what)->needs(undeclared)->capture_default_str();
+    return verb.add_option(name, &value, what).needs(undeclared).shows_default();
   };
-  CLI::Option* hidden =
-      verb.add_option("--hidden", flags.hidden,
+  const Option hidden =
+      verb.add_option("--hidden", &flags.hidden,
                       "Effect to hide, or one of its laws as EFFECT:LAW (default: the library)")
-          ->needs(undeclared)
-          ->type_name("EFFECT");
-  CLI::Option* clean = add_flag("--clean", flags.clean, "Hide nothing: count false alarms");
-  CLI::Option* pairs = add_flag("--pairs", flags.pairs, "Hide two effects at once");
-  CLI::Option* withhold = add_flag("--withhold", flags.withhold,
+          .needs(undeclared)
+          .type_name("EFFECT");
+  const Option clean = add_flag("--clean", flags.clean, "Hide nothing: count false alarms");
+  const Option pairs = add_flag("--pairs", flags.pairs, "Hide two effects at once");
+  const Option withhold = add_flag("--withhold", flags.withhold,
                                    "Leave the hidden effect out of what the diagnosis knows");
   add("--mimicked", flags.most_mimicked,
       "Squared multiple correlation with all other effects, below which one is withheld");
-  clean->excludes(hidden)->excludes(pairs)->excludes(withhold);
-  pairs->excludes(withhold);
-  CLI::Option* same =
+  clean.excludes(hidden).excludes(pairs).excludes(withhold);
+  pairs.excludes(withhold);
+  const Option same =
       add_flag("--same-model", flags.same_model, "A truth of the fit's own mesh and integrator");
   add("--integrator", flags.integrator, "How the truth is simulated")
-      ->check(CLI::IsMember({"euler", "runge-kutta"}))
-      ->excludes(same);
+      .one_of({"euler", "runge-kutta"})
+      .excludes(same);
   add("--fitted", flags.fitted, "Frames that are fitted; 0 for three quarters");
   add("--least-sigmas", flags.least_sigmas, "Smallest amplitude, in its standard deviations");
   add("--most-sigmas", flags.most_sigmas, "Largest amplitude");

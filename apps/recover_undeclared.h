@@ -1,12 +1,12 @@
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "apps/study/undeclared.h"
+#include "apps/terminal/command_line.h"
 
 namespace clothfit {
 
@@ -22,7 +22,7 @@ struct UndeclaredFlags {
   int lines = DiagnoseOptions{}.lines, refits = DiagnoseOptions{}.refits;
 };
 
-void add_undeclared_options(CLI::App& verb, UndeclaredFlags& flags);
+void add_undeclared_options(Verb verb, UndeclaredFlags& flags);
 
 /// What recover's own flags say already, and where to leave the results.
 struct UndeclaredRun {

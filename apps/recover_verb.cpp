@@ -43,21 +43,6 @@ std::string check_picture_size(const std::string& text) {
   return fmt::format("'{}' is no size of pictures, such as 1280x960", text);
 }
 
-/// The options given that shape the result.
-std::string command_text(const CLI::App& verb) {
-  std::string text = "clothfit recover";
-  for (const CLI::Option* option : verb.get_options()) {
-    const std::string name = option->get_name();
-    if (option->count() == 0 || name == "--out" || name == "--journal" || name == "--resume" ||
-        name == "--threads")
-      continue;
-    text += " " + name;
-    if (option->get_items_expected_max() > 0)
-      for (const std::string& value : option->results()) text += " " + value;
-  }
-  return text;
-}
-
 RecoverOptions options_of(const RecoverFlags& flags) {
   RecoverOptions options = flags.study;
   options.scene.frames =
@@ -79,8 +64,8 @@ RecoverOptions options_of(const RecoverFlags& flags) {
 }
 
 /// Undeclared effects ask for cloths of their own size, unless they are told another one.
-UndeclaredRun undeclared_run(RecoverFlags flags, const CLI::App& verb, const std::string& command) {
-  const auto is_given = [&](const char* option) { return verb.count(option) > 0; };
+UndeclaredRun undeclared_run(RecoverFlags flags, const Verb& verb, const std::string& command) {
+  const auto is_given = [&](const char* option) { return verb.is_given(option); };
   if (!is_given("--mesh")) flags.mesh = 9;
   if (!is_given("--markers")) flags.study.scene.markers = 9;
   if (!is_given("--noise-mm")) flags.noise_mm = 0.5;
@@ -148,38 +133,38 @@ int run_recover(const RecoverFlags& flags, const std::string& command) {
 
 }  // namespace
 
-void add_recover_verb(CLI::App& program, VerbAction& action) {
+void add_recover_verb(Verb program) {
   const auto flags = std::make_shared<RecoverFlags>();
-  CLI::App* verb = program.add_subcommand(
+  Verb verb = program.add_verb(
       "recover", "Simulate cloth whose numbers are known, fit it, hold the fits against the truth");
   SyntheticScene& scene = flags->study.scene;
   const auto add = [&](const char* name, auto& value, const char* what) {
-    return verb->add_option(name, value, what)->capture_default_str();
+    return verb.add_option(name, &value, what).shows_default();
   };
   add("--trials", flags->study.trials, "Recordings, each released another way");
-  verb->add_option("--observations", flags->observations,
-                   "What to fit to (default: tracks3d; tracks2d with --render)")
-      ->check(CLI::IsMember({"tracks3d", "tracks2d"}));
-  CLI::Option* render = verb->add_flag("--render", flags->render,
-                                       "Find the markers in rendered pictures of a printed cloth");
-  CLI::Option* noise_mm =
+  verb.add_option("--observations", &flags->observations,
+                  "What to fit to (default: tracks3d; tracks2d with --render)")
+      .one_of({"tracks3d", "tracks2d"});
+  const Option render = verb.add_flag("--render", flags->render,
+                                      "Find the markers in rendered pictures of a printed cloth");
+  const Option noise_mm =
       add("--noise-mm", flags->noise_mm, "Noise of 3D tracks, standard deviation per coordinate");
-  CLI::Option* noise_px = add("--noise-px", scene.noise_px, "Noise of pixels");
+  const Option noise_px = add("--noise-px", scene.noise_px, "Noise of pixels");
   add("--cameras", scene.cameras, "Cameras, 1 to 4");
   add("--rate", scene.frame_rate_hz, "Frames per second");
   add("--seconds", flags->seconds, "Length of a recording");
   add("--before", scene.before_s,
       "Seconds that the cloth has been swinging when the recording begins: its start is then "
       "unknown to the fit");
-  CLI::Option* markers = add("--markers", scene.markers, "Markers a side");
-  for (CLI::Option* option : {noise_mm, noise_px, markers}) option->excludes(render);
+  const Option markers = add("--markers", scene.markers, "Markers a side");
+  for (Option option : {noise_mm, noise_px, markers}) option.excludes(render);
   const auto add_of_pictures = [&](const char* name, auto& value, const char* what) {
-    return add(name, value, what)->needs(render);
+    return add(name, value, what).needs(render);
   };
   add_of_pictures("--tags", flags->pictures.tags, "Tags a side");
   add_of_pictures("--picture", flags->picture_size, "Size of pictures")
-      ->type_name("WIDTHxHEIGHT")
-      ->check(check_picture_size);
+      .type_name("WIDTHxHEIGHT")
+      .check(check_picture_size);
   add_of_pictures("--exposure-ms", flags->exposure_ms, "Exposure, milliseconds");
   add_of_pictures("--instants", flags->pictures.instants,
                   "Instants that an exposure is averaged over, odd");
@@ -195,28 +180,30 @@ void add_recover_verb(CLI::App& program, VerbAction& action) {
   add("--drag", scene.drag_per_s,
       "Viscous damping of the truth that the recordings do not declare");
   add("--missing", scene.missing, "Share of the observations that are lost");
-  verb->add_flag("--hand", scene.hand,
-                 "A hand hides a quarter of the cloth for a third of the time");
+  verb.add_flag("--hand", scene.hand,
+                "A hand hides a quarter of the cloth for a third of the time");
   add("--outliers", scene.outliers, "Share of the observations that are far off");
   add("--start-factor", flags->study.start_factor,
       "Fits begin off by this factor, without a search; 0: from scratch");
-  add("--loss", flags->loss, "What large residuals weigh")
-      ->check(CLI::IsMember({"squared", "huber"}));
-  verb->add_option("--effect", flags->study.fit.effects, "Effect to fit; may be repeated")
-      ->type_name("NAME");
+  add("--loss", flags->loss, "What large residuals weigh").one_of({"squared", "huber"});
+  verb.add_option("--effect", &flags->study.fit.effects, "Effect to fit; may be repeated")
+      .type_name("NAME");
   add("--start-nodes", flags->study.fit.start_nodes,
       "Nodes a side of the corrections of a start that is unknown");
   add("--seed", flags->study.seed, "Seed of releases, noise and searches");
-  add("--threads", flags->study.threads, "Threads; 0 for as many as the machine has");
-  verb->add_option("--journal", flags->journal,
-                   "Where finished trials are kept (default: OUT.journal)")
-      ->type_name("FILE");
-  verb->add_flag("--resume", flags->resume, "Go on from the journal of an interrupted run");
-  add_undeclared_options(*verb, flags->undeclared);
+  add("--threads", flags->study.threads, "Threads; 0 for as many as the machine has")
+      .shapes_no_result();
+  verb.add_option("--journal", &flags->journal,
+                  "Where finished trials are kept (default: OUT.journal)")
+      .shapes_no_result()
+      .type_name("FILE");
+  verb.add_flag("--resume", flags->resume, "Go on from the journal of an interrupted run")
+      .shapes_no_result();
+  add_undeclared_options(verb, flags->undeclared);
   for (const char* other : {"--render", "--start-factor", "--effect"})
-    verb->get_option("--undeclared")->excludes(verb->get_option(other));
-  add_out_option(*verb, flags->out, "recover");
-  verb->footer(
+    verb.option("--undeclared").excludes(verb.option(other));
+  add_out_option(verb, flags->out, "recover");
+  verb.footer(
       "Examples:\n"
       "  clothfit recover --trials 100 --start-factor 5\n"
       "  clothfit recover --observations tracks2d --before 0.25 --trials 20\n"
@@ -224,14 +211,11 @@ void add_recover_verb(CLI::App& program, VerbAction& action) {
       "  clothfit recover --render --rate 30 --trials 4\n"
       "  clothfit recover --undeclared --trials 20\n"
       "  clothfit recover --undeclared --clean --observations tracks2d --trials 100");
-  verb->callback([flags, verb, &action] {
-    const std::string command = command_text(*verb);
+  verb.runs([flags, verb] {
+    const std::string command = verb.command_text();
     if (flags->undeclared.undeclared)
-      action = [flags, run = undeclared_run(*flags, *verb, command)] {
-        return run_undeclared(flags->undeclared, run);
-      };
-    else
-      action = [flags, command] { return run_recover(*flags, command); };
+      return run_undeclared(flags->undeclared, undeclared_run(*flags, verb, command));
+    return run_recover(*flags, command);
   });
 }
 

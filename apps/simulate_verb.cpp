@@ -384,60 +384,58 @@ std::string check_assignment(const std::string& text) {
 
 }  // namespace
 
-void add_simulate_verb(CLI::App& program, VerbAction& action) {
+void add_simulate_verb(Verb program) {
   struct Flags {
     std::string mesh;
     std::string formats = "csv,obj";
   };
   const auto options = std::make_shared<SimulateVerbOptions>();
   const auto flags = std::make_shared<Flags>();
-  CLI::App* verb = program.add_subcommand(
+  Verb verb = program.add_verb(
       "simulate", "Simulate a fitted or described cloth: positions as CSV, OBJ, PC2 or glTF");
   ModelRequest& request = options->request;
-  verb->add_option("model", request.input,
-                   "Model file, a folder that holds model.yaml, or a recording")
-      ->type_name("MODEL.yaml|RECORDING");
-  verb->add_option("--fit", request.fit,
-                   "Result folder of a fit, or its fit.json: the model that it found; beside a "
-                   "recording, its parameters only")
-      ->type_name("FIT");
-  verb->add_option("--model", request.model, "Model file whose fabric and effects are taken")
-      ->type_name("MODEL.yaml");
-  verb->add_option("--set", request.set,
-                   "A parameter's value, such as shear=20 or wind.q_y=0.25; may be repeated")
-      ->type_name("NAME=NUMBER")
-      ->allow_extra_args(false)
-      ->check(check_assignment);
-  verb->add_option("--mesh", flags->mesh, "Columns and rows of the mesh (default: the model's)")
-      ->type_name("CxR")
-      ->check(check_mesh);
-  verb->add_option("--duration", request.duration_s, "Seconds (default: the model's)")
-      ->check(check_positive);
-  verb->add_option("--frame-rate", request.frame_rate_hz, "Frames per second that are written")
-      ->check(check_positive);
-  verb->add_option("--time-step", options->time_step_s,
-                   "Largest time step in seconds (default: the model's, or two thirds of the "
-                   "largest stable one)")
-      ->check(check_positive);
-  verb->add_flag("--allow-unstable", options->allow_unstable,
-                 "Run a time step that is not stable all the same");
-  verb->add_option("--format", flags->formats, "What to write: csv, obj, pc2, gltf")
-      ->type_name("LIST")
-      ->check(check_formats)
-      ->capture_default_str();
-  add_out_option(*verb, options->out, "NAME.simulation");
-  verb->footer(
+  verb.add_option("model", &request.input,
+                  "Model file, a folder that holds model.yaml, or a recording")
+      .type_name("MODEL.yaml|RECORDING");
+  verb.add_option("--fit", &request.fit,
+                  "Result folder of a fit, or its fit.json: the model that it found; beside a "
+                  "recording, its parameters only")
+      .type_name("FIT");
+  verb.add_option("--model", &request.model, "Model file whose fabric and effects are taken")
+      .type_name("MODEL.yaml");
+  verb.add_option("--set", &request.set,
+                  "A parameter's value, such as shear=20 or wind.q_y=0.25; may be repeated")
+      .type_name("NAME=NUMBER")
+      .one_at_a_time()
+      .check(check_assignment);
+  verb.add_option("--mesh", &flags->mesh, "Columns and rows of the mesh (default: the model's)")
+      .type_name("CxR")
+      .check(check_mesh);
+  verb.add_option("--duration", &request.duration_s, "Seconds (default: the model's)")
+      .check(check_positive);
+  verb.add_option("--frame-rate", &request.frame_rate_hz, "Frames per second that are written")
+      .check(check_positive);
+  verb.add_option("--time-step", &options->time_step_s,
+                  "Largest time step in seconds (default: the model's, or two thirds of the "
+                  "largest stable one)")
+      .check(check_positive);
+  verb.add_flag("--allow-unstable", options->allow_unstable,
+                "Run a time step that is not stable all the same");
+  verb.add_option("--format", &flags->formats, "What to write: csv, obj, pc2, gltf")
+      .type_name("LIST")
+      .check(check_formats)
+      .shows_default();
+  add_out_option(verb, options->out, "NAME.simulation");
+  verb.footer(
       "Examples:\n"
       "  clothfit simulate --fit swing_plain.fit\n"
       "  clothfit simulate --fit swing_plain.fit --set shear=40 --duration 3 --format gltf\n"
       "  clothfit simulate curtain.yaml --format csv,pc2\n"
       "  clothfit simulate OTHER_RECORDING --fit swing_plain.fit");
-  verb->callback([options, flags, &action] {
-    action = [options, flags] {
-      if (!flags->mesh.empty()) options->request.mesh = parse_grid_size(flags->mesh);
-      options->formats = *parse_formats(flags->formats);
-      return run_simulate(*options);
-    };
+  verb.runs([options, flags] {
+    if (!flags->mesh.empty()) options->request.mesh = parse_grid_size(flags->mesh);
+    options->formats = *parse_formats(flags->formats);
+    return run_simulate(*options);
   });
 }
 

@@ -73,29 +73,6 @@ std::vector<StudiedModel> models_of(const std::vector<std::string>& effects) {
   return models;
 }
 
-/// What study.json keeps of the command line: the options that shape the result, in fixed order.
-std::string command_text(const StudyFlags& flags) {
-  const FitOptions& fit = flags.options.fit;
-  const FitOptions defaults = study_defaults();
-  std::string text = "clothfit study recordings";
-  for (const fs::path& folder : flags.folders) text += " " + folder.string();
-  for (const std::string& effect : flags.effects) text += " --effect " + effect;
-  if (!flags.mesh.empty()) text += " --mesh " + flags.mesh;
-  if (!flags.weights.empty()) text += " --weights " + flags.weights.string();
-  if (!flags.published.empty()) text += " --published " + flags.published.string();
-  if (flags.search != StudyFlags().search) text += " --search " + flags.search;
-  const auto add = [&](const char* flag, const auto& value, const auto& default_value) {
-    if (value != default_value) text += fmt::format(" {} {}", flag, value);
-  };
-  add("--seed", fit.seed, defaults.seed);
-  add("--search-share", fit.search_share, defaults.search_share);
-  add("--marker-offsets", fit.marker_offset_sigma_m, defaults.marker_offset_sigma_m);
-  add("--refine-best", fit.refine_best, defaults.refine_best);
-  add("--generations", fit.generations, defaults.generations);
-  add("--work", fit.work, defaults.work);
-  return text;
-}
-
 void write_results(const std::vector<StudyRow>& rows, const std::string& command,
                    const fs::path& folder) {
   const Table table = study_table(rows);
@@ -110,7 +87,7 @@ void write_results(const std::vector<StudyRow>& rows, const std::string& command
   write_text(study_page_html(rows, command), folder / "report.html");
 }
 
-int run_recordings_study(const StudyFlags& flags) {
+int run_recordings_study(const StudyFlags& flags, const std::string& command) {
   RecordingsStudyOptions options = flags.options;
   options.models = models_of(flags.effects);
   if (const auto mesh = parse_grid_size(flags.mesh)) {
@@ -141,7 +118,7 @@ int run_recordings_study(const StudyFlags& flags) {
     }
   }
   if (interrupted()) throw Cancelled();
-  write_results(rows, command_text(flags), out.path());
+  write_results(rows, command, out.path());
   out.publish();
   if (flags.journal.empty()) fs::remove(journal_file);
 
@@ -160,75 +137,78 @@ int run_recordings_study(const StudyFlags& flags) {
 
 }  // namespace
 
-void add_study_verb(CLI::App& program, VerbAction& action) {
+void add_study_verb(Verb program) {
   const auto flags = std::make_shared<StudyFlags>();
-  CLI::App* verb = program.add_subcommand("study", "Fit many recordings, and judge the models");
-  verb->require_subcommand(1);
-  CLI::App* recordings = verb->add_subcommand(
+  Verb verb = program.add_verb("study", "Fit many recordings, and judge the models");
+  verb.requires_verb();
+  Verb recordings = verb.add_verb(
       "recordings", "Fit every recording with every model; one table beside the trivial guesses");
   FitOptions& fit = flags->options.fit;
   fit = study_defaults();
   recordings
-      ->add_option("folders", flags->folders, "Recordings, or folders with recordings in them")
-      ->required()
-      ->type_name("FOLDER");
+      .add_option("folders", &flags->folders, "Recordings, or folders with recordings in them")
+      .required()
+      .type_name("FOLDER");
   recordings
-      ->add_option("--effect", flags->effects,
-                   "One more model beside the base: with this effect, or with several (A+B), "
-                   "marker_offsets among them; may be repeated")
-      ->type_name("NAME");
+      .add_option("--effect", &flags->effects,
+                  "One more model beside the base: with this effect, or with several (A+B), "
+                  "marker_offsets among them; may be repeated")
+      .type_name("NAME");
   recordings
-      ->add_option("--mesh", flags->mesh,
-                   "Columns and rows of the mesh (default: each recording's)")
-      ->type_name("CxR")
-      ->check(check_mesh);
+      .add_option("--mesh", &flags->mesh,
+                  "Columns and rows of the mesh (default: each recording's)")
+      .type_name("CxR")
+      .check(check_mesh);
   recordings
-      ->add_option("--weights", flags->weights,
-                   "Table of markers and weights for one more error, over all frames")
-      ->type_name("FILE.csv");
+      .add_option("--weights", &flags->weights,
+                  "Table of markers and weights for one more error, over all frames")
+      .type_name("FILE.csv");
   recordings
-      ->add_option("--published", flags->published,
-                   "Table of recordings and errors that others have stated for them, with these "
-                   "weights")
-      ->type_name("FILE.csv");
+      .add_option("--published", &flags->published,
+                  "Table of recordings and errors that others have stated for them, with these "
+                  "weights")
+      .type_name("FILE.csv");
   recordings
-      ->add_option("--marker-offsets", fit.marker_offset_sigma_m,
-                   "Standard deviation of the offsets in models with marker_offsets")
-      ->transform(length_in_metres())
-      ->capture_default_str();
-  recordings->add_option("--search", flags->search, "CMA-ES, or the founding paper's strategy")
-      ->check(CLI::IsMember({"paper", "cma"}))
-      ->capture_default_str();
+      .add_option("--marker-offsets", &fit.marker_offset_sigma_m,
+                  "Standard deviation of the offsets in models with marker_offsets")
+      .is_length()
+      .shows_default();
+  recordings.add_option("--search", &flags->search, "CMA-ES, or the founding paper's strategy")
+      .one_of({"paper", "cma"})
+      .shows_default();
   recordings
-      ->add_option("--search-share", fit.search_share,
-                   "Share of the fitted frames that the searches look at")
-      ->capture_default_str();
+      .add_option("--search-share", &fit.search_share,
+                  "Share of the fitted frames that the searches look at")
+      .shows_default();
   recordings
-      ->add_option("--refine-best", fit.refine_best, "Optima of a search that go to refinement")
-      ->capture_default_str();
-  recordings->add_option("--seed", fit.seed, "Seed of the searches")->capture_default_str();
-  recordings->add_option("--generations", fit.generations, "Generations of a search, at most")
-      ->capture_default_str();
+      .add_option("--refine-best", &fit.refine_best, "Optima of a search that go to refinement")
+      .shows_default();
+  recordings.add_option("--seed", &fit.seed, "Seed of the searches").shows_default();
+  recordings.add_option("--generations", &fit.generations, "Generations of a search, at most")
+      .shows_default();
   recordings
-      ->add_option("--work", fit.work,
-                   "Times as much work as a refinement is allowed before it ends unconverged")
-      ->capture_default_str();
+      .add_option("--work", &fit.work,
+                  "Times as much work as a refinement is allowed before it ends unconverged")
+      .shows_default();
   recordings
-      ->add_option("--journal", flags->journal,
-                   "Where finished fits are kept (default: OUT.journal)")
-      ->type_name("FILE");
-  recordings->add_flag("--resume", flags->resume, "Go on from the journal of an interrupted run");
+      .add_option("--journal", &flags->journal,
+                  "Where finished fits are kept (default: OUT.journal)")
+      .shapes_no_result()
+      .type_name("FILE");
+  recordings.add_flag("--resume", flags->resume, "Go on from the journal of an interrupted run")
+      .shapes_no_result();
   recordings
-      ->add_option("--threads", flags->options.threads,
-                   "Fits side by side; 0 for as many as the machine has")
-      ->capture_default_str();
-  add_out_option(*recordings, flags->out, "recordings.study");
-  recordings->footer(
+      .add_option("--threads", &flags->options.threads,
+                  "Fits side by side; 0 for as many as the machine has")
+      .shows_default()
+      .shapes_no_result();
+  add_out_option(recordings, flags->out, "recordings.study");
+  recordings.footer(
       "Example:\n"
       "  clothfit study recordings data/recordings --effect viscous_damping \\\n"
       "      --effect natural_size+viscous_damping+marker_offsets");
-  recordings->callback(
-      [flags, &action] { action = [flags] { return run_recordings_study(*flags); }; });
+  recordings.runs(
+      [flags, recordings] { return run_recordings_study(*flags, recordings.command_text()); });
 }
 
 }  // namespace clothfit

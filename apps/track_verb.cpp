@@ -80,22 +80,22 @@ int run_track(const TrackVerbOptions& options) {
 
 }  // namespace
 
-void add_track_verb(CLI::App& program, VerbAction& action) {
+void add_track_verb(Verb program) {
   const auto options = std::make_shared<TrackVerbOptions>();
-  CLI::App* verb = program.add_subcommand(
+  Verb verb = program.add_verb(
       "track", "Find the cloth's markers in the pictures and place the cameras in the world");
-  verb->add_option("recording", options->recording, "Folder of the recording")
-      ->required()
-      ->type_name("RECORDING");
-  verb->add_option("--max-speed", options->track.max_speed_px,
-                   "A marker that moved further than this between frames is doubted (px)")
-      ->capture_default_str();
-  verb->add_option("--min-margin", options->track.min_decision_margin,
-                   "Tag readings weaker than this are rejected")
-      ->capture_default_str();
-  add_out_option(*verb, options->out, "NAME.tracks");
-  verb->footer("Example:\n  clothfit track data/recordings/tags_onecam");
-  verb->callback([options, &action] { action = [options] { return run_track(*options); }; });
+  verb.add_option("recording", &options->recording, "Folder of the recording")
+      .required()
+      .type_name("RECORDING");
+  verb.add_option("--max-speed", &options->track.max_speed_px,
+                  "A marker that moved further than this between frames is doubted (px)")
+      .shows_default();
+  verb.add_option("--min-margin", &options->track.min_decision_margin,
+                  "Tag readings weaker than this are rejected")
+      .shows_default();
+  add_out_option(verb, options->out, "NAME.tracks");
+  verb.footer("Example:\n  clothfit track data/recordings/tags_onecam");
+  verb.runs([options] { return run_track(*options); });
 }
 
 }  // namespace clothfit

@@ -8,16 +8,17 @@ namespace clothfit {
 
 namespace fs = std::filesystem;
 
-void add_out_option(CLI::App& verb, std::filesystem::path& out, const std::string& default_name) {
-  verb.add_option("--out", out, "Folder for the results (default: " + default_name + ")")
-      ->type_name("DIR");
+void add_out_option(Verb verb, std::filesystem::path& out, const std::string& default_name) {
+  verb.add_option("--out", &out, "Folder for the results (default: " + default_name + ")")
+      .type_name("DIR")
+      .shapes_no_result();
 }
 
-void add_prior_option(CLI::App& verb, std::vector<std::string>& priors) {
-  verb.add_option("--prior", priors,
+void add_prior_option(Verb verb, std::vector<std::string>& priors) {
+  verb.add_option("--prior", &priors,
                   "What is known of a parameter from elsewhere, its mean and standard deviation in "
                   "its unit: clock_offset.time=0,0.002; may be repeated")
-      ->type_name("PARAMETER=MEAN,SIGMA");
+      .type_name("PARAMETER=MEAN,SIGMA");
 }
 
 ParameterPrior parse_prior(const std::string& text) {
@@ -31,11 +32,6 @@ ParameterPrior parse_prior(const std::string& text) {
   throw InputError("--prior", "'" + text + "' is not a prior",
                    "PARAMETER=MEAN,SIGMA without spaces, SIGMA more than 0, such as "
                    "clock_offset.time=0,0.002");
-}
-
-CLI::AsNumberWithUnit length_in_metres() {
-  return CLI::AsNumberWithUnit(
-      std::map<std::string, double>{{"m", 1.0}, {"cm", 1e-2}, {"mm", 1e-3}});
 }
 
 std::filesystem::path out_folder(const std::filesystem::path& asked,

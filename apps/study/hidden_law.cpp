@@ -5,6 +5,7 @@
 #include <limits>
 #include <set>
 
+#include "data/algebra/dense_factors.h"
 #include "data/input_error.h"
 #include "fit/diagnosis/law_derivatives.h"
 #include "fit/draws.h"
@@ -19,7 +20,7 @@ constexpr double kSame = 0.9;             ///< multiple correlation of what cann
 constexpr double kStabilityMargin = 1.5;  ///< as fits leave it
 
 /// Series of draws under a trial's seed.
-enum Series : int { kShape = 300, kDirection, kSize };
+enum HiddenLawSeries : int { kShape = 300, kDirection, kSize };
 
 const LawShapes* shapes_of(const RecordingInformation& information, const HiddenLaw& law) {
   const auto found = std::ranges::find_if(information.laws, [&](const LawShapes& shapes) {
@@ -149,7 +150,7 @@ DrawnLaw draw_law(const RecordingInformation& information, const HiddenLaw& law,
   const Columns columns = law_derivatives(information.model, {&drawn.term, 1}).front();
   if (columns.empty()) return {};
   Eigen::VectorXd projected = information.projection.columns({columns.front() * direction});
-  if (beside.cols() > 0) projected -= beside * beside.colPivHouseholderQr().solve(projected);
+  if (beside.cols() > 0) projected -= beside * PivotedQr(beside).solve(projected);
   const double information_along = projected.norm();  // 1 / sigma of the amount along direction
   if (!(information_along > 0)) return {};
 
@@ -227,9 +228,8 @@ double mimicked_by_others(const RecordingInformation& information, const DrawnLa
     }
     if (best == nullptr) break;
     const Eigen::MatrixXd chosen = best->colwise().normalized();
-    const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(chosen);
-    const Eigen::MatrixXd basis =
-        Eigen::MatrixXd(qr.householderQ() * Eigen::MatrixXd::Identity(chosen.rows(), qr.rank()));
+    const PivotedQr qr(chosen);
+    const Eigen::MatrixXd basis = qr.first_of_q(qr.rank());
     left -= basis * (basis.transpose() * left);
     for (Eigen::MatrixXd& columns : others) columns -= basis * (basis.transpose() * columns);
   }

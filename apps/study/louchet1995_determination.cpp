@@ -1,7 +1,8 @@
 #include "apps/study/louchet1995_determination.h"
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
+
+#include "data/algebra/dense_factors.h"
 
 namespace clothfit {
 namespace {
@@ -42,11 +43,11 @@ Eigen::VectorXd relative_sigmas(const Objective& whitened, const Eigen::VectorXd
   const Eigen::VectorXd length = jacobian.colwise().norm();
   for (Eigen::Index p = 0; p < truth.size(); ++p)
     if (length[p] > 0) jacobian.col(p) /= length[p];
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> information(jacobian.transpose() * jacobian);
+  const SymmetricEigen information = symmetric_eigen(jacobian.transpose() * jacobian);
   Eigen::VectorXd variance = Eigen::VectorXd::Zero(truth.size());
   for (Eigen::Index k = 0; k < truth.size(); ++k) {
-    const Eigen::VectorXd& direction = information.eigenvectors().col(k);
-    const double told = information.eigenvalues()[k];
+    const Eigen::VectorXd& direction = information.vectors.col(k);
+    const double told = information.values[k];
     for (Eigen::Index p = 0; p < truth.size(); ++p) {
       if (told > kNoInformation)
         variance[p] += direction[p] * direction[p] / told;

@@ -2,13 +2,13 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "data/algebra/dense_factors.h"
 #include "data/input_error.h"
 #include "data/median.h"
 #include "fit/cluster_covariance.h"
@@ -25,7 +25,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-enum Series : int { kStart = 100 };
+enum RecoverSeries : int { kStart = 100 };
 
 Json number(double value) {
   return std::isfinite(value) ? Json(value) : Json(nullptr);
@@ -228,7 +228,7 @@ std::map<std::string, double> bound_sigmas(const SyntheticRecording& recording,
       linear.residual_by_coordinate.transpose() * linear.residual_by_coordinate +
       prior_cost(problem, values).information;
   const Eigen::MatrixXd covariance =
-      information.ldlt().solve(Eigen::MatrixXd::Identity(slope.size(), slope.size()));
+      SymmetricFactors(information).solve(Eigen::MatrixXd::Identity(slope.size(), slope.size()));
   for (int p = 0; p < problem.space.size(); ++p)
     result[problem.space.parameters[static_cast<size_t>(p)].name] =
         std::sqrt(covariance(p, p)) * slope[p];

@@ -27,7 +27,7 @@ constexpr double kTold = 0.9;      ///< correlation of two hidden laws, below
 constexpr int kWithheldDraws = 3;  ///< each asks for the derivatives of every law
 constexpr int kDraws = 20;         ///< of release, shape and direction, before a trial is given up
 constexpr int kDirections = 20;    ///< of a law in one release
-enum Series : int { kPartner = 320, kReleases };
+enum UndeclaredSeries : int { kPartner = 320, kReleases };
 
 /// What a trial hides, with the release that shows it.
 struct Setting {

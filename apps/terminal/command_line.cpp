@@ -1,0 +1,153 @@
+#include "apps/terminal/command_line.h"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <map>
+#include <set>
+#include <utility>
+
+#include "apps/exit_code.h"
+#include "data/nearest_name.h"
+
+namespace clothfit {
+
+/// What options and verbs leave while arguments are parsed.
+struct ParsedCommandLine {
+  VerbAction action;
+  std::set<const CLI::Option*> shape_no_result;
+};
+
+Option Option::required() const {
+  option_->required();
+  return *this;
+}
+
+Option Option::type_name(const std::string& name) const {
+  option_->type_name(name);
+  return *this;
+}
+
+Option Option::shows_default() const {
+  option_->capture_default_str();
+  return *this;
+}
+
+Option Option::check(const TextCheck& check) const {
+  option_->check(check);
+  return *this;
+}
+
+Option Option::one_of(const std::vector<std::string>& texts) const {
+  option_->check(CLI::IsMember(texts));
+  return *this;
+}
+
+Option Option::is_length() const {
+  option_->transform(
+      CLI::AsNumberWithUnit(std::map<std::string, double>{{"m", 1.0}, {"cm", 1e-2}, {"mm", 1e-3}}));
+  return *this;
+}
+
+Option Option::one_at_a_time() const {
+  option_->allow_extra_args(false);
+  return *this;
+}
+
+Option Option::needs(Option other) const {
+  option_->needs(other.option_);
+  return *this;
+}
+
+Option Option::excludes(Option other) const {
+  option_->excludes(other.option_);
+  return *this;
+}
+
+Option Option::shapes_no_result() const {
+  parsed_->shape_no_result.insert(option_);
+  return *this;
+}
+
+Verb Verb::add_verb(const std::string& name, const std::string& what) {
+  return {app_->add_subcommand(name, what), parsed_};
+}
+
+void Verb::requires_verb() {
+  app_->require_subcommand(1);
+}
+
+Option Verb::add_option(const std::string& name, OptionTarget target, const std::string& what) {
+  CLI::Option* option =
+      std::visit([&](auto* value) { return app_->add_option(name, *value, what); }, target);
+  return {option, parsed_};
+}
+
+Option Verb::add_flag(const std::string& name, bool& given, const std::string& what) {
+  return {app_->add_flag(name, given, what), parsed_};
+}
+
+Option Verb::option(const std::string& name) const {
+  return {app_->get_option(name), parsed_};
+}
+
+void Verb::footer(const std::string& text) {
+  app_->footer(text);
+}
+
+void Verb::runs(VerbAction action) {
+  app_->callback([parsed = parsed_, action = std::move(action)] { parsed->action = action; });
+}
+
+bool Verb::is_given(const std::string& name) const {
+  return app_->count(name) > 0;
+}
+
+std::string Verb::command_text() const {
+  std::string text = app_->get_name();
+  for (const CLI::App* parent = app_->get_parent(); parent != nullptr;
+       parent = parent->get_parent())
+    text = parent->get_name() + " " + text;
+  for (const CLI::Option* option : app_->get_options()) {
+    if (option->count() == 0 || parsed_->shape_no_result.contains(option)) continue;
+    const bool has_values = option->get_items_expected_max() > 0;
+    if (!has_values) text += " " + option->get_name();
+    if (option->get_positional())
+      for (const std::string& value : option->results()) text += " " + value;
+    else if (has_values)
+      for (const std::string& value : option->results())
+        text += " " + option->get_name() + " " + value;
+  }
+  return text;
+}
+
+CommandLine::CommandLine(const std::string& what, const std::string& name,
+                         const std::string& version)
+    : app_(std::make_unique<CLI::App>(what, name)), parsed_(std::make_unique<ParsedCommandLine>()) {
+  app_->set_version_flag("--version", version);
+}
+
+CommandLine::~CommandLine() = default;
+
+Verb CommandLine::program() {
+  return {app_.get(), parsed_.get()};
+}
+
+CommandLine::Parsed CommandLine::parse(int argc, char** argv) {
+  std::vector<std::string> verbs;
+  for (const CLI::App* verb : app_->get_subcommands({})) verbs.push_back(verb->get_name());
+  const std::string first = argc > 1 ? argv[1] : "-";
+  if (!first.starts_with('-') && std::ranges::find(verbs, first) == verbs.end()) {
+    fmt::print(stderr, "There is no verb `{}`; {}\n", first, known_names(first, verbs));
+    return {.exit_code = kExitWrongUsage, .action = {}};
+  }
+  try {
+    app_->parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return {.exit_code = app_->exit(error) == 0 ? kExitGood : kExitWrongUsage, .action = {}};
+  }
+  return {.exit_code = std::nullopt, .action = parsed_->action};
+}
+
+}  // namespace clothfit

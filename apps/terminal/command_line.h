@@ -1,0 +1,108 @@
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <initializer_list>
+#include <memory>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+namespace CLI {
+class App;
+class Option;
+}  // namespace CLI
+
+namespace clothfit {
+
+/// What a verb does; returns an exit code.
+using VerbAction = std::function<int()>;
+
+/// Where an option's text goes once it is parsed. Lists take several texts; an empty std::optional
+/// stays empty where the option is not given.
+using OptionTarget = std::variant<int*, unsigned long long*, double*, std::optional<double>*,
+                                  std::string*, std::filesystem::path*, std::vector<std::string>*,
+                                  std::vector<std::filesystem::path>*>;
+
+/// Empty, or what is wrong with the text of an option.
+using TextCheck = std::function<std::string(const std::string& text)>;
+
+struct ParsedCommandLine;
+
+/// An option or flag of a verb. A handle: copies mean the same option.
+class Option {
+ public:
+  Option required() const;
+  /// How help calls its value: "DIR".
+  Option type_name(const std::string& name) const;
+  /// Help shows the value that the target holds now.
+  Option shows_default() const;
+  Option check(const TextCheck& check) const;
+  Option one_of(const std::vector<std::string>& texts) const;
+  /// Lengths such as 10mm, 1cm, 0.01m or 0.01, in metres.
+  Option is_length() const;
+  /// Takes one value each time that it is given.
+  Option one_at_a_time() const;
+  Option needs(Option other) const;
+  Option excludes(Option other) const;
+  /// Results are the same with and without it, so that Verb::command_text leaves it out.
+  Option shapes_no_result() const;
+
+ private:
+  friend class Verb;
+  Option(CLI::Option* option, ParsedCommandLine* parsed) : option_(option), parsed_(parsed) {}
+  CLI::Option* option_;
+  ParsedCommandLine* parsed_;
+};
+
+/// A verb with its options. A handle: copies mean the same verb, which lives as long as the
+/// CommandLine.
+class Verb {
+ public:
+  Verb add_verb(const std::string& name, const std::string& what);
+  /// One of its verbs has to be named.
+  void requires_verb();
+  /// `name` is "--NAME", or a bare word for what is told by its place.
+  Option add_option(const std::string& name, OptionTarget target, const std::string& what);
+  Option add_flag(const std::string& name, bool& given, const std::string& what);
+  /// An option that was added before.
+  Option option(const std::string& name) const;
+  /// What help ends with.
+  void footer(const std::string& text);
+  /// What is run where this verb is named.
+  void runs(VerbAction action);
+
+  bool is_given(const std::string& name) const;
+  /// Verb and options as they were given, for results to keep: "clothfit fit swing_plain --seed 2".
+  std::string command_text() const;
+
+ private:
+  friend class CommandLine;
+  Verb(CLI::App* app, ParsedCommandLine* parsed) : app_(app), parsed_(parsed) {}
+  CLI::App* app_;
+  ParsedCommandLine* parsed_;
+};
+
+/// The command line of the program. All that is known of CLI11 stays in its source file: that
+/// library is expensive to compile.
+class CommandLine {
+ public:
+  CommandLine(const std::string& what, const std::string& name, const std::string& version);
+  ~CommandLine();
+  Verb program();
+
+  /// Prints help, the version, or what is wrong with the arguments; then the exit code is set.
+  /// Otherwise the action of the verb that was named is.
+  struct Parsed {
+    std::optional<int> exit_code;
+    VerbAction action;
+  };
+  Parsed parse(int argc, char** argv);
+
+ private:
+  std::unique_ptr<CLI::App> app_;
+  std::unique_ptr<ParsedCommandLine> parsed_;
+};
+
+}  // namespace clothfit
