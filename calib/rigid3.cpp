@@ -27,6 +27,11 @@ Eigen::Vector3d rotation_vector(const Eigen::Quaterniond& rotation) {
   return factor * axis;
 }
 
+Eigen::Matrix3d nearest_orthogonal(const Eigen::Matrix3d& matrix) {
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(matrix, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  return svd.matrixU() * svd.matrixV().transpose();
+}
+
 Rigid3 fit_rigid(const Eigen::Matrix3Xd& a, const Eigen::Matrix3Xd& b,
                  const Eigen::VectorXd& weight) {
   assert(a.cols() == b.cols() && a.cols() >= 3);

@@ -35,6 +35,10 @@ Rigid3 turn_and_shift(const Eigen::Vector3d& rotation_vector_rad,
 /// Inverse of exp: the rotation vector (rad), no longer than pi.
 Eigen::Vector3d rotation_vector(const Eigen::Quaterniond& rotation);
 
+/// The orthogonal matrix nearest to this one, by the sum of squares; a reflection where that is
+/// nearer than any rotation.
+Eigen::Matrix3d nearest_orthogonal(const Eigen::Matrix3d& matrix);
+
 /// The rigid transform that takes the columns of `a` closest to those of `b` (3 x N, N >= 3, not
 /// all on a line), in least squares weighted by `weight` (N; empty: all alike). Umeyama 1991
 /// without scale.

@@ -3,7 +3,6 @@
 #include <ceres/ceres.h>
 #include <fmt/format.h>
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -14,6 +13,7 @@
 #include "calib/pose_start.h"
 #include "calib/sheet_pose.h"
 #include "calib/tag_squares.h"
+#include "data/algebra/dense_factors.h"
 
 namespace clothfit {
 namespace {
@@ -179,14 +179,11 @@ WorldSolve solve_world(const FixedCamera& camera, const std::vector<PlacedPixel>
   // Columns are scaled to length 1: metres and radians, pixels and millimetres stay comparable.
   const Eigen::VectorXd scale = jacobian.colwise().norm().cwiseInverse();
   if (!scale.allFinite()) return result;
-  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(jacobian * scale.asDiagonal());
+  const PivotedQr qr(jacobian * scale.asDiagonal());
   if (qr.rank() < jacobian.cols()) return result;
   const Eigen::Index n = jacobian.cols();
-  const Eigen::MatrixXd thin_q = qr.householderQ() * Eigen::MatrixXd::Identity(jacobian.rows(), n);
-  const Eigen::MatrixXd inverse_r =
-      qr.matrixR().topLeftCorner(n, n).triangularView<Eigen::Upper>().solve(
-          Eigen::MatrixXd::Identity(n, n));
-  const Eigen::MatrixXd root = scale.asDiagonal() * (qr.colsPermutation() * inverse_r);
+  const Eigen::MatrixXd thin_q = qr.first_of_q(n);
+  const Eigen::MatrixXd root = scale.asDiagonal() * qr.inverse_r();
   result.covariance = (root * root.transpose()).topLeftCorner<6, 6>();
 
   const auto survey_rows = static_cast<Eigen::Index>(3 * surveys.size());
@@ -219,9 +216,9 @@ std::optional<Rigid3> start_world(const CameraParameters& parameters, const Fixe
 
   // Points in nearly one plane look nearly the same under two poses: both are tried.
   const Eigen::Vector3d middle = points.rowwise().mean();
-  const Eigen::JacobiSVD<Eigen::Matrix3Xd> svd(points.colwise() - middle, Eigen::ComputeFullU);
-  if (svd.singularValues()[1] < 1e-3 * svd.singularValues()[0]) return std::nullopt;  // on a line
-  Eigen::Matrix3d axes = svd.matrixU();
+  const SingularVectors svd = left_singular_vectors(points.colwise() - middle);
+  if (svd.values[1] < 1e-3 * svd.values[0]) return std::nullopt;  // on a line
+  Eigen::Matrix3d axes = svd.vectors;
   if (axes.determinant() < 0) axes.col(2) *= -1;
   const Rigid3 world_from_plane{Eigen::Quaterniond(axes), middle};
   std::vector<Eigen::Vector2d> on_plane_m;

@@ -2,7 +2,7 @@
 # a boundary with no link to show for it, so the includes themselves are read.
 #
 #   apps -> vision -> calib -> camera -> data
-#   apps -> fit    -> model           -> data (input_error.h only)
+#   apps -> fit    -> model           -> data (input_error.h and algebra/ only)
 #           fit    -> camera
 #
 # `camera` is the part of calib/ that needs Eigen only: see its list of headers.
@@ -46,7 +46,7 @@ function(clothfit_check_arrows)
         if(target IN_LIST CLOTHFIT_ARROWS_${room})
           continue()
         endif()
-        if(room STREQUAL "model" AND included STREQUAL "data/input_error.h")
+        if(room STREQUAL "model" AND included MATCHES "^data/(input_error\\.h|algebra/)")
           continue()
         endif()
         string(REGEX REPLACE "^calib/" "" camera_header "${included}")

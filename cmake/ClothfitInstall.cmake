@@ -4,7 +4,7 @@
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
-set(rooms data camera calib vision model fit)
+set(rooms algebra data camera calib vision model fit)
 list(TRANSFORM rooms PREPEND clothfit_ OUTPUT_VARIABLE room_targets)
 foreach(room IN LISTS rooms)
   set_target_properties(clothfit_${room} PROPERTIES EXPORT_NAME ${room})

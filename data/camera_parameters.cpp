@@ -2,12 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cassert>
 #include <cmath>
 
+#include "data/algebra/dense_factors.h"
 #include "data/input_error.h"
 #include "data/text_file.h"
 #include "data/unit_quaternion.h"
@@ -62,9 +62,7 @@ bool is_covariance(const Eigen::Matrix<double, 6, 6>& matrix) {
   const Eigen::Matrix<double, 6, 6> correlation = scale.asDiagonal() * matrix * scale.asDiagonal();
   if (!correlation.allFinite()) return false;
   constexpr double kRounding = 1e-6;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> solver(correlation,
-                                                                          Eigen::EigenvaluesOnly);
-  return solver.eigenvalues().minCoeff() >= -kRounding;
+  return symmetric_eigenvalues(correlation).minCoeff() >= -kRounding;
 }
 
 Eigen::Matrix<double, 6, 6> read_covariance(const YamlValue& value) {

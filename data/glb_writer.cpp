@@ -1,5 +1,6 @@
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
 
@@ -18,6 +19,17 @@ constexpr int kUnsignedInt = 5125, kFloat = 5126;
 constexpr int kArrayBuffer = 34962, kElementArrayBuffer = 34963;
 constexpr std::uint32_t kMagic = 0x46546C67, kVersion = 2;
 constexpr std::uint32_t kJsonChunk = 0x4E4F534A, kBinaryChunk = 0x004E4942;
+
+/// The turn that takes a direction to +y; where it points to -y, half a turn about x.
+Eigen::Quaterniond turn_to_y(const Eigen::Vector3d& direction) {
+  const Eigen::Vector3d from = direction.normalized(), to = Eigen::Vector3d::UnitY();
+  const double cosine = to.dot(from);
+  constexpr double kOpposite = -1 + 1e-12;
+  if (cosine < kOpposite) return {0, 1, 0, 0};
+  const double twice_half_cosine = std::sqrt((1 + cosine) * 2);
+  const Eigen::Vector3d axis = from.cross(to) * (1 / twice_half_cosine);
+  return {0.5 * twice_half_cosine, axis.x(), axis.y(), axis.z()};
+}
 
 /// The one buffer of the file, with its views and accessors: one accessor per view.
 class Buffer {
@@ -138,8 +150,7 @@ class GlbWriter {
   }
 
   std::string bytes() {
-    const Eigen::Quaterniond turn =
-        Eigen::Quaterniond::FromTwoVectors(mesh_.up, Eigen::Vector3d::UnitY());
+    const Eigen::Quaterniond turn = turn_to_y(mesh_.up);
     Json children = Json::array();
     for (std::size_t n = 0; n < nodes_.size(); ++n) children.push_back(n + 1);
     Json root = {{"name", "world"},

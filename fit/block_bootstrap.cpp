@@ -1,6 +1,5 @@
 #include "fit/block_bootstrap.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -8,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "data/algebra/dense_factors.h"
 #include "data/input_error.h"
 #include "fit/draws.h"
 
@@ -22,9 +22,9 @@ constexpr int kLeastReplicates = 19;
 std::optional<Eigen::MatrixXd> invert(const Eigen::MatrixXd& information) {
   const Eigen::VectorXd unit = information.diagonal().cwiseSqrt().cwiseInverse();
   if (!unit.allFinite()) return std::nullopt;
-  const Eigen::LLT<Eigen::MatrixXd> factor(
+  const CholeskyFactors factor(
       Eigen::MatrixXd(unit.asDiagonal() * information * unit.asDiagonal()));
-  if (factor.info() != Eigen::Success || factor.rcond() < 1e-12) return std::nullopt;
+  if (!factor.usable() || factor.reciprocal_condition() < 1e-12) return std::nullopt;
   return unit.asDiagonal() *
          factor.solve(Eigen::MatrixXd::Identity(information.rows(), information.cols())) *
          unit.asDiagonal();

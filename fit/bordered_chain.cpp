@@ -1,7 +1,8 @@
 #include "fit/bordered_chain.h"
 
-#include <Eigen/Cholesky>
 #include <cassert>
+
+#include "data/algebra/dense_factors.h"
 
 namespace clothfit {
 
@@ -9,7 +10,7 @@ BorderedChainSolution solve(BorderedChain chain) {
   const size_t blocks = chain.diagonal.size();
   assert(chain.to_border.size() == blocks && chain.right.size() == blocks);
   assert(blocks == 0 || chain.next.size() + 1 == blocks);
-  std::vector<Eigen::LDLT<Eigen::MatrixXd>> factors;
+  std::vector<SymmetricFactors> factors;
   for (size_t k = 0; k < blocks; ++k) {
     factors.emplace_back(chain.diagonal[k]);
     if (chain.diagonal[k].rows() == 0) continue;
@@ -24,14 +25,14 @@ BorderedChainSolution solve(BorderedChain chain) {
     chain.right[k + 1] -= next.transpose() * right;
   }
   BorderedChainSolution solution;
-  solution.border = chain.border.ldlt().solve(chain.border_right);
+  solution.border = SymmetricFactors(chain.border).solve(chain.border_right);
   solution.blocks.resize(blocks);
   for (size_t k = blocks; k-- > 0;) {
     Eigen::VectorXd right = chain.right[k];
     if (right.size() > 0) {
       right -= chain.to_border[k] * solution.border;
       if (k + 1 < blocks) right -= chain.next[k] * solution.blocks[k + 1];
-      right = factors[k].solve(right).eval();
+      right = factors[k].solve(right);
     }
     solution.blocks[k] = std::move(right);
   }

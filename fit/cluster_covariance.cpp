@@ -1,12 +1,12 @@
 #include "fit/cluster_covariance.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <boost/math/distributions/normal.hpp>
 #include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 #include <limits>
 
+#include "data/algebra/dense_factors.h"
 #include "data/input_error.h"
 
 namespace clothfit {
@@ -26,20 +26,18 @@ Eigen::MatrixXd score_correction(const Eigen::MatrixXd& block_information,
   // residuals to be enlarged, so the exact bound does not matter.
   constexpr double kLeastFreedom = 1e-6;
 
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> own(block_information);
-  const Eigen::VectorXd root = own.eigenvalues().cwiseMax(0).cwiseSqrt();
+  const SymmetricEigen own = symmetric_eigen(block_information);
+  const Eigen::VectorXd root = own.values.cwiseMax(0).cwiseSqrt();
   const double least = 1e-7 * root.maxCoeff();
   Eigen::VectorXd inverse_root = Eigen::VectorXd::Zero(p);
   for (Eigen::Index i = 0; i < p; ++i)
     if (root[i] > least) inverse_root[i] = 1 / root[i];
-  const Eigen::MatrixXd& v = own.eigenvectors();
+  const Eigen::MatrixXd& v = own.vectors;
   const Eigen::MatrixXd leverage =
       root.asDiagonal() * (v.transpose() * inverse * v) * root.asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> lever(leverage);
-  const Eigen::VectorXd grown =
-      (1 - lever.eigenvalues().array()).max(kLeastFreedom).pow(power).matrix();
-  return v * root.asDiagonal() *
-         (lever.eigenvectors() * grown.asDiagonal() * lever.eigenvectors().transpose()) *
+  const SymmetricEigen lever = symmetric_eigen(leverage);
+  const Eigen::VectorXd grown = (1 - lever.values.array()).max(kLeastFreedom).pow(power).matrix();
+  return v * root.asDiagonal() * (lever.vectors * grown.asDiagonal() * lever.vectors.transpose()) *
          inverse_root.asDiagonal() * v.transpose();
 }
 
@@ -74,14 +72,13 @@ ClusterCovariance cluster_covariance(const LinearisedFit& fit, const Eigen::Vect
     return Eigen::MatrixXd(unit.asDiagonal() * Eigen::MatrixXd(matrix(known, known)) *
                            unit.asDiagonal());
   };
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> total(scaled(all.total_information));
-  if (total.eigenvalues().minCoeff() < kLeastInformation) {
+  const SymmetricEigen total = symmetric_eigen(scaled(all.total_information));
+  if (total.values.minCoeff() < kLeastInformation) {
     result.reason = "some coordinates cannot be told apart";
     return result;
   }
-  const Eigen::MatrixXd inverse = total.eigenvectors() *
-                                  total.eigenvalues().cwiseInverse().asDiagonal() *
-                                  total.eigenvectors().transpose();
+  const Eigen::MatrixXd inverse =
+      total.vectors * total.values.cwiseInverse().asDiagonal() * total.vectors.transpose();
   const Eigen::MatrixXd prior = scaled(all.prior_information);
 
   Eigen::MatrixXd score(p, all.blocks());

@@ -1,6 +1,5 @@
 #include "fit/cma_es.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cassert>
 #include <cmath>
@@ -8,6 +7,7 @@
 #include <optional>
 #include <sstream>
 
+#include "data/algebra/dense_factors.h"
 #include "data/input_error.h"
 #include "fit/draws.h"
 
@@ -54,9 +54,9 @@ struct Axes {
   Eigen::VectorXd lengths;     ///< D
 
   explicit Axes(const Eigen::MatrixXd& covariance) {
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(covariance);
-    directions = solver.eigenvectors();
-    lengths = solver.eigenvalues().cwiseMax(0).cwiseSqrt();
+    const SymmetricEigen eigen = symmetric_eigen(covariance);
+    directions = eigen.vectors;
+    lengths = eigen.values.cwiseMax(0).cwiseSqrt();
   }
   /// C^-1/2 y.
   Eigen::VectorXd whitened(const Eigen::VectorXd& y) const {

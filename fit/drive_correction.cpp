@@ -1,12 +1,12 @@
 #include "fit/drive_correction.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cassert>
 #include <cmath>
 #include <string>
 #include <utility>
 
+#include "data/algebra/dense_factors.h"
 #include "data/input_error.h"
 
 namespace clothfit {
@@ -163,13 +163,12 @@ DriveCorrection make_drive_correction(const std::vector<TrackedPoint>& tracked, 
       }
     }
     // C = L L', so that L^-1 c is standard normal.
-    const Eigen::LLT<Eigen::MatrixXd> factors(covariance);
-    assert(factors.info() == Eigen::Success);
+    const CholeskyFactors factors(covariance);
+    assert(factors.usable());
     for (int axis = 0; axis < 3; ++axis) {
-      GaussianPrior prior{
-          .indices = {},
-          .mean = Eigen::VectorXd::Zero(knots),
-          .sqrt_information = factors.matrixL().solve(Eigen::MatrixXd::Identity(knots, knots))};
+      GaussianPrior prior{.indices = {},
+                          .mean = Eigen::VectorXd::Zero(knots),
+                          .sqrt_information = factors.inverse_lower()};
       for (int k = 0; k < knots; ++k) prior.indices.push_back(first + 3 * k + axis);
       priors.push_back(std::move(prior));
     }

@@ -1,10 +1,10 @@
 #include "fit/parameter_profiles.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "data/algebra/dense_factors.h"
 #include "fit/cluster_covariance.h"
 #include "fit/prior_cost.h"
 
@@ -79,7 +79,7 @@ class FixedCost {
         gradient[p] = 0;
       }
       information.diagonal() *= 1 + damping;
-      const Eigen::VectorXd move = information.ldlt().solve(-gradient);
+      const Eigen::VectorXd move = SymmetricFactors(information).solve(-gradient);
       if (!move.allFinite()) return point;
       point = {.usable = true, .value = x[held], .cost = cost, .others = x};
       if (-0.5 * gradient.dot(move) < kSmallFall) return point;

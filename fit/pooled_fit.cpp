@@ -2,11 +2,11 @@
 
 #include <tbb/parallel_for.h>
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "data/algebra/dense_factors.h"
 #include "data/input_error.h"
 #include "fit/parameterised_model.h"
 #include "fit/prior_cost.h"
@@ -30,7 +30,7 @@ Eigen::VectorXd amounts_of(const Eigen::MatrixXd& directions, const Eigen::Vecto
   const Eigen::MatrixXd weighted = weight.asDiagonal() * directions;
   Eigen::MatrixXd information = weighted.transpose() * directions;
   information.diagonal().array() += 1;
-  return -information.ldlt().solve(weighted.transpose() * residual);
+  return -SymmetricFactors(information).solve(weighted.transpose() * residual);
 }
 
 /// Half of Huber's sum of squares, observation by observation.
@@ -277,7 +277,7 @@ Quadratic quadratic_of(const FitProblem& problem, const PooledPart& part, double
     const Eigen::MatrixXd between = weighted.transpose() * part.directions;
     Eigen::MatrixXd own = part.directions.transpose() * weight.asDiagonal() * part.directions;
     own.diagonal().array() += 1;
-    const Eigen::LDLT<Eigen::MatrixXd> solver(own);
+    const SymmetricFactors solver(own);
     // Zero where the amounts are at their least, but for the weights' last change.
     const Eigen::VectorXd pull =
         part.directions.transpose() * weight.cwiseProduct(residual) + part.amounts;

@@ -1,8 +1,8 @@
 #include "fit/pooled_space.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 
+#include "data/algebra/dense_factors.h"
 #include "data/input_error.h"
 
 namespace clothfit {
@@ -54,9 +54,10 @@ std::vector<Eigen::VectorXd> PooledSpace::values(const Eigen::VectorXd& coordina
   std::vector<Eigen::VectorXd> result;
   for (size_t n = 0; n < problems_.size(); ++n) {
     Eigen::VectorXd own(problems_[n]->space.size());
-    own(shared_of(n)) = coordinates.head(shared());
-    own(places_[n].own) =
-        coordinates.segment(places_[n].first, static_cast<Eigen::Index>(places_[n].own.size()));
+    Eigen::Index next = 0;
+    for (const int place : shared_of(n)) own[place] = coordinates[next++];
+    next = places_[n].first;
+    for (const int place : places_[n].own) own[place] = coordinates[next++];
     result.push_back(problems_[n]->space.values(own));
   }
   return result;
@@ -121,7 +122,7 @@ Eigen::VectorXd PooledSpace::step(const Expansion& expansion, double damping,
     if (held[static_cast<size_t>(p)]) gradient[p] = 0;
   Eigen::MatrixXd reduced = prepared(expansion.shared, 0);
   Eigen::VectorXd right = -gradient.head(shared());
-  std::vector<Eigen::LDLT<Eigen::MatrixXd>> own;
+  std::vector<SymmetricFactors> own;
   std::vector<Eigen::MatrixXd> between;
   for (size_t n = 0; n < places_.size(); ++n) {
     own.emplace_back(prepared(expansion.own[n], places_[n].first));
@@ -136,7 +137,7 @@ Eigen::VectorXd PooledSpace::step(const Expansion& expansion, double damping,
              own[n].solve(gradient.segment(places_[n].first, between[n].rows()));
   }
   Eigen::VectorXd step(size_);
-  step.head(shared()) = reduced.ldlt().solve(right);
+  step.head(shared()) = SymmetricFactors(reduced).solve(right);
   for (size_t n = 0; n < places_.size(); ++n) {
     const Eigen::Index count = between[n].rows();
     if (count == 0) continue;

@@ -238,9 +238,10 @@ class ObservationCost final : public ceres::CostFunction {
   Objective::Block block_;
 };
 
-class PriorCost final : public ceres::CostFunction {
+class GaussianPriorCost final : public ceres::CostFunction {
  public:
-  PriorCost(const SharedEvaluation& shared, const ParameterSpace& space, const GaussianPrior& prior)
+  GaussianPriorCost(const SharedEvaluation& shared, const ParameterSpace& space,
+                    const GaussianPrior& prior)
       : shared_(shared), space_(space), prior_(prior) {
     set_num_residuals(static_cast<int>(prior.mean.size()));
     mutable_parameter_block_sizes()->push_back(space.size());
@@ -351,7 +352,7 @@ Round solve(const ObjectiveMaker& make_objective, std::unique_ptr<Objective>& ob
   for (const Objective::Block& rows : objective->blocks())
     least_squares.AddResidualBlock(new ObservationCost(shared, rows, space.size()), loss, block);
   for (const GaussianPrior& prior : problem.priors)
-    least_squares.AddResidualBlock(new PriorCost(shared, space, prior), nullptr, block);
+    least_squares.AddResidualBlock(new GaussianPriorCost(shared, space, prior), nullptr, block);
   for (int p = 0; p < space.size(); ++p) {
     least_squares.SetParameterLowerBound(block, p, box.lower[p]);
     least_squares.SetParameterUpperBound(block, p, box.upper[p]);

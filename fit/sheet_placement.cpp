@@ -2,10 +2,10 @@
 
 #include <ceres/ceres.h>
 
-#include <Eigen/SVD>
 #include <algorithm>
 
 #include "calib/projection.h"
+#include "data/algebra/dense_factors.h"
 
 namespace clothfit {
 namespace {
@@ -37,8 +37,8 @@ bool spans_plane(const SheetView& view, const Eigen::Matrix2Xd& marker_m) {
   for (size_t n = 0; n < view.rows.size(); ++n)
     places.col(static_cast<Eigen::Index>(n)) = marker_m.col(view.rows[n]->marker);
   places.colwise() -= places.rowwise().mean().eval();
-  const Eigen::Vector2d extent = places.jacobiSvd().singularValues();
-  return extent[1] > 1e-3 * extent[0];
+  const Eigen::VectorXd square = symmetric_eigenvalues(places * places.transpose());
+  return square[0] > 1e-6 * square[1];
 }
 
 Rigid3 start_from_3d(const SheetView& view, const Eigen::Matrix2Xd& marker_m) {
@@ -69,18 +69,15 @@ std::optional<Rigid3> start_from_pixels(const SheetView& view, const Eigen::Matr
     equations.row(used++) << 0, 0, 0, s, t, 1, -y * s, -y * t, -y;
   }
   if (used < 8) return std::nullopt;
-  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(equations.topRows(used), Eigen::ComputeFullV);
+  const SingularVectors svd = right_singular_vectors(equations.topRows(used));
   Eigen::Matrix3d homography;
-  homography << svd.matrixV().col(8).head<3>().transpose(),
-      svd.matrixV().col(8).segment<3>(3).transpose(), svd.matrixV().col(8).tail<3>().transpose();
+  homography << svd.vectors.col(8).head<3>().transpose(),
+      svd.vectors.col(8).segment<3>(3).transpose(), svd.vectors.col(8).tail<3>().transpose();
   homography /= 0.5 * (homography.col(0).norm() + homography.col(1).norm());
   if (homography(2, 2) < 0) homography = -homography;  // the sheet lies in front of the camera
   Eigen::Matrix3d axes;
   axes << homography.col(0), homography.col(1), homography.col(0).cross(homography.col(1));
-  const Eigen::JacobiSVD<Eigen::Matrix3d> nearest(axes, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Rigid3 camera_from_sheet{
-      Eigen::Quaterniond(Eigen::Matrix3d(nearest.matrixU() * nearest.matrixV().transpose())),
-      homography.col(2)};
+  const Rigid3 camera_from_sheet{Eigen::Quaterniond(nearest_orthogonal(axes)), homography.col(2)};
   return inverse(camera_from_world(camera)) * camera_from_sheet;
 }
 

@@ -2,13 +2,13 @@
 
 #include <tbb/parallel_for.h>
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cassert>
 #include <cmath>
 #include <limits>
 #include <utility>
 
+#include "data/algebra/dense_factors.h"
 #include "data/input_error.h"
 #include "fit/node_weights.h"
 #include "fit/parameterised_model.h"
@@ -84,7 +84,7 @@ ShootingObjective::ShootingObjective(const FitProblem& problem, int frames, cons
   if (!(continuity.position_m > 0 && continuity.velocity_m_per_s > 0))
     throw InputError("shooting", "the continuity's sigma is not positive", "more than 0");
   basis_ = node_weights(mesh, windows_.nodes, flat_positions(mesh).topRows<2>());
-  to_nodes_ = (basis_.transpose() * basis_).ldlt().solve(basis_.transpose());
+  to_nodes_ = SymmetricFactors(basis_.transpose() * basis_).solve(basis_.transpose());
   corrections_ = no_corrections();
 
   for (int w = 0; w < windows_.count(); ++w) {

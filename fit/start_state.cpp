@@ -1,12 +1,12 @@
 #include "fit/start_state.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <optional>
 #include <string>
 
+#include "data/algebra/dense_factors.h"
 #include "fit/node_weights.h"
 #include "fit/shape_from_pixels.h"
 #include "fit/smoothing_spline.h"
@@ -72,8 +72,8 @@ Eigen::Matrix3Xd smooth_field(const Mesh& mesh, const Eigen::Matrix2Xd& places,
   const Eigen::Vector3d mean = values.rowwise().mean();
   Eigen::MatrixXd normal = at_markers.transpose() * at_markers;
   normal.diagonal().array() += ridge;
-  const Eigen::MatrixXd node_values =
-      normal.ldlt().solve(at_markers.transpose() * (values.colwise() - mean).transpose());
+  const Eigen::MatrixXd node_values = SymmetricFactors(normal).solve(
+      at_markers.transpose() * (values.colwise() - mean).transpose());
   return (node_weights(mesh, nodes, vertex_places(mesh)) * node_values).transpose().colwise() +
          mean;
 }

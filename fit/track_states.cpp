@@ -1,10 +1,10 @@
 #include "fit/track_states.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <functional>
 
+#include "data/algebra/dense_factors.h"
 #include "data/input_error.h"
 #include "fit/node_weights.h"
 #include "fit/smoothing_spline.h"
@@ -137,7 +137,7 @@ Eigen::MatrixXd field_through(const Mesh& mesh, const Eigen::Matrix2Xd& place_m,
   const Eigen::MatrixXd normal =
       at_points.transpose() * at_points + kStiffness * mean * bending.transpose() * bending;
   return node_weights(mesh, nodes, flat_positions(mesh).topRows<2>()) *
-         normal.ldlt().solve(at_points.transpose());
+         SymmetricFactors(normal).solve(at_points.transpose());
 }
 
 }  // namespace

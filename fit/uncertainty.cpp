@@ -1,11 +1,11 @@
 #include "fit/uncertainty.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
 
+#include "data/algebra/dense_factors.h"
 #include "fit/block_bootstrap.h"
 #include "fit/cluster_covariance.h"
 #include "fit/observed_blocks.h"
@@ -20,9 +20,9 @@ constexpr double kLeastInformation = 1e-12;
 /// Inverse of an information matrix. Directions that the data say nothing about get a standard
 /// deviation of a million instead of spoiling the inverse for all.
 Eigen::MatrixXd invert(const Eigen::MatrixXd& information) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(information);
-  const Eigen::VectorXd variance = eigen.eigenvalues().cwiseMax(kLeastInformation).cwiseInverse();
-  return eigen.eigenvectors() * variance.asDiagonal() * eigen.eigenvectors().transpose();
+  const SymmetricEigen eigen = symmetric_eigen(information);
+  const Eigen::VectorXd variance = eigen.values.cwiseMax(kLeastInformation).cwiseInverse();
+  return eigen.vectors * variance.asDiagonal() * eigen.vectors.transpose();
 }
 
 /// The sandwich's variance of each coordinate and its degrees of freedom; where there is none, 0

@@ -1,8 +1,9 @@
 #include "model/fabric_conversion.h"
 
-#include <Eigen/Dense>
 #include <array>
 #include <cassert>
+
+#include "data/algebra/dense_factors.h"
 
 namespace clothfit {
 namespace {
@@ -77,7 +78,7 @@ Nearest<Fabric> nearest_fabric(const SpringParameters& springs, const Mesh& mesh
   numbers << parts.stiffness[0], parts.stiffness[1], parts.stiffness[2], parts.stiffness[4],
       parts.stiffness[5], 0, 0;
   // Of times that no stiffness asks for, the smallest.
-  const auto solver = parts.by_times.completeOrthogonalDecomposition();
+  const LeastNormFactors solver(parts.by_times);
   numbers.tail<2>() = solver.solve(parts.damping);
   if (solver.rank() == 0 && parts.damping.cwiseAbs().maxCoeff() > 0)
     nearest.reason = "there is damping but no stiffness: no retardation time says that";
@@ -101,9 +102,9 @@ Eigen::Matrix<double, kFabricNumbers, kSpringNumbers> fabric_by_springs(
   const Parts parts = parts_of(springs);
   const DampingMatrix& a = parts.by_times;
   const Eigen::Matrix2d normal = a.transpose() * a;
-  const Eigen::Vector2d times = a.completeOrthogonalDecomposition().solve(parts.damping);
+  const Eigen::Vector2d times = LeastNormFactors(a).solve(parts.damping);
   const Eigen::Matrix<double, kSpringTypes, 1> left = parts.damping - a * times;
-  const Eigen::Matrix2d inverse = normal.completeOrthogonalDecomposition().pseudoInverse();
+  const Eigen::Matrix2d inverse = LeastNormFactors(normal).pseudo_inverse();
   result.block<2, kSpringTypes>(5, damping_block) = inverse * a.transpose();
   const Shares shares = damping_shares();
   for (int type = 0; type < kSpringTypes; ++type) {

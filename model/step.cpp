@@ -1,8 +1,9 @@
 #include "model/step.h"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cassert>
+
+#include "data/algebra/dense_factors.h"
 
 namespace clothfit {
 
@@ -53,8 +54,7 @@ HeldPlacement<L>::HeldPlacement(const Cloth& cloth)
   for (Eigen::Index n = 0; n < touched; ++n)
     inverse_mass_a.row(n) /= cloth.mass_kg[touched_[static_cast<size_t>(n)]];
   // Two held points in the same place would make this singular; the pseudo-inverse lets them share.
-  correction_ =
-      inverse_mass_a * (a * inverse_mass_a).completeOrthogonalDecomposition().pseudoInverse();
+  correction_ = inverse_mass_a * LeastNormFactors(a * inverse_mass_a).pseudo_inverse();
 }
 
 template <class L>

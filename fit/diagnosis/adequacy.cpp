@@ -6,6 +6,7 @@
 #include <numbers>
 #include <utility>
 
+#include "data/algebra/dense_factors.h"
 #include "fit/diagnosis/law_derivatives.h"
 #include "fit/diagnosis/projection.h"
 
@@ -163,7 +164,7 @@ Adequacy judge_adequacy(const ModelFit& model, Loss loss) {
         if (m != n) functions[m] = Eigen::MatrixXd::Zero(functions[m].rows(), functions[n].cols());
       const Eigen::MatrixXd left = projection.columns(functions);
       const Eigen::MatrixXd information = left.transpose() * left;
-      const Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver(information);
+      const LeastNormFactors solver(information);
       const Eigen::VectorXd pull = left.transpose() * residual;
       taken += pull.dot(solver.solve(pull));
       rank += static_cast<double>(solver.rank());

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -12,6 +11,7 @@
 #include <utility>
 
 #include "calib/projection.h"
+#include "data/algebra/dense_factors.h"
 #include "fit/parameterised_model.h"
 #include "fit/predictor.h"
 
@@ -65,13 +65,13 @@ std::optional<HeldLine> held_line(const FitProblem& problem) {
   Eigen::Matrix3Xd around(3, static_cast<Eigen::Index>(places.size()));
   for (size_t n = 0; n < places.size(); ++n)
     around.col(static_cast<Eigen::Index>(n)) = places[n] - line.point_m;
-  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(around, Eigen::ComputeFullU);
+  const SingularVectors svd = left_singular_vectors(around);
   const double small_m =
       kStraight * std::min(problem.cloth.mesh.width_m, problem.cloth.mesh.height_m);
-  if (svd.singularValues().size() > 1 && svd.singularValues()[1] > small_m) return std::nullopt;
-  line.single = svd.singularValues()[0] < small_m;
+  if (svd.values.size() > 1 && svd.values[1] > small_m) return std::nullopt;
+  line.single = svd.values[0] < small_m;
   if (!line.single) {
-    line.along = svd.matrixU().col(0);
+    line.along = svd.vectors.col(0);
   } else if (const Eigen::Vector3d level = axes.normal.cross(axes.down); level.norm() > 0.1) {
     line.along = level.normalized();
   }

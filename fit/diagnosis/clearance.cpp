@@ -1,9 +1,9 @@
 #include "fit/diagnosis/clearance.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
+#include "data/algebra/dense_factors.h"
 #include "data/median.h"
 #include "fit/diagnosis/refit.h"
 #include "fit/pooled_space.h"
@@ -44,8 +44,8 @@ double inflation(const Adequacy& structure) {
 Eigen::MatrixXd covariance(const PooledSpace& space, const std::vector<Quadratic>& quadratics) {
   Eigen::MatrixXd information = dense(space, space.gather(quadratics));
   information.diagonal().array() += 1e-12 * std::max(1.0, information.diagonal().maxCoeff());
-  return information.ldlt().solve(
-      Eigen::MatrixXd::Identity(information.rows(), information.cols()));
+  return SymmetricFactors(information)
+      .solve(Eigen::MatrixXd::Identity(information.rows(), information.cols()));
 }
 
 /// By the residuals' trend where derivatives are rough. Empty where a recording has none.
@@ -98,7 +98,7 @@ FromNeutral from_neutral(const ModelFit& model, double threshold) {
   }
   const Eigen::Map<const Eigen::VectorXd> way(away.data(), static_cast<Eigen::Index>(away.size()));
   const Eigen::MatrixXd own = covariance(pooled, quadratics)(indices, indices);
-  const double square = way.dot(own.ldlt().solve(way));
+  const double square = way.dot(SymmetricFactors(own).solve(way));
   return {.square = std::isfinite(square) ? std::max(0.0, square) : 0, .amplitudes = way.size()};
 }
 

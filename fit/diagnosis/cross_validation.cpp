@@ -2,7 +2,6 @@
 
 #include <tbb/parallel_for.h>
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <iterator>
@@ -11,6 +10,7 @@
 #include <numeric>
 #include <utility>
 
+#include "data/algebra/dense_factors.h"
 #include "fit/diagnosis/free_forces.h"
 #include "fit/prior_cost.h"
 #include "fit/uncertainty.h"
@@ -171,7 +171,7 @@ class Folds {
     Eigen::MatrixXd reduced = Eigen::MatrixXd::Zero(shared, shared);
     Eigen::VectorXd right = Eigen::VectorXd::Zero(shared);
     struct Own {
-      Eigen::LDLT<Eigen::MatrixXd> solver;
+      SymmetricFactors solver;
       Eigen::MatrixXd between;
       Eigen::VectorXd gradient;
       std::vector<int> places;
@@ -194,7 +194,7 @@ class Folds {
         places.push_back(k);
       if (sigma_m_per_s2 > 0) add_forces(n, b, sigma_m_per_s2, information, gradient, places);
       information.diagonal().array() += 1e-9 * std::max(1.0, information.diagonal().maxCoeff());
-      Own own{.solver = Eigen::LDLT<Eigen::MatrixXd>(information(places, places)),
+      Own own{.solver = SymmetricFactors(information(places, places)),
               .between = information(places, common),
               .gradient = gradient(places),
               .places = places};
@@ -209,7 +209,7 @@ class Folds {
       owns.push_back(std::move(own));
     }
     reduced.diagonal().array() += 1e-12 * std::max(1.0, reduced.diagonal().maxCoeff());
-    const Eigen::VectorXd step = reduced.ldlt().solve(right);
+    const Eigen::VectorXd step = SymmetricFactors(reduced).solve(right);
     std::vector<Eigen::VectorXd> ways(normals_.size());
     for (size_t n = 0; n < normals_.size(); ++n) {
       ways[n] = Eigen::VectorXd::Zero(sigma_m_per_s2 > 0 ? normals_[n].gradient.size()

@@ -2,7 +2,6 @@
 
 #include <tbb/parallel_for.h>
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -10,6 +9,7 @@
 #include <string>
 #include <tuple>
 
+#include "data/algebra/dense_factors.h"
 #include "fit/measurement_effects/applicability.h"
 #include "fit/measurement_effects/registry.h"
 #include "model/effects/registry.h"
@@ -213,8 +213,8 @@ double squared_multiple_correlation(const Eigen::VectorXd& of, const Eigen::Matr
   Eigen::MatrixXd scaled = columns;
   for (Eigen::Index k = 0; k < scaled.cols(); ++k)
     if (const double norm = scaled.col(k).norm(); norm > 0) scaled.col(k) /= norm;
-  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(scaled);
-  const Eigen::VectorXd turned = qr.householderQ().adjoint() * of;
+  const PivotedQr qr(scaled);
+  const Eigen::VectorXd turned = qr.times_q_transposed(of);
   return std::min(1.0, turned.head(qr.rank()).squaredNorm() / all);
 }
 

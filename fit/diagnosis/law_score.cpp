@@ -1,9 +1,10 @@
 #include "fit/diagnosis/law_score.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
+
+#include "data/algebra/dense_factors.h"
 
 namespace clothfit {
 namespace {
@@ -34,9 +35,9 @@ LawScore judge(const Term& term, const ModelProjection& projection, Columns colu
   const Eigen::VectorXd size = explained.information.diagonal().cwiseSqrt();
   if (size.minCoeff() > 0) {
     const Eigen::VectorXd unit = size.cwiseInverse();
-    const Eigen::LDLT<Eigen::MatrixXd> information(
+    const SymmetricFactors information(
         Eigen::MatrixXd(unit.asDiagonal() * explained.information * unit.asDiagonal()));
-    if (information.isPositive() && information.vectorD().minCoeff() > 0)
+    if (information.is_positive_definite())
       result.sigma = information.solve(Eigen::MatrixXd::Identity(count, count))
                          .diagonal()
                          .cwiseSqrt()

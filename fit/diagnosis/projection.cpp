@@ -1,10 +1,10 @@
 #include "fit/diagnosis/projection.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cassert>
 #include <limits>
 
+#include "data/algebra/dense_factors.h"
 #include "fit/prior_cost.h"
 #include "fit/uncertainty.h"
 
@@ -28,24 +28,24 @@ Projection::Projection(const Eigen::MatrixXd& jacobian, const Eigen::MatrixXd& p
     residual_ = root_weight_.cwiseProduct(residual);
     return;
   }
-  Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> prior;
+  SymmetricEigen prior;
   Eigen::VectorXd root(0), pull(0);
   if (fitted > 0) {
-    prior.compute(prior_information);
-    root = prior.eigenvalues().cwiseMax(0).cwiseSqrt();
-    pull = prior.eigenvectors().transpose() * prior_gradient;
+    prior = symmetric_eigen(prior_information);
+    root = prior.values.cwiseMax(0).cwiseSqrt();
+    pull = prior.vectors.transpose() * prior_gradient;
   }
 
   moved_ = Eigen::MatrixXd::Zero(rows + fitted + units, fitted + units);
   moved_.topLeftCorner(rows, fitted) = root_weight_.asDiagonal() * jacobian;
   moved_.topRightCorner(rows, units) = root_weight_.asDiagonal() * unit_directions;
   if (fitted > 0)
-    moved_.block(rows, 0, fitted, fitted) = root.asDiagonal() * prior.eigenvectors().transpose();
+    moved_.block(rows, 0, fitted, fitted) = root.asDiagonal() * prior.vectors.transpose();
   moved_.bottomRightCorner(units, units).setIdentity();
   Eigen::MatrixXd information = moved_.transpose() * moved_;
   // A coordinate that data and priors say nothing of stays where it is.
   information.diagonal().array() += 1e-12 * std::max(1.0, information.diagonal().maxCoeff());
-  information_.compute(information);
+  information_ = SymmetricFactors(information);
   const auto of_data = moved_.topRows(rows);
   taken_ = information_.solve(of_data.transpose() * of_data).trace();
 

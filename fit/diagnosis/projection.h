@@ -1,9 +1,9 @@
 #pragma once
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <vector>
 
+#include "data/algebra/dense_factors.h"
 #include "fit/diagnosis/model_fit.h"
 
 namespace clothfit {
@@ -36,7 +36,7 @@ class Projection {
  private:
   Eigen::VectorXd root_weight_;
   Eigen::MatrixXd moved_;  ///< sqrt(W) [J E], then the roots of diag(P, I)
-  Eigen::LDLT<Eigen::MatrixXd> information_;
+  SymmetricFactors information_;
   Eigen::VectorXd residual_;
   double taken_ = 0;
 };

@@ -20,7 +20,7 @@ namespace {
 /// Horizons at which terms are scored, as shares of the model's frames: from the shortest on at
 /// which something is missing, for over all frames what is missing biases the model.
 constexpr double kShares[] = {0.3, 0.5, 0.75, 1.0};
-constexpr double kVisible = 1.2;  ///< chi-square per residual there
+constexpr double kVisibleToTerms = 1.2;  ///< chi-square per residual there
 constexpr size_t kHorizons = 2;
 
 /// Terms that are foreseen to explain less than this share of what the best one does are not
@@ -121,7 +121,7 @@ class Pursuit {
       if (law_.cancelled) return {};
       if (!at.usable) continue;
       const bool visible =
-          at.residual().squaredNorm() > kVisible * static_cast<double>(at.residual_count());
+          at.residual().squaredNorm() > kVisibleToTerms * static_cast<double>(at.residual_count());
       if (!visible && list.empty() && share < 1) continue;
       const ModelProjection projection(at, setup_.options.loss);
       std::vector<LawScore> scores = score_laws(at, projection, terms, progress_);

@@ -1,20 +1,20 @@
 #include "fit/diagnosis/residual_force.h"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <map>
 #include <utility>
 
+#include "data/algebra/dense_factors.h"
 #include "fit/parameterised_model.h"
 #include "fit/smoothing_spline.h"
 
 namespace clothfit {
 namespace {
 
-constexpr size_t kFewestFrames = 10;  ///< of a marker
-constexpr size_t kEnds = 2;           ///< frames left out at each of its ends
+constexpr size_t kFewestFramesOfMarker = 10;  ///< of a marker
+constexpr size_t kEnds = 2;                   ///< frames left out at each of its ends
 
 /// A marker in one frame: the residual acceleration, and how the model has it move there.
 struct Sample {
@@ -64,7 +64,7 @@ Eigen::Vector3d take_out_parabola(const std::vector<double>& time_s, Eigen::Matr
   Eigen::MatrixXd powers(count, 3);
   powers << Eigen::VectorXd::Ones(count), t, 0.5 * t.cwiseAbs2();
   const Eigen::MatrixXd coefficients =
-      powers.colPivHouseholderQr().solve(path_m.transpose());  // 3 x coordinates
+      PivotedQr(powers).solve(path_m.transpose());  // 3 x coordinates
   path_m -= (powers * coefficients).transpose();
   return coefficients.row(2).transpose();
 }
@@ -82,7 +82,7 @@ std::vector<Sample> samples_of(const FitProblem& problem, const PooledPart& part
 
   std::vector<Sample> samples;
   for (const auto& [marker, blocks] : of_marker) {
-    if (blocks.size() < kFewestFrames) continue;
+    if (blocks.size() < kFewestFramesOfMarker) continue;
     std::vector<double> time_s, sigma_m;
     Eigen::MatrixXd residual_m(3, static_cast<Eigen::Index>(blocks.size()));
     for (const Objective::Block* block : blocks) {

@@ -1,6 +1,5 @@
 #include "model/equilibrium/equilibrium_derivatives.h"
 
-#include <Eigen/Dense>
 #include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <cassert>

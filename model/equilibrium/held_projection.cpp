@@ -1,9 +1,10 @@
 #include "model/equilibrium/held_projection.h"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+
+#include "data/algebra/dense_factors.h"
 
 namespace clothfit {
 
@@ -24,8 +25,7 @@ HeldProjection::HeldProjection(const Mesh& mesh, const std::vector<HeldVertexWei
       if (weight != 0)
         weights_(h, std::ranges::lower_bound(touched_, vertex) - touched_.begin()) += weight;
   if (held_.empty()) return;
-  lift_ = weights_.transpose() *
-          (weights_ * weights_.transpose()).completeOrthogonalDecomposition().pseudoInverse();
+  lift_ = weights_.transpose() * LeastNormFactors(weights_ * weights_.transpose()).pseudo_inverse();
   projection_ = Eigen::MatrixXd::Identity(touched, touched) - lift_ * weights_;
   // What rounding leaves of a vertex that is held itself.
   projection_ = projection_.unaryExpr([](double p) { return std::abs(p) < 1e-14 ? 0.0 : p; });
@@ -59,8 +59,8 @@ void HeldProjection::place(const Eigen::Matrix3Xd& target_m, MeshField& position
 Eigen::SparseMatrix<double> allowed_motions(const HeldProjection& held, int vertices) {
   Eigen::MatrixXd among_touched(held.touched().size(), 0);
   const Eigen::MatrixXd& weights = held.weights();
-  if (held.count() > 0 && weights.completeOrthogonalDecomposition().rank() < weights.cols())
-    among_touched = weights.fullPivLu().kernel();
+  if (held.count() > 0 && LeastNormFactors(weights).rank() < weights.cols())
+    among_touched = null_space(weights);
   std::vector<Eigen::Triplet<double>> entries;
   int column = 0;
   for (int v = 0; v < vertices; ++v)

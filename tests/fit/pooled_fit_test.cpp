@@ -20,7 +20,7 @@
 namespace clothfit {
 namespace {
 
-SyntheticCloth tiny(unsigned seed) {
+SyntheticCloth tiny_cloth(unsigned seed) {
   return {
       .mesh = 5, .markers = 5, .frames = 20, .held_out_from = 20, .noise_m = 5e-4, .seed = seed};
 }
@@ -55,13 +55,13 @@ constexpr double kInfinite = std::numeric_limits<double>::infinity();
 /// Two recordings of one cloth, one with an uncertain vertical, and the costs that a fit of both
 /// adds up, at a time step of 1 ms.
 struct TwoRecordings {
-  FitProblem first = make_problem(synthetic_input(tiny(1)), {}, 5, 5);
+  FitProblem first = make_problem(synthetic_input(tiny_cloth(1)), {}, 5, 5);
   FitProblem second = make_problem(seen(), {.observations = ObservationKind::tracks2d}, 5, 5);
   std::array<const FitProblem*, 2> problems{&first, &second};
   PooledSpace space{problems};
 
   static FitInput seen() {
-    FitInput input = synthetic_input(tiny(2));
+    FitInput input = synthetic_input(tiny_cloth(2));
     input.cameras[0].camera_from_world->covariance = Eigen::Matrix<double, 6, 6>::Identity() * 9e-6;
     return input;
   }
@@ -161,7 +161,7 @@ TEST(Quadratic, HasTheGradientThatDifferencesOfTheCostShow) {
 // Directions of unit variance are a covariance I + E E': with their amounts eliminated a part's
 // cost is that of generalised least squares, of what is left beside what is expected.
 TEST(Quadratic, CountsDirectionsAsACovariance) {
-  const FitProblem problem = make_problem(synthetic_input(tiny(1)), {}, 5, 5);
+  const FitProblem problem = make_problem(synthetic_input(tiny_cloth(1)), {}, 5, 5);
   ASSERT_TRUE(problem.priors.empty());
   const Eigen::Index rows = TrajectoryObjective(problem, 4, 1e-3).residual_count();
   std::mt19937_64 generator(3);
@@ -200,8 +200,8 @@ TEST(Quadratic, CountsDirectionsAsACovariance) {
 }
 
 TEST(PooledSpace, StepsAsTheWholeSystemOfEquationsSays) {
-  const FitProblem first = make_problem(synthetic_input(tiny(1)), {}, 5, 5);
-  const FitProblem second = make_problem(synthetic_input(tiny(2)), {}, 5, 5);
+  const FitProblem first = make_problem(synthetic_input(tiny_cloth(1)), {}, 5, 5);
+  const FitProblem second = make_problem(synthetic_input(tiny_cloth(2)), {}, 5, 5);
   const FitProblem* const problems[] = {&first, &second};
   const PooledSpace space(problems);
   std::vector<Quadratic> quadratics;
@@ -245,8 +245,8 @@ TEST(PooledSpace, StepsAsTheWholeSystemOfEquationsSays) {
 }
 
 TEST(PooledFit, RecoversTheTruthFromTwoRecordingsWithoutNoise) {
-  FitProblem first = make_problem(synthetic_input(tiny(1)), {}, 5, 5);
-  FitProblem second = make_problem(synthetic_input(tiny(2)), {}, 5, 5);
+  FitProblem first = make_problem(synthetic_input(tiny_cloth(1)), {}, 5, 5);
+  FitProblem second = make_problem(synthetic_input(tiny_cloth(2)), {}, 5, 5);
   make_exact(first, 1);
   make_exact(second, 2);
   const FitProblem* const problems[] = {&first, &second};
@@ -269,7 +269,7 @@ TEST(PooledFit, RecoversTheTruthFromTwoRecordingsWithoutNoise) {
 }
 
 TEST(PooledFit, EndsAfterTheWorkThatItIsAllowed) {
-  FitProblem problem = make_problem(synthetic_input(tiny(1)), {}, 5, 5);
+  FitProblem problem = make_problem(synthetic_input(tiny_cloth(1)), {}, 5, 5);
   make_exact(problem, 1);
   const FitProblem* const problems[] = {&problem};
   std::map<std::string, double> start = truth();
@@ -287,7 +287,7 @@ TEST(PooledFit, EndsAfterTheWorkThatItIsAllowed) {
 }
 
 TEST(PooledFit, OfTheRecordingsOwnAloneLeavesThePhysicsWhereItIs) {
-  FitProblem problem = make_problem(synthetic_input(tiny(1)), {}, 5, 5);
+  FitProblem problem = make_problem(synthetic_input(tiny_cloth(1)), {}, 5, 5);
   make_exact(problem, 1);
   ASSERT_FALSE(problem.sheet_motion.empty());
   const FitProblem* const problems[] = {&problem};
@@ -305,7 +305,7 @@ TEST(PooledFit, OfTheRecordingsOwnAloneLeavesThePhysicsWhereItIs) {
 }
 
 TEST(PooledFit, GoesRoughlyTheWholeWayWithTheDerivativesThatItBeginsWith) {
-  FitProblem problem = make_problem(synthetic_input(tiny(1)), {}, 5, 5);
+  FitProblem problem = make_problem(synthetic_input(tiny_cloth(1)), {}, 5, 5);
   make_exact(problem, 1);
   const FitProblem* const problems[] = {&problem};
   PooledPart part;
@@ -324,8 +324,8 @@ TEST(PooledFit, GoesRoughlyTheWholeWayWithTheDerivativesThatItBeginsWith) {
 }
 
 TEST(PooledFit, LiesBetweenTheFitsOfItsRecordingsAlone) {
-  const FitProblem first = make_problem(synthetic_input(tiny(3)), {}, 5, 5);
-  const FitProblem second = make_problem(synthetic_input(tiny(4)), {}, 5, 5);
+  const FitProblem first = make_problem(synthetic_input(tiny_cloth(3)), {}, 5, 5);
+  const FitProblem second = make_problem(synthetic_input(tiny_cloth(4)), {}, 5, 5);
   const FitProblem* const both[] = {&first, &second};
 
   const PooledFit pooled = fit_pooled(both, truth(), {}, {});
@@ -342,8 +342,9 @@ TEST(PooledFit, LiesBetweenTheFitsOfItsRecordingsAlone) {
 }
 
 TEST(PooledFit, RefusesRecordingsOfDifferentPhysics) {
-  const FitProblem plain = make_problem(synthetic_input(tiny(1)), {}, 5, 5);
-  const FitProblem windy = make_problem(synthetic_input(tiny(1)), {.effects = {"wind"}}, 5, 5);
+  const FitProblem plain = make_problem(synthetic_input(tiny_cloth(1)), {}, 5, 5);
+  const FitProblem windy =
+      make_problem(synthetic_input(tiny_cloth(1)), {.effects = {"wind"}}, 5, 5);
   const FitProblem* const problems[] = {&plain, &windy};
   const FitProblem* const turned[] = {&windy, &plain};
 

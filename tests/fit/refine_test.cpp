@@ -14,13 +14,13 @@ namespace clothfit {
 namespace {
 
 /// A 5 x 5 cloth over 20 frames: a fit of it takes a fraction of a second.
-SyntheticCloth tiny(unsigned seed) {
+SyntheticCloth tiny_swing(unsigned seed) {
   return {
       .mesh = 5, .markers = 5, .frames = 20, .held_out_from = 20, .noise_m = 5e-4, .seed = seed};
 }
 
 FitProblem tiny_problem(unsigned seed, const FitOptions& options = {}) {
-  return make_problem(synthetic_input(tiny(seed)), options, 5, 5);
+  return make_problem(synthetic_input(tiny_swing(seed)), options, 5, 5);
 }
 
 Eigen::VectorXd truth_of(const FitProblem& problem) {
@@ -146,7 +146,7 @@ TEST(Uncertainty, ForeseesWhatALongTimeStepDoesToTheParameters) {
 }
 
 TEST(Refine, GrossOutliersHardlyPull) {
-  FitInput input = synthetic_input(tiny(2));
+  FitInput input = synthetic_input(tiny_swing(2));
   std::mt19937_64 generator(9);
   std::uniform_real_distribution<double> uniform(-0.1, 0.1);
   for (size_t n = 40; n < input.tracks3d.size(); n += 20)  // 5 %, up to 10 cm off; not in frame 0
@@ -163,7 +163,7 @@ TEST(Refine, GrossOutliersHardlyPull) {
 
 TEST(Refine, PriorHoldsWhatTheDataLeaveOpen) {
   // Given pixels of a camera whose pose is uncertain, and a start with gravity turned by 5 mrad
-  FitInput input = synthetic_input(tiny(3));
+  FitInput input = synthetic_input(tiny_swing(3));
   input.cameras[0].camera_from_world->covariance = Eigen::Matrix<double, 6, 6>::Identity() * 9e-6;
   const FitProblem problem = make_problem(input, {.observations = ObservationKind::tracks2d}, 5, 5);
   const int tilt_a = problem.space.index("world_tilt_a");

@@ -13,7 +13,7 @@
 namespace clothfit {
 namespace {
 
-using Nearest = Obstacle::Nearest;
+using NearestPoint = Obstacle::Nearest;
 
 /// The unit cube, its corners given once for each of its twelve triangles.
 TriangleMesh cube() {
@@ -53,7 +53,7 @@ TEST(Obstacle, OfACubeIsItsNearestFaceForWhatIsInsideAndNothingOutside) {
     if (!nearest) continue;
     ++inside;
     EXPECT_NEAR((nearest->place_m - point).norm(), depth, 1e-15);
-    EXPECT_EQ(nearest->kind, Nearest::face);
+    EXPECT_EQ(nearest->kind, NearestPoint::face);
     EXPECT_NEAR(nearest->direction.dot(nearest->place_m - point), depth, 1e-15);
   }
   EXPECT_GT(inside, 50);
@@ -95,9 +95,9 @@ TEST(Obstacle, IsFoundByTheTreeAsByTryingEveryTriangle) {
     EXPECT_NEAR((nearest->place_m - point).norm(), least, 1e-14);
     ++kinds[nearest->kind];
   }
-  EXPECT_GT(kinds[Nearest::face], 10);
-  EXPECT_GT(kinds[Nearest::edge], 10);
-  EXPECT_GT(kinds[Nearest::corner], 10);
+  EXPECT_GT(kinds[NearestPoint::face], 10);
+  EXPECT_GT(kinds[NearestPoint::edge], 10);
+  EXPECT_GT(kinds[NearestPoint::corner], 10);
 }
 
 TEST(Obstacle, AnOpenSurfaceEndsAtItsBorder) {

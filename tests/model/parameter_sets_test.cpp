@@ -14,7 +14,7 @@
 namespace clothfit {
 namespace {
 
-const Mesh kMesh{.columns = 7, .rows = 9, .width_m = 0.3, .height_m = 0.5};
+const Mesh kSevenByNine{.columns = 7, .rows = 9, .width_m = 0.3, .height_m = 0.5};
 
 Louchet5 random_louchet5(Uniform& uniform) {
   return {.natural_length_01_m = uniform(0.01, 0.05),
@@ -208,7 +208,8 @@ TEST(FabricConversion, ComesBackFromItsSprings) {
     Uniform uniform(seed);
     const Fabric fabric = random_fabric(uniform);
 
-    const Nearest<Fabric> nearest = nearest_fabric(spring_parameters(fabric, kMesh), kMesh);
+    const Nearest<Fabric> nearest =
+        nearest_fabric(spring_parameters(fabric, kSevenByNine), kSevenByNine);
 
     ASSERT_TRUE(nearest.usable()) << nearest.reason;
     EXPECT_LT((to_vector(nearest.set) - to_vector(fabric)).cwiseAbs().maxCoeff(), 1e-12);
@@ -222,11 +223,11 @@ TEST(FabricConversion, IsTheNearestThereIs) {
   Uniform uniform(8);
   SpringParameters springs = random_springs(uniform);
   springs.critical_elongation = SpringParameters::kNoLimit;
-  const Nearest<Fabric> nearest = nearest_fabric(springs, kMesh);
+  const Nearest<Fabric> nearest = nearest_fabric(springs, kSevenByNine);
   ASSERT_TRUE(nearest.usable());
   // In stiffnesses first, then in dampings.
   const auto squares = [&](const FabricVector& numbers, SpringBlock block) {
-    return (to_vector(spring_parameters(fabric_of(numbers), kMesh)) - to_vector(springs))
+    return (to_vector(spring_parameters(fabric_of(numbers), kSevenByNine)) - to_vector(springs))
         .segment<6>(block)
         .squaredNorm();
   };
@@ -245,19 +246,19 @@ TEST(FabricConversion, IsTheNearestThereIs) {
 
 TEST(FabricConversion, SaysWhatItCannot) {
   Uniform uniform(9);
-  SpringParameters springs = spring_parameters(random_fabric(uniform), kMesh);
+  SpringParameters springs = spring_parameters(random_fabric(uniform), kSevenByNine);
   springs.natural_length_m[flexion_t] *= 1.1;
-  EXPECT_NEAR(nearest_fabric(springs, kMesh).natural_length_m,
-              0.1 * flat_lengths(kMesh)[flexion_t] / std::sqrt(6), 1e-15);
+  EXPECT_NEAR(nearest_fabric(springs, kSevenByNine).natural_length_m,
+              0.1 * flat_lengths(kSevenByNine)[flexion_t] / std::sqrt(6), 1e-15);
 
   springs.stiffness_n_per_m.fill(0);
   springs.damping_ns_per_m.fill(0.1);
-  EXPECT_THAT(nearest_fabric(springs, kMesh).reason, testing::HasSubstr("no stiffness"));
+  EXPECT_THAT(nearest_fabric(springs, kSevenByNine).reason, testing::HasSubstr("no stiffness"));
 
   springs.stiffness_n_per_m.fill(10);
   springs.damping_ns_per_m = {0, 0.1, 0, 0, 0, 0.1};
   springs.damping_ns_per_m[shear_down] = springs.damping_ns_per_m[shear_up] = -0.05;
-  EXPECT_THAT(nearest_fabric(springs, kMesh).reason, testing::HasSubstr("below 0"));
+  EXPECT_THAT(nearest_fabric(springs, kSevenByNine).reason, testing::HasSubstr("below 0"));
 }
 
 TEST(FabricConversion, HasTheDerivativesOfBothWays) {
@@ -267,11 +268,11 @@ TEST(FabricConversion, HasTheDerivativesOfBothWays) {
     const Fabric fabric = random_fabric(uniform);
     const SpringParameters springs = random_springs(uniform);
     const auto springs_at = [](const Eigen::VectorXd& numbers) -> Eigen::VectorXd {
-      const SpringParameters at = spring_parameters(fabric_of(numbers), kMesh);
+      const SpringParameters at = spring_parameters(fabric_of(numbers), kSevenByNine);
       return to_vector(at).head<elongation_block>();
     };
     const auto fabric_at = [](const Eigen::VectorXd& numbers) -> Eigen::VectorXd {
-      return to_vector(nearest_fabric(springs_of(numbers), kMesh).set);
+      return to_vector(nearest_fabric(springs_of(numbers), kSevenByNine).set);
     };
 
     EXPECT_LT(error(springs_by_fabric(fabric).topRows<elongation_block>(),
@@ -283,7 +284,7 @@ TEST(FabricConversion, HasTheDerivativesOfBothWays) {
     EXPECT_LT(error(derivative.topRows<5>(), difference.topRows<5>()), 1e-8);
     EXPECT_LT(error(derivative.bottomRows<2>(), difference.bottomRows<2>()), 1e-6);
     // There and back is the same fabric.
-    const SpringParameters own = spring_parameters(fabric, kMesh);
+    const SpringParameters own = spring_parameters(fabric, kSevenByNine);
     EXPECT_LT((fabric_by_springs(own) * springs_by_fabric(fabric) -
                Eigen::Matrix<double, 7, 7>::Identity())
                   .norm(),
@@ -297,7 +298,7 @@ TEST(FabricConversion, CatchesAWrongDerivative) {
   Eigen::MatrixXd wrong = fabric_by_springs(springs);
   wrong(5, stiffness_block) *= 1.001;
   const auto fabric_at = [](const Eigen::VectorXd& numbers) -> Eigen::VectorXd {
-    return to_vector(nearest_fabric(springs_of(numbers), kMesh).set);
+    return to_vector(nearest_fabric(springs_of(numbers), kSevenByNine).set);
   };
 
   const Eigen::MatrixXd difference = differences(fabric_at, to_vector(springs));
@@ -308,7 +309,7 @@ TEST(Springs, ThatCannotBeAreRefused) {
   Uniform uniform(1);
   const SpringParameters good = random_springs(uniform);
   EXPECT_NO_THROW(require_possible(good, "test"));
-  EXPECT_NO_THROW(require_possible(spring_parameters(cotton(), kMesh), "test"));
+  EXPECT_NO_THROW(require_possible(spring_parameters(cotton(), kSevenByNine), "test"));
   const auto refusal = [&](int number, double value) {
     SpringVector numbers = to_vector(good);
     numbers[number] = value;

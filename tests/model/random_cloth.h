@@ -34,6 +34,8 @@ inline Mesh square_mesh(int vertices_per_side) {
   return {.columns = vertices_per_side, .rows = vertices_per_side, .width_m = 0.4, .height_m = 0.4};
 }
 
+inline constexpr double kSquareClothDensity_kg_per_m2 = 0.025 / 0.16;
+
 inline Cloth square_cloth(int vertices_per_side) {
   const Mesh mesh = square_mesh(vertices_per_side);
   return Cloth::of(mesh, masses_by_area(mesh, 0.025));

@@ -339,13 +339,13 @@ INSTANTIATE_TEST_SUITE_P(InstructionSets, StrainLimitOn, testing::ValuesIn(instr
 
 /// Largest elongation beyond 10 % while a soft cloth, let go flat, falls into its two held corners
 /// for half a second; and how many springs the limit had to shorten in the last step.
-struct Swing {
+struct LimitedSwing {
   double largest_excess = -1;
   double too_long = 0;
   bool met = true;
 };
 
-Swing swing(StrainLimitMode mode) {
+LimitedSwing swing(StrainLimitMode mode) {
   Cloth cloth = square_cloth(9);
   cloth.held = {held_at(cloth.mesh, 0, 0), held_at(cloth.mesh, 0.4, 0)};
   cloth.strain_limit = {.mode = mode, .tolerance = 1e-3, .most_sweeps = 1000};
@@ -355,7 +355,7 @@ Swing swing(StrainLimitMode mode) {
                    .start_position_m = flat_positions(cloth.mesh)};
   set.springs.critical_elongation.fill(0.1);
   SteppedCloth<> run(cloth, set, at_rest(set.start_position_m));
-  Swing result;
+  LimitedSwing result;
   for (int n = 0; n < 1000; ++n) {
     run.step(5e-4);
     result.met = result.met && run.limit_outcome().unmet[0] == 0;
@@ -367,9 +367,9 @@ Swing swing(StrainLimitMode mode) {
 }
 
 TEST(StrainLimit, HoldsTheWholeClothInTheConsistentMode) {
-  const Swing free = swing(StrainLimitMode::off);
-  const Swing paper = swing(StrainLimitMode::positions);
-  const Swing consistent = swing(StrainLimitMode::consistent);
+  const LimitedSwing free = swing(StrainLimitMode::off);
+  const LimitedSwing paper = swing(StrainLimitMode::positions);
+  const LimitedSwing consistent = swing(StrainLimitMode::consistent);
 
   EXPECT_GT(free.largest_excess, 0.3);
   EXPECT_TRUE(consistent.met);

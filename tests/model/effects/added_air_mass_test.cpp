@@ -9,8 +9,6 @@
 namespace clothfit {
 namespace {
 
-constexpr double kArealDensity_kg_per_m2 = 0.025 / 0.16;  // square_cloth's
-
 ClothWithEffect in_air(double mu_kg_per_m2, const Eigen::Matrix3d& attitude) {
   const Cloth bare = square_cloth(5);
   return {bare, "added_air_mass", {mu_kg_per_m2}, attitude * flat_positions(bare.mesh)};
@@ -22,7 +20,8 @@ TEST(AddedAirMass, KeepsTheContractOfEffects) {
 
 TEST(AddedAirMass, SlowsASheetThatFallsFlatAndNoneThatFallsEdgeOn) {
   const double mu = 0.1, h = 1e-3;
-  const double slowed = -9.81 * kArealDensity_kg_per_m2 / (kArealDensity_kg_per_m2 + mu);
+  const double slowed =
+      -9.81 * kSquareClothDensity_kg_per_m2 / (kSquareClothDensity_kg_per_m2 + mu);
 
   const auto flat = in_air(mu, lying()).after(400, h);
   const auto edge_on = in_air(mu, upright()).after(400, h);
@@ -41,7 +40,8 @@ TEST(AddedAirMass, MakesATiltedSheetGlide) {
   const double mu = 0.1;
   const Eigen::Matrix3d tilt = Eigen::AngleAxisd(0.5, Eigen::Vector3d::UnitY()).toRotationMatrix();
   const Eigen::Vector3d n = tilt.col(2), g(0, 0, -9.81);
-  const Eigen::Vector3d expected = 0.2 * (g - mu / (kArealDensity_kg_per_m2 + mu) * n.dot(g) * n);
+  const Eigen::Vector3d expected =
+      0.2 * (g - mu / (kSquareClothDensity_kg_per_m2 + mu) * n.dot(g) * n);
 
   const auto state = in_air(mu, tilt).after(200, 1e-3);
 
@@ -80,7 +80,7 @@ TEST(AddedAirMass, DividesAForceAlongTheNormalByBothMasses) {
 
   const auto state = sheet.after(100, 1e-3);
 
-  const double expected = 0.1 * 0.8 / (kArealDensity_kg_per_m2 + mu);
+  const double expected = 0.1 * 0.8 / (kSquareClothDensity_kg_per_m2 + mu);
   EXPECT_LT(
       (state.velocity_m_per_s.colwise() - Eigen::Vector3d(0, 0, expected)).cwiseAbs().maxCoeff(),
       1e-12);

@@ -12,8 +12,6 @@
 namespace clothfit {
 namespace {
 
-constexpr double kArealDensity_kg_per_m2 = 0.025 / 0.16;  // square_cloth's
-
 std::vector<double> coefficients(const std::map<std::string, double>& named) {
   std::vector<double> values;
   for (const EffectParameter& parameter : force_law::describe().parameters) {
@@ -95,7 +93,7 @@ TEST(ForceLaw, OfTheSquaredVelocityInTheSurfaceIsQuadraticDragOnAFlatSheet) {
   const double c_t = 0.4;
 
   const Eigen::Matrix3Xd force =
-      cloth.force_n({{"tangential_drag_squared", c_t / (2 * kArealDensity_kg_per_m2)}});
+      cloth.force_n({{"tangential_drag_squared", c_t / (2 * kSquareClothDensity_kg_per_m2)}});
 
   const Eigen::Matrix3Xd expected = cloth.force_n("quadratic_drag", {0, c_t});
   EXPECT_LT((force - expected).norm(), 1e-13 * expected.norm());
@@ -132,8 +130,8 @@ TEST(ForceLaw, OverTheClothAndWithTheHeightRunsInStraightLines) {
       const double mass = cloth.bare.mass_kg[k];
       EXPECT_LT((by_t.col(k) + mass * 0.5 * (2 * t - 1) * cloth.velocity_m_per_s.col(k)).norm(),
                 1e-15);
-      EXPECT_NEAR(by_s.col(k).norm(), mass / kArealDensity_kg_per_m2 * 0.5 * std::abs(2 * s - 1),
-                  1e-15);
+      EXPECT_NEAR(by_s.col(k).norm(),
+                  mass / kSquareClothDensity_kg_per_m2 * 0.5 * std::abs(2 * s - 1), 1e-15);
       EXPECT_NEAR(by_height(0, k), mass * 2 * ((1 - t) * height_at_top + t * height_at_bottom),
                   1e-15);
     }

@@ -12,8 +12,6 @@
 namespace clothfit {
 namespace {
 
-constexpr double kArealDensity_kg_per_m2 = 0.025 / 0.16;  // square_cloth's
-
 double harmonic(double frequency_hz, double phase_turns, double time_s) {
   return std::sin(2 * std::numbers::pi * (frequency_hz * time_s + phase_turns));
 }
@@ -36,7 +34,7 @@ TEST(Gust, PushesAFlatSheetToAndFroAlongItsNormal) {
   double expected = 0;
   free.after(900, h, [&](int step, const ClothWithEffect::State& state) {
     // Every vertex has the same area per mass: V += h (n . q) sin / sigma n.
-    expected += h * n.dot(q) * harmonic(f, phase, (step - 1) * h) / kArealDensity_kg_per_m2;
+    expected += h * n.dot(q) * harmonic(f, phase, (step - 1) * h) / kSquareClothDensity_kg_per_m2;
     EXPECT_LT((state.velocity_m_per_s.colwise() - expected * n).cwiseAbs().maxCoeff(), 1e-12)
         << step;
   });

@@ -11,7 +11,7 @@
 namespace clothfit {
 namespace {
 
-constexpr double kStiffness_n_per_m = 40;
+constexpr double kUniform_n_per_m = 40;
 
 struct Pattern {
   double patch = 0, patch_s = 0.5, patch_t = 0.5, patch_radius = 0.3, edge = 0, edge_width = 0.15,
@@ -24,11 +24,11 @@ struct Pattern {
 /// Elongation (m) of a ribbon of `rows` rows under the tension of 1 N in each column: the sum over
 /// its springs, whose stiffness is read off the effect's tension at a common elongation.
 double stretch_m(const Pattern& pattern, int rows) {
-  DrivenRibbon ribbon(rows, kStiffness_n_per_m, "nonuniform_stiffness", pattern.values());
+  DrivenRibbon ribbon(rows, kUniform_n_per_m, "nonuniform_stiffness", pattern.values());
   const Eigen::VectorXd e = Eigen::VectorXd::Constant(rows - 1, 0.01);
   const Eigen::VectorXd extra_n = ribbon.tensions_n(e, 0 * e, 1e-3);
   const Eigen::VectorXd k =
-      kStiffness_n_per_m + (extra_n / (0.01 * ribbon.natural_length_m())).array();
+      kUniform_n_per_m + (extra_n / (0.01 * ribbon.natural_length_m())).array();
   return k.cwiseInverse().sum() / (rows - 1);  // per spring of the whole cloth: mesh-free
 }
 
@@ -39,7 +39,7 @@ TEST(NonuniformStiffness, KeepsTheContractOfEffects) {
 TEST(NonuniformStiffness, AStripWithAGradientStretchesByTheIntegralOfItsCompliance) {
   // integral over t in (0, 1) of 1 / (k (1 + g (2 t - 1))) = log((1 + g) / (1 - g)) / (2 g k).
   const double g = 0.6;
-  const double exact = std::log((1 + g) / (1 - g)) / (2 * g) / kStiffness_n_per_m;
+  const double exact = std::log((1 + g) / (1 - g)) / (2 * g) / kUniform_n_per_m;
 
   double coarser = 0;
   for (const int rows : {9, 17, 33, 65}) {
@@ -53,18 +53,18 @@ TEST(NonuniformStiffness, AStripWithAGradientStretchesByTheIntegralOfItsComplian
 }
 
 TEST(NonuniformStiffness, SpringsInSeriesAreSofterThanTheirMean) {
-  EXPECT_DOUBLE_EQ(stretch_m({}, 9), 1 / kStiffness_n_per_m);
-  EXPECT_GT(stretch_m({.gradient_t = 0.6}, 33), 1.1 / kStiffness_n_per_m);
+  EXPECT_DOUBLE_EQ(stretch_m({}, 9), 1 / kUniform_n_per_m);
+  EXPECT_GT(stretch_m({.gradient_t = 0.6}, 33), 1.1 / kUniform_n_per_m);
 }
 
 TEST(NonuniformStiffness, APatchIsFullInItsCentreAndNothingOutside) {
   // Where the ribbon's first column passes through the patch's centre, at t = 0.5.
-  DrivenRibbon ribbon(22, kStiffness_n_per_m, "nonuniform_stiffness",
+  DrivenRibbon ribbon(22, kUniform_n_per_m, "nonuniform_stiffness",
                       Pattern{.patch = 2, .patch_s = 0, .patch_radius = 0.25}.values());
   const Eigen::VectorXd e = Eigen::VectorXd::Constant(21, 0.01);
 
   const Eigen::VectorXd share =
-      ribbon.tensions_n(e, 0 * e, 1e-3) / (kStiffness_n_per_m * 0.01 * ribbon.natural_length_m());
+      ribbon.tensions_n(e, 0 * e, 1e-3) / (kUniform_n_per_m * 0.01 * ribbon.natural_length_m());
 
   for (int i = 0; i < 21; ++i) {
     const double from = std::abs((i + 0.5) / 21 - 0.5) / 0.25;

@@ -11,8 +11,6 @@
 namespace clothfit {
 namespace {
 
-constexpr double kArealDensity_kg_per_m2 = 0.025 / 0.16;  // square_cloth's
-
 ClothWithEffect falling(int vertices_per_side, double c_n, double c_t,
                         const Eigen::Matrix3d& attitude) {
   const Cloth bare = square_cloth(vertices_per_side);
@@ -26,7 +24,7 @@ TEST(QuadraticDrag, KeepsTheContractOfEffects) {
 TEST(QuadraticDrag, AFallingSheetComesToTheSpeedAtWhichDragCarriesIt) {
   // c v^2 A / 2 = m g, lying flat by normal drag, edge-on by tangential drag, on any mesh.
   const double c = 1.2;
-  const Eigen::Vector3d expected(0, 0, -std::sqrt(2 * 9.81 * kArealDensity_kg_per_m2 / c));
+  const Eigen::Vector3d expected(0, 0, -std::sqrt(2 * 9.81 * kSquareClothDensity_kg_per_m2 / c));
   for (const int vertices : {2, 5}) {
     SCOPED_TRACE(vertices);
 

@@ -11,7 +11,7 @@
 namespace clothfit {
 namespace {
 
-constexpr double kStiffness_n_per_m = 40, kRatio = 0.7, kTime_s = 0.05, kElongation = 0.03;
+constexpr double kAtOnce_n_per_m = 40, kRatio = 0.7, kTime_s = 0.05, kElongation = 0.03;
 
 TEST(Relaxation, KeepsTheContractOfEffects) {
   expect_effect_contract("relaxation", {.isotropic = true, .proportional = true, .internal = true});
@@ -19,10 +19,10 @@ TEST(Relaxation, KeepsTheContractOfEffects) {
 
 /// The share of the arm's tension that is left of a sudden elongation after `steps` steps.
 double left_after(double time_step_s, int steps) {
-  DrivenRibbon ribbon(2, kStiffness_n_per_m, "relaxation", {kRatio, kTime_s});
+  DrivenRibbon ribbon(2, kAtOnce_n_per_m, "relaxation", {kRatio, kTime_s});
   double tension_n = 0;
   for (int n = 0; n < steps; ++n) tension_n = ribbon.tension_n(kElongation, 0, time_step_s);
-  return tension_n / (kRatio * kStiffness_n_per_m * ribbon.natural_length_m() * kElongation);
+  return tension_n / (kRatio * kAtOnce_n_per_m * ribbon.natural_length_m() * kElongation);
 }
 
 TEST(Relaxation, TheArmsStressFallsAsTheSchemeHasIt) {
@@ -47,9 +47,9 @@ TEST(Relaxation, TheArmsStressFallsExponentiallyInTheLimitOfSmallSteps) {
 }
 
 TEST(Relaxation, IsASpringForFastMotionsAndNothingForSlowOnes) {
-  DrivenRibbon fast(2, kStiffness_n_per_m, "relaxation", {kRatio, 10.0}),
-      slow(2, kStiffness_n_per_m, "relaxation", {kRatio, 0.005});
-  const double full_n = kRatio * kStiffness_n_per_m * fast.natural_length_m() * kElongation;
+  DrivenRibbon fast(2, kAtOnce_n_per_m, "relaxation", {kRatio, 10.0}),
+      slow(2, kAtOnce_n_per_m, "relaxation", {kRatio, 0.005});
+  const double full_n = kRatio * kAtOnce_n_per_m * fast.natural_length_m() * kElongation;
 
   double fast_n = 0, slow_n = 0;
   for (int n = 1; n <= 1000; ++n) {  // stretched within 1 s
@@ -64,7 +64,7 @@ TEST(Relaxation, IsASpringForFastMotionsAndNothingForSlowOnes) {
 TEST(Relaxation, AnOscillatorLosesMostAtTheArmsOwnFrequency) {
   // A standard linear solid: the loss is largest where frequency times time is about 1.
   using Rig = SpringOscillator;
-  const double period_time_s = std::sqrt(Rig::kMass_kg / Rig::kStiffness_n_per_m);
+  const double period_time_s = std::sqrt(Rig::kMass_kg / Rig::kAtOnce_n_per_m);
   const auto left = [&](double time_s) {
     const std::vector<double> x = Rig("relaxation", {0.1, time_s}, 0.02).extensions_m(5e-5, 20000);
     double largest = 0;

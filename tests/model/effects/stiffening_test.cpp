@@ -11,12 +11,12 @@
 namespace clothfit {
 namespace {
 
-constexpr double kStiffness_n_per_m = 40, kLength_m = 0.4, kStrain = 0.02;
+constexpr double kSoft_n_per_m = 40, kLength_m = 0.4, kStrain = 0.02;
 
 double tension_n(double stretched, double compressed, double elongation) {
-  DrivenRibbon ribbon(2, kStiffness_n_per_m, "stiffening", {stretched, compressed, kStrain});
+  DrivenRibbon ribbon(2, kSoft_n_per_m, "stiffening", {stretched, compressed, kStrain});
   return ribbon.tension_n(elongation, 0, 1e-3) +
-         kStiffness_n_per_m * kLength_m * elongation;  // with the spring's own
+         kSoft_n_per_m * kLength_m * elongation;  // with the spring's own
 }
 
 TEST(Stiffening, KeepsTheContractOfEffects) {
@@ -25,8 +25,8 @@ TEST(Stiffening, KeepsTheContractOfEffects) {
 
 TEST(Stiffening, StiffnessIsTheSpringsOwnAtNoElongationOnBothSides) {
   for (const double e : {1e-7, -1e-7}) {
-    EXPECT_NEAR(tension_n(3, 0.8, e) / e, kStiffness_n_per_m * kLength_m,
-                1e-4 * kStiffness_n_per_m)
+    EXPECT_NEAR(tension_n(3, 0.8, e) / e, kSoft_n_per_m * kLength_m,
+                1e-4 * kSoft_n_per_m)
         << e;  // 3 e / strain of it
   }
 }
@@ -34,7 +34,7 @@ TEST(Stiffening, StiffnessIsTheSpringsOwnAtNoElongationOnBothSides) {
 TEST(Stiffening, FarStretchedOrCompressedItsStiffnessIsTheOneThatTheParametersName) {
   const auto slope = [](double at) {
     return (tension_n(3, 0.8, at + 1e-4) - tension_n(3, 0.8, at - 1e-4)) / 2e-4 /
-           (kStiffness_n_per_m * kLength_m);
+           (kSoft_n_per_m * kLength_m);
   };
   // The slope lacks (strain / (|e| + strain))^2 of the change: 0.04 % at |e| = 0.98.
   EXPECT_NEAR(slope(0.98), 1 + 3, 3 * 1e-3);
@@ -44,7 +44,7 @@ TEST(Stiffening, FarStretchedOrCompressedItsStiffnessIsTheOneThatTheParametersNa
 TEST(Stiffening, AHangingLoadStretchesTheSpringByTheRootOfAQuadratic) {
   // T = k l0 (e + b e^2 / (e + c)):  (1 + b) e^2 + (c - f) e - f c = 0 with f = T / (k l0).
   const double b = 4, load_n = 0.9;
-  const double f = load_n / (kStiffness_n_per_m * kLength_m), q = kStrain - f;
+  const double f = load_n / (kSoft_n_per_m * kLength_m), q = kStrain - f;
   const double expected = (-q + std::sqrt(q * q + 4 * (1 + b) * f * kStrain)) / (2 * (1 + b));
   // The masses of the oscillator, loaded by gravity along t and braked until they rest.
   const Mesh mesh{.columns = 2, .rows = 2, .width_m = 0.1, .height_m = kLength_m};
@@ -52,7 +52,7 @@ TEST(Stiffening, AHangingLoadStretchesTheSpringByTheRootOfAQuadratic) {
   cloth.held = {held_at(mesh, 0, 0), held_at(mesh, 0.1, 0)};
   cloth.add_effect("stiffening", "test");
   cloth.add_effect("viscous_damping", "test");
-  const ParameterSet set{.springs = warp_springs(mesh, kStiffness_n_per_m),
+  const ParameterSet set{.springs = warp_springs(mesh, kSoft_n_per_m),
                          .gravity_m_per_s2 = {0, load_n / 0.01, 0},
                          .effects = {{b, 0, kStrain}, {30}},
                          .start_position_m = flat_positions(mesh)};

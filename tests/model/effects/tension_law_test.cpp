@@ -12,13 +12,13 @@
 namespace clothfit {
 namespace {
 
-constexpr double kStiffness_n_per_m = 40, kLength_m = 0.4;  // of the ribbon, along the warp
-constexpr double kScale_n = kStiffness_n_per_m * kLength_m;
+constexpr double kLinear_n_per_m = 40, kLength_m = 0.4;  // of the ribbon, along the warp
+constexpr double kScale_n = kLinear_n_per_m * kLength_m;
 
 /// With the warp's coefficients.
 double tension_n(double stretched, double compressed, double rate_squared_s2, double elongation,
                  double rate_per_s) {
-  DrivenRibbon ribbon(2, kStiffness_n_per_m, "tension_law",
+  DrivenRibbon ribbon(2, kLinear_n_per_m, "tension_law",
                       {stretched, 0, 0, compressed, 0, 0, rate_squared_s2, 0, 0});
   return ribbon.tension_n(elongation, rate_per_s, 1e-3);
 }
@@ -66,7 +66,7 @@ TEST(TensionLaw, ActsOnItsOwnSpringsOnly) {
   for (size_t k = 0; k < 9; ++k) {
     std::vector<double> one(9, 0);
     one[k] = tension_law::describe().parameters[k].typical;
-    DrivenRibbon ribbon(2, kStiffness_n_per_m, "tension_law", one);
+    DrivenRibbon ribbon(2, kLinear_n_per_m, "tension_law", one);
     EXPECT_EQ(ribbon.tension_n(k == 3 ? -0.05 : 0.05, 1, 1e-3) != 0, k % 3 == 0)
         << tension_law::describe().parameters[k].name;
   }

@@ -10,18 +10,19 @@
 namespace clothfit {
 namespace {
 
-const Mesh kMesh = square_mesh(6);
+const Mesh kSixBySix = square_mesh(6);
 
 /// A vertex, a point inside a cell, and one on an edge of the same cell.
 std::vector<HeldVertexWeights> points() {
-  return {held_at(kMesh, 0, 0), held_at(kMesh, 0.19, 0.23), held_at(kMesh, 0.16, 0.2)};
+  return {held_at(kSixBySix, 0, 0), held_at(kSixBySix, 0.19, 0.23), held_at(kSixBySix, 0.16, 0.2)};
 }
 
 TEST(HeldProjection, PlacesAllPointsAtOnceByTheSmallestMove) {
   SCOPED_TRACE("seed 1");
   Uniform uniform(1);
-  const HeldProjection held(kMesh, points());
-  const MeshField before = MeshField::of(FieldLayout::of(kMesh), crumpled(kMesh, 0.3, uniform));
+  const HeldProjection held(kSixBySix, points());
+  const MeshField before =
+      MeshField::of(FieldLayout::of(kSixBySix), crumpled(kSixBySix, 0.3, uniform));
   const Eigen::Matrix3Xd target_m = uniform.vectors(3, 1);
 
   MeshField after = before;
@@ -39,9 +40,9 @@ TEST(HeldProjection, PlacesAllPointsAtOnceByTheSmallestMove) {
 TEST(HeldProjection, LeavesOnlyMovesThatHoldThePoints) {
   SCOPED_TRACE("seed 2");
   Uniform uniform(2);
-  const HeldProjection held(kMesh, points());
+  const HeldProjection held(kSixBySix, points());
   const MeshField field =
-      MeshField::of(FieldLayout::of(kMesh), uniform.vectors(kMesh.vertex_count(), 1));
+      MeshField::of(FieldLayout::of(kSixBySix), uniform.vectors(kSixBySix.vertex_count(), 1));
 
   MeshField once = field;
   held.project(once);
@@ -57,8 +58,8 @@ TEST(HeldProjection, LeavesOnlyMovesThatHoldThePoints) {
 }
 
 TEST(HeldProjection, LetsTwoPointsShareAPlace) {
-  const HeldProjection held(kMesh, {held_at(kMesh, 0, 0), held_at(kMesh, 0, 0)});
-  MeshField field(FieldLayout::of(kMesh));
+  const HeldProjection held(kSixBySix, {held_at(kSixBySix, 0, 0), held_at(kSixBySix, 0, 0)});
+  MeshField field(FieldLayout::of(kSixBySix));
 
   held.place(Eigen::Matrix3Xd::Ones(3, 2), field);
 

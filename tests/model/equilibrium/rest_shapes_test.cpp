@@ -15,7 +15,7 @@
 namespace clothfit {
 namespace {
 
-Cloth hung_cloth(int vertices_per_side, int corners) {
+Cloth cloth_hung_by(int vertices_per_side, int corners) {
   Cloth cloth = square_cloth(vertices_per_side);
   cloth.held = {held_at(cloth.mesh, 0, 0)};
   if (corners == 2) cloth.held.push_back(held_at(cloth.mesh, 0.4, 0));
@@ -36,7 +36,7 @@ ParameterSet cotton_set(const Cloth& cloth, size_t type, double stiffer) {
 
 TEST(RestShapes, AreBalanced) {
   for (const int corners : {1, 2}) {
-    const Cloth cloth = hung_cloth(8, corners);
+    const Cloth cloth = cloth_hung_by(8, corners);
     const ParameterSet set = cotton_set(cloth, 0, 0);
     const Eigen::Matrix3Xd shape = rest_shapes(cloth, {&set, 1}, 0).front();
 
@@ -52,7 +52,7 @@ TEST(RestShapes, AreBalanced) {
 }
 
 TEST(RestShapes, AreWhereRelaxationEnds) {
-  const Cloth cloth = hung_cloth(9, 2);
+  const Cloth cloth = cloth_hung_by(9, 2);
   ParameterSet set = cotton_set(cloth, 0, 0);
   const double h = 0.5 * stable_time_step_s(cloth, set);
 
@@ -65,7 +65,7 @@ TEST(RestShapes, AreWhereRelaxationEnds) {
 
 TEST(RestShapes, AreSmoothInTheParameters) {
   for (const int corners : {1, 2}) {
-    const Cloth cloth = hung_cloth(7, corners);
+    const Cloth cloth = cloth_hung_by(7, corners);
     for (const size_t type : {structural_t, structural_s, shear_down, flexion_t}) {
       SCOPED_TRACE(testing::Message() << corners << " corners, type " << type);
       const auto derivative = [&](double step) {
@@ -85,7 +85,7 @@ TEST(RestShapes, AreSmoothInTheParameters) {
 }
 
 TEST(RestShapes, OfAClothOnOneCornerFaceTheirStart) {
-  const Cloth cloth = hung_cloth(7, 1);
+  const Cloth cloth = cloth_hung_by(7, 1);
   const ParameterSet set = cotton_set(cloth, 0, 0);
   ParameterSet turned = set;
   const Eigen::Matrix3d turn = Eigen::AngleAxisd(2.0, Eigen::Vector3d::UnitZ()).toRotationMatrix();
@@ -98,7 +98,7 @@ TEST(RestShapes, OfAClothOnOneCornerFaceTheirStart) {
 }
 
 TEST(RestShapes, DoNotDependOnTheOtherSetsOrTheThreads) {
-  const Cloth cloth = hung_cloth(9, 2);
+  const Cloth cloth = cloth_hung_by(9, 2);
   std::vector<ParameterSet> sets;
   for (int n = 0; n < 5; ++n) sets.push_back(cotton_set(cloth, 1, 0.1 * n));
   const auto shapes = rest_shapes(cloth, sets, 0);
@@ -111,7 +111,7 @@ TEST(RestShapes, DoNotDependOnTheOtherSetsOrTheThreads) {
 }
 
 TEST(RestShapes, HaveHeldPointsWhereTheyAreAtThatTime) {
-  Cloth cloth = hung_cloth(5, 2);
+  Cloth cloth = cloth_hung_by(5, 2);
   cloth.held[1].motion = [](double time_s) { return Eigen::Vector3d(0.3 + 0.1 * time_s, 0, 0); };
   const ParameterSet set = cotton_set(cloth, 0, 0);
 
