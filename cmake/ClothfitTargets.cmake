@@ -45,7 +45,7 @@ function(clothfit_add_test room)
   target_include_directories(${ARG_NAME} PRIVATE ${PROJECT_SOURCE_DIR})
   target_link_libraries(${ARG_NAME} PRIVATE
     clothfit::${room} ${ARG_LINK} GTest::gtest_main GTest::gmock clothfit_warnings)
-  target_precompile_headers(${ARG_NAME} PRIVATE <gmock/gmock.h> <gtest/gtest.h> <Eigen/Dense>)
+  target_precompile_headers(${ARG_NAME} REUSE_FROM clothfit_test_headers)
   target_compile_definitions(${ARG_NAME} PRIVATE
     CLOTHFIT_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
   gtest_discover_tests(${ARG_NAME}

@@ -14,6 +14,7 @@
 #include "data/recording.h"
 #include "data/tracks.h"
 #include "model/surface.h"
+#include "tests/apps/bundled_recordings.h"
 #include "tests/apps/program_run.h"
 #include "tests/apps/scratch_folder.h"
 
@@ -27,8 +28,6 @@ using test::run_program;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
-
-const fs::path kBundled = fs::path(CLOTHFIT_SOURCE_DIR) / "data" / "recordings";
 
 std::string read_text(const fs::path& file) {
   std::ifstream in(file);

@@ -9,6 +9,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "data/camera_parameters.h"
+#include "tests/apps/bundled_recordings.h"
 #include "tests/apps/program_run.h"
 #include "tests/apps/scratch_folder.h"
 
@@ -22,8 +23,6 @@ using test::run_program;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::MatchesRegex;
-
-const fs::path kBundled = fs::path(CLOTHFIT_SOURCE_DIR) / "data" / "recordings";
 
 void write_text(const fs::path& file, const std::string& text) {
   fs::create_directories(file.parent_path());

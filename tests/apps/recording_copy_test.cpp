@@ -9,14 +9,13 @@
 
 #include "data/camera_parameters.h"
 #include "data/tracks.h"
+#include "tests/apps/bundled_recordings.h"
 #include "tests/apps/scratch_folder.h"
 
 namespace clothfit {
 namespace {
 
 namespace fs = std::filesystem;
-
-const fs::path kBundled = fs::path(CLOTHFIT_SOURCE_DIR) / "data" / "recordings";
 
 TEST(CopyRecording, HoldsItsTablesAndReadsBack) {
   const test::ScratchFolder scratch("copy_recording");

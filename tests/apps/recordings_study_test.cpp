@@ -15,6 +15,7 @@
 #include "apps/study/recordings_tables.h"
 #include "apps/study/study_row_json.h"
 #include "data/input_error.h"
+#include "tests/apps/bundled_recordings.h"
 #include "tests/apps/scratch_folder.h"
 
 namespace clothfit {
@@ -25,8 +26,6 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::Pair;
 using ::testing::ThrowsMessage;
-
-const fs::path kBundled = fs::path(CLOTHFIT_SOURCE_DIR) / "data" / "recordings";
 
 class RecordingsStudy : public ::testing::Test {
  protected:

@@ -12,6 +12,7 @@
 
 #include "data/recording.h"
 #include "data/tracks.h"
+#include "tests/apps/bundled_recordings.h"
 #include "tests/apps/program_run.h"
 #include "tests/apps/scratch_folder.h"
 
@@ -26,8 +27,6 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
-
-const fs::path kBundled = fs::path(CLOTHFIT_SOURCE_DIR) / "data" / "recordings";
 
 /// `held`, `effects` and `more` are put in as they are; the sheet hangs, t downwards.
 std::string model_text(const std::string& held, const std::string& effects = "[]",

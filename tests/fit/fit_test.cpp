@@ -394,7 +394,7 @@ TEST(Fit, SaysThatSpringsOnTheirStrainLimitTellNothingOfTheirStiffness) {
   options.start = {{"viscous_damping.rate", truth.drag_rate_per_s}};
   const double flat_m[] = {0.1, 0.1, 0.1 * std::sqrt(2.0), 0.1 * std::sqrt(2.0), 0.2, 0.2};
   for (int type = 0; type < 6; ++type) {
-    const std::string of_type = "_" + std::to_string(type);
+    const std::string of_type = std::string("_") + static_cast<char>('0' + type);
     (*options.start)["stiffness" + of_type] = 0.1;
     (*options.start)["natural_length" + of_type] = flat_m[type];
     (*options.start)["critical_elongation" + of_type] = truth.critical_elongation;

@@ -22,7 +22,7 @@ namespace {
 
 constexpr double kSquares = std::numeric_limits<double>::infinity();
 constexpr int kBlocks = 5, kStretches = 10;
-const FitOptions kOptions = [] {
+const FitOptions kFreeForcesOptions = [] {
   FitOptions options;
   options.loss = Loss::squared;
   options.generations = 10;
@@ -32,7 +32,7 @@ const FitOptions kOptions = [] {
 }();
 
 DiagnosisSetup setup_of(std::span<const FitInput> inputs, int mesh = 9) {
-  return {.inputs = inputs, .options = kOptions, .columns = mesh, .rows = mesh};
+  return {.inputs = inputs, .options = kFreeForcesOptions, .columns = mesh, .rows = mesh};
 }
 
 /// A push that is the same everywhere and always: gravity out of the vertical, a hundredth of it

@@ -10,7 +10,7 @@
 namespace clothfit {
 namespace {
 
-const FitOptions kOptions = [] {
+const FitOptions kPlantingOptions = [] {
   FitOptions options;
   options.loss = Loss::squared;
   return options;
@@ -23,7 +23,7 @@ SearchOptions few_laws(const FitInput& input) {
                         .refits = 2,
                         .most_effects = 2,
                         .threshold = std::numeric_limits<double>::infinity()};
-  for (const LawShapes& law : laws_to_test(input, kOptions, 0.5)) {
+  for (const LawShapes& law : laws_to_test(input, kPlantingOptions, 0.5)) {
     const std::string& effect = law.front().effect;
     if (effect == "viscous_damping" || effect == "gravity_tilt" || effect == "wind")
       options.laws.push_back(law);
@@ -34,7 +34,8 @@ SearchOptions few_laws(const FitInput& input) {
 TEST(Planting, FindsThePlantedDragOnATwinAndNothingOnATwinWithoutIt) {
   const SyntheticCloth cloth{};
   const FitInput input = synthetic_input(cloth);
-  const DiagnosisSetup setup{.inputs = {&input, 1}, .options = kOptions, .columns = 9, .rows = 9};
+  const DiagnosisSetup setup{
+      .inputs = {&input, 1}, .options = kPlantingOptions, .columns = 9, .rows = 9};
   const ModelFit model = true_model(setup, cloth);
   const Plant drag{.term = drag_term(), .parameter = "rate", .beyond_neutral = 0.8};
 
@@ -51,7 +52,8 @@ TEST(Planting, FindsThePlantedDragOnATwinAndNothingOnATwinWithoutIt) {
 TEST(Planting, FindsNothingOnATwinOfWhatTheModelHas) {
   const SyntheticCloth cloth{.drag_rate_per_s = 1};
   const FitInput input = synthetic_input(cloth);
-  const DiagnosisSetup setup{.inputs = {&input, 1}, .options = kOptions, .columns = 9, .rows = 9};
+  const DiagnosisSetup setup{
+      .inputs = {&input, 1}, .options = kPlantingOptions, .columns = 9, .rows = 9};
   const ModelFit model = true_model(setup, cloth, {drag_term()});
 
   SearchOptions options = few_laws(input);

@@ -21,12 +21,13 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
-const FitOptions kOptions{.mesh_columns = 9, .mesh_rows = 9, .loss = Loss::squared};
+const FitOptions kProposedLawOptions{.mesh_columns = 9, .mesh_rows = 9, .loss = Loss::squared};
 
 /// What a diagnosis ends with that has found nothing, and the law that is proposed for the rest.
 struct Proposal {
   FitInput input;
-  DiagnosisSetup setup{.inputs = {&input, 1}, .options = kOptions, .columns = 9, .rows = 9};
+  DiagnosisSetup setup{
+      .inputs = {&input, 1}, .options = kProposedLawOptions, .columns = 9, .rows = 9};
   ModelFit model;
   ProposedLaw law;
 

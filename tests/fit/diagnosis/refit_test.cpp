@@ -13,7 +13,7 @@
 namespace clothfit {
 namespace {
 
-const FitOptions kOptions = [] {
+const FitOptions kRefitOptions = [] {
   FitOptions options;
   options.loss = Loss::squared;
   options.generations = 10;
@@ -38,7 +38,8 @@ void expect_optimum(const ModelFit& anew, const DiagnosisSetup& setup,
 TEST(FittedAnew, IsTheOptimumWhateverIsKnown) {
   const SyntheticCloth cloth{.drag_rate_per_s = 1.2};
   const FitInput input = synthetic_input(cloth);
-  const DiagnosisSetup setup{.inputs = {&input, 1}, .options = kOptions, .columns = 9, .rows = 9};
+  const DiagnosisSetup setup{
+      .inputs = {&input, 1}, .options = kRefitOptions, .columns = 9, .rows = 9};
 
   const ModelFit anew = fitted_anew(setup, {drag_term()}, {});
 
@@ -52,7 +53,7 @@ TEST(FittedAnew, IsOfAllRecordings) {
   std::vector<FitInput> inputs{synthetic_input(cloth)};
   cloth.seed = 2;
   inputs.push_back(synthetic_input(cloth));
-  const DiagnosisSetup setup{.inputs = inputs, .options = kOptions, .columns = 9, .rows = 9};
+  const DiagnosisSetup setup{.inputs = inputs, .options = kRefitOptions, .columns = 9, .rows = 9};
 
   const ModelFit anew = fitted_anew(setup, {drag_term()}, {});
 
@@ -65,7 +66,8 @@ TEST(FittedAnew, IsOfAllRecordings) {
 TEST(FittedAnew, IsOfAKnownStart) {
   FitInput input = synthetic_input({});
   input.recording.start = StartKind::unknown;
-  const DiagnosisSetup setup{.inputs = {&input, 1}, .options = kOptions, .columns = 9, .rows = 9};
+  const DiagnosisSetup setup{
+      .inputs = {&input, 1}, .options = kRefitOptions, .columns = 9, .rows = 9};
 
   EXPECT_FALSE(fitted_anew(setup, {}, {}).usable);
 }
@@ -73,7 +75,8 @@ TEST(FittedAnew, IsOfAKnownStart) {
 TEST(RaceOnMesh, LeavesWhatIsNotFarBehindAndRuns) {
   const SyntheticCloth cloth{.drag_rate_per_s = 1.2};
   const FitInput input = synthetic_input(cloth);
-  const DiagnosisSetup setup{.inputs = {&input, 1}, .options = kOptions, .columns = 9, .rows = 9};
+  const DiagnosisSetup setup{
+      .inputs = {&input, 1}, .options = kRefitOptions, .columns = 9, .rows = 9};
   DiagnosisSetup coarse = setup;
   coarse.columns = coarse.rows = 7;
   const Term drift{.effect = "support_drift", .law = "", .amplitudes = {"velocity_x"}};
@@ -95,7 +98,8 @@ TEST(RaceOnMesh, LeavesWhatIsNotFarBehindAndRuns) {
 TEST(WithTerms, HandsOnWhatTheModelIsExpectedToErrBy) {
   const SyntheticCloth cloth;
   const FitInput input = synthetic_input(cloth);
-  const DiagnosisSetup setup{.inputs = {&input, 1}, .options = kOptions, .columns = 9, .rows = 9};
+  const DiagnosisSetup setup{
+      .inputs = {&input, 1}, .options = kRefitOptions, .columns = 9, .rows = 9};
   ModelFit model = true_model(setup, cloth);
   PooledPart& part = model.parts.front();
   part.correction = Eigen::VectorXd::LinSpaced(part.linear.residual.size(), 0, 1);
@@ -114,7 +118,8 @@ TEST(WithTerms, HandsOnWhatTheModelIsExpectedToErrBy) {
 TEST(WithTerms, WithoutTheOnlyLawIsTheModelBeforeIt) {
   const SyntheticCloth cloth{.drag_rate_per_s = 0.1};
   const FitInput input = synthetic_input(cloth);
-  const DiagnosisSetup setup{.inputs = {&input, 1}, .options = kOptions, .columns = 9, .rows = 9};
+  const DiagnosisSetup setup{
+      .inputs = {&input, 1}, .options = kRefitOptions, .columns = 9, .rows = 9};
   const ModelFit with_drag = true_model(setup, cloth, {drag_term()});
 
   ModelFit without = with_terms(setup, with_drag, {}, {});

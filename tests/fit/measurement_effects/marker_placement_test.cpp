@@ -11,7 +11,7 @@ namespace clothfit {
 namespace {
 
 constexpr double kShiftS = 0.002, kShiftT = -0.003, kStretchS = 0.01, kStretchT = -0.008,
-                 kTurn = 0.015;
+                 kTurnedBy = 0.015;
 
 TEST(MarkerPlacement, KeepsToTheContract) {
   check_measurement_effect("marker_placement", synthetic_input({}));
@@ -22,8 +22,8 @@ TEST(MarkerPlacement, IsFoundWhereItWasPlanted) {
   const auto seen = [](const SyntheticMotion& motion, double time_s,
                        const Eigen::Vector2d& place_m) {
     const Eigen::Vector2d from_middle = place_m - Eigen::Vector2d(0.2, 0.2);
-    const Eigen::Vector2d shift(kShiftS + kStretchS * from_middle[0] - kTurn * from_middle[1],
-                                kShiftT + kStretchT * from_middle[1] + kTurn * from_middle[0]);
+    const Eigen::Vector2d shift(kShiftS + kStretchS * from_middle[0] - kTurnedBy * from_middle[1],
+                                kShiftT + kStretchT * from_middle[1] + kTurnedBy * from_middle[0]);
     return motion(time_s, place_m + shift);
   };
 
@@ -33,7 +33,7 @@ TEST(MarkerPlacement, IsFoundWhereItWasPlanted) {
                           {"shift_t", kShiftT},
                           {"stretch_s", kStretchS},
                           {"stretch_t", kStretchT},
-                          {"turn", kTurn}}});
+                          {"turn", kTurnedBy}}});
 }
 
 }  // namespace

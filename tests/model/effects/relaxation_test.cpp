@@ -64,7 +64,7 @@ TEST(Relaxation, IsASpringForFastMotionsAndNothingForSlowOnes) {
 TEST(Relaxation, AnOscillatorLosesMostAtTheArmsOwnFrequency) {
   // A standard linear solid: the loss is largest where frequency times time is about 1.
   using Rig = SpringOscillator;
-  const double period_time_s = std::sqrt(Rig::kMass_kg / Rig::kAtOnce_n_per_m);
+  const double period_time_s = std::sqrt(Rig::kMass_kg / Rig::kStiffness_n_per_m);
   const auto left = [&](double time_s) {
     const std::vector<double> x = Rig("relaxation", {0.1, time_s}, 0.02).extensions_m(5e-5, 20000);
     double largest = 0;
