@@ -4,11 +4,11 @@
 #include <exception>
 #include <string>
 
-#include "apps/exit_code.h"
-#include "apps/interrupt.h"
 #include "apps/terminal/command_line.h"
-#include "apps/verb.h"
-#include "apps/version.h"
+#include "apps/terminal/exit_code.h"
+#include "apps/terminal/interrupt.h"
+#include "apps/terminal/version.h"
+#include "apps/verbs/verb.h"
 #include "data/input_error.h"
 
 namespace {

@@ -1,22 +1,25 @@
-# What `cmake --install` puts where: the program, the rooms as libraries for find_package(clothfit),
+# What `cmake --install` puts where: the program, the folders as libraries for find_package(clothfit),
 # the bundled recordings beside the program's share folder, where `clothfit demo` looks for them.
 
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
-set(rooms algebra data camera calib vision model fit)
-list(TRANSFORM rooms PREPEND clothfit_ OUTPUT_VARIABLE room_targets)
-foreach(room IN LISTS rooms)
-  set_target_properties(clothfit_${room} PROPERTIES EXPORT_NAME ${room})
+# Pages and studies are the program's own.
+get_property(libraries GLOBAL PROPERTY CLOTHFIT_LIBRARIES)
+list(FILTER libraries EXCLUDE REGEX "^apps")
+set(targets "")
+foreach(library IN LISTS libraries)
+  set_target_properties(clothfit_${library} PROPERTIES EXPORT_NAME ${library})
+  list(APPEND targets clothfit_${library})
 endforeach()
 
 install(TARGETS clothfit RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
-install(TARGETS ${room_targets} EXPORT clothfit-targets
+install(TARGETS ${targets} EXPORT clothfit-targets
   ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(EXPORT clothfit-targets NAMESPACE clothfit::
   DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/clothfit)
 
-# Headers keep their room: #include "model/step.h" with include/clothfit as the include folder.
+# Headers keep their room: #include "model/integrate/step.h" with include/clothfit as the include folder.
 install(DIRECTORY data calib vision model fit
   DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/clothfit
   FILES_MATCHING PATTERN "*.h" PATTERN recordings EXCLUDE)

@@ -1,4 +1,4 @@
-# One library per room, one test program per room.
+# One library per folder, one test program per room.
 
 find_program(CLOTHFIT_CCACHE ccache)
 if(CLOTHFIT_CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
@@ -17,21 +17,38 @@ if(CLOTHFIT_WARNINGS_AS_ERRORS)
   target_compile_options(clothfit_warnings INTERFACE -Werror)
 endif()
 
-# clothfit_add_library(NAME SOURCES a.cpp ... [PUBLIC lib ...] [PRIVATE lib ...]
-#                      [PRECOMPILE <header> ...])
-# The single include root lets every include name its room: "model/step.h".
-function(clothfit_add_library name)
-  cmake_parse_arguments(ARG "" "" "SOURCES;PUBLIC;PRIVATE;PRECOMPILE" ${ARGN})
+# clothfit_add_folder(FOLDER SOURCES a.cpp ... [PUBLIC lib ...] [PRIVATE lib ...])
+# The library of a folder, clothfit::FOLDER with _ for /. It links what its arrows name
+# (ClothfitArrows.cmake); PUBLIC and PRIVATE are libraries of others, seen in headers or not.
+# The single include root lets every include name its folder: "model/integrate/step.h".
+function(clothfit_add_folder folder)
+  cmake_parse_arguments(ARG "" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
+  string(REPLACE "/" "_" name ${folder})
   add_library(clothfit_${name} STATIC ${ARG_SOURCES})
   add_library(clothfit::${name} ALIAS clothfit_${name})
   target_include_directories(clothfit_${name} PUBLIC
     $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}> $<INSTALL_INTERFACE:include/clothfit>)
+  clothfit_arrows_of(${folder} arrows)
+  set(folders "")
+  foreach(arrow IN LISTS arrows)
+    string(REGEX REPLACE "/[a-z_0-9]+\\.h$" "" arrow ${arrow})  # a header stands for its folder
+    string(REPLACE "/" "_" arrow ${arrow})
+    list(APPEND folders clothfit::${arrow})
+  endforeach()
   target_link_libraries(clothfit_${name}
-    PUBLIC ${ARG_PUBLIC}
+    PUBLIC ${folders} ${ARG_PUBLIC}
     PRIVATE ${ARG_PRIVATE} $<BUILD_INTERFACE:clothfit_warnings>)
-  if(ARG_PRECOMPILE)
-    target_precompile_headers(clothfit_${name} PRIVATE ${ARG_PRECOMPILE})
-  endif()
+  set_property(GLOBAL APPEND PROPERTY CLOTHFIT_LIBRARIES ${name})
+endfunction()
+
+# clothfit_add_room(ROOM FOLDER ...): clothfit::ROOM, all of them at once.
+function(clothfit_add_room room)
+  add_library(clothfit_${room} INTERFACE)
+  add_library(clothfit::${room} ALIAS clothfit_${room})
+  foreach(folder ${ARGN})
+    target_link_libraries(clothfit_${room} INTERFACE clothfit::${room}_${folder})
+  endforeach()
+  set_property(GLOBAL APPEND PROPERTY CLOTHFIT_LIBRARIES ${room})
 endfunction()
 
 # clothfit_add_test(ROOM SOURCES a_test.cpp ... [LINK lib ...] [LABELS slow])

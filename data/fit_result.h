@@ -74,7 +74,7 @@ struct ObservationErrors {
   TrivialErrors trivial;
 };
 
-/// How far the model's surface is from measured clouds (fit/cloud_errors.h).
+/// How far the model's surface is from measured clouds (fit/observe/cloud_errors.h).
 struct CloudErrors {
   /// Chamfer distance, the mean over frames that have a cloud.
   struct Summary {

@@ -9,12 +9,13 @@
 #include <span>
 
 #include "data/input_error.h"
-#include "fit/lead_in.h"
-#include "fit/observed_motion.h"
-#include "fit/parameter_search.h"
-#include "fit/parameterised_model.h"
-#include "fit/prior_cost.h"
-#include "model/stability.h"
+#include "fit/cost/observed_motion.h"
+#include "fit/problem/mesh_ladder.h"
+#include "fit/problem/parameterised_model.h"
+#include "fit/problem/prior_cost.h"
+#include "fit/refine/lead_in.h"
+#include "fit/search/parameter_search.h"
+#include "model/cloth/stability.h"
 
 namespace clothfit {
 namespace {
@@ -217,7 +218,7 @@ double window_cost(const FitProblem& problem, const Eigen::VectorXd& values) {
   return search_cost(usual_window(problem), values);
 }
 
-/// Whether the model follows the cloth there (fit/observed_motion.h).
+/// Whether the model follows the cloth there (fit/cost/observed_motion.h).
 bool follows(const FitProblem& problem, const Eigen::VectorXd& values) {
   return window_cost(problem, values) < cost_of_following(usual_window(problem));
 }

@@ -2,15 +2,15 @@
 
 #include <vector>
 
-#include "fit/basins.h"
-#include "fit/fit.h"
-#include "fit/problem.h"
-#include "fit/refine.h"
+#include "data/progress.h"
+#include "fit/interface/fit_input.h"
+#include "fit/interface/fit_options.h"
+#include "fit/interface/fit_report.h"
+#include "fit/problem/problem.h"
+#include "fit/refine/refine.h"
+#include "fit/uncertainty/basins.h"
 
 namespace clothfit {
-
-/// No mesh is made coarser than this many vertices a side.
-inline constexpr int kSmallestMesh = 7;
 
 /// The whole way to the optimum, search and refinement, as docs/theory/identification.md has it:
 /// from a given start, and from the ranges where there is none or where it does not lead to an

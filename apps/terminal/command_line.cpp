@@ -8,7 +8,7 @@
 #include <set>
 #include <utility>
 
-#include "apps/exit_code.h"
+#include "apps/terminal/exit_code.h"
 #include "data/nearest_name.h"
 
 namespace clothfit {

@@ -82,6 +82,10 @@ Eigen::MatrixXd PivotedQr::solve_matrix(const Eigen::MatrixXd& right) const {
   return factors_.solve(right);
 }
 
+Eigen::MatrixXd PivotedQr::solve_matrix(const Rows& right) const {
+  return factors_.solve(right);
+}
+
 LeastNormFactors::LeastNormFactors(const Eigen::MatrixXd& matrix) : factors_(matrix) {}
 
 Eigen::Index LeastNormFactors::rank() const {

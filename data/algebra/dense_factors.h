@@ -23,7 +23,8 @@ Eigen::VectorXd symmetric_eigenvalues(const Eigen::MatrixXd& matrix);
 
 namespace internal {
 
-/// Solves for right sides that are vectors (n) or matrices (n x m), each by its own routine.
+/// Solves for right sides that are vectors (n) or matrices (n x m), each by its own routine, and
+/// rows as rows where a class knows how: Eigen's sums, and so the last bit, depend on it.
 template <class Factors>
 class Solves {
  public:
@@ -33,7 +34,7 @@ class Solves {
     if constexpr (Right::ColsAtCompileTime == 1)
       return self.solve_vector(right);
     else
-      return self.solve_matrix(right);
+      return self.solve_matrix(right.derived().eval());
   }
 };
 
@@ -83,6 +84,8 @@ class PivotedQr : public internal::Solves<PivotedQr> {
   Eigen::VectorXd times_q_transposed(const Eigen::VectorXd& right) const;
   Eigen::VectorXd solve_vector(const Eigen::VectorXd& right) const;
   Eigen::MatrixXd solve_matrix(const Eigen::MatrixXd& right) const;
+  using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  Eigen::MatrixXd solve_matrix(const Rows& right) const;
 
  private:
   Eigen::ColPivHouseholderQR<Eigen::MatrixXd> factors_;

@@ -10,10 +10,11 @@
 #include <optional>
 #include <utility>
 
-#include "calib/projection.h"
+#include "calib/camera/projection.h"
 #include "data/algebra/dense_factors.h"
-#include "fit/parameterised_model.h"
-#include "fit/predictor.h"
+#include "fit/problem/parameterised_model.h"
+#include "fit/problem/predictor.h"
+#include "model/effects/registry.h"
 
 namespace clothfit {
 namespace {
@@ -163,7 +164,7 @@ void shake(FitProblem& problem, const Eigen::Vector3d& amplitude_m, double frequ
                                               {"amplitude_z", amplitude_m.z()},
                                               {"frequency", frequency_hz},
                                               {"phase", 0.25}};
-  problem.cloth.add_effect("support_motion", "a candidate recording");
+  add_effect(problem.cloth, "support_motion", "a candidate recording");
   std::vector<Binding> bindings;
   for (const EffectParameter& parameter : problem.cloth.effect_descriptions.back().parameters)
     bindings.push_back({.parameter = -1, .constant = numbers.at(parameter.name)});

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "fit/problem.h"
-#include "model/relax.h"
+#include "fit/problem/problem.h"
+#include "model/integrate/relax.h"
 
 namespace clothfit {
 

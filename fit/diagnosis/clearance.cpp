@@ -6,8 +6,8 @@
 #include "data/algebra/dense_factors.h"
 #include "data/median.h"
 #include "fit/diagnosis/refit.h"
-#include "fit/pooled_space.h"
-#include "fit/uncertainty.h"
+#include "fit/refine/pooled_space.h"
+#include "fit/uncertainty/uncertainty.h"
 
 namespace clothfit {
 namespace {

@@ -12,7 +12,7 @@ namespace clothfit {
 /// along the cloth, the (1 + rho) / (1 - rho) of a process that forgets geometrically, rho the
 /// correlation of neighbours. Where the cost is rough, as of cloth that folds and unfolds, and
 /// derivatives are far steeper than the residuals' trend over two per cent, the trend counts
-/// (`trend_of`, fit/uncertainty.h). `threshold` is Huber's.
+/// (`trend_of`, fit/uncertainty/uncertainty.h). `threshold` is Huber's.
 double clear_of_neutral(const ModelFit& model, const Adequacy& structure, double threshold);
 
 /// By how much chi-square is foreseen to rise where the last term is dropped and all else follows,
@@ -24,9 +24,9 @@ double rise_without_last(const ModelFit& model, double threshold);
 std::vector<NamedValues> sigma_of(const ModelFit& model, const Adequacy& structure,
                                   double threshold);
 
-/// Roughness of a linearised model's derivatives (fit/uncertainty.h), the median over the physics'
-/// parameters: by so much the standard deviations of effects that are not in it, too, are larger
-/// than derivatives say. 1 where the cost is a valley.
+/// Roughness of a linearised model's derivatives (fit/uncertainty/uncertainty.h), the median over
+/// the physics' parameters: by so much the standard deviations of effects that are not in it, too,
+/// are larger than derivatives say. 1 where the cost is a valley.
 double typical_roughness(const ModelFit& model);
 
 }  // namespace clothfit

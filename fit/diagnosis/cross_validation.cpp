@@ -11,9 +11,10 @@
 #include <utility>
 
 #include "data/algebra/dense_factors.h"
+#include "fit/cost/huber.h"
 #include "fit/diagnosis/free_forces.h"
-#include "fit/prior_cost.h"
-#include "fit/uncertainty.h"
+#include "fit/problem/prior_cost.h"
+#include "fit/uncertainty/uncertainty.h"
 
 namespace clothfit {
 namespace {

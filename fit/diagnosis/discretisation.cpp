@@ -4,10 +4,11 @@
 #include <cmath>
 #include <tuple>
 
-#include "fit/diagnosis/refit.h"
+#include "fit/diagnosis/horizons.h"
 #include "fit/identify.h"
-#include "fit/other_mesh.h"
-#include "fit/parameterised_model.h"
+#include "fit/problem/mesh_ladder.h"
+#include "fit/problem/parameterised_model.h"
+#include "fit/refine/other_mesh.h"
 
 namespace clothfit {
 DiagnosisSetup with_other_mesh(const DiagnosisSetup& setup) {

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "model/cloth.h"
+#include "model/cloth/cloth.h"
 #include "model/effects/number.h"
 
 namespace clothfit {

@@ -3,7 +3,7 @@
 #include <memory>
 
 #include "fit/diagnosis/law_derivatives.h"
-#include "model/effects/effect.h"
+#include "model/cloth/effect.h"
 
 namespace clothfit {
 

@@ -108,7 +108,7 @@ std::vector<Eigen::MatrixXd> derivatives_in(const FitProblem& problem, const Poo
     for (size_t n = 0; n < laws.size(); ++n) {
       if (kinds[n] != kind) continue;
       const MeasurementEffectEntry* entry = measurement_effect_named(laws[n].effect);
-      if (entry && why_inapplicable(*entry->make(), problem)) continue;
+      if (entry && why_inapplicable(*entry->make(), measurement_setting(problem))) continue;
       const auto more = static_cast<int>(laws[n].amplitudes.size());
       if (more > most) continue;
       if (!begun || batches.back().amplitudes + more > most)

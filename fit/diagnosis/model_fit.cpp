@@ -10,9 +10,9 @@
 #include "fit/identify.h"
 #include "fit/measurement_effects/measurement_effect.h"
 #include "fit/measurement_effects/registry.h"
-#include "fit/parameterised_model.h"
-#include "fit/prior_cost.h"
-#include "model/stability.h"
+#include "fit/problem/parameterised_model.h"
+#include "fit/problem/prior_cost.h"
+#include "model/cloth/stability.h"
 
 namespace clothfit {
 namespace {

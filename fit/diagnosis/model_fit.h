@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "fit/diagnosis/term.h"
-#include "fit/pooled_fit.h"
+#include "fit/refine/pooled_fit.h"
 
 namespace clothfit {
 
@@ -77,7 +77,7 @@ struct StageOptions {
   /// parameter by a seventh of its sigma.
   double least_fall = 0.01;
   bool own_only = false;  ///< what is shared by recordings stays
-  bool rough = false;     ///< with the derivatives that it has, updated (fit/pooled_fit.h)
+  bool rough = false;     ///< with the derivatives that it has, updated (fit/refine/pooled_fit.h)
 };
 
 /// Refines a model from where it stands: with the derivatives that it has, or anew.

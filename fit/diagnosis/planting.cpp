@@ -4,7 +4,8 @@
 
 #include "fit/diagnosis/discretisation.h"
 #include "fit/diagnosis/twin.h"
-#include "fit/draws.h"
+#include "fit/fit.h"
+#include "fit/jobs/draws.h"
 
 namespace clothfit {
 namespace {

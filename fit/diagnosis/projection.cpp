@@ -5,8 +5,9 @@
 #include <limits>
 
 #include "data/algebra/dense_factors.h"
-#include "fit/prior_cost.h"
-#include "fit/uncertainty.h"
+#include "fit/cost/huber.h"
+#include "fit/problem/prior_cost.h"
+#include "fit/uncertainty/uncertainty.h"
 
 namespace clothfit {
 namespace {

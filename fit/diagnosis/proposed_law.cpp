@@ -10,7 +10,7 @@
 
 #include "data/shared_progress.h"
 #include "fit/diagnosis/refit.h"
-#include "fit/uncertainty.h"
+#include "fit/uncertainty/uncertainty.h"
 #include "model/effects/force_law.h"
 #include "model/effects/tension_law.h"
 

@@ -32,7 +32,7 @@ struct LawCoefficient {
   std::string unit;
   std::string term;  ///< what it multiplies
   double value = 0;
-  double sigma = 0;       ///< as fits state it (fit/uncertainty.h)
+  double sigma = 0;       ///< as fits state it (fit/uncertainty/uncertainty.h)
   bool at_bound = false;  ///< at an end of its range: more of it would do better
 };
 

@@ -8,6 +8,8 @@
 #include <numeric>
 
 #include "fit/diagnosis/discretisation.h"
+#include "fit/diagnosis/horizons.h"
+#include "fit/fit.h"
 
 namespace clothfit {
 namespace {
@@ -169,13 +171,6 @@ std::vector<ModelFit> fit_near(const DiagnosisSetup& setup, const ModelFit& mode
 
 double least_fall(Eigen::Index amplitudes) {
   return 25 + 3.6 * static_cast<double>(amplitudes - 1);
-}
-
-std::vector<double> shares_from(double first) {
-  std::vector<double> shares;
-  for (double at = first; at < 0.85; at *= 1.6) shares.push_back(at);
-  shares.push_back(1);
-  return shares;
 }
 
 ModelFit with_terms(const DiagnosisSetup& setup, const ModelFit& model,

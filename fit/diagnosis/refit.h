@@ -11,13 +11,6 @@ namespace clothfit {
 /// them, that is as unlikely as five sigmas.
 double least_fall(Eigen::Index amplitudes);
 
-/// Of half chi-square per residual: a fit over a horizon that is not the last ends where a step
-/// promises less.
-inline constexpr double kRough = 1e-3;
-
-/// Growing shares of the frames from `first` on, the last one all.
-std::vector<double> shares_from(double first);
-
 /// The model with other terms, where it stands: amplitudes that are new are neutral. What is known
 /// of its derivatives is handed on, those by new parameters are of `columns` (per unit, of each
 /// recording, by the last term's amplitudes) or had here.

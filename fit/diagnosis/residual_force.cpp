@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "data/algebra/dense_factors.h"
-#include "fit/parameterised_model.h"
-#include "fit/smoothing_spline.h"
+#include "fit/observe/smoothing_spline.h"
+#include "fit/problem/parameterised_model.h"
 
 namespace clothfit {
 namespace {

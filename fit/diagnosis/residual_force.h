@@ -10,7 +10,7 @@ namespace clothfit {
 
 /// The force per mass that data ask for beyond a model's: the acceleration of what the model leaves
 /// of 3D tracks, observed less predicted, each marker's smoothed by a parabola
-/// and a spline (fit/smoothing_spline.h) of what that leaves.
+/// and a spline (fit/observe/smoothing_spline.h) of what that leaves.
 ///
 /// Cloth answers a missing force with others, those of its springs above all, so that what is seen
 /// here is the missing force less that answer: a picture, and regressions that say what it goes

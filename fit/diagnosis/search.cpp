@@ -12,11 +12,12 @@
 #include <utility>
 
 #include "data/shared_progress.h"
+#include "fit/cost/huber.h"
 #include "fit/diagnosis/adequacy.h"
 #include "fit/diagnosis/clearance.h"
 #include "fit/diagnosis/discretisation.h"
 #include "fit/diagnosis/refit.h"
-#include "fit/refine.h"
+#include "fit/refine/refine.h"
 
 namespace clothfit {
 namespace {

@@ -16,11 +16,12 @@
 #include "data/shared_progress.h"
 #include "fit/diagnosis/candidate_recording.h"
 #include "fit/diagnosis/discretisation.h"
+#include "fit/diagnosis/horizons.h"
 #include "fit/diagnosis/law_derivatives.h"
 #include "fit/diagnosis/projection.h"
 #include "fit/diagnosis/refit.h"
-#include "fit/parameterised_model.h"
-#include "model/stability.h"
+#include "fit/problem/parameterised_model.h"
+#include "model/cloth/stability.h"
 
 namespace clothfit {
 namespace {

@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "data/input_error.h"
-#include "fit/held_tracks.h"
 #include "fit/measurement_effects/registry.h"
+#include "fit/observe/held_tracks.h"
 #include "model/effects/harmonic.h"
 #include "model/effects/registry.h"
 

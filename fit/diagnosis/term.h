@@ -4,8 +4,9 @@
 #include <string>
 #include <vector>
 
-#include "fit/fit.h"
-#include "model/effects/effect.h"
+#include "fit/interface/fit_input.h"
+#include "fit/interface/fit_options.h"
+#include "model/cloth/effect.h"
 
 namespace clothfit {
 

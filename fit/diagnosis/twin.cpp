@@ -4,7 +4,7 @@
 #include <map>
 #include <utility>
 
-#include "fit/draws.h"
+#include "fit/jobs/draws.h"
 
 namespace clothfit {
 namespace {

@@ -2,7 +2,8 @@
 
 #include <cstdint>
 
-#include "fit/fit.h"
+#include "fit/interface/fit_input.h"
+#include "fit/interface/fit_report.h"
 
 namespace clothfit {
 

@@ -2,9 +2,10 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "fit/measurement_effects/measurement_effect.h"
-#include "fit/problem.h"
+#include "fit/observe/observations.h"
 
 namespace clothfit {
 
@@ -14,9 +15,15 @@ struct Inapplicable {
   std::string expected;  ///< what it should have, and why
 };
 
-/// Nothing where `effect` applies to the problem, as far as its observations, held points and
-/// springs are known.
+/// What of a fit decides whether an effect of the measurement applies.
+struct MeasurementSetting {
+  const std::vector<ObservationSet>& observations;
+  bool tracks_held_points = false;
+  bool limits_strain = false;  ///< by moving vertices without their velocities
+};
+
+/// Nothing where `effect` applies.
 std::optional<Inapplicable> why_inapplicable(const MeasurementEffect& effect,
-                                             const FitProblem& problem);
+                                             const MeasurementSetting& setting);
 
 }  // namespace clothfit

@@ -3,7 +3,7 @@
 #include <memory>
 
 #include "fit/measurement_effects/measurement_effect.h"
-#include "model/effects/effect.h"
+#include "model/cloth/effect.h"
 
 /// Frames were lost without a word: from a time on, everything was seen later than its frame's time
 /// says. A frame of time t shows the cloth at

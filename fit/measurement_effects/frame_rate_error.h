@@ -3,7 +3,7 @@
 #include <memory>
 
 #include "fit/measurement_effects/measurement_effect.h"
-#include "model/effects/effect.h"
+#include "model/cloth/effect.h"
 
 /// The frame rate is not the stated one: a frame of time t shows the cloth at
 /// t0 + (1 + excess) (t - t0), t0 the first frame's time. Parameter: excess (1), neutral at 0.

@@ -3,7 +3,7 @@
 #include <memory>
 
 #include "fit/measurement_effects/measurement_effect.h"
-#include "model/effects/effect.h"
+#include "model/cloth/effect.h"
 
 /// The pattern of markers slides over the cloth: after the time t - t0 since the first frame, a
 /// marker that is said to be at (s, t) is (velocity_s, velocity_t) (t - t0) further, and appears

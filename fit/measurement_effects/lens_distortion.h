@@ -3,7 +3,7 @@
 #include <memory>
 
 #include "fit/measurement_effects/measurement_effect.h"
-#include "model/effects/effect.h"
+#include "model/cloth/effect.h"
 
 /// The lens bends more than its calibration says: a pixel at u appears at
 ///

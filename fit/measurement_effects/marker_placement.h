@@ -3,7 +3,7 @@
 #include <memory>
 
 #include "fit/measurement_effects/measurement_effect.h"
-#include "model/effects/effect.h"
+#include "model/cloth/effect.h"
 
 /// The pattern of markers sits elsewhere on the cloth than stated: a marker that is said to be at
 /// (s, t) is at (s + ds, t + dt),

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "fit/measurement_effects/measurement_effect.h"
-#include "model/effects/effect.h"
+#include "model/cloth/effect.h"
 
 namespace clothfit {
 

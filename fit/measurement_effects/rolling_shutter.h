@@ -3,7 +3,7 @@
 #include <memory>
 
 #include "fit/measurement_effects/measurement_effect.h"
-#include "model/effects/effect.h"
+#include "model/cloth/effect.h"
 
 /// The camera reads its picture row by row: a pixel in row y of H is seen readout (y / H - 1/2)
 /// later than its frame's time says, which is that of the middle row. The row is that of the

@@ -3,7 +3,7 @@
 #include <memory>
 
 #include "fit/measurement_effects/measurement_effect.h"
-#include "model/effects/effect.h"
+#include "model/cloth/effect.h"
 
 /// What is measured is larger than what is there, by a factor about the middle of the placed sheet:
 /// a calibration target whose squares are not as long as stated. Parameter: factor (1), neutral at

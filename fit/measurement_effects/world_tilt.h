@@ -3,7 +3,7 @@
 #include <memory>
 
 #include "fit/measurement_effects/measurement_effect.h"
-#include "model/effects/effect.h"
+#include "model/cloth/effect.h"
 
 /// What is measured is turned about the middle c of the placed sheet, because "down" was taken from
 /// where it is not: a marker at x appears at c + R (x - c), R the turn about the world's axes x and

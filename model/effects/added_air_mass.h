@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "model/effects/effect.h"
+#include "model/cloth/effect.h"
 
 /// Air that moves along with the surface: a mass mu A beside the vertex's own, in the direction of
 /// the normal only. The sum F of all forces but the weight m g becomes

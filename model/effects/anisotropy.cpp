@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
+#include "model/cloth/network_bound.h"
 #include "model/effects/spring_law.h"
-#include "model/network_bound.h"
 
 namespace clothfit::anisotropy {
 namespace {

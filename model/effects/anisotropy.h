@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "model/effects/effect.h"
+#include "model/cloth/effect.h"
 
 /// Warp stiffer than weft beyond what the fabric says, or softer:
 ///

@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "model/effects/effect.h"
+#include "model/cloth/effect.h"
 
 /// Bending stiffness of a plate without lateral contraction (Poisson's ratio 0):
 ///

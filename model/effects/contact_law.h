@@ -3,7 +3,7 @@
 #include <array>
 #include <cmath>
 
-#include "model/effects/effect.h"
+#include "model/cloth/effect.h"
 #include "model/effects/number.h"
 #include "model/effects/vertex_law.h"
 

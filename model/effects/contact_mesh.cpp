@@ -4,7 +4,7 @@
 
 #include "model/effects/contact_law.h"
 #include "model/effects/lane_by_lane.h"
-#include "model/obstacle.h"
+#include "model/topology/obstacle.h"
 
 namespace clothfit::contact_mesh {
 namespace {

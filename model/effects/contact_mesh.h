@@ -2,11 +2,11 @@
 
 #include <memory>
 
-#include "model/effects/effect.h"
+#include "model/cloth/effect.h"
 
-/// An obstacle of triangles that the cloth cannot pass: the cloth's `obstacle` (model/obstacle.h).
-/// A vertex below its surface feels the force of contact_law.h towards the nearest point of the
-/// surface; a cloth without an obstacle feels nothing.
+/// An obstacle of triangles that the cloth cannot pass: the cloth's `obstacle`
+/// (model/topology/obstacle.h). A vertex below its surface feels the force of contact_law.h towards
+/// the nearest point of the surface; a cloth without an obstacle feels nothing.
 ///
 /// Parameters: stiffness (Pa/m), damping (Pa s/m), friction (ratio), neutral at 0.
 namespace clothfit::contact_mesh {

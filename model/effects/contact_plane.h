@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "model/effects/effect.h"
+#include "model/cloth/effect.h"
 
 /// A plane that the cloth cannot pass: floor, table, wall. A vertex at x is depth = offset - n . x
 /// below it and feels the force of contact_law.h.

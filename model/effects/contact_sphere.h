@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "model/effects/effect.h"
+#include "model/cloth/effect.h"
 
 /// A ball that the cloth cannot pass. A vertex at x is depth = radius - |x - centre| inside it and
 /// feels the force of contact_law.h along n = (x - centre) / |x - centre|.

@@ -3,7 +3,7 @@
 #include <memory>
 #include <string>
 
-#include "model/effects/effect.h"
+#include "model/cloth/effect.h"
 
 /// An empirical force on every vertex: what goes with its mass m and, along the surface's normal n,
 /// with its area A, each a sum of terms with a coefficient of its own,

@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "model/effects/effect.h"
+#include "model/cloth/effect.h"
 
 /// The frame that everything is seen in shakes: the inertial force F = -m a sin(2 pi (f t + phase))
 /// on every vertex, supports at rest in the frame, t the recording's time (s).

@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "model/effects/effect.h"
+#include "model/cloth/effect.h"
 
 /// Gravity that is stronger or weaker than stated: F = excess m g at every vertex. Parameter:
 /// excess (ratio), neutral at 0. Ours.

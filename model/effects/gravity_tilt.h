@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "model/effects/effect.h"
+#include "model/cloth/effect.h"
 
 /// Gravity in a direction other than the stated one: F = m (R g - g), R the turn about the
 /// horizontal axes x and y of the world by two small angles.

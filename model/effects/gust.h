@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "model/effects/effect.h"
+#include "model/cloth/effect.h"
 
 /// A gust: wind that comes and goes, at every vertex F = A [n . q sin(2 pi (f t + phase))] n.
 ///

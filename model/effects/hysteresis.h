@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "model/effects/effect.h"
+#include "model/cloth/effect.h"
 
 /// Dry friction inside the fabric: an elastoplastic element beside every spring (Prandtl's),
 ///

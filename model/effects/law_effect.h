@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "model/effects/effect.h"
+#include "model/cloth/effect.h"
 
 namespace clothfit {
 

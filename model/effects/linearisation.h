@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "model/kernels/block_products.h"
-#include "model/mesh.h"
+#include "model/topology/mesh.h"
 
 namespace clothfit {
 

@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "model/effects/effect.h"
+#include "model/cloth/effect.h"
 
 /// A fabric whose springs are at ease at another size than the stated one, as of cloth that shrank,
 /// or whose markers were placed on it by a wrong scale:

@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "model/effects/effect.h"
+#include "model/cloth/effect.h"
 
 /// Mass that is not spread as stated. At a vertex that carries r times its stated mass the sum F of
 /// all forces but the weight becomes F / r, so that it moves by g + F / (r m), with

@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "model/effects/effect.h"
+#include "model/cloth/effect.h"
 
 /// A fabric whose stiffness varies over the cloth, by a relative change of every spring and of the
 /// dashpot beside it:

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <type_traits>
 
-#include "model/effects/effect.h"
-#include "model/lanes.h"
+#include "model/cloth/effect.h"
+#include "model/kernels/lanes.h"
 
 /// The numbers that the laws of effects are written over, so that each is written once: `double`, a
 /// number in every lane, or a dual number that carries derivatives (ceres::Jet).

@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "model/effects/effect.h"
+#include "model/cloth/effect.h"
 
 /// Drag that grows with the square of the speed, normal to the surface and along it: at every
 /// vertex

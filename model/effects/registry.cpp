@@ -44,4 +44,14 @@ const EffectEntry& find_effect(const std::string& name, const std::string& where
   throw InputError(where, "there is no effect '" + name + "'", "known effects: " + effect_names());
 }
 
+void add_effect(Cloth& cloth, const std::string& name, const std::string& where) {
+  const EffectEntry& entry = find_effect(name, where);
+  if (name == "contact_mesh" && !cloth.obstacle)
+    throw InputError(where, "effect 'contact_mesh' has no obstacle to touch",
+                     "the key `obstacle: FILE.obj` beside the effects, a surface of triangles",
+                     "add it; contact_plane and contact_sphere need none");
+  cloth.effect_descriptions.push_back(entry.describe());
+  cloth.effects.push_back(entry.make());
+}
+
 }  // namespace clothfit

@@ -4,7 +4,8 @@
 #include <span>
 #include <string>
 
-#include "model/effects/effect.h"
+#include "model/cloth/cloth.h"
+#include "model/cloth/effect.h"
 
 namespace clothfit {
 
@@ -22,5 +23,10 @@ std::string effect_names();
 
 /// The entry called `name`. Throws InputError at `where` that lists the known names.
 const EffectEntry& find_effect(const std::string& name, const std::string& where);
+
+/// Adds the effect called `name` to a cloth. Throws InputError at `where` for a name that is not
+/// known (it lists those that are), and for contact_mesh on a cloth whose `obstacle` is not set
+/// yet: it would touch nothing without a word.
+void add_effect(Cloth& cloth, const std::string& name, const std::string& where);
 
 }  // namespace clothfit

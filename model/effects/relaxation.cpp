@@ -1,7 +1,7 @@
 #include "model/effects/relaxation.h"
 
+#include "model/cloth/network_bound.h"
 #include "model/effects/spring_law.h"
-#include "model/network_bound.h"
 
 namespace clothfit::relaxation {
 namespace {

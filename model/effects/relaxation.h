@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "model/effects/effect.h"
+#include "model/cloth/effect.h"
 
 /// Stress that relaxes: a Maxwell arm, a spring and a dashpot in series, beside every spring,
 ///

@@ -4,7 +4,7 @@
 #include <array>
 #include <vector>
 
-#include "model/mesh.h"
+#include "model/topology/mesh.h"
 
 namespace clothfit {
 

@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "model/effects/effect.h"
+#include "model/cloth/effect.h"
 
 /// A cloth that wants to be curved, as one that was rolled up for long:
 ///

@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "model/effects/effect.h"
+#include "model/cloth/effect.h"
 
 /// Two held points that follow motions of their own are held by one rigid body, which keeps their
 /// distance, while what is known of the motions lets it wander: with D from one to the other there,

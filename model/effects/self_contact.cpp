@@ -5,8 +5,8 @@
 #include <numbers>
 
 #include "model/effects/lane_by_lane.h"
+#include "model/effects/near_pairs.h"
 #include "model/effects/vertex_law.h"
-#include "model/near_pairs.h"
 
 namespace clothfit::self_contact {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "model/effects/effect.h"
+#include "model/cloth/effect.h"
 
 /// The cloth does not pass through itself: between every two vertices that are not neighbours,
 /// closer than the thickness d,

@@ -1,7 +1,7 @@
 #include "model/effects/spring_damping.h"
 
+#include "model/cloth/network_bound.h"
 #include "model/effects/spring_law.h"
-#include "model/network_bound.h"
 
 namespace clothfit::spring_damping {
 namespace {

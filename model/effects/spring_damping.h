@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "model/effects/effect.h"
+#include "model/cloth/effect.h"
 
 /// Damping inside the fabric beyond the common one, for each group of springs by itself:
 ///

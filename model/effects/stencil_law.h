@@ -5,7 +5,7 @@
 #include <array>
 #include <vector>
 
-#include "model/cloth.h"
+#include "model/cloth/cloth.h"
 #include "model/effects/law_effect.h"
 #include "model/effects/linearisation.h"
 #include "model/effects/number.h"

@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "model/effects/effect.h"
+#include "model/cloth/effect.h"
 
 /// A tension curve that is not straight. With e = (l - l0) / l0 the elongation,
 ///

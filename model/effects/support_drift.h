@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "model/effects/effect.h"
+#include "model/cloth/effect.h"
 
 /// The held points drift, all alike, beside what is known of their motion: shift(t) = velocity t,
 /// with t the recording's time (s). Parameters: velocity_x, velocity_y, velocity_z (m/s), neutral

@@ -4,7 +4,7 @@
 
 #include <array>
 
-#include "model/cloth.h"
+#include "model/cloth/cloth.h"
 #include "model/effects/law_effect.h"
 #include "model/effects/linearisation.h"
 #include "model/effects/number.h"

@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "model/effects/effect.h"
+#include "model/cloth/effect.h"
 
 /// The held points move to and fro, all alike, beside what is known of their motion:
 ///

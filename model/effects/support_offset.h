@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "model/effects/effect.h"
+#include "model/cloth/effect.h"
 
 /// Held points that follow a motion are held beside where that has them, all by the same constant:
 ///

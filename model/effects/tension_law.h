@@ -3,7 +3,7 @@
 #include <memory>
 #include <string>
 
-#include "model/effects/effect.h"
+#include "model/cloth/effect.h"
 
 /// An empirical tension inside the springs: beyond k (l - l0) + c dl/dt,
 ///

@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "model/cloth.h"
+#include "model/cloth/cloth.h"
 #include "model/effects/law_effect.h"
 #include "model/effects/linearisation.h"
 #include "model/effects/number.h"

@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "model/effects/effect.h"
+#include "model/cloth/effect.h"
 
 /// Viscous damping by the surrounding air: F = -rate m v at every vertex.
 ///

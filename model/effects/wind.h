@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "model/effects/effect.h"
+#include "model/cloth/effect.h"
 
 /// Wind on the surface: at every vertex F = A [n . (q - c v)] n.
 ///

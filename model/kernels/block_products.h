@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 #include <span>
 
-#include "model/lanes.h"
+#include "model/kernels/lanes.h"
 
 namespace clothfit {
 

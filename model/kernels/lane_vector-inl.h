@@ -12,7 +12,7 @@
 #include <cstddef>
 #include <type_traits>
 
-#include "model/lanes.h"
+#include "model/kernels/lanes.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace clothfit {

@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "model/kernels/lane_limits.h"
 #include "model/kernels/spring_reach.h"
-#include "model/kernels/strain_limit.h"
 
 namespace clothfit {
 

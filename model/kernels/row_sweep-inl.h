@@ -11,7 +11,7 @@
 
 #include "model/kernels/lane_vector-inl.h"
 #include "model/kernels/spring_reach.h"
-#include "model/mesh.h"
+#include "model/topology/mesh.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace clothfit {

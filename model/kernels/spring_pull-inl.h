@@ -7,7 +7,7 @@
 #endif
 
 #include "model/kernels/lane_vector-inl.h"
-#include "model/mesh.h"
+#include "model/topology/mesh.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace clothfit {

@@ -2,7 +2,7 @@
 
 #include <cstddef>
 
-#include "model/mesh.h"
+#include "model/topology/mesh.h"
 
 namespace clothfit {
 

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "model/kernels/cloth_sweep.h"
+#include "model/kernels/lane_springs.h"
 #include "model/kernels/spring_reach.h"
 
 namespace clothfit {

@@ -3,10 +3,10 @@
 #include <array>
 #include <vector>
 
-#include "model/aligned_numbers.h"
+#include "model/kernels/aligned_numbers.h"
 #include "model/kernels/cloth_sweep.h"
-#include "model/lanes.h"
-#include "model/mesh.h"
+#include "model/kernels/lanes.h"
+#include "model/topology/mesh.h"
 
 namespace clothfit {
 

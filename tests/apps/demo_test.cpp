@@ -10,7 +10,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "calib/projection.h"
+#include "calib/camera/projection.h"
 #include "data/camera_parameters.h"
 #include "data/fit_result.h"
 #include "data/recording.h"
@@ -127,7 +127,7 @@ void expect_true_gravity(const fs::path& demo) {
   const Rigid3 placed = camera_from_world(camera_after(demo, "tracked"));
   const FitResult result = read_fit_result(demo / "fit.json");
   // world_tilt_a turns about the world's x axis, world_tilt_b about x cross down = y
-  // (fit/problem.cpp)
+  // (fit/problem/problem.cpp)
   const Eigen::Vector3d turn =
       value_of(result, "world_tilt_a") * Eigen::Vector3d::UnitX() +
       value_of(result, "world_tilt_b") * Eigen::Vector3d::UnitX().cross(down);

@@ -1,6 +1,6 @@
 // `clothfit experiment louchet1995 --quick` from outside: what it leaves, and that neither threads
-// nor an interruption change it. Its numbers: tests/fit/louchet1995_test.cpp; how the page looks is
-// for a person to judge.
+// nor an interruption change it. Its numbers: tests/apps/study/louchet1995/paper_problem_test.cpp;
+// how the page looks is for a person to judge.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -13,7 +13,7 @@
 #include "data/fit_result.h"
 #include "data/recording.h"
 #include "data/tracks.h"
-#include "model/surface.h"
+#include "model/topology/surface.h"
 #include "tests/apps/bundled_recordings.h"
 #include "tests/apps/program_run.h"
 #include "tests/apps/scratch_folder.h"

@@ -27,7 +27,7 @@
 #include <string>
 #include <vector>
 
-#include "model/simulate.h"
+#include "model/integrate/simulate.h"
 #include "tests/bench/bullet_patch.h"
 #include "tests/bench/peak_rate.h"
 #include "tests/bench/stepped_lanes.h"

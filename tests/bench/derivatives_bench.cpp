@@ -14,10 +14,11 @@
 #include <functional>
 #include <vector>
 
-#include "fit/parameterised_model.h"
-#include "model/adjoint.h"
-#include "model/stability.h"
-#include "model/tangents.h"
+#include "fit/problem/parameterised_model.h"
+#include "model/cloth/stability.h"
+#include "model/effects/registry.h"
+#include "model/integrate/adjoint.h"
+#include "model/integrate/tangents.h"
 #include "tests/bench/swinging_cloth.h"
 
 namespace clothfit {
@@ -60,7 +61,7 @@ void measure(int vertices_per_side, bool wind) {
   Cloth cloth = swinging_cloth(vertices_per_side);
   ParameterSet set = cotton_sets(cloth, 1).front();
   if (wind) {
-    cloth.add_effect("wind", "benchmark");
+    add_effect(cloth, "wind", "benchmark");
     set.effects = {{0.01, 0.0, 0.05, 0.0}};
   }
   const std::vector<ParameterSet> eight(8, set);

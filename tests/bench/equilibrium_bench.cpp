@@ -19,11 +19,11 @@
 #include <ctime>
 #include <vector>
 
-#include "model/equilibrium/equilibrium.h"
-#include "model/equilibrium/rest_shapes.h"
-#include "model/relax.h"
-#include "model/simulate.h"
-#include "model/stability.h"
+#include "model/cloth/stability.h"
+#include "model/integrate/relax.h"
+#include "model/integrate/simulate.h"
+#include "model/rest/equilibrium.h"
+#include "model/rest/rest_shapes.h"
 
 namespace clothfit {
 namespace {

@@ -3,9 +3,9 @@
 
 #include <benchmark/benchmark.h>
 
-#include "model/relax.h"
-#include "model/simulate.h"
-#include "model/stability.h"
+#include "model/cloth/stability.h"
+#include "model/integrate/relax.h"
+#include "model/integrate/simulate.h"
 #include "tests/bench/swinging_cloth.h"
 
 namespace clothfit {

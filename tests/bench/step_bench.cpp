@@ -11,7 +11,8 @@
 
 #include <benchmark/benchmark.h>
 
-#include "model/step.h"
+#include "model/effects/registry.h"
+#include "model/integrate/step.h"
 #include "tests/bench/swinging_cloth.h"
 
 namespace clothfit {
@@ -65,7 +66,7 @@ BENCHMARK(step)->Arg(9)->Arg(17)->Arg(33)->Arg(65)->Arg(129);
 
 void step_with_viscous_damping(benchmark::State& run) {
   LaneCloth lanes(static_cast<int>(run.range(0)));
-  lanes.cloth.add_effect("viscous_damping", "benchmark");
+  add_effect(lanes.cloth, "viscous_damping", "benchmark");
   lanes.parameters.effects = {{LaneValue<>::Constant(0.1)}};
   EulerStepper<> stepper(lanes.cloth);
   const LaneVectors<> target = stepper.held().locate(lanes.state.position_m);

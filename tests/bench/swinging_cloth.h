@@ -3,7 +3,7 @@
 #include <cmath>
 #include <vector>
 
-#include "model/cloth.h"
+#include "model/cloth/cloth.h"
 
 namespace clothfit {
 

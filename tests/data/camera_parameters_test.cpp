@@ -20,7 +20,7 @@ const std::string kCamera =
     "camera_from_world: {rotation: [0, 1, 0, 0], translation: [1, 2, 3.5]}\n"  // 8
     "readout_time: 0.01\n";                                                    // 9
 
-std::string replaced(std::string text, const std::string& from, const std::string& to) {
+std::string with_replaced(std::string text, const std::string& from, const std::string& to) {
   const std::size_t at = text.find(from);
   EXPECT_NE(at, std::string::npos) << from;
   return text.replace(at, from.size(), to);
@@ -110,7 +110,7 @@ TEST(CameraFile, ReadsBackToTheLastBit) {
 
 TEST(CameraFile, NormalisesARotationThatRoundingShortened) {
   const TemporaryFolder folder;
-  const std::string text = replaced(kCamera, "[0, 1, 0, 0]", "[0.7071, 0.7071, 0, 0]");
+  const std::string text = with_replaced(kCamera, "[0, 1, 0, 0]", "[0.7071, 0.7071, 0, 0]");
 
   const CameraParameters camera = read_camera(folder.write("front.yaml", text));
 
@@ -120,7 +120,7 @@ TEST(CameraFile, NormalisesARotationThatRoundingShortened) {
 TEST(CameraFile, WithoutDistortionHasNone) {
   const TemporaryFolder folder;
   const std::string text =
-      replaced(kCamera, "distortion: [-0.11, 0.035, 0.0008, -0.0005, 0]\n", "");
+      with_replaced(kCamera, "distortion: [-0.11, 0.035, 0.0008, -0.0005, 0]\n", "");
 
   const CameraParameters camera = read_camera(folder.write("front.yaml", text));
 
@@ -172,7 +172,7 @@ TEST(CameraFile, IsRefusedWithFileAndLine) {
   };
   const TemporaryFolder folder;
   for (const Case& test : cases) {
-    const auto file = folder.write("c.yaml", replaced(kCamera, test.from, test.to));
+    const auto file = folder.write("c.yaml", with_replaced(kCamera, test.from, test.to));
     expect_refused(folder, test.message, [&] { read_camera(file); });
   }
   for (const std::string text : {"", "# nothing\n"}) {

@@ -1,5 +1,6 @@
 // Model files: what is read, written and refused. Not checked here: what a model's simulation does
-// (tests/fit/simulation_test.cpp), and what recordings share with it in full (recording_test.cpp).
+// (tests/fit/problem/simulation_test.cpp), and what recordings share with it in full
+// (recording_test.cpp).
 
 #include "data/model_description.h"
 

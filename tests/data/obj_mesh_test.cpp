@@ -1,5 +1,5 @@
 // Surfaces in Wavefront OBJ files. Not checked here: what an obstacle makes of them
-// (tests/model/obstacle_test.cpp), compressed and damaged files (corruption_test.cpp).
+// (tests/model/topology/obstacle_test.cpp), compressed and damaged files (corruption_test.cpp).
 
 #include "data/obj_mesh.h"
 

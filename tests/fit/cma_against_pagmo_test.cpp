@@ -12,7 +12,7 @@
 #include <pagmo/problem.hpp>
 #include <vector>
 
-#include "fit/cma_es.h"
+#include "fit/search/cma_es.h"
 
 namespace clothfit {
 namespace {

@@ -5,7 +5,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "fit/diagnose.h"
+#include "fit/diagnosis/diagnose.h"
 #include "tests/fit/whole_recording.h"
 
 namespace clothfit {

@@ -11,8 +11,8 @@
 #include <fstream>
 
 #include "data/input_error.h"
-#include "synthetic_cloth.h"
 #include "tests/data/temporary_folder.h"
+#include "tests/fit/synthetic_cloth.h"
 
 namespace clothfit {
 namespace {

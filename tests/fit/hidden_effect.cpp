@@ -2,8 +2,8 @@
 
 #include <random>
 
-#include "fit/observations.h"
-#include "fit/parameterised_model.h"
+#include "fit/observe/observations.h"
+#include "fit/problem/parameterised_model.h"
 #include "tests/fit/synthetic_cloth.h"
 
 namespace clothfit {

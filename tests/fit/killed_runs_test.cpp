@@ -16,8 +16,8 @@
 #include <set>
 #include <sstream>
 
-#include "fit/draws.h"
-#include "fit/executor.h"
+#include "fit/jobs/draws.h"
+#include "fit/jobs/executor.h"
 #include "tests/data/temporary_folder.h"
 
 namespace clothfit {

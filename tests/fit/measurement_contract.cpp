@@ -3,9 +3,9 @@
 #include <gtest/gtest.h>
 
 #include "data/input_error.h"
+#include "fit/cost/objective.h"
 #include "fit/measurement_effects/applicability.h"
 #include "fit/measurement_effects/registry.h"
-#include "fit/objective.h"
 
 namespace clothfit {
 
@@ -17,12 +17,12 @@ void check_measurement_effect(const std::string& name, const FitInput& input) {
     const FitProblem without = make_problem(input, {.observations = kind}, 7, 7);
     const auto effect = measurement_effect_named(name)->make();
     if (effect->needs_camera() && kind == ObservationKind::tracks3d) {
-      EXPECT_TRUE(why_inapplicable(*effect, without).has_value());
+      EXPECT_TRUE(why_inapplicable(*effect, measurement_setting(without)).has_value());
       EXPECT_THROW(make_problem(input, {.observations = kind, .effects = {name}}, 7, 7),
                    InputError);
       continue;
     }
-    EXPECT_FALSE(why_inapplicable(*effect, without).has_value());
+    EXPECT_FALSE(why_inapplicable(*effect, measurement_setting(without)).has_value());
     const FitProblem with = make_problem(input, {.observations = kind, .effects = {name}}, 7, 7);
     const TrajectoryObjective plain(without, kFrames, kStepS), objective(with, kFrames, kStepS);
 

@@ -3,7 +3,7 @@
 #include <Eigen/Cholesky>
 #include <cmath>
 
-#include "fit/draws.h"
+#include "fit/jobs/draws.h"
 
 namespace clothfit {
 

@@ -2,8 +2,8 @@
 
 #include <cstdint>
 
-#include "fit/linearised_fit.h"
-#include "fit/space_time_blocks.h"
+#include "fit/uncertainty/linearised_fit.h"
+#include "fit/uncertainty/space_time_blocks.h"
 
 namespace clothfit {
 

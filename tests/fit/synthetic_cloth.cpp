@@ -1,4 +1,4 @@
-#include "synthetic_cloth.h"
+#include "tests/fit/synthetic_cloth.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -6,10 +6,11 @@
 #include <random>
 #include <utility>
 
-#include "calib/projection.h"
-#include "model/cloth.h"
-#include "model/simulate.h"
-#include "model/surface.h"
+#include "calib/camera/projection.h"
+#include "model/cloth/cloth.h"
+#include "model/effects/registry.h"
+#include "model/integrate/simulate.h"
+#include "model/topology/surface.h"
 
 namespace clothfit {
 
@@ -89,7 +90,7 @@ FitInput synthetic_input(const SyntheticCloth& truth) {
   const Mesh mesh{truth.mesh, truth.mesh, kSize, kSize};
   Cloth cloth = Cloth::of(mesh, masses_by_area(mesh, kMass));
   cloth.held = {held_at(mesh, 0, 0), held_at(mesh, kSize, 0)};
-  cloth.add_effect("viscous_damping", "test");
+  add_effect(cloth, "viscous_damping", "test");
   ParameterSet parameters{.springs = spring_parameters(truth.fabric, mesh),
                           .effects = {{truth.drag_rate_per_s}}};
   if (truth.critical_elongation > 0) {

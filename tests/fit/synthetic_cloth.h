@@ -4,9 +4,9 @@
 #include <functional>
 
 #include "fit/fit.h"
-#include "fit/problem.h"
-#include "fit/simulation.h"
-#include "model/fabric.h"
+#include "fit/problem/problem.h"
+#include "fit/problem/simulation.h"
+#include "model/fabric/fabric.h"
 
 namespace clothfit {
 

@@ -10,8 +10,9 @@
 #include <memory>
 #include <new>
 
-#include "model/step.h"
-#include "model/tangent_step.h"
+#include "model/effects/registry.h"
+#include "model/integrate/step.h"
+#include "model/integrate/tangent_step.h"
 #include "tests/model/random_cloth.h"
 
 namespace {
@@ -60,7 +61,7 @@ struct Busy {
     cloth.held = {held_at(cloth.mesh, 0, 0), held_at(cloth.mesh, 0.31, 0.02)};
     cloth.strain_limit.mode = mode;
     for (const char* name : {"wind", "hysteresis", "added_air_mass", "support_drift"})
-      cloth.add_effect(name, "test");
+      add_effect(cloth, name, "test");
     set.springs.critical_elongation.fill(0.01);
     for (const EffectDescription& effect : cloth.effect_descriptions) {
       set.effects.emplace_back();

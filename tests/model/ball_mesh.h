@@ -4,7 +4,7 @@
 #include <map>
 #include <vector>
 
-#include "model/obstacle.h"
+#include "model/topology/obstacle.h"
 
 namespace clothfit {
 

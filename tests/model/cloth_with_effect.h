@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "model/effects/registry.h"
 #include "tests/model/effect_contract.h"
 
 namespace clothfit {
@@ -16,7 +17,7 @@ struct ClothWithEffect {
   ClothWithEffect(const Cloth& bare, const std::string& effect, std::vector<double> parameters,
                   const Eigen::Matrix3Xd& start_position_m)
       : cloth(bare) {
-    cloth.add_effect(effect, "test");
+    add_effect(cloth, effect, "test");
     set.springs = spring_parameters(cotton(), cloth.mesh);
     set.effects = {std::move(parameters)};
     set.start_position_m = start_position_m;

@@ -5,9 +5,10 @@
 #include <utility>
 #include <vector>
 
-#include "model/relax.h"
-#include "model/simulate.h"
-#include "model/stability.h"
+#include "model/cloth/stability.h"
+#include "model/effects/registry.h"
+#include "model/integrate/relax.h"
+#include "model/integrate/simulate.h"
 #include "tests/model/random_cloth.h"
 
 namespace clothfit {
@@ -21,7 +22,7 @@ struct Curtain {
   explicit Curtain(const std::vector<std::pair<std::string, std::vector<double>>>& effects) {
     for (int j = 0; j < 7; ++j) cloth.held.push_back(held_at(cloth.mesh, 0.4 * j / 6, 0));
     for (const auto& [name, parameters] : effects) {
-      cloth.add_effect(name, "test");
+      add_effect(cloth, name, "test");
       set.effects.push_back(parameters);
     }
   }

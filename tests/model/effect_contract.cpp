@@ -2,9 +2,10 @@
 
 #include <gtest/gtest.h>
 
-#include "model/network_bound.h"
-#include "model/simulate.h"
-#include "model/stability.h"
+#include "model/cloth/network_bound.h"
+#include "model/cloth/stability.h"
+#include "model/effects/registry.h"
+#include "model/integrate/simulate.h"
 #include "tests/model/effect_derivatives.h"
 #include "tests/model/plain_springs.h"
 
@@ -58,7 +59,7 @@ void expect_nothing_at_neutral(const EffectEntry& entry, Uniform& uniform) {
   Cloth plain = touched_cloth(6);
   plain.held = drifting_points(plain.mesh);
   Cloth with = plain;
-  with.add_effect(entry.name, "test");
+  add_effect(with, entry.name, "test");
   ParameterSet set{.springs = spring_parameters(cotton(), plain.mesh),
                    .start_position_m = crumpled_for(entry.name, plain.mesh, 0.3, uniform)};
   const Schedule schedule{.frame_time_s = {0, 0.1, 0.2, 0.3}, .time_step_s = 2e-4};
@@ -109,7 +110,7 @@ void expect_lanes_to_know_nothing_of_each_other(const EffectEntry& entry, Unifor
   const EffectDescription effect = entry.describe();
   Cloth cloth = touched_cloth(5);
   cloth.held = drifting_points(cloth.mesh);
-  cloth.add_effect(entry.name, "test");
+  add_effect(cloth, entry.name, "test");
   std::vector<ParameterSet> sets;
   for (int l = 0; l < kLanes; ++l)
     sets.push_back({.springs = spring_parameters(cotton(), cloth.mesh),
@@ -160,7 +161,7 @@ void expect_true_derivatives(const EffectEntry& entry, Uniform& uniform) {
 void expect_the_stable_step_to_be_stable(const EffectEntry& entry, Uniform& uniform) {
   Cloth cloth = touched_cloth(6);
   cloth.held = {held_at(cloth.mesh, 0, 0), held_at(cloth.mesh, 0.31, 0.02)};
-  cloth.add_effect(entry.name, "test");
+  add_effect(cloth, entry.name, "test");
   ParameterSet set{.springs = spring_parameters(cotton(), cloth.mesh),
                    .effects = {{}},
                    .start_position_m = crumpled_for(entry.name, cloth.mesh, 0.3, uniform)};

@@ -7,9 +7,9 @@
 #include <utility>
 #include <vector>
 
+#include "model/cloth/stability.h"
 #include "model/effects/registry.h"
-#include "model/simulate.h"
-#include "model/stability.h"
+#include "model/integrate/simulate.h"
 #include "tests/model/effect_derivatives.h"
 #include "tests/model/mechanics.h"
 #include "tests/model/random_cloth.h"

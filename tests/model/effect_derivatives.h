@@ -3,7 +3,7 @@
 #include <Eigen/Dense>
 #include <string>
 
-#include "model/cloth.h"
+#include "model/cloth/cloth.h"
 #include "model/effects/linearisation.h"
 #include "tests/model/random_cloth.h"
 

@@ -4,9 +4,9 @@
 
 #include <vector>
 
-#include "model/adjoint.h"
-#include "model/equilibrium/equilibrium.h"
-#include "model/relax.h"
+#include "model/integrate/adjoint.h"
+#include "model/integrate/relax.h"
+#include "model/rest/equilibrium.h"
 #include "tests/model/hung_cloth.h"
 #include "tests/model/swing.h"
 

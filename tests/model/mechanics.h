@@ -2,9 +2,9 @@
 
 #include <Eigen/Dense>
 
-#include "model/cloth.h"
+#include "model/cloth/cloth.h"
+#include "model/integrate/step.h"
 #include "model/kernels/cloth_sweep.h"
-#include "model/step.h"
 
 namespace clothfit {
 

@@ -7,8 +7,9 @@
 #include <cstdio>
 #include <vector>
 
-#include "model/simulate.h"
-#include "model/stability.h"
+#include "model/cloth/stability.h"
+#include "model/effects/registry.h"
+#include "model/integrate/simulate.h"
 #include "tests/model/random_cloth.h"
 
 namespace clothfit {
@@ -23,8 +24,8 @@ std::vector<Eigen::Matrix3Xd> swing(int vertices_per_side, double time_step_s) {
   Cloth cloth = square_cloth(vertices_per_side);
   for (int j = 0; j < vertices_per_side; ++j)
     cloth.held.push_back({.weights = {{.vertex = j, .weight = 1}}});
-  cloth.add_effect("bending_energy", "test");
-  cloth.add_effect("viscous_damping", "test");
+  add_effect(cloth, "bending_energy", "test");
+  add_effect(cloth, "viscous_damping", "test");
   Fabric fabric = cotton();
   fabric.damping_warp_s = fabric.damping_weft_s = 3e-4;
   fabric.flexion_warp_n_per_m = fabric.flexion_weft_n_per_m = 0;

@@ -6,9 +6,9 @@
 #include <gtest/gtest.h>
 
 #include "data/input_error.h"
-#include "model/fabric_conversion.h"
-#include "model/louchet18.h"
-#include "model/louchet5.h"
+#include "model/fabric/fabric_conversion.h"
+#include "model/fabric/louchet18.h"
+#include "model/fabric/louchet5.h"
 #include "tests/model/random_cloth.h"
 
 namespace clothfit {

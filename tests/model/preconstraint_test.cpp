@@ -5,9 +5,10 @@
 
 #include <cmath>
 
-#include "model/louchet18.h"
-#include "model/simulate.h"
-#include "model/stability.h"
+#include "model/cloth/stability.h"
+#include "model/effects/registry.h"
+#include "model/fabric/louchet18.h"
+#include "model/integrate/simulate.h"
 #include "tests/model/random_cloth.h"
 
 namespace clothfit {
@@ -49,7 +50,7 @@ struct Strip {
     for (int n = 0; n < 2; ++n)
       for (int across = 0; across < 3; ++across)
         cloth.held.push_back({.weights = {{vertex(n, across), 1.0}}, .motion = {}});
-    cloth.add_effect("viscous_damping", "test");
+    add_effect(cloth, "viscous_damping", "test");
     set.effects = {{4.0}};  // about as fast as the strip sways
     set.start_position_m = flat_positions(cloth.mesh);
   }

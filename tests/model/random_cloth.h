@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <random>
 
-#include "model/cloth.h"
+#include "model/cloth/cloth.h"
 
 namespace clothfit {
 

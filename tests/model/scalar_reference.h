@@ -2,7 +2,7 @@
 
 #include <Eigen/Core>
 
-#include "model/cloth.h"
+#include "model/cloth/cloth.h"
 
 namespace clothfit {
 

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "model/effects/registry.h"
 #include "tests/model/effect_contract.h"
 
 namespace clothfit {
@@ -83,7 +84,7 @@ class SpringOscillator {
     const Mesh mesh{.columns = 2, .rows = 2, .width_m = 0.1, .height_m = kLength_m};
     cloth_ = Cloth::of(mesh, Eigen::VectorXd::Constant(4, kMass_kg));
     cloth_.held = {held_at(mesh, 0, 0), held_at(mesh, mesh.width_m, 0)};
-    cloth_.add_effect(effect, "test");
+    add_effect(cloth_, effect, "test");
     set_ = {.springs = warp_springs(mesh, kStiffness_n_per_m),
             .gravity_m_per_s2 = Eigen::Vector3d::Zero(),
             .effects = {parameters},

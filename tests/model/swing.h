@@ -3,7 +3,8 @@
 #include <algorithm>
 #include <vector>
 
-#include "model/tangents.h"
+#include "model/effects/registry.h"
+#include "model/integrate/tangents.h"
 #include "tests/model/effect_contract.h"
 #include "tests/model/random_cloth.h"
 
@@ -42,7 +43,7 @@ inline std::vector<Eigen::VectorXd> random_memory(const Cloth& cloth, Uniform& u
 /// something where it remembers.
 inline Swing swing_under(const EffectEntry& entry, Uniform& uniform) {
   Swing swing(uniform);
-  swing.cloth.add_effect(entry.name, "test");
+  add_effect(swing.cloth, entry.name, "test");
   swing.set.effects = {effect_contract::random_parameters(entry.describe(), uniform)};
   swing.schedule = {.frame_time_s = {0, 0.004, 0.01}, .time_step_s = 2e-4};
   swing.set.start_position_m = crumpled_for(entry.name, swing.cloth.mesh, 0.1, uniform);
@@ -65,7 +66,7 @@ struct TwoWays {
 
   TwoWays(const Cloth& without, const ParameterSet& own, const EmergingLaw& law)
       : cloth(without), set(own) {
-    cloth.add_effect(law.effect, "test");
+    add_effect(cloth, law.effect, "test");
     const EffectDescription& effect = cloth.effect_descriptions.back();
     set.effects.push_back(effect_contract::neutral(effect));
     for (const std::vector<double>& values : set.effects)

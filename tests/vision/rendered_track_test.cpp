@@ -10,9 +10,9 @@
 #include "data/recording.h"
 #include "tests/data/temporary_folder.h"
 #include "tests/vision/tag_sheet.h"
-#include "vision/render_cloth.h"
-#include "vision/track.h"
-#include "vision/true_markers.h"
+#include "vision/render/render_cloth.h"
+#include "vision/render/true_markers.h"
+#include "vision/track/track.h"
 
 namespace clothfit {
 namespace {

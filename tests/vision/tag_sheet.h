@@ -5,7 +5,7 @@
 
 #include "data/camera_parameters.h"
 #include "data/markers.h"
-#include "vision/sheet_scene.h"
+#include "vision/render/sheet_scene.h"
 
 namespace clothfit {
 

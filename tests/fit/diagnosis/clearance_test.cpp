@@ -18,15 +18,15 @@
 namespace clothfit {
 namespace {
 
-constexpr double kInfinite = std::numeric_limits<double>::infinity();
-const FitOptions kOptions{.loss = Loss::squared};
+constexpr double kNoThreshold = std::numeric_limits<double>::infinity();
+const FitOptions kClearanceOptions{.loss = Loss::squared};
 constexpr Adequacy kWhite{.chi_square_per_dof = 1};
 
 /// The true model of a recording with `term` as its last one, linearised.
 ModelFit model_with(const Term& term, const SyntheticCloth& cloth) {
   const FitInput input = synthetic_input(cloth);
-  return true_model({.inputs = {&input, 1}, .options = kOptions, .columns = 9, .rows = 9}, cloth,
-                    {term});
+  return true_model({.inputs = {&input, 1}, .options = kClearanceOptions, .columns = 9, .rows = 9},
+                    cloth, {term});
 }
 
 const ModelFit& of_drag() {
@@ -78,7 +78,7 @@ TEST(ClearOfNeutral, OfOneAmplitudeInWhiteNoiseIsItsNumberOfSigmas) {
   ASSERT_TRUE(model.usable);
   const double sigma = 1 / std::sqrt(information_of_amplitudes(model)(0, 0));
 
-  const double clear = clear_of_neutral(model, kWhite, kInfinite);
+  const double clear = clear_of_neutral(model, kWhite, kNoThreshold);
 
   EXPECT_NEAR(clear, 0.5 / sigma, 1e-4 * clear);  // what keeps the inverse finite takes a little
   EXPECT_GT(clear, 5);
@@ -87,13 +87,13 @@ TEST(ClearOfNeutral, OfOneAmplitudeInWhiteNoiseIsItsNumberOfSigmas) {
 TEST(ClearOfNeutral, IsLessByWhatSumsOfDependentResidualsScatterMore) {
   const ModelFit& model = of_drag();
   ASSERT_TRUE(model.usable);
-  const double white = clear_of_neutral(model, kWhite, kInfinite);
+  const double white = clear_of_neutral(model, kWhite, kNoThreshold);
   const auto share = [&](double chi_square, double in_time, double along) {
     return clear_of_neutral(model,
                             {.chi_square_per_dof = chi_square,
                              .time_correlation = in_time,
                              .neighbour_correlation = along},
-                            kInfinite) /
+                            kNoThreshold) /
            white;
   };
 
@@ -108,18 +108,18 @@ TEST(ClearOfNeutral, IsLessByWhatSumsOfDependentResidualsScatterMore) {
 TEST(ClearOfNeutral, IsNoMoreThanNoiseAllows) {
   const ModelFit& model = of_drag();
   ASSERT_TRUE(model.usable);
-  const double white = clear_of_neutral(model, kWhite, kInfinite);
+  const double white = clear_of_neutral(model, kWhite, kNoThreshold);
 
   EXPECT_EQ(
       clear_of_neutral(
           model,
           {.chi_square_per_dof = 0.7, .time_correlation = -0.2, .neighbour_correlation = -0.3},
-          kInfinite),
+          kNoThreshold),
       white);
   // Residuals that never change leave little, but a number.
   const double least = clear_of_neutral(
       model, {.chi_square_per_dof = 1, .time_correlation = 1, .neighbour_correlation = 1},
-      kInfinite);
+      kNoThreshold);
   EXPECT_GT(least, 0);
   EXPECT_LT(least, 1e-3 * white);
 }
@@ -135,7 +135,7 @@ TEST(ClearOfNeutral, CountsSeveralAmplitudesAsOneNumberThatIsAsUnlikely) {
   for (int axis = 0; axis < 3; ++axis)
     model.parts.front().values[places[static_cast<size_t>(axis)]] = pressure_pa[axis];
 
-  EXPECT_NEAR(clear_of_neutral(model, kWhite, kInfinite), 5, 1e-3);
+  EXPECT_NEAR(clear_of_neutral(model, kWhite, kNoThreshold), 5, 1e-3);
 }
 
 // Derivatives of cloth that folds and unfolds are steeper than what the residuals do over any
@@ -146,12 +146,12 @@ TEST(ClearOfNeutral, GoesByTheTrendWhereDerivativesExplode) {
   ModelFit rough = model;
   rough.parts.front().linear.residual_by_coordinate *= 1000;
 
-  const double smooth = clear_of_neutral(model, kWhite, kInfinite);
-  EXPECT_NEAR(clear_of_neutral(rough, kWhite, kInfinite), smooth, 0.1 * smooth);
+  const double smooth = clear_of_neutral(model, kWhite, kNoThreshold);
+  EXPECT_NEAR(clear_of_neutral(rough, kWhite, kNoThreshold), smooth, 0.1 * smooth);
   EXPECT_EQ(typical_roughness(model), 1);
   EXPECT_NEAR(typical_roughness(rough), 1000, 100);
-  const NamedValues sigma = sigma_of(model, kWhite, kInfinite).front();
-  const NamedValues by_trend = sigma_of(rough, kWhite, kInfinite).front();
+  const NamedValues sigma = sigma_of(model, kWhite, kNoThreshold).front();
+  const NamedValues by_trend = sigma_of(rough, kWhite, kNoThreshold).front();
   ASSERT_EQ(by_trend.size(), sigma.size());
   for (const FitParameter& parameter : model.problems.front()->space.parameters) {
     if (!is_physical(parameter.role)) continue;
@@ -164,8 +164,9 @@ TEST(ClearOfNeutral, GrowsWithTheRecordingsThatShareAnAmplitude) {
   const ModelFit& model = of_drag();
   ASSERT_TRUE(model.usable);
 
-  const double one = clear_of_neutral(model, kWhite, kInfinite);
-  EXPECT_NEAR(clear_of_neutral(twice(model), kWhite, kInfinite), std::sqrt(2.0) * one, 1e-4 * one);
+  const double one = clear_of_neutral(model, kWhite, kNoThreshold);
+  EXPECT_NEAR(clear_of_neutral(twice(model), kWhite, kNoThreshold), std::sqrt(2.0) * one,
+              1e-4 * one);
 }
 
 // Two clocks that are off alike: their squares add, and count as those of two amplitudes.
@@ -174,9 +175,9 @@ TEST(ClearOfNeutral, CountsTheAmplitudesThatEachRecordingHasOfItsOwn) {
   ASSERT_TRUE(model.usable);
   model.parts.front().values[places_of(model).front()] = 2e-3;
 
-  const double one = clear_of_neutral(model, kWhite, kInfinite);
+  const double one = clear_of_neutral(model, kWhite, kNoThreshold);
   EXPECT_GT(one, 0);
-  EXPECT_NEAR(clear_of_neutral(twice(model), kWhite, kInfinite),
+  EXPECT_NEAR(clear_of_neutral(twice(model), kWhite, kNoThreshold),
               5 * std::sqrt(2 * one * one / least_fall(2)), 1e-4 * one);
 }
 
@@ -191,17 +192,18 @@ double chance_beyond(int numbers, double square) {
 TEST(RiseWithoutLast, IsThatOfAFitWithout) {
   const SyntheticCloth cloth{.drag_rate_per_s = 0.02};
   const FitInput input = synthetic_input(cloth);
-  const DiagnosisSetup setup{.inputs = {&input, 1}, .options = kOptions, .columns = 9, .rows = 9};
+  const DiagnosisSetup setup{
+      .inputs = {&input, 1}, .options = kClearanceOptions, .columns = 9, .rows = 9};
   ModelFit with = true_model(setup, cloth, {drag_term()});
   with.parts.front().linear = {};  // at time steps as those of the other fit
   refine_model(with, setup, {}, {});
   ModelFit without = with_terms(setup, with, {}, {});
   refine_model(without, setup, {}, {});
   ASSERT_TRUE(with.usable && without.usable);
-  const double rise = without.chi_square(kInfinite) - with.chi_square(kInfinite);
+  const double rise = without.chi_square(kNoThreshold) - with.chi_square(kNoThreshold);
   ASSERT_GT(rise, 25);
 
-  EXPECT_NEAR(rise_without_last(with, kInfinite), rise, 0.1 * rise);
+  EXPECT_NEAR(rise_without_last(with, kNoThreshold), rise, 0.1 * rise);
 }
 
 TEST(LeastFall, IsAsUnlikelyAsFiveSigmas) {

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "fit/diagnosis/cross_validation.h"
+#include "fit/diagnosis/horizons.h"
 #include "fit/diagnosis/refit.h"
 #include "fit/diagnosis/search.h"
 #include "tests/fit/diagnosis/true_model.h"
@@ -20,7 +21,7 @@
 namespace clothfit {
 namespace {
 
-constexpr double kSquares = std::numeric_limits<double>::infinity();
+constexpr double kFreeForcesSquares = std::numeric_limits<double>::infinity();
 constexpr int kBlocks = 5, kStretches = 10;
 const FitOptions kFreeForcesOptions = [] {
   FitOptions options;
@@ -55,7 +56,7 @@ ModelFit fitted(const DiagnosisSetup& setup) {
 }
 
 CrossValidation with_forces(const DiagnosisSetup& setup, const ModelFit& model) {
-  return cross_validate(setup, model, kBlocks, kSquares, false, &setup);
+  return cross_validate(setup, model, kBlocks, kFreeForcesSquares, false, &setup);
 }
 
 /// Derivative of a model's residuals by a push that is there in its runs, along one of the world's
@@ -122,14 +123,14 @@ TEST(FreeForces, HaveTheDerivativesOfASimulationThatIsPushedLikeThat) {
       // Where it begins and ends an emerging force is known to a millisecond (kEmergingInterval_s),
       // of the 43 that a stretch lasts.
       constexpr double kRough = 0.03;
-      expect_near(column(0, product, axis), -kSquares, begin_s(1), kRough);
+      expect_near(column(0, product, axis), -kFreeForcesSquares, begin_s(1), kRough);
       expect_near(column(5, product, axis), begin_s(5), begin_s(6), kRough);
-      expect_near(column(9, product, axis), begin_s(9), kSquares, kRough);
+      expect_near(column(9, product, axis), begin_s(9), kFreeForcesSquares, kRough);
       // All of them together are a push that never begins nor ends. Differences err by the square
       // of the step.
       Eigen::VectorXd sum = Eigen::VectorXd::Zero(columns.rows());
       for (int stretch = 0; stretch < kStretches; ++stretch) sum += column(stretch, product, axis);
-      expect_near(sum, -kSquares, kSquares, 1e-4);
+      expect_near(sum, -kFreeForcesSquares, kFreeForcesSquares, 1e-4);
     }
   }
 }
@@ -211,7 +212,8 @@ TEST(FreeForces, AreFoundWithTheDerivativesOfACoarserMesh) {
   const ModelFit model = fitted(setup);
 
   const double fine = with_forces(setup, model).free_forces,
-               rough = cross_validate(setup, model, kBlocks, kSquares, false, &coarse).free_forces;
+               rough = cross_validate(setup, model, kBlocks, kFreeForcesSquares, false, &coarse)
+                           .free_forces;
 
   EXPECT_NEAR(rough, fine, 0.2 * fine);
 }
@@ -233,8 +235,10 @@ TEST(FreeForces, OfARecordingThatIsLeftOutAreNotKnown) {
   const DiagnosisSetup setup = setup_of(inputs);
   const ModelFit model = true_model(setup, {});
 
-  EXPECT_EQ(cross_validate(setup, model, kBlocks, kSquares, true, &setup).free_forces, kSquares);
-  EXPECT_EQ(cross_validate(setup, model, kBlocks, kSquares).free_forces, kSquares);
+  EXPECT_EQ(cross_validate(setup, model, kBlocks, kFreeForcesSquares, true, &setup).free_forces,
+            kFreeForcesSquares);
+  EXPECT_EQ(cross_validate(setup, model, kBlocks, kFreeForcesSquares).free_forces,
+            kFreeForcesSquares);
 }
 
 // Of two laws that are hidden each one alone leaves more than free forces do, which take much of
@@ -248,7 +252,7 @@ TEST(FreeForces, DoNotKeepASearchFromTheFirstOfTwoLaws) {
                               .lines = 1,
                               .refits = 2,
                               .most_effects = 2,
-                              .threshold = kSquares};
+                              .threshold = kFreeForcesSquares};
 
   const LawSearch search = search_laws(setup, fitted(setup), options, {});
 

@@ -1,6 +1,6 @@
 // The score test of laws on simulated recordings, the derivatives it is made of, and the judgement
 // of what a fit leaves. Not checked here: derivatives of runs along effects that a cloth does not
-// have, one by one (tests/model/tangents_test.cpp).
+// have, one by one (tests/model/integrate/tangents_test.cpp).
 #include "fit/diagnosis/law_score.h"
 
 #include <gtest/gtest.h>
@@ -20,10 +20,10 @@
 namespace clothfit {
 namespace {
 
-const FitOptions kOptions{.loss = Loss::squared};
+const FitOptions kScoreOptions{.loss = Loss::squared};
 
 DiagnosisSetup setup_of(std::span<const FitInput> inputs) {
-  return {.inputs = inputs, .options = kOptions, .columns = 9, .rows = 9};
+  return {.inputs = inputs, .options = kScoreOptions, .columns = 9, .rows = 9};
 }
 
 TEST(LawScore, ForeseesASmallDragAndItsSigma) {
@@ -32,7 +32,7 @@ TEST(LawScore, ForeseesASmallDragAndItsSigma) {
   const DiagnosisSetup setup = setup_of({&input, 1});
   const ModelFit model = true_model(setup, cloth);
   ASSERT_TRUE(model.usable);
-  const ModelProjection projection(model, kOptions.loss);
+  const ModelProjection projection(model, kScoreOptions.loss);
 
   const std::vector<LawScore> scores = score_laws(model, projection, {{drag_term()}}, {});
 
@@ -50,11 +50,11 @@ TEST(LawScore, IsThatOfNoiseWhereNothingIsHidden) {
   const DiagnosisSetup setup = setup_of({&input, 1});
   const ModelFit model = that_may_err(setup, true_model(setup, cloth));
   ASSERT_TRUE(model.usable);
-  std::vector<LawShapes> laws = laws_to_test(input, kOptions, 0.4);
+  std::vector<LawShapes> laws = laws_to_test(input, kScoreOptions, 0.4);
   std::erase_if(laws, [](const LawShapes& law) { return law.size() > 1; });
 
   const std::vector<LawScore> scores =
-      score_laws(model, ModelProjection(model, kOptions.loss), laws, {});
+      score_laws(model, ModelProjection(model, kScoreOptions.loss), laws, {});
 
   EXPECT_GT(scores.size(), 5u);
   for (const LawScore& score : scores)
@@ -72,7 +72,8 @@ TEST(LawScore, SharesThePhysicsOfTwoRecordingsAndNotTheirClocks) {
   const Term clock{.effect = "clock_offset", .law = "", .amplitudes = {"time"}};
   const auto scores_of = [&](std::span<const FitInput> some) {
     const ModelFit model = true_model(setup_of(some), cloth);
-    return score_laws(model, ModelProjection(model, kOptions.loss), {{drag_term()}, {clock}}, {});
+    return score_laws(model, ModelProjection(model, kScoreOptions.loss), {{drag_term()}, {clock}},
+                      {});
   };
 
   const std::vector<LawScore> one = scores_of({inputs.data(), 1}), two = scores_of(inputs);
@@ -150,7 +151,7 @@ TEST(Adequacy, HoldsForATrueModelAndNotForOneThatLacksDrag) {
     const ModelFit model = that_may_err(setup, true_model(setup, cloth));
     ASSERT_TRUE(model.usable);
 
-    const Adequacy adequacy = judge_adequacy(model, kOptions.loss);
+    const Adequacy adequacy = judge_adequacy(model, kScoreOptions.loss);
 
     EXPECT_EQ(adequacy.adequate, drag == 0) << "drag " << drag;
     if (drag == 0) {
@@ -172,7 +173,7 @@ TEST(Adequacy, TakesLittleBesideTheDiscretisationsErrorForNoStructure) {
   const DiagnosisSetup setup = setup_of({&input, 1});
   ModelFit model = true_model(setup, cloth);
   ASSERT_TRUE(model.usable);
-  ASSERT_FALSE(judge_adequacy(model, kOptions.loss).adequate);
+  ASSERT_FALSE(judge_adequacy(model, kScoreOptions.loss).adequate);
 
   // A direction that looks like nothing else: of mean square 40, its sign alternating.
   Eigen::MatrixXd& directions = model.parts.front().directions;
@@ -180,7 +181,7 @@ TEST(Adequacy, TakesLittleBesideTheDiscretisationsErrorForNoStructure) {
   for (Eigen::Index n = 0; n < directions.rows(); n += 2) directions(n, 0) *= -1;
   model.parts.front().amounts = Eigen::VectorXd::Zero(1);
 
-  const Adequacy adequacy = judge_adequacy(model, kOptions.loss);
+  const Adequacy adequacy = judge_adequacy(model, kScoreOptions.loss);
   EXPECT_NEAR(adequacy.discretisation_square, 40, 1e-9);
   EXPECT_TRUE(adequacy.adequate);
 }
@@ -225,7 +226,7 @@ TEST(CrossValidation, OfATrueModelForeseesAnotherRecordingToTheNoise) {
 TEST(CrossValidation, KeepsTheFramesThatShowAStartInMotion) {
   FitInput input = synthetic_input({.frames = 46, .held_out_from = 40});
   input.recording.start = StartKind::unknown;
-  FitOptions options = kOptions;
+  FitOptions options = kScoreOptions;
   options.start_nodes = 3;
   const DiagnosisSetup setup{.inputs = {&input, 1}, .options = options, .columns = 9, .rows = 9};
   ModelFit model = model_at(setup, {}, {named(SyntheticCloth().fabric)});
@@ -285,7 +286,7 @@ TEST(Discretisation, ExpectsOfTheStepWhatAFinerOneShows) {
 TEST(Discretisation, OfAStartInMotionStopsShortOnlyAlongTheParameters) {
   FitInput input = synthetic_input({.frames = 28, .held_out_from = 20});
   input.recording.start = StartKind::unknown;
-  FitOptions options = kOptions;
+  FitOptions options = kScoreOptions;
   options.start_nodes = 4;
   const DiagnosisSetup setup{.inputs = {&input, 1}, .options = options, .columns = 13, .rows = 13};
   ModelFit model = model_at(setup, {}, {named(SyntheticCloth().fabric)});

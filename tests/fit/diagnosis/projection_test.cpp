@@ -9,7 +9,7 @@
 #include <random>
 #include <vector>
 
-#include "fit/prior_cost.h"
+#include "fit/problem/prior_cost.h"
 #include "tests/fit/synthetic_cloth.h"
 
 namespace clothfit {

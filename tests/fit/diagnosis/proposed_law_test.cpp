@@ -10,8 +10,8 @@
 #include <utility>
 
 #include "fit/diagnosis/discretisation.h"
-#include "fit/parameterised_model.h"
-#include "fit/simulation.h"
+#include "fit/problem/parameterised_model.h"
+#include "fit/problem/simulation.h"
 #include "tests/fit/hidden_effect.h"
 #include "tests/fit/synthetic_cloth.h"
 

@@ -1,5 +1,5 @@
 // Models that are fitted again in a diagnosis. How well laws race each other: search_test.cpp,
-// tests/fit/diagnose_test.cpp.
+// tests/fit/diagnosis/diagnose_test.cpp.
 #include "fit/diagnosis/refit.h"
 
 #include <gtest/gtest.h>

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <utility>
 
-#include "fit/simulation.h"
+#include "fit/problem/simulation.h"
 #include "tests/fit/hidden_effect.h"
 #include "tests/fit/synthetic_cloth.h"
 

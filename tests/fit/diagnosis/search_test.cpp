@@ -1,4 +1,5 @@
-// What a law must gain to be named. Whole searches: planting_test.cpp, tests/fit/diagnose_test.cpp.
+// What a law must gain to be named. Whole searches: planting_test.cpp,
+// tests/fit/diagnosis/diagnose_test.cpp.
 #include "fit/diagnosis/search.h"
 
 #include <gtest/gtest.h>

@@ -14,9 +14,9 @@
 #include <string>
 #include <utility>
 
-#include "fit/diagnose.h"
 #include "fit/diagnosis/candidate_recording.h"
-#include "fit/parameterised_model.h"
+#include "fit/diagnosis/diagnose.h"
+#include "fit/problem/parameterised_model.h"
 #include "model/effects/registry.h"
 #include "tests/fit/diagnosis/true_model.h"
 #include "tests/fit/hidden_effect.h"
@@ -301,7 +301,7 @@ TEST(Candidates, AreThoseThatCanBeMade) {
   const auto nothing = [](FitProblem&) {};
 
   EXPECT_FALSE(kinds_of(input, [](FitProblem& problem) {
-                 problem.cloth.add_effect("contact_plane", "test");
+                 add_effect(problem.cloth, "contact_plane", "test");
                  problem.effects.emplace_back(
                      problem.cloth.effect_descriptions.back().parameters.size());
                }).contains(CandidateKind::attitude));

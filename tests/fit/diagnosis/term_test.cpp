@@ -9,7 +9,7 @@
 
 #include "data/input_error.h"
 #include "fit/diagnosis/model_fit.h"
-#include "fit/problem.h"
+#include "fit/problem/problem.h"
 #include "tests/fit/synthetic_cloth.h"
 
 namespace clothfit {

@@ -6,8 +6,8 @@
 
 #include "fit/diagnosis/discretisation.h"
 #include "fit/diagnosis/model_fit.h"
-#include "fit/parameterised_model.h"
-#include "fit/simulation.h"
+#include "fit/problem/parameterised_model.h"
+#include "fit/problem/simulation.h"
 #include "tests/fit/synthetic_cloth.h"
 
 namespace clothfit {

@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "fit/parameterised_model.h"
+#include "fit/problem/parameterised_model.h"
 #include "tests/fit/synthetic_cloth.h"
 
 namespace clothfit {

@@ -20,7 +20,7 @@ std::set<std::string> inapplicable(const FitInput& input, const FitOptions& opti
   const FitProblem problem = make_problem(input, options, 5, 5);
   std::set<std::string> names;
   for (const MeasurementEffectEntry& entry : measurement_effect_registry())
-    if (why_inapplicable(*entry.make(), problem)) names.insert(entry.name);
+    if (why_inapplicable(*entry.make(), measurement_setting(problem))) names.insert(entry.name);
   return names;
 }
 

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "calib/projection.h"
+#include "calib/camera/projection.h"
 #include "tests/fit/measurement_contract.h"
 #include "tests/fit/planted_effect.h"
 #include "tests/fit/synthetic_cloth.h"

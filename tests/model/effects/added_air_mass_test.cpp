@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "model/effects/registry.h"
 #include "tests/model/cloth_with_effect.h"
 
 namespace clothfit {
@@ -74,7 +75,7 @@ TEST(AddedAirMass, DividesAForceAlongTheNormalByBothMasses) {
   // F' / m = F / (m + mu A) for a force along the normal, whatever gravity does beside it.
   const double mu = 0.3;
   ClothWithEffect sheet = in_air(mu, lying());
-  sheet.cloth.add_effect("wind", "test");
+  add_effect(sheet.cloth, "wind", "test");
   sheet.set.effects.push_back({0, 0, 0, 0.8});
   sheet.set.gravity_m_per_s2.setZero();
 

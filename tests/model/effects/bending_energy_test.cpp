@@ -8,6 +8,7 @@
 #include <Eigen/Dense>
 #include <cmath>
 
+#include "model/effects/registry.h"
 #include "tests/model/effect_contract.h"
 
 namespace clothfit {
@@ -152,7 +153,7 @@ TEST(BendingEnergy, TheStepThatItsRatesAllowIsStableAndTwiceItIsNot) {
   const Mesh mesh = square_mesh(17);
   Cloth cloth = Cloth::of(mesh, masses_by_area(mesh, 0.025));
   cloth.held = {held_at(mesh, 0, 0), held_at(mesh, 0.4, 0)};
-  cloth.add_effect("bending_energy", "test");
+  add_effect(cloth, "bending_energy", "test");
   Uniform uniform(3);
   const ParameterSet set{.springs = spring_parameters(
                              {.tension_warp_n_per_m = 0.1, .tension_weft_n_per_m = 0.1}, mesh),

@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "model/stability.h"
+#include "model/cloth/stability.h"
 #include "tests/model/ball_mesh.h"
 #include "tests/model/cloth_with_effect.h"
 

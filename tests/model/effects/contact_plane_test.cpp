@@ -6,8 +6,8 @@
 
 #include <cmath>
 
+#include "model/cloth/stability.h"
 #include "model/effects/contact_law.h"
-#include "model/stability.h"
 #include "tests/model/cloth_with_effect.h"
 
 namespace clothfit {

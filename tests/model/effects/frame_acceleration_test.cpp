@@ -13,15 +13,15 @@ namespace clothfit {
 namespace {
 
 const Eigen::Vector3d kAmplitude_m_per_s2(1.5, -0.7, 0.9);
-constexpr double kFrequency_hz = 2.3, kPhase_turns = 0.15;
+constexpr double kShaking_hz = 2.3, kPhase_turns = 0.15;
 
 Eigen::Vector3d acceleration_m_per_s2(double time_s) {
-  return std::sin(2 * std::numbers::pi * (kFrequency_hz * time_s + kPhase_turns)) *
+  return std::sin(2 * std::numbers::pi * (kShaking_hz * time_s + kPhase_turns)) *
          kAmplitude_m_per_s2;
 }
 
 std::vector<double> parameters() {
-  return {kAmplitude_m_per_s2.x(), kAmplitude_m_per_s2.y(), kAmplitude_m_per_s2.z(), kFrequency_hz,
+  return {kAmplitude_m_per_s2.x(), kAmplitude_m_per_s2.y(), kAmplitude_m_per_s2.z(), kShaking_hz,
           kPhase_turns};
 }
 

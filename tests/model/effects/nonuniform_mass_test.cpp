@@ -11,7 +11,7 @@
 namespace clothfit {
 namespace {
 
-constexpr double kMass_kg = 0.025, kSide_m = 0.4;  // square_cloth's
+constexpr double kUniformMass_kg = 0.025, kSide_m = 0.4;  // square_cloth's
 
 struct Masses {
   double hem = 0, hem_width = 0.01, hem_left = 0, hem_right = 0, hem_top = 0, hem_bottom = 0,
@@ -55,7 +55,7 @@ TEST(NonuniformMass, AHemWeighsTheSameOnEveryMesh) {
 
       const Eigen::VectorXd mass = true_mass_kg(with(vertices, {.hem = 1.5, .hem_width = width_m}));
 
-      EXPECT_NEAR(mass.sum(), kMass_kg * (1 + 1.5 * band), 1e-15);
+      EXPECT_NEAR(mass.sum(), kUniformMass_kg * (1 + 1.5 * band), 1e-15);
       EXPECT_GT(mass[0] / with(vertices, {}).cloth.mass_kg[0], 1.01);
     }
   }
@@ -66,7 +66,7 @@ TEST(NonuniformMass, AHemWeighsTheSameOnEveryMesh) {
 // the band is wide.
 TEST(NonuniformMass, AHeavyEdgeWeighsTheSameAndLiesAtTheSamePlaceOnEveryMesh) {
   for (const double width_m : {0.007, 0.03}) {
-    const double band_kg = kMass_kg * width_m / kSide_m;
+    const double band_kg = kUniformMass_kg * width_m / kSide_m;
     for (const int vertices : {2, 6, 17}) {
       SCOPED_TRACE(testing::Message() << width_m << " m, " << vertices);
       const Eigen::VectorXd plain = with(vertices, {}).cloth.mass_kg;
@@ -117,10 +117,10 @@ TEST(NonuniformMass, GradientsShiftTheCentreOfMassAndKeepTheSum) {
 
   const Eigen::VectorXd mass = true_mass_kg(cloth);
 
-  EXPECT_NEAR(mass.sum(), kMass_kg, 1e-15);
+  EXPECT_NEAR(mass.sum(), kUniformMass_kg, 1e-15);
   // Of a side with unit density and slope, int x (x - 1/2) = 1/12; trapezoids on 8 intervals see
   // 1/12 (1 + 2 / 64).
-  const Eigen::Vector3d centre = cloth.set.start_position_m * mass / kMass_kg;
+  const Eigen::Vector3d centre = cloth.set.start_position_m * mass / kUniformMass_kg;
   EXPECT_NEAR(centre.x() / kSide_m - 0.5, 0.4 / 12 * (1 + 2.0 / 64), 1e-14);
   EXPECT_NEAR(centre.y() / kSide_m - 0.5, -0.2 / 12 * (1 + 2.0 / 64), 1e-14);
 }
@@ -129,9 +129,10 @@ TEST(NonuniformMass, APatchWeighsAQuarterOfItsDisc) {
   // int (1 - u^2)^3 dA = pi R^2 / 4.
   const Masses patch{.patch = 0.8, .patch_s = 0.55, .patch_t = 0.4, .patch_radius = 0.12};
 
-  const double added = true_mass_kg(with(65, patch)).sum() - kMass_kg;
+  const double added = true_mass_kg(with(65, patch)).sum() - kUniformMass_kg;
 
-  const double expected = 0.8 * kMass_kg / (kSide_m * kSide_m) * std::numbers::pi * 0.12 * 0.12 / 4;
+  const double expected =
+      0.8 * kUniformMass_kg / (kSide_m * kSide_m) * std::numbers::pi * 0.12 * 0.12 / 4;
   EXPECT_NEAR(added, expected, 1e-5 * expected);  // 19 spacings to a radius
 }
 

@@ -9,7 +9,7 @@
 #include <algorithm>
 
 #include "data/input_error.h"
-#include "model/cloth.h"
+#include "model/cloth/cloth.h"
 #include "tests/model/effect_contract.h"
 
 namespace clothfit {
@@ -61,7 +61,7 @@ TEST(EffectRegistry, FindsEveryEffectByItsName) {
   for (const EffectEntry& entry : effect_registry()) {
     EXPECT_EQ(find_effect(entry.name, "test").make, entry.make);
     Cloth cloth = touched_cloth(3);
-    cloth.add_effect(entry.name, "test");
+    add_effect(cloth, entry.name, "test");
     EXPECT_EQ(cloth.effect_descriptions.at(0).name, entry.name);
     EXPECT_NE(cloth.effects.at(0), nullptr);
   }
@@ -72,7 +72,7 @@ TEST(EffectRegistry, RefusesAnUnknownNameAndListsTheKnownOnes) {
   for (const char* name : {"viscous", "Viscous_damping", ""}) {
     SCOPED_TRACE(name);
     try {
-      cloth.add_effect(name, "recording.yaml:31");
+      add_effect(cloth, name, "recording.yaml:31");
       FAIL() << "accepted";
     } catch (const InputError& error) {
       const std::string text = error.what();
@@ -88,7 +88,7 @@ TEST(EffectRegistry, RefusesAnUnknownNameAndListsTheKnownOnes) {
 TEST(EffectRegistry, ContactWithAMeshIsRefusedWithoutOne) {
   Cloth cloth = square_cloth(3);
   try {
-    cloth.add_effect("contact_mesh", "recording.yaml:7");
+    add_effect(cloth, "contact_mesh", "recording.yaml:7");
     FAIL() << "it would do nothing without a word";
   } catch (const InputError& error) {
     EXPECT_NE(std::string(error.what()).find("recording.yaml:7"), std::string::npos);

@@ -7,6 +7,7 @@
 
 #include <Eigen/Dense>
 
+#include "model/effects/registry.h"
 #include "tests/model/effect_contract.h"
 
 namespace clothfit {
@@ -84,9 +85,9 @@ TEST(RestCurvature, AFreeStripWithBendingStiffnessRollsToMomentOverStiffness) {
   const double b_nm = 1e-4, m_t_n = 8e-4;
   const Mesh mesh{.columns = 3, .rows = 17, .width_m = 0.03, .height_m = 0.24};
   Cloth cloth = Cloth::of(mesh, masses_by_area(mesh, 0.15 * mesh.width_m * mesh.height_m));
-  cloth.add_effect("bending_energy", "test");
-  cloth.add_effect("rest_curvature", "test");
-  cloth.add_effect("viscous_damping", "test");
+  add_effect(cloth, "bending_energy", "test");
+  add_effect(cloth, "rest_curvature", "test");
+  add_effect(cloth, "viscous_damping", "test");
   Fabric fabric = cotton();  // whose flexion springs would bear a part of the moment
   fabric.flexion_warp_n_per_m = fabric.flexion_weft_n_per_m = 0;
   const ParameterSet set{.springs = spring_parameters(fabric, mesh),

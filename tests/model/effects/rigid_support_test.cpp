@@ -6,7 +6,7 @@
 
 #include <cmath>
 
-#include "model/relax.h"
+#include "model/integrate/relax.h"
 #include "tests/model/cloth_with_effect.h"
 
 namespace clothfit {

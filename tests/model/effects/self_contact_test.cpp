@@ -6,6 +6,7 @@
 
 #include <numbers>
 
+#include "model/effects/registry.h"
 #include "tests/model/cloth_with_effect.h"
 
 namespace clothfit {
@@ -88,7 +89,7 @@ TEST(SelfContact, AClothFoldedOnItselfComesToRestOnItself) {
       for (int j = 0; j <= 5; ++j)
         bare.held.push_back(held_at(mesh, j * mesh.spacing_s_m(), i * mesh.spacing_t_m()));
     ClothWithEffect sheet(bare, "self_contact", {stiffness, 0.045}, folded(mesh, 0.05));
-    sheet.cloth.add_effect("viscous_damping", "test");
+    add_effect(sheet.cloth, "viscous_damping", "test");
     sheet.set.effects.push_back({5});
     double lowest = INFINITY;
     sheet.after(8000, 1e-4, [&](int, const ClothWithEffect::State& state) {

@@ -6,6 +6,7 @@
 
 #include <cmath>
 
+#include "model/effects/registry.h"
 #include "tests/model/spring_rig.h"
 
 namespace clothfit {
@@ -50,8 +51,8 @@ TEST(Stiffening, AHangingLoadStretchesTheSpringByTheRootOfAQuadratic) {
   const Mesh mesh{.columns = 2, .rows = 2, .width_m = 0.1, .height_m = kLength_m};
   Cloth cloth = Cloth::of(mesh, Eigen::VectorXd::Constant(4, 0.01));
   cloth.held = {held_at(mesh, 0, 0), held_at(mesh, 0.1, 0)};
-  cloth.add_effect("stiffening", "test");
-  cloth.add_effect("viscous_damping", "test");
+  add_effect(cloth, "stiffening", "test");
+  add_effect(cloth, "viscous_damping", "test");
   const ParameterSet set{.springs = warp_springs(mesh, kSoft_n_per_m),
                          .gravity_m_per_s2 = {0, load_n / 0.01, 0},
                          .effects = {{b, 0, kStrain}, {30}},

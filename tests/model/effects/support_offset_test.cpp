@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "model/relax.h"
+#include "model/integrate/relax.h"
 #include "tests/model/cloth_with_effect.h"
 
 namespace clothfit {

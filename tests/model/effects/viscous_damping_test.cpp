@@ -7,6 +7,7 @@
 
 #include <cmath>
 
+#include "model/effects/registry.h"
 #include "tests/model/effect_contract.h"
 
 namespace clothfit {
@@ -18,7 +19,7 @@ struct Fall {
   ParameterSet set;
 
   Fall(const Cloth& bare, double rate_per_s, const Eigen::Matrix3d& attitude) : cloth(bare) {
-    cloth.add_effect("viscous_damping", "test");
+    add_effect(cloth, "viscous_damping", "test");
     set.springs = spring_parameters(cotton(), cloth.mesh);
     set.effects = {{rate_per_s}};
     set.start_position_m = attitude * flat_positions(cloth.mesh);

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "model/effects/registry.h"
 #include "tests/model/effect_contract.h"
 
 namespace clothfit {
@@ -19,7 +20,7 @@ struct Flight {
 
   Flight(int vertices_per_side, double c, const Eigen::Vector3d& q, const Eigen::Matrix3d& attitude)
       : cloth(square_cloth(vertices_per_side)) {
-    cloth.add_effect("wind", "test");
+    add_effect(cloth, "wind", "test");
     set.springs = spring_parameters(cotton(), cloth.mesh);
     set.effects = {{c, q.x(), q.y(), q.z()}};
     set.start_position_m = attitude * flat_positions(cloth.mesh);

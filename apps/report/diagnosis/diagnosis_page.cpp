@@ -1,0 +1,305 @@
+#include "apps/report/diagnosis/diagnosis_page.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "apps/report/diagnosis/diagnosis_law.h"
+#include "apps/report/diagnosis/diagnosis_tables.h"
+#include "apps/report/fit/fit_figures.h"
+#include "apps/report/page/html.h"
+#include "apps/terminal/number_text.h"
+#include "apps/terminal/version.h"
+
+namespace clothfit {
+namespace {
+
+/// The first recording's name, and how many more were fitted.
+std::string names_text(const Diagnosis& diagnosis) {
+  const auto fitted =
+      std::ranges::count(diagnosis.recordings, false, &DiagnosedRecording::held_out);
+  return diagnosis.base().result.recording +
+         (fitted > 1 ? fmt::format(" and {} more", fitted - 1) : "");
+}
+
+std::string effects_text(const Diagnosis& diagnosis) {
+  std::string text;
+  if (diagnosis.seen_elsewhere) text = "constants by which its markers are seen elsewhere";
+  for (const AcceptedEffect& accepted : diagnosis.accepted)
+    text += (text.empty() ? "" : ", then ") + accepted.trial.term.title();
+  return text;
+}
+
+std::string verdict_text(const Diagnosis& diagnosis) {
+  const bool several = diagnosis.recordings.size() > 1;
+  switch (diagnosis.verdict) {
+    case DiagnosisVerdict::adequate:
+      return fmt::format("The model explains {}: nothing is missing that {} could show.",
+                         several ? "these recordings" : "this recording", several ? "they" : "it");
+    case DiagnosisVerdict::explained:
+      return "The model lacked " + effects_text(diagnosis) +
+             ". With that, what is left looks like noise.";
+    case DiagnosisVerdict::partly_explained:
+      return "The model lacked " + effects_text(diagnosis) +
+             ". With that, structure still remains that no tested effect explains.";
+    case DiagnosisVerdict::unexplained:
+      return "Something is missing, and no tested effect explains it.";
+  }
+  return "";
+}
+
+/// Root mean square over recordings of one kind of observation, each number as often as it was
+/// observed.
+struct Mean {
+  std::string kind, unit;
+  double before = 0, after = 0, noise = 0;  ///< sums of squares
+  int count = 0, recordings = 0;
+  double rms(double sum) const { return std::sqrt(sum / std::max(1, count)); }
+};
+
+std::string before_after_text(const Diagnosis& diagnosis) {
+  const std::vector<ErrorsBeforeAfter> all = errors_before_after(diagnosis);
+  // Whole recordings held out say more than frames, and frames more than what was fitted.
+  const bool whole = std::ranges::any_of(
+      all, [](const ErrorsBeforeAfter& one) { return one.recording->held_out; });
+  const bool frames = std::ranges::any_of(
+      all, [](const ErrorsBeforeAfter& one) { return one.before->held_out.count > 0; });
+  std::vector<Mean> means;
+  for (const auto& [recording, before, after] : all) {
+    if (whole && !recording->held_out) continue;
+    const ErrorSummary& one = frames ? before->held_out : before->fitted;
+    const ErrorSummary& other = frames ? after->held_out : after->fitted;
+    auto mean = std::ranges::find(means, before->kind, &Mean::kind);
+    if (mean == means.end())
+      mean = means.insert(means.end(), {.kind = before->kind, .unit = before->unit});
+    mean->before += one.count * one.rms * one.rms;
+    mean->after += other.count * other.rms * other.rms;
+    mean->noise += one.count * before->noise * before->noise;
+    mean->count += one.count;
+    ++mean->recordings;
+  }
+  std::string text;
+  for (const Mean& mean : means) {
+    const ShownUnit unit = shown_unit(mean.unit);
+    const auto shown = [&](double sum) { return significant(mean.rms(sum) * unit.factor, 3); };
+    const std::string where =
+        whole    ? fmt::format("on {} that no fit and no decision has seen",
+                            mean.recordings == 1 ? "a recording"
+                                                    : fmt::format("{} recordings", mean.recordings))
+           : frames ? "on frames that no decision has seen"
+                 : "on the fitted frames";
+    text += fmt::format("{}{}: {} {} before {}, {} after, noise {}", text.empty() ? "" : "; ",
+                        kind_title(mean.kind, mean.unit), shown(mean.before), unit.name, where,
+                        shown(mean.after), shown(mean.noise));
+  }
+  return text + ".";
+}
+
+/// Recordings that would tell an accepted law from others.
+std::string what_to_record(std::span<const Separation> separations) {
+  const Table table = separation_table(separations);
+  if (table.rows.empty()) return "";
+  return paragraph("What to record next: laws are told apart from about five sigma on.") +
+         html_table(table,
+                    "How far this law, as it was found, is from what the other one can do in its "
+                    "place, all else fitted again, in standard deviations of the noise: now, and "
+                    "in recordings that could be made, each by itself, simulated with the model "
+                    "found. The best that differ in kind; linear, from the derivatives.");
+}
+
+std::string what_was_missing(const Diagnosis& diagnosis) {
+  std::string content;
+  if (diagnosis.seen_elsewhere) {
+    const SeenElsewhere& seen = *diagnosis.seen_elsewhere;
+    content += "<h3>Markers seen elsewhere</h3>\n";
+    content += paragraph(
+        "Each marker is seen beside where the model has it by about a constant: it sits elsewhere "
+        "on the cloth, the tracker misplaces it, or the cloth rests in folds that no parameter "
+        "describes. Laws alone leave more, and the constants found in the fitted frames are added "
+        "wherever else the cloth is foreseen.");
+    content += fmt::format("<p class=\"found\"><strong>{}</strong></p>\n",
+                           escape_xml(seen_elsewhere_text(seen)));
+    content += paragraph(fmt::format(
+        "Blocks of time that were left out in turn are predicted with a chi-square of {} per "
+        "number with constants from the others, {} without.",
+        significant(seen.cross_validated, 4), significant(seen.without_it, 4)));
+  }
+  for (size_t n = 0; n < diagnosis.accepted.size(); ++n) {
+    const AcceptedEffect& accepted = diagnosis.accepted[n];
+    const LawTrial& trial = accepted.trial;
+    content += fmt::format("<h3>{}</h3>\n", escape_xml(trial.term.title()));
+    content += paragraph(describe_effect(trial.term.effect).summary + ".");
+    content += fmt::format("<p class=\"found\"><strong>{}</strong></p>\n",
+                           escape_xml(found_text(trial.term, diagnosis.found().result)));
+    content += paragraph(fmt::format(
+        "Chi-square falls by {}, of {} that the derivatives foresaw. Blocks of time that were left "
+        "out in turn are predicted with a chi-square of {} per number, {} without it, {} with the "
+        "best correction that needs no physics. Its amplitude stands {:.0f} sigma clear of doing "
+        "nothing, with errors that may depend on each other over the cloth.",
+        significant(trial.fall, 3), significant(trial.foreseen_fall, 3),
+        significant(trial.cross_validated, 4), significant(trial.without_it, 4),
+        significant(trial.best_trivial, 4), trial.clear_of_neutral));
+    if (trial.clear_of_neutral < LawTrial::kClear)
+      content += paragraph(
+          "That is less than five, the usual bar; all else that the model lacks counts as error "
+          "here. The effect is accepted because it takes a good part of what is left, and nothing "
+          "that was left out is predicted worse with it.");
+    if (trial.with_later_ones)
+      content += paragraph(
+          "A constant for each marker, or the last residual held, did as well as this effect "
+          "alone, and not as well as it and those below together.");
+    if (!accepted.alike.empty()) {
+      std::string names;
+      for (const Term& term : accepted.alike) names += (names.empty() ? "" : ", ") + term.title();
+      content += paragraph("This recording cannot tell it from: " + names + ".");
+      content += what_to_record(diagnosis.separation_of(n));
+    }
+  }
+  return content;
+}
+
+/// Two figures beside each other.
+std::string side_by_side(const std::string& before, const std::string& after) {
+  return "<div class=\"pair\">" + figure(before, "Before.") + figure(after, "After.") + "</div>\n";
+}
+
+std::string maps_of(const DiagnosedRecording& of, bool changed, const Recording& recording) {
+  std::string content;
+  for (size_t k = 0; k < of.before.residuals.size(); ++k) {
+    const FitReport::Residuals& before = of.before.residuals[k];
+    const auto after =
+        std::ranges::find(of.after.residuals, before.kind, &FitReport::Residuals::kind);
+    if (after == of.after.residuals.end()) continue;
+    const ObservationErrors& errors = of.before.result.errors[k];
+    const ObservationErrors& errors_after =
+        of.after.result.errors[static_cast<size_t>(after - of.after.residuals.begin())];
+    content += fmt::format("<h4>{}</h4>\n", escape_xml(kind_title(before.kind, before.unit)));
+    if (!changed) {
+      content += figure(residual_over_time_svg(before, errors, recording), "In each frame.");
+      content += figure(residual_map_svg(before, recording), "Of each marker over the cloth.");
+      continue;
+    }
+    content += side_by_side(residual_over_time_svg(before, errors, recording),
+                            residual_over_time_svg(*after, errors_after, recording));
+    const double largest = std::max(largest_marker_rms(before), largest_marker_rms(*after));
+    content += side_by_side(residual_map_svg(before, recording, largest),
+                            residual_map_svg(*after, recording, largest));
+  }
+  return content;
+}
+
+/// Of one recording open, of several each behind its name.
+std::string maps(const Diagnosis& diagnosis, std::span<const Recording> recordings) {
+  const bool changed = diagnosis.changed();
+  if (recordings.size() == 1)
+    return maps_of(diagnosis.recordings.front(), changed, recordings.front());
+  std::string content;
+  for (size_t n = 0; n < recordings.size(); ++n)
+    content += fmt::format("<details><summary>{}{}</summary>\n{}</details>\n",
+                           escape_xml(recordings[n].name),
+                           diagnosis.recordings[n].held_out ? " (held out)" : "",
+                           maps_of(diagnosis.recordings[n], changed, recordings[n]));
+  return content;
+}
+
+/// Searches of twins: of what was accepted, and of planted amplitudes.
+std::string planted(const Diagnosis& diagnosis) {
+  std::string content;
+  if (diagnosis.reinjected && diagnosis.reinjected->ran)
+    content += paragraph(
+        diagnosis.reinjected->found.empty()
+            ? "A twin of the recording, simulated with what was accepted and its own noise, was "
+              "diagnosed in the same way: nothing more is found there, as it should be."
+            : "A twin of the recording, simulated with what was accepted and its own noise, was "
+              "diagnosed in the same way, and " +
+                  diagnosis.reinjected->found.front().title() +
+                  " is found there, which it does not have: trust no small effect here.");
+  if (!diagnosis.plants.empty())
+    content += html_table(plant_table(diagnosis),
+                          "Planted on twins of the recording, at 1.6 times its limit, and searched "
+                          "for: one amplitude of each effect, those first that are seen best.");
+  return content;
+}
+
+std::string wide(const std::string& html) {
+  return "<div class=\"wide\">" + html + "</div>\n";
+}
+
+std::string words() {
+  return "<dl>\n"
+         "<dt>chi-square</dt><dd>The sum of squared residuals in units of the measured noise. One "
+         "per number is what noise alone leaves.</dd>\n"
+         "<dt>explains</dt><dd>The share of all that is above the noise which a law would take "
+         "away, by the derivatives of the model where the law does nothing yet, everything else "
+         "free to move along; a mean over short horizons.</dd>\n"
+         "<dt>left out</dt><dd>Cross-validation: the fitted frames are cut into blocks of time, "
+         "and each is predicted by a fit of the others.</dd>\n"
+         "<dt>mended without physics</dt><dd>The best of: a constant offset for every marker; the "
+         "last residual, held; forces that follow no law, the last ones held. An effect that does "
+         "not beat the first two is refused, unless those accepted after it and it beat them "
+         "together; one that does not beat such forces is refused unless it takes a tenth of what "
+         "they leave beside them.</dd>\n"
+         "<dt>would have been seen from</dt><dd>Five standard deviations, or as many as it takes "
+         "to "
+         "be worth a name. A smaller amplitude may be there, and this recording does not show "
+         "it.</dd>\n"
+         "<dt>held out</dt><dd>Frames that no fit and no decision has seen; both models are "
+         "compared with them once.</dd>\n"
+         "</dl>\n";
+}
+
+}  // namespace
+
+std::string diagnosis_sentence(const Diagnosis& diagnosis) {
+  return verdict_text(diagnosis);
+}
+
+std::string diagnosis_page_html(const Diagnosis& diagnosis, std::span<const Recording> recordings,
+                                const std::string& command) {
+  const Recording& recording = recordings.front();
+  std::string body = fmt::format(
+      "<h1>Diagnosis of “{}”</h1>\n<p class=\"meta\">clothfit {} · {} s</p>\n"
+      "<div class=\"verdict\"><strong>{}</strong>\n<p>{}</p></div>\n",
+      escape_xml(names_text(diagnosis)), escape_xml(program_version()),
+      significant(diagnosis.seconds, 3), escape_xml(verdict_text(diagnosis)),
+      escape_xml(before_after_text(diagnosis)));
+  body += section("What was missing", what_was_missing(diagnosis));
+  body += section("Errors before and after",
+                  wide(html_table(before_after_table(diagnosis),
+                                  "Root mean square of one coordinate's residual. The last three "
+                                  "columns are guesses that need no model.")));
+  body += section("Where and when it is off", maps(diagnosis, recordings));
+  body +=
+      section("Which force is missing", residual_force_html(diagnosis.residual_force, recording));
+  body += section("Does what is left look like noise?",
+                  html_table(adequacy_table(diagnosis),
+                             "Residuals after everything that was fitted has been taken out."));
+  body += section(
+      "Which laws were asked",
+      wide(html_table(short_candidate_table(diagnosis),
+                      fmt::format("The most telling of {} laws, scored where the model as declared "
+                                  "first misses something: over its first {} frames.",
+                                  diagnosis.scores.size(), diagnosis.score_frames))));
+  const Table trials = trial_table(diagnosis);
+  if (!trials.rows.empty())
+    body += section("Which were fitted",
+                    wide(html_table(trials, "Round by round: those that the score put first.")));
+  body += section("A law for what remains", proposed_law_html(diagnosis));
+  body += section(
+      "What would have been seen",
+      wide(html_table(limit_table(diagnosis),
+                      "In the last model: amplitudes that would stand five sigma clear and take "
+                      "enough of what is left to be accepted. Limits are linear, from the "
+                      "derivatives; the estimate is the score's, not a fit's.")) +
+          planted(diagnosis));
+  body += section("What the words mean", words());
+  body += section("Do it again", fmt::format("<pre>{}</pre>\n<p>Numbers stand in diagnosis.json, "
+                                             "candidates.csv, trials.csv and limits.csv beside "
+                                             "this page; the model with what was accepted in "
+                                             "fit.json and model.yaml.</p>\n",
+                                             escape_xml(command)));
+  return html_page("clothfit: diagnosis of " + names_text(diagnosis), body);
+}
+
+}  // namespace clothfit

@@ -1,0 +1,61 @@
+#include "apps/report/fit/background_picture.h"
+
+#include <algorithm>
+#include <map>
+#include <opencv2/imgcodecs.hpp>
+#include <optional>
+
+#include "data/input_error.h"
+#include "vision/ingest/image_source.h"
+
+namespace clothfit {
+namespace {
+
+std::optional<BackgroundPicture> read_picture(const std::string& kind,
+                                              const std::filesystem::path& images, int frame) {
+  try {
+    const std::unique_ptr<ImageSource> source = open_images(images);
+    cv::Mat grey;
+    for (int i = 0; i <= frame; ++i) {
+      if (!source->next(grey)) return std::nullopt;
+    }
+    std::vector<unsigned char> bytes;
+    if (!cv::imencode(".jpg", grey, bytes, {cv::IMWRITE_JPEG_QUALITY, 80})) return std::nullopt;
+    return BackgroundPicture{.kind = kind,
+                             .frame = frame,
+                             .width = grey.cols,
+                             .height = grey.rows,
+                             .jpeg = std::string(bytes.begin(), bytes.end())};
+  } catch (const InputError&) {
+    return std::nullopt;
+  }
+}
+
+}  // namespace
+
+int overlay_frame(const FitReport::Residuals& residuals) {
+  std::map<int, int> count;
+  for (const FitReport::Residuals::Row& row : residuals.rows) ++count[row.frame];
+  int most = 0;
+  for (const auto& [frame, rows] : count) most = std::max(most, rows);
+  for (auto frame = count.rbegin(); frame != count.rend(); ++frame) {
+    if (2 * frame->second >= most) return frame->first;
+  }
+  return -1;
+}
+
+std::vector<BackgroundPicture> background_pictures(const FitReport& report,
+                                                   const Recording& recording) {
+  std::vector<BackgroundPicture> pictures;
+  for (const FitReport::Residuals& residuals : report.residuals) {
+    const CameraEntry* camera = recording.find_camera(residuals.kind);
+    const int frame = overlay_frame(residuals);
+    if (camera == nullptr || !camera->images || frame < 0) continue;
+    if (auto picture = read_picture(residuals.kind, *camera->images, frame)) {
+      pictures.push_back(std::move(*picture));
+    }
+  }
+  return pictures;
+}
+
+}  // namespace clothfit

@@ -1,0 +1,170 @@
+#include "apps/report/page/html.h"
+
+#include <fmt/format.h>
+
+#include <cstdint>
+
+#include "apps/terminal/number_text.h"
+
+namespace clothfit {
+namespace {
+
+// Paper-like: one column of text, figures as wide as it, numbers in tabular figures.
+constexpr const char* kStyle = R"(
+:root { color-scheme: light; --ink: #1c1e21; --soft: #5b616b; --rule: #d4d8de; --accent: #1f4e79; }
+* { box-sizing: border-box; }
+body { margin: 0; background: #fff; color: var(--ink);
+  font: 16px/1.55 "Source Sans 3", "Helvetica Neue", Arial, "Liberation Sans", "DejaVu Sans", sans-serif; }
+main { max-width: 52rem; margin: 0 auto; padding: 2.5rem 1.25rem 4rem; }
+h1 { font-size: 1.9rem; line-height: 1.2; margin: 0 0 .3rem; letter-spacing: -.01em; }
+h2 { font-size: 1.2rem; margin: 2rem 0 .5rem; padding-top: .8rem; border-top: 1px solid var(--rule); }
+p { margin: .5rem 0 .8rem; }
+.meta { color: var(--soft); margin: 0 0 1.2rem; }
+.verdict { border-left: 4px solid var(--accent); background: #f4f7fa; padding: .9rem 1.1rem; margin: 1.2rem 0; }
+.verdict strong { display: block; font-size: 1.08rem; margin-bottom: .2rem; }
+.verdict p { margin: 0; }
+.wide { overflow-x: auto; }
+.pair { display: grid; grid-template-columns: 1fr 1fr; gap: 1rem; }
+table { border-collapse: collapse; width: 100%; font-size: .92rem; font-variant-numeric: tabular-nums; margin: .4rem 0 1.2rem; }
+caption { text-align: left; color: var(--soft); padding: 0 0 .4rem; }
+th, td { padding: .32rem .7rem .32rem 0; text-align: left; vertical-align: top; }
+thead th { border-bottom: 1.5px solid var(--ink); font-weight: 600; vertical-align: bottom; }
+tbody td, tbody th { border-bottom: 1px solid var(--rule); font-weight: 400; }
+.number { text-align: right; } td.number, td.brief, tbody th { white-space: nowrap; }
+td:last-child, th:last-child { padding-right: 0; }
+.matrix { width: auto; } .matrix td, .matrix th { padding: .25rem .45rem; }
+.matrix thead th { writing-mode: vertical-rl; transform: rotate(180deg); text-align: left; border-bottom: 0; border-top: 1.5px solid var(--ink); padding: .45rem .25rem; }
+figure { margin: 1rem 0 1.6rem; }
+figure svg { display: block; width: 100%; height: auto; }
+figcaption { color: var(--soft); font-size: .92rem; margin-top: .4rem; }
+pre { background: #f4f5f7; padding: .7rem .9rem; overflow-x: auto; font: .88rem/1.5 "DejaVu Sans Mono", Menlo, Consolas, monospace; }
+dl { display: grid; grid-template-columns: max-content 1fr; gap: .35rem 1.2rem; }
+dt { font-weight: 600; } dd { margin: 0; }
+ol.stages { padding-left: 1.4rem; font-size: .92rem; }
+@media (max-width: 34rem) { dl { grid-template-columns: 1fr; } dd { margin-bottom: .5rem; } }
+@media print {
+  body { font-size: 10pt; } main { max-width: none; padding: 0; }
+  h2 { break-after: avoid; } figure, tr, .verdict { break-inside: avoid; }
+  pre { white-space: pre-wrap; }
+}
+)";
+
+}  // namespace
+
+std::string escape_xml(std::string_view text) {
+  std::string escaped;
+  escaped.reserve(text.size());
+  for (const char c : text) {
+    switch (c) {
+      case '&':
+        escaped += "&amp;";
+        break;
+      case '<':
+        escaped += "&lt;";
+        break;
+      case '>':
+        escaped += "&gt;";
+        break;
+      case '"':
+        escaped += "&quot;";
+        break;
+      case '\'':
+        escaped += "&#39;";
+        break;
+      default:
+        escaped += c;
+    }
+  }
+  return escaped;
+}
+
+std::string typeset_number(const std::string& text) {
+  if (text == "-") return "–";
+  std::string mantissa = text;
+  std::string power;
+  const std::size_t e = text.find('e');
+  if (e != std::string::npos) {
+    mantissa = text.substr(0, e);
+    const int exponent = std::atoi(text.c_str() + e + 1);
+    power = fmt::format(" × 10<sup>{}{}</sup>", exponent < 0 ? "−" : "", std::abs(exponent));
+  }
+  const bool negative = !mantissa.empty() && mantissa.front() == '-';
+  return (negative ? "−" + escape_xml(mantissa.substr(1)) : escape_xml(mantissa)) + power;
+}
+
+std::string html_table(const Table& table, const std::string& caption) {
+  constexpr std::size_t kBrief = 28;  // letters: a rate with its bounds stays on a line
+  std::vector<bool> number(table.header.size(), true), brief(table.header.size(), true);
+  for (const std::vector<std::string>& row : table.rows) {
+    for (std::size_t c = 0; c < row.size(); ++c) {
+      number[c] = number[c] && shows_number(row[c]);
+      brief[c] = brief[c] && row[c].size() <= kBrief;
+    }
+  }
+  const auto mark = [&](std::size_t c) {
+    return number[c] ? " class=\"number\"" : brief[c] ? " class=\"brief\"" : "";
+  };
+
+  std::string html = "<div class=\"wide\"><table>";
+  if (!caption.empty()) html += "<caption>" + escape_xml(caption) + "</caption>";
+  html += "<thead><tr>";
+  for (std::size_t c = 0; c < table.header.size(); ++c) {
+    html += fmt::format("<th scope=\"col\"{}>{}</th>", mark(c), escape_xml(table.header[c]));
+  }
+  html += "</tr></thead>\n<tbody>\n";
+  for (const std::vector<std::string>& row : table.rows) {
+    html += "<tr>";
+    for (std::size_t c = 0; c < row.size(); ++c) {
+      const char* tag = c == 0 ? "th" : "td";
+      html += fmt::format("<{}{}{}>{}</{}>", tag, c == 0 ? " scope=\"row\"" : "", mark(c),
+                          shows_number(row[c]) ? typeset_number(row[c]) : escape_xml(row[c]), tag);
+    }
+    html += "</tr>\n";
+  }
+  return html + "</tbody></table></div>\n";
+}
+
+std::string data_uri(std::string_view media_type, std::string_view bytes) {
+  constexpr const char* kDigits =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string uri = fmt::format("data:{};base64,", media_type);
+  uri.reserve(uri.size() + bytes.size() * 4 / 3 + 4);
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    const auto byte = [&](std::size_t k) -> std::uint32_t {
+      return i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0U;
+    };
+    const std::uint32_t word = byte(0) << 16U | byte(1) << 8U | byte(2);
+    const std::size_t given = bytes.size() - i;
+    uri += kDigits[word >> 18U & 63U];
+    uri += kDigits[word >> 12U & 63U];
+    uri += given > 1 ? kDigits[word >> 6U & 63U] : '=';
+    uri += given > 2 ? kDigits[word & 63U] : '=';
+  }
+  return uri;
+}
+
+std::string section(const std::string& title, const std::string& content) {
+  if (content.empty()) return "";
+  return fmt::format("<section>\n<h2>{}</h2>\n{}</section>\n", escape_xml(title), content);
+}
+
+std::string paragraph(const std::string& text) {
+  return fmt::format("<p>{}</p>\n", escape_xml(text));
+}
+
+std::string figure(const std::string& svg, const std::string& caption) {
+  if (svg.empty()) return "";
+  return fmt::format("<figure>\n{}<figcaption>{}</figcaption>\n</figure>\n", svg,
+                     escape_xml(caption));
+}
+
+std::string html_page(const std::string& title, const std::string& body) {
+  return fmt::format(
+      "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n"
+      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\n"
+      "<title>{}</title>\n<style>{}</style>\n</head>\n<body>\n<main>\n{}</main>\n</body>\n"
+      "</html>\n",
+      escape_xml(title), kStyle, body);
+}
+
+}  // namespace clothfit

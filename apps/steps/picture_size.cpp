@@ -1,0 +1,25 @@
+#include "apps/steps/picture_size.h"
+
+#include <fmt/format.h>
+
+#include <opencv2/core.hpp>
+
+#include "data/input_error.h"
+#include "vision/ingest/image_source.h"
+
+namespace clothfit {
+
+PictureSize picture_size(const std::filesystem::path& images) {
+  const std::unique_ptr<ImageSource> source = open_images(images);
+  cv::Mat grey;
+  if (!source->next(grey)) {
+    throw InputError(images.string(), "holds no picture", "a folder of pictures or a video");
+  }
+  return {grey.cols, grey.rows};
+}
+
+std::string to_string(const PictureSize& size) {
+  return fmt::format("{} x {} px", size.width, size.height);
+}
+
+}  // namespace clothfit

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <filesystem>
+
+#include "calib/boards/calibrate.h"
+#include "data/progress.h"
+#include "data/recording.h"
+#include "fit/interface/fit_input.h"
+#include "fit/interface/fit_options.h"
+#include "vision/track/track.h"
+
+namespace clothfit {
+
+/// Options of the steps that come before a fit.
+struct StepOptions {
+  CalibrateOptions calibrate;
+  TrackOptions track;
+};
+
+/// What a fit of `kind` will look at: 3D tracks where there are any, unless told otherwise.
+ObservationKind resolve_observations(const Recording& recording, ObservationKind kind);
+
+/// Runs the steps that a recording still lacks for a fit of `kind`, each into a complete recording
+/// of its own: `steps`/calibrated, `steps`/tracked. Returns the recording to go on with, which is
+/// the given one when nothing was lacking. Throws InputError, NoResult, Cancelled.
+Recording complete_recording(const Recording& recording, ObservationKind kind,
+                             const StepOptions& options, const std::filesystem::path& steps,
+                             const ProgressCallback& progress);
+
+/// Reads what a fit of `kind` looks at. Throws InputError, also where there is nothing to look at
+/// or a camera has no pose.
+FitInput read_fit_input(const Recording& recording, ObservationKind kind);
+
+}  // namespace clothfit

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calib/placement/world_placement.h"
+#include "data/progress.h"
+#include "data/recording.h"
+#include "vision/track/track.h"
+
+namespace clothfit {
+
+/// One camera tracked, and placed in the world where that was possible and needed.
+struct CameraTracks {
+  std::string camera;
+  TrackResult result;  ///< usable
+  std::optional<WorldPlacementResult> placement;
+  std::string not_placed;  ///< why the camera still has no pose; empty when it has one
+};
+
+struct TrackStepResult {
+  Recording recording;  ///< as it stands in the step's folder, with tracks and poses
+  std::vector<CameraTracks> cameras;
+};
+
+/// Cameras whose pictures wait to be tracked: those without tracks, and those whose pose can only
+/// come from reference points that tracking sees. With `again`, every camera with pictures.
+std::vector<std::string> cameras_to_track(const Recording& recording, bool again);
+
+/// Tracks the named cameras and writes a complete recording into `folder`, which exists:
+/// tracks2d/CAMERA.csv, cameras/CAMERA.yaml with the pose, overlay_CAMERA.png, tracks.json. Refuses
+/// a camera file of another size than the pictures.
+TrackStepResult track_step(const Recording& recording, const std::vector<std::string>& cameras,
+                           const TrackOptions& options, const std::filesystem::path& folder,
+                           const ProgressCallback& progress);
+
+}  // namespace clothfit

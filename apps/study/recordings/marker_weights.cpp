@@ -1,0 +1,39 @@
+#include "apps/study/recordings/marker_weights.h"
+
+#include <algorithm>
+
+#include "data/csv_table.h"
+#include "data/input_error.h"
+
+namespace clothfit {
+
+MarkerWeights read_marker_weights(const std::filesystem::path& file) {
+  const CsvTable table(file, {{.name = "marker"}, {.name = "weight"}});
+  table.require_rows("weights");
+  MarkerWeights weights;
+  for (int row = 0; row < table.rows(); ++row) {
+    const double weight = table.number(row, 1);
+    if (weight < 0)
+      table.refuse(row, "weight = " + std::string(table.text(row, 1)), "a number of 0 or more");
+    const std::string name = table.name(row, 0);
+    if (!weights.emplace(name, weight).second)
+      table.refuse(row, "marker " + name + " stands here again", "one row per marker");
+  }
+  if (std::ranges::all_of(weights, [](const auto& named) { return named.second == 0; }))
+    throw InputError(file.string(), "all weights are 0", "at least one marker that counts");
+  return weights;
+}
+
+std::vector<double> weights_of(const MarkerSet& markers, const MarkerWeights& weights) {
+  std::vector<double> result(markers.markers.size(), 0.0);
+  for (const auto& [name, weight] : weights) {
+    const auto found = markers.index.find(name);
+    if (found == markers.index.end())
+      throw InputError("--weights", "names marker " + name + ", which the recording does not have",
+                       "markers of every recording of the study");
+    result[static_cast<std::size_t>(found->second)] = weight;
+  }
+  return result;
+}
+
+}  // namespace clothfit

@@ -1,0 +1,18 @@
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+#include "apps/study/recordings/study_row.h"
+
+namespace clothfit {
+
+/// A row as study.json and a study's journal have it; a number that is not one is null.
+nlohmann::ordered_json to_json(const StudyRow& row);
+
+/// All digits and words of some rows as one line, and back.
+std::string rows_to_text(const std::vector<StudyRow>& rows);
+std::vector<StudyRow> rows_from_text(const std::string& text);
+
+}  // namespace clothfit

@@ -1,0 +1,239 @@
+#include "apps/study/scene/hidden_law.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <set>
+
+#include "data/algebra/dense_factors.h"
+#include "data/input_error.h"
+#include "fit/diagnosis/law_derivatives.h"
+#include "fit/jobs/draws.h"
+#include "fit/problem/parameterised_model.h"
+#include "fit/problem/problem.h"
+#include "model/integrate/relax.h"
+
+namespace clothfit {
+namespace {
+
+constexpr double kSame = 0.9;             ///< multiple correlation of what cannot be told apart
+constexpr double kStabilityMargin = 1.5;  ///< as fits leave it
+
+/// Series of draws under a trial's seed.
+enum HiddenLawSeries : int { kShape = 300, kDirection, kSize };
+
+const LawShapes* shapes_of(const RecordingInformation& information, const HiddenLaw& law) {
+  const auto found = std::ranges::find_if(information.laws, [&](const LawShapes& shapes) {
+    return shapes.front().effect == law.effect && shapes.front().law == law.law;
+  });
+  return found == information.laws.end() ? nullptr : &*found;
+}
+
+const EffectParameter& parameter_of(const EffectDescription& effect, const std::string& name) {
+  return *std::ranges::find(effect.parameters, name, &EffectParameter::name);
+}
+
+double between(double least, double most, double share) {
+  if (least > 0 && most > 5 * least) return least * std::pow(most / least, share);
+  return least + (most - least) * share;
+}
+
+/// The state of the truth's cloth at the first frame, as the guess that a fit corrects.
+void start_at_truth(const SyntheticScene& scene, std::uint64_t seed, FitProblem& problem) {
+  constexpr double kApartS = 1e-3;
+  const auto positions_m = simulate_scene(
+      scene, seed,
+      std::vector<double>{scene.before_s - kApartS, scene.before_s, scene.before_s + kApartS});
+  problem.start_state.position_m = positions_m[1];
+  problem.start_state.velocity_m_per_s = (positions_m[2] - positions_m[0]) / (2 * kApartS);
+}
+
+}  // namespace
+
+std::vector<HiddenLaw> hidden_laws(ObservationKind observations) {
+  std::vector<HiddenLaw> laws = {
+      {"bending_energy", ""},
+      {"frame_acceleration", ""},
+      {"gravity_tilt", ""},
+      {"gust", ""},
+      {"hysteresis", ""},
+      {"nonuniform_mass", "gradient"},
+      {"nonuniform_mass", "hem"},
+      {"nonuniform_mass", "patch"},
+      {"nonuniform_stiffness", "gradient"},
+      {"nonuniform_stiffness", "patch"},
+      {"quadratic_drag", "normal"},
+      {"relaxation", ""},
+      {"stiffening", "stretched"},
+      {"support_motion", ""},
+      {"viscous_damping", ""},
+      {"wind", "pressure"},
+      {"camera_drift", "turn"},
+      {"camera_shake", "shift"},
+      {"frame_rate_error", ""},
+      {"marker_placement", "stretch"},
+      {"scale", ""},
+      {"temporal_smoothing", ""},
+  };
+  if (observations == ObservationKind::tracks2d) {
+    laws.push_back({"focal_error", ""});
+    laws.push_back({"lens_distortion", ""});
+    laws.push_back({"rolling_shutter", ""});
+  }
+  return laws;
+}
+
+RecordingInformation recording_information(const SyntheticScene& scene, const FitOptions& fit,
+                                           std::uint64_t seed) {
+  // A coarse mesh sees some laws far better than a recording shows them, or far worse.
+  const int mesh = std::min(scene.truth_mesh, 2 * fit.mesh_columns - 1);
+  SyntheticScene twin = scene;
+  twin.truth_mesh = mesh;
+  twin.integrator = TruthIntegrator::euler;
+  twin.hidden.clear();
+  twin.noisy = false;
+  SyntheticRecording recording = make_synthetic_recording(twin, seed);
+  FitProblem problem = make_problem(recording.input, fit, mesh, mesh);
+  if (problem.start == StartKind::unknown) start_at_truth(twin, seed, problem);
+  const Eigen::VectorXd values = values_of(problem, recording.truth);
+  const int frames = problem.first_held_out;
+  const double duration_s =
+      problem.frame_time_s[static_cast<size_t>(frames - 1)] - problem.frame_time_s.front();
+  const TimeSteps stable = stable_time_steps(problem.cloth, parameter_set(problem, values));
+  ModelFit model{.terms = {},
+                 .problems = {std::make_shared<const FitProblem>(std::move(problem))},
+                 .parts = {{.values = values,
+                            .frames = frames,
+                            .steps = stable.times(1 / kStabilityMargin),
+                            .linear = {},
+                            .correction = {},
+                            .directions = {},
+                            .amounts = {}}}};
+  linearise_model(model);
+  if (!model.usable)
+    throw InputError("recover", "the scene has no derivatives", "a calmer motion",
+                     "shorten it with --seconds, or raise the stiffness");
+  std::vector<LawShapes> laws = laws_to_test(recording.input, fit, duration_s);
+  ModelProjection projection(model, Loss::squared);
+  return {.recording = std::move(recording),
+          .laws = std::move(laws),
+          .model = std::move(model),
+          .projection = std::move(projection)};
+}
+
+DrawnLaw draw_law(const RecordingInformation& information, const HiddenLaw& law,
+                  const DrawOptions& options, std::uint64_t seed, const Eigen::MatrixXd& beside) {
+  const LawShapes* shapes = shapes_of(information, law);
+  if (shapes == nullptr) return {};
+  DrawnLaw drawn{.term = shapes->front(), .amount = {}, .projected = {}};
+  int place = 0;
+  for (auto& [name, value] : drawn.term.shape) {
+    double least = value, most = value;
+    for (const Term& term : *shapes) {
+      least = std::min(least, term.shape.at(name));
+      most = std::max(most, term.shape.at(name));
+    }
+    value = between(least, most, Draws(seed, kShape, place++).uniform());
+  }
+
+  const EffectDescription effect = describe_effect(law.effect);
+  const auto count = static_cast<Eigen::Index>(drawn.term.amplitudes.size());
+  Eigen::VectorXd direction(count);
+  Draws draws(seed, kDirection, 0);
+  for (Eigen::Index k = 0; k < count; ++k) {
+    const EffectParameter& p = parameter_of(effect, drawn.term.amplitudes[static_cast<size_t>(k)]);
+    double along = draws.normal();
+    if (p.lower >= p.neutral) along = std::abs(along);
+    if (p.upper <= p.neutral) along = -std::abs(along);
+    direction[k] = p.typical * along;
+  }
+  const Columns columns = law_derivatives(information.model, {&drawn.term, 1}).front();
+  if (columns.empty()) return {};
+  Eigen::VectorXd projected = information.projection.columns({columns.front() * direction});
+  if (beside.cols() > 0) projected -= beside * PivotedQr(beside).solve(projected);
+  const double information_along = projected.norm();  // 1 / sigma of the amount along direction
+  if (!(information_along > 0)) return {};
+
+  double reach = std::numeric_limits<double>::infinity();
+  for (Eigen::Index k = 0; k < count; ++k) {
+    const EffectParameter& p = parameter_of(effect, drawn.term.amplitudes[static_cast<size_t>(k)]);
+    const double end = (direction[k] > 0 ? p.upper : p.lower) - p.neutral;
+    if (direction[k] != 0) reach = std::min(reach, end / direction[k]);
+  }
+  const double most = std::min(options.most, reach * information_along);
+  if (most < options.least) return {};
+  drawn.sigmas = options.least * std::pow(most / options.least, Draws(seed, kSize, 0).uniform());
+  drawn.amount = drawn.sigmas / information_along * direction;
+  drawn.projected = projected / information_along;
+  return drawn;
+}
+
+HiddenEffect hidden_effect(const DrawnLaw& drawn) {
+  HiddenEffect hidden{.name = drawn.term.effect, .values = {}};
+  for (const EffectParameter& parameter : describe_effect(hidden.name).parameters) {
+    double value = parameter.neutral;
+    if (const auto shape = drawn.term.shape.find(parameter.name); shape != drawn.term.shape.end())
+      value = shape->second;
+    const auto& amplitudes = drawn.term.amplitudes;
+    if (const auto at = std::ranges::find(amplitudes, parameter.name); at != amplitudes.end())
+      value += drawn.amount[at - amplitudes.begin()];
+    hidden.values.push_back(value);
+  }
+  return hidden;
+}
+
+std::vector<std::vector<Eigen::MatrixXd>> projected_laws(const RecordingInformation& information) {
+  std::vector<Term> all;
+  for (const LawShapes& law : information.laws) all.insert(all.end(), law.begin(), law.end());
+  const std::vector<Columns> derivatives = law_derivatives(information.model, all);
+  std::vector<std::vector<Eigen::MatrixXd>> result;
+  size_t n = 0;
+  for (const LawShapes& law : information.laws) {
+    std::vector<Eigen::MatrixXd>& shapes = result.emplace_back();
+    for (size_t k = 0; k < law.size(); ++k, ++n)
+      shapes.push_back(derivatives[n].empty() ? Eigen::MatrixXd()
+                                              : information.projection.columns(derivatives[n]));
+  }
+  return result;
+}
+
+std::vector<std::string> right_class(const RecordingInformation& information, const DrawnLaw& drawn,
+                                     const std::vector<std::vector<Eigen::MatrixXd>>& projected) {
+  std::set<std::string> effects{drawn.term.effect};
+  for (size_t n = 0; n < information.laws.size(); ++n)
+    for (const Eigen::MatrixXd& columns : projected[n])
+      if (squared_multiple_correlation(drawn.projected, columns) > kSame * kSame)
+        effects.insert(information.laws[n].front().effect);
+  return {effects.begin(), effects.end()};
+}
+
+double mimicked_by_others(const RecordingInformation& information, const DrawnLaw& drawn,
+                          const std::vector<std::vector<Eigen::MatrixXd>>& projected, int most) {
+  // Forward selection: what is left of the hidden law, and of the others, beside those taken.
+  Eigen::VectorXd left = drawn.projected;
+  std::vector<Eigen::MatrixXd> others;
+  for (size_t n = 0; n < projected.size(); ++n)
+    for (const Eigen::MatrixXd& columns : projected[n])
+      if (information.laws[n].front().effect != drawn.term.effect && columns.cols() > 0)
+        others.push_back(columns);
+  const double all = left.squaredNorm();
+  for (int taken = 0; taken < most; ++taken) {
+    const Eigen::MatrixXd* best = nullptr;
+    double least = left.squaredNorm();
+    for (const Eigen::MatrixXd& columns : others) {
+      const double rest = (1 - squared_multiple_correlation(left, columns)) * left.squaredNorm();
+      if (rest >= least) continue;
+      least = rest;
+      best = &columns;
+    }
+    if (best == nullptr) break;
+    const Eigen::MatrixXd chosen = best->colwise().normalized();
+    const PivotedQr qr(chosen);
+    const Eigen::MatrixXd basis = qr.first_of_q(qr.rank());
+    left -= basis * (basis.transpose() * left);
+    for (Eigen::MatrixXd& columns : others) columns -= basis * (basis.transpose() * columns);
+  }
+  return 1 - left.squaredNorm() / all;
+}
+
+}  // namespace clothfit

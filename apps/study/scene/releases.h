@@ -1,0 +1,47 @@
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <mutex>
+#include <vector>
+
+#include "apps/study/scene/hidden_law.h"
+
+namespace clothfit {
+
+/// What recordings of one release say of laws, computed when it is first asked for, by whichever
+/// thread asks.
+class Release {
+ public:
+  Release(const SyntheticScene& scene, const FitOptions& fit, std::uint64_t seed)
+      : scene_(scene), fit_(fit), seed_(seed) {}
+
+  std::uint64_t seed() const { return seed_; }
+  const RecordingInformation& information() const;
+  const std::vector<std::vector<Eigen::MatrixXd>>& projected_laws() const;
+
+ private:
+  const SyntheticScene& scene_;
+  const FitOptions& fit_;
+  std::uint64_t seed_;
+  mutable std::once_flag has_information_, has_laws_;
+  mutable std::unique_ptr<RecordingInformation> information_;
+  mutable std::vector<std::vector<Eigen::MatrixXd>> laws_;
+};
+
+/// The releases that were asked for last: each is some tens of megabytes.
+class Releases {
+ public:
+  /// Both must outlive it.
+  Releases(const SyntheticScene& scene, const FitOptions& fit) : scene_(scene), fit_(fit) {}
+  std::shared_ptr<const Release> at(std::uint64_t seed);
+
+ private:
+  const SyntheticScene& scene_;
+  const FitOptions& fit_;
+  std::mutex mutex_;
+  std::deque<std::shared_ptr<const Release>> known_;
+};
+
+}  // namespace clothfit

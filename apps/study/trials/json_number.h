@@ -1,0 +1,13 @@
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+
+namespace clothfit {
+
+/// A number as journals keep it: null where it is not finite.
+nlohmann::ordered_json json_number(double value);
+
+/// Back again; not a number where it is null.
+double number_of_json(const nlohmann::ordered_json& json);
+
+}  // namespace clothfit

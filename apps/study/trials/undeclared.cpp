@@ -1,0 +1,393 @@
+#include "apps/study/trials/undeclared.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <optional>
+#include <span>
+#include <utility>
+
+#include "apps/study/scene/true_sight.h"
+#include "apps/study/trials/undeclared_json.h"
+#include "data/input_error.h"
+#include "fit/diagnosis/law_derivatives.h"
+#include "fit/jobs/draws.h"
+#include "fit/measurement_effects/registry.h"
+
+namespace clothfit {
+namespace {
+
+constexpr double kNothingHidden = std::numeric_limits<double>::quiet_NaN();
+constexpr double kTold = 0.9;      ///< correlation of two hidden laws, below
+constexpr int kWithheldDraws = 3;  ///< each asks for the derivatives of every law
+constexpr int kDraws = 20;         ///< of release, shape and direction, before a trial is given up
+constexpr int kDirections = 20;    ///< of a law in one release
+enum UndeclaredSeries : int { kPartner = 320, kReleases };
+
+/// What a trial hides, with the release that shows it.
+struct Setting {
+  std::uint64_t release = 0;
+  std::vector<DrawnLaw> laws;
+  std::vector<std::vector<std::string>> right;
+  double mimicked = kNothingHidden;
+};
+
+/// The second law of a pair: any other effect's.
+std::vector<HiddenLaw> laws_of_trial(const UndeclaredOptions& options, int index,
+                                     std::uint64_t seed) {
+  if (options.hide == UndeclaredOptions::Hide::nothing) return {};
+  const auto laws = static_cast<int>(options.laws.size());
+  std::vector<HiddenLaw> result{options.laws[static_cast<size_t>(index % laws)]};
+  if (options.hide == UndeclaredOptions::Hide::pairs) {
+    std::vector<HiddenLaw> others;
+    for (const HiddenLaw& law : options.laws)
+      if (law.effect != result.front().effect) others.push_back(law);
+    Draws draws(seed, kPartner, 0);
+    result.push_back(others[static_cast<size_t>(draws.index(static_cast<int>(others.size())))]);
+  }
+  return result;
+}
+
+bool markers_stay_on_cloth(const UndeclaredOptions& options,
+                           const RecordingInformation& information,
+                           std::span<const DrawnLaw> laws) {
+  SyntheticScene scene = options.scene;
+  for (const DrawnLaw& drawn : laws) scene.hidden.push_back(hidden_effect(drawn));
+  return HiddenMeasurement(scene, information.recording.input.recording).markers_stay_on_cloth();
+}
+
+/// Laws with numbers for one release; nothing where one of them cannot be seen in it, or puts
+/// markers beside the cloth. `mimicked` is lowered to how well others mimic one that is withheld.
+std::optional<Setting> draw_setting(const UndeclaredOptions& options,
+                                    const std::vector<HiddenLaw>& laws, std::uint64_t seed,
+                                    std::uint64_t release_seed, Releases& releases,
+                                    double& mimicked) {
+  Setting setting{.release = release_seed, .laws = {}, .right = {}};
+  if (laws.empty()) return setting;
+  const std::shared_ptr<const Release> release = releases.at(release_seed);
+  const RecordingInformation& information = release->information();
+  std::vector<std::uint64_t> seeds;
+  for (size_t n = 0; n < laws.size(); ++n) {
+    // A pattern of markers that reaches the edges can shrink only: other directions are drawn anew.
+    for (int k = 0; k < kDirections && setting.laws.size() == n; ++k) {
+      seeds.resize(n);
+      seeds.push_back(derived_seed(seed, static_cast<int>(n) + 2 * k));
+      DrawnLaw drawn = draw_law(information, laws[n], options.draw, seeds.back());
+      if (drawn.amount.size() == 0) return std::nullopt;
+      if (markers_stay_on_cloth(options, information, {&drawn, 1}))
+        setting.laws.push_back(std::move(drawn));
+    }
+    if (setting.laws.size() == n) return std::nullopt;
+  }
+  if (laws.size() == 2) {
+    // Each is to be seen beside the other, so that the other's direction is nobody's evidence.
+    const Eigen::VectorXd first = setting.laws[0].projected, second = setting.laws[1].projected;
+    if (std::abs(first.dot(second)) > kTold) return std::nullopt;
+    setting.laws[0] = draw_law(information, laws[0], options.draw, seeds[0], second);
+    setting.laws[1] = draw_law(information, laws[1], options.draw, seeds[1], first);
+    for (DrawnLaw& drawn : setting.laws)
+      if (drawn.amount.size() == 0) return std::nullopt;
+    setting.laws[0].projected = first;
+    setting.laws[1].projected = second;
+  }
+  if (!markers_stay_on_cloth(options, information, setting.laws)) return std::nullopt;
+  for (const DrawnLaw& drawn : setting.laws)
+    setting.right.push_back(right_class(information, drawn, release->projected_laws()));
+  if (options.hide == UndeclaredOptions::Hide::withheld) {
+    setting.mimicked =
+        mimicked_by_others(information, setting.laws.front(), release->projected_laws(),
+                           options.diagnosis.most_effects);
+    mimicked = std::fmin(mimicked, setting.mimicked);
+    if (setting.mimicked >= options.most_mimicked) return std::nullopt;
+  }
+  return setting;
+}
+
+const ParameterEstimate* estimate_of(const FitResult& result, const std::string& effect,
+                                     const std::string& parameter) {
+  const auto nuisance =
+      std::ranges::find(result.nuisance, effect + "." + parameter, &ParameterEstimate::name);
+  if (nuisance != result.nuisance.end()) return &*nuisance;
+  for (const EffectEstimate& of : result.effects) {
+    const auto own = std::ranges::find(of.parameters, parameter, &ParameterEstimate::name);
+    if (of.name == effect && own != of.parameters.end()) return &*own;
+  }
+  return nullptr;
+}
+
+/// Amplitudes of a hidden law that was accepted as it is, and their ratio to the truth: as the
+/// recording sees them, by the derivatives at the shape that was found, so that a wave's other sign
+/// half a turn later is the same.
+void compare_amplitudes(const RecordingInformation& information, const DrawnLaw& drawn,
+                        const FitResult& result, HiddenInTrial& hidden) {
+  const EffectDescription effect = describe_effect(drawn.term.effect);
+  Term found = drawn.term;
+  for (auto& [name, value] : found.shape)
+    if (const ParameterEstimate* estimate = estimate_of(result, found.effect, name))
+      value = estimate->value;
+  Eigen::VectorXd amount = Eigen::VectorXd::Zero(drawn.amount.size());
+  for (Eigen::Index k = 0; k < amount.size(); ++k) {
+    const std::string& name = drawn.term.amplitudes[static_cast<size_t>(k)];
+    const ParameterEstimate* estimate = estimate_of(result, found.effect, name);
+    if (estimate == nullptr || estimate->state == ParameterState::undetermined) continue;
+    const double neutral =
+        std::ranges::find(effect.parameters, name, &EffectParameter::name)->neutral;
+    amount[k] = estimate->value - neutral;
+    hidden.found.push_back({.name = found.effect + "." + name,
+                            .truth = neutral + drawn.amount[k],
+                            .estimate = estimate->value,
+                            .sigma = estimate->sigma});
+  }
+  const std::array<Term, 2> terms{found, drawn.term};
+  const std::vector<Columns> columns = law_derivatives(information.model, terms);
+  if (hidden.found.empty() || columns[0].empty() || columns[1].empty()) return;
+  const Eigen::VectorXd seen = information.projection.columns({columns[0].front() * amount});
+  const Eigen::VectorXd truth = information.projection.columns({columns[1].front() * drawn.amount});
+  hidden.amplitude_ratio = seen.dot(truth) / truth.squaredNorm();
+  if (hidden.amplitude_ratio > 0 && amount.dot(drawn.amount) < 0)
+    for (FoundAmplitude& one : hidden.found) {
+      const std::string name = one.name.substr(found.effect.size() + 1);
+      const double neutral =
+          std::ranges::find(effect.parameters, name, &EffectParameter::name)->neutral;
+      one.estimate = 2 * neutral - one.estimate;
+    }
+}
+
+double held_out_rms(const FitReport& report) {
+  return report.result.errors.empty() ? kNothingHidden : report.result.errors.front().held_out.rms;
+}
+double fitted_rms(const FitReport& report) {
+  return report.result.errors.empty() ? kNothingHidden : report.result.errors.front().fitted.rms;
+}
+
+/// Held-out error of a fit that is told the hidden laws and their shapes, from the truth, on the
+/// mesh that was analysed.
+double error_with_truth(const FitInput& input, const UndeclaredOptions& options,
+                        const std::vector<DrawnLaw>& laws, const Diagnosis& diagnosis,
+                        const std::map<std::string, double>& truth) {
+  FitOptions told = options.diagnosis.fit;
+  told.mesh_columns = diagnosis.columns;
+  told.mesh_rows = diagnosis.rows;
+  told.start = diagnosis.base().values;
+  for (auto& [name, value] : *told.start)
+    if (const auto known = truth.find(name); known != truth.end()) value = known->second;
+  std::vector<Term> terms;
+  for (const DrawnLaw& drawn : laws) {
+    terms.push_back(drawn.term);
+    const HiddenEffect hidden = hidden_effect(drawn);
+    const EffectDescription effect = describe_effect(hidden.name);
+    for (size_t p = 0; p < effect.parameters.size(); ++p) {
+      const std::string& name = effect.parameters[p].name;
+      const auto& amplitudes = drawn.term.amplitudes;
+      if (std::ranges::find(amplitudes, name) != amplitudes.end())
+        (*told.start)[hidden.name + "." + name] = hidden.values[p];
+    }
+  }
+  const FitReport report = fit(with_terms(input, terms), told, {});
+  return report.usable() ? held_out_rms(report) : kNothingHidden;
+}
+
+/// Says of each hidden law whether an accepted effect is right about it: one that stands for no
+/// other.
+void name_hidden(UndeclaredTrial& trial) {
+  std::vector<bool> used(trial.accepted_effects.size(), false);
+  for (HiddenInTrial& hidden : trial.hidden) {
+    // Its own name first, so that a member of two classes is left to the other one.
+    for (const bool own : {true, false})
+      for (size_t k = 0; k < used.size() && !hidden.named; ++k) {
+        const std::string& effect = trial.accepted_effects[k];
+        const bool counts = own ? effect == hidden.law.effect
+                                : std::ranges::find(hidden.right, effect) != hidden.right.end();
+        if (!used[k] && counts) used[k] = hidden.named = true;
+      }
+  }
+}
+
+double seconds_since(std::chrono::steady_clock::time_point began) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+}
+
+}  // namespace
+
+std::string to_string(UndeclaredOptions::Hide hide) {
+  switch (hide) {
+    case UndeclaredOptions::Hide::one:
+      return "one";
+    case UndeclaredOptions::Hide::nothing:
+      return "nothing";
+    case UndeclaredOptions::Hide::pairs:
+      return "pairs";
+    case UndeclaredOptions::Hide::withheld:
+      return "withheld";
+  }
+  return "";
+}
+
+int UndeclaredOptions::count() const {
+  return hide == Hide::nothing ? trials : trials * static_cast<int>(laws.size());
+}
+
+void UndeclaredOptions::validate() const {
+  scene.validate();
+  diagnosis.validate();
+  const auto require = [](bool good, const char* option, const char* expected) {
+    if (!good) throw InputError(option, "is out of range", expected);
+  };
+  require(trials >= 1, "--trials", "at least 1");
+  require(threads >= 0, "--threads", "0 (all) or more");
+  require(most_mimicked > 0 && most_mimicked <= 1, "--mimicked", "a share, to 1");
+  require(draw.least > 0 && draw.least <= draw.most, "--sigmas", "rising, more than 0");
+  require(diagnosis.fit.mesh_columns >= 3 && diagnosis.fit.mesh_columns == diagnosis.fit.mesh_rows,
+          "--mesh", "at least 3 vertices a side");
+  require(scene.held_out_from > 0, "--fitted", "frames to judge by");
+  if (hide == Hide::nothing) return;
+  require(!laws.empty(), "--hidden", "an effect");
+  const bool of_pixels = diagnosis.fit.observations == ObservationKind::tracks2d;
+  for (const HiddenLaw& law : laws) {
+    const MeasurementEffectEntry* entry = measurement_effect_named(law.effect);
+    if (entry != nullptr && entry->make()->needs_camera() && !of_pixels)
+      throw InputError("--hidden", law.effect + " says nothing of 3D tracks",
+                       "an effect that they show", "add --observations tracks2d");
+  }
+  if (hide == Hide::pairs)
+    require(std::ranges::any_of(
+                laws, [&](const HiddenLaw& law) { return law.effect != laws.front().effect; }),
+            "--hidden", "two effects or more, for pairs");
+}
+
+std::string UndeclaredOptions::key() const {
+  const Fabric& f = scene.fabric;
+  const FitOptions& fit = diagnosis.fit;
+  std::string hidden;
+  if (hide != Hide::nothing)
+    for (const HiddenLaw& law : laws) hidden += law.title() + ", ";
+  std::string without;
+  for (const std::string& effect : diagnosis.without) without += " " + effect;
+  return fmt::format(
+      "undeclared 4 seed {} hide {} {} laws {} sigmas {} {} scene {} {} {} {} {} {} {} {} {} {} {} "
+      "{} "
+      "{} {} {} {} {} {} {} {} {} {} {} fit {} {} {} {} {} {} {} {} {} diagnosis {} {} {}{}",
+      seed, to_string(hide), most_mimicked, hidden, draw.least, draw.most, scene.size_m,
+      scene.mass_kg, f.tension_warp_n_per_m, f.tension_weft_n_per_m, f.shear_n_per_m,
+      f.flexion_warp_n_per_m, f.flexion_weft_n_per_m, f.damping_warp_s, f.damping_weft_s,
+      scene.drag_per_s, to_string(scene.integrator), scene.truth_mesh, scene.truth_steps,
+      scene.markers, scene.frames, scene.held_out_from, scene.frame_rate_hz, scene.before_s,
+      scene.cameras, scene.noise_m, scene.noise_px, scene.missing, scene.outliers,
+      static_cast<int>(fit.observations), fit.mesh_columns, fit.population, fit.generations,
+      fit.refine_best, static_cast<int>(fit.loss), fit.start_nodes, fit.substep_scale, fit.work,
+      diagnosis.lines, diagnosis.refits, diagnosis.most_effects, without);
+}
+
+bool UndeclaredTrial::right_first() const {
+  if (hidden.empty()) return accepted.empty();
+  return !accepted_effects.empty() && std::ranges::any_of(hidden, [&](const HiddenInTrial& law) {
+    return std::ranges::find(law.right, accepted_effects.front()) != law.right.end();
+  });
+}
+
+bool UndeclaredTrial::all_named() const {
+  return std::ranges::all_of(hidden, &HiddenInTrial::named);
+}
+
+UndeclaredTrial undeclared_once(const UndeclaredOptions& options, int index, std::uint64_t seed,
+                                Releases& releases) {
+  const auto began = std::chrono::steady_clock::now();
+  UndeclaredTrial trial{.before = kNothingHidden,
+                        .after = kNothingHidden,
+                        .with_truth = kNothingHidden,
+                        .noise = kNothingHidden,
+                        .with_law = kNothingHidden};
+  const std::vector<HiddenLaw> laws = laws_of_trial(options, index, seed);
+  for (const HiddenLaw& law : laws) trial.hidden.push_back({.law = law});
+  std::optional<Setting> setting;
+  const int round = laws.empty() ? index : index / static_cast<int>(options.laws.size());
+  const bool withheld = options.hide == UndeclaredOptions::Hide::withheld;
+  trial.mimicked = kNothingHidden;
+  for (int n = 0; n < (withheld ? kWithheldDraws : kDraws) && !setting; ++n)
+    setting = draw_setting(options, laws, derived_seed(seed, n),
+                           derived_seed(derived_seed(options.seed, kReleases), kDraws * round + n),
+                           releases, trial.mimicked);
+  if (!setting) {
+    trial.refused = std::isfinite(trial.mimicked)
+                        ? fmt::format("others mimic it, R2 at least {:.3f}", trial.mimicked)
+                        : "not seen within its bounds, or beside the cloth";
+    return trial;
+  }
+  trial.mimicked = setting->mimicked;
+  SyntheticScene scene = options.scene;
+  for (size_t n = 0; n < laws.size(); ++n) {
+    const DrawnLaw& drawn = setting->laws[n];
+    scene.hidden.push_back(hidden_effect(drawn));
+    trial.hidden[n].shape = drawn.term.shape;
+    trial.hidden[n].sigmas = drawn.sigmas;
+    trial.hidden[n].right = setting->right[n];
+    trial.hidden[n].amplitude_ratio = kNothingHidden;
+  }
+  const SyntheticRecording recording = make_synthetic_recording(scene, setting->release, seed);
+  trial.drawing_seconds = seconds_since(began);
+
+  UndeclaredOptions own = options;
+  own.diagnosis.fit.seed = seed;
+  own.diagnosis.fit.threads = 1;  // trials run side by side
+  own.diagnosis.separate = false;
+  if (withheld)
+    own.diagnosis.without.push_back(laws.front().effect);
+  else
+    own.diagnosis.law_terms = 0;  // nobody asks for it where the hidden effect is known
+  const auto diagnosis_began = std::chrono::steady_clock::now();
+  const Diagnosis diagnosis = diagnose(recording.input, own.diagnosis, {});
+  trial.seconds = seconds_since(diagnosis_began);
+  trial.stop = diagnosis.stop;
+  trial.message = diagnosis.message;
+  if (!diagnosis.usable()) return trial;
+  trial.verdict = diagnosis.verdict;
+  // Never right: no trial hides such a thing.
+  if (diagnosis.seen_elsewhere) {
+    trial.accepted.push_back("markers seen elsewhere");
+    trial.accepted_effects.push_back("markers seen elsewhere");
+  }
+  for (const AcceptedEffect& accepted : diagnosis.accepted) {
+    trial.accepted.push_back(accepted.trial.term.title());
+    trial.accepted_effects.push_back(accepted.trial.term.effect);
+  }
+  name_hidden(trial);
+  trial.before = held_out_rms(diagnosis.base());
+  trial.after = held_out_rms(diagnosis.found());
+  if (diagnosis.law.found()) trial.with_law = held_out_rms(diagnosis.with_law());
+  trial.before_fitted = fitted_rms(diagnosis.base());
+  trial.after_fitted = fitted_rms(diagnosis.found());
+  trial.noise = diagnosis.base().result.errors.front().noise;
+  for (size_t n = 0; n < laws.size(); ++n) {
+    const bool same_law =
+        std::ranges::find(trial.accepted, setting->laws[n].term.title()) != trial.accepted.end();
+    if (same_law)
+      compare_amplitudes(releases.at(setting->release)->information(), setting->laws[n],
+                         diagnosis.found().result, trial.hidden[n]);
+  }
+  if (!laws.empty())
+    trial.with_truth =
+        error_with_truth(recording.input, own, setting->laws, diagnosis, recording.truth);
+  return trial;
+}
+
+UndeclaredResult recover_undeclared(const UndeclaredOptions& options, Journal* journal,
+                                    const ProgressCallback& progress) {
+  options.validate();
+  Releases releases(options.scene, options.diagnosis.fit);
+  const Work work = [&](int index, std::uint64_t seed) {
+    return payload_of(undeclared_once(options, index, seed, releases));
+  };
+  const ExecuteResult executed = execute(
+      options.count(), work, {.threads = options.threads, .seed = options.seed}, journal, progress);
+  UndeclaredResult result{.stop = executed.stop, .message = executed.message, .trials = {}};
+  for (const std::string& payload : executed.payloads)
+    result.trials.push_back(undeclared_trial_of(payload));
+  return result;
+}
+
+}  // namespace clothfit

@@ -1,0 +1,94 @@
+#include "apps/terminal/progress_line.h"
+
+#include <fmt/format.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "apps/terminal/interrupt.h"
+
+namespace clothfit {
+namespace {
+
+std::string duration_text(double seconds) {
+  const auto whole = static_cast<long long>(std::ceil(seconds));
+  if (whole >= 3600) {
+    return fmt::format("{}:{:02}:{:02}", whole / 3600, whole / 60 % 60, whole % 60);
+  }
+  return fmt::format("{}:{:02}", whole / 60, whole % 60);
+}
+
+int terminal_width(std::FILE* stream) {
+  winsize size{};
+  const bool known = ioctl(fileno(stream), TIOCGWINSZ, &size) == 0 && size.ws_col > 0;
+  return known ? size.ws_col : 80;
+}
+
+}  // namespace
+
+std::string progress_text(const Progress& progress, double elapsed_s, int width) {
+  const bool total_known = progress.total > 0;
+  std::string text = progress.stage;
+  if (total_known) {
+    text += fmt::format("  {:.0f}/{:.0f} {}", progress.done, progress.total, progress.unit);
+  } else if (progress.done > 0) {
+    text += fmt::format("  {:.0f} {}", progress.done, progress.unit);
+  }
+
+  const double rate = elapsed_s > 0 ? progress.done / elapsed_s : 0;
+  if (rate > 0) {
+    text += fmt::format("  {:.3g}/s", rate);
+    if (total_known) {
+      const double left_s = std::max(0.0, progress.total - progress.done) / rate;
+      text += fmt::format("  {} left", duration_text(left_s));
+    }
+  }
+  if (!progress.note.empty()) text += "  " + progress.note;
+
+  const auto limit = static_cast<std::size_t>(std::max(width, 0));
+  if (text.size() > limit) {
+    std::size_t end = limit;
+    // Never in the middle of a UTF-8 character.
+    while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0U) == 0x80U) --end;
+    text.resize(end);
+  }
+  return text;
+}
+
+ProgressLine::ProgressLine(std::FILE* stream)
+    : stream_(stream), terminal_(isatty(fileno(stream)) != 0) {}
+
+ProgressLine::~ProgressLine() {
+  if (dirty_) {
+    std::fputs("\r\033[K", stream_);
+    std::fflush(stream_);
+  }
+}
+
+void ProgressLine::show(const Progress& progress) {
+  if (!terminal_) return;
+  const Clock::time_point now = Clock::now();
+  if (progress.stage != stage_) {
+    stage_ = progress.stage;
+    stage_begin_ = now;
+  } else if (now - last_shown_ < std::chrono::milliseconds(100)) {
+    return;
+  }
+  last_shown_ = now;
+  const double elapsed_s = std::chrono::duration<double>(now - stage_begin_).count();
+  fmt::print(stream_, "\r\033[K{}",
+             progress_text(progress, elapsed_s, terminal_width(stream_) - 1));
+  std::fflush(stream_);
+  dirty_ = true;
+}
+
+ProgressCallback watch(ProgressLine& line) {
+  return [&line](const Progress& progress) {
+    line.show(progress);
+    return !interrupted();
+  };
+}
+
+}  // namespace clothfit

@@ -1,0 +1,9 @@
+#include "apps/terminal/version.h"
+
+namespace clothfit {
+
+const char* program_version() {
+  return CLOTHFIT_VERSION;
+}
+
+}  // namespace clothfit

@@ -1,0 +1,123 @@
+#include "apps/verbs/experiment_verb.h"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <memory>
+
+#include "apps/report/study/louchet1995_page.h"
+#include "apps/report/study/louchet1995_tables.h"
+#include "apps/terminal/csv_table.h"
+#include "apps/terminal/exit_code.h"
+#include "apps/terminal/interrupt.h"
+#include "apps/terminal/progress_line.h"
+#include "apps/terminal/text_table.h"
+#include "apps/terminal/version.h"
+#include "apps/verbs/identification_experiment.h"
+#include "apps/verbs/verb.h"
+#include "data/output_folder.h"
+#include "data/text_file.h"
+
+namespace clothfit {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kDefaultFolder = "louchet1995.experiment";
+
+/// "louchet1995.experiment.journal" for that folder.
+fs::path journal_beside(const fs::path& folder) {
+  fs::path whole = fs::absolute(folder).lexically_normal();
+  if (!whole.has_filename()) whole = whole.parent_path();
+  return whole.parent_path() / (whole.filename().string() + ".journal");
+}
+
+void write_results(const Louchet1995Study& study, const ExperimentVerbOptions& options,
+                   const fs::path& folder) {
+  for (const StudyTable& one : louchet1995_files(study))
+    write_csv_table(one.table.header, one.table.rows, folder / one.file);
+  const StudyTable timing = louchet1995_timing(study);
+  write_csv_table(timing.table.header, timing.table.rows, folder / timing.file);
+  write_text(louchet1995_page_html(study, options.study, options.command, program_version()),
+             folder / "report.html");
+}
+
+void print_targets(const Louchet1995Study& study) {
+  Table table = target_table(study);
+  const std::string mark = "measured: ";
+  for (std::vector<std::string>& row : table.rows)
+    for (std::string& cell : row)
+      if (cell.starts_with(mark)) cell.erase(0, mark.size());
+  fmt::print("\n{}\n", text_table(table.header, table.rows));
+}
+
+}  // namespace
+
+int run_louchet1995(const ExperimentVerbOptions& options) {
+  options.study.validate();
+  OutputFolder out(out_folder(options.out, kDefaultFolder));
+  const bool own_journal = options.journal.empty();
+  const fs::path journal_file = own_journal ? journal_beside(out.final_path()) : options.journal;
+  Louchet1995Study study;
+  {
+    Journal journal(journal_file, options.study.key(),
+                    options.resume ? JournalStart::resume : JournalStart::anew);
+    ProgressLine line;
+    study = study_louchet1995(options.study, &journal, watch(line));
+  }
+  if (study.cancelled || interrupted()) {
+    spdlog::info("what was finished is in {}; go on with the same command and --resume",
+                 shown_path(journal_file));
+    throw Cancelled();
+  }
+  write_results(study, options, out.path());
+  out.publish();
+  if (own_journal) fs::remove(journal_file);
+  print_targets(study);
+  fmt::print("Report: {}\n", shown_path(out.final_path() / "report.html"));
+  return kExitGood;
+}
+
+void add_experiment_verb(Verb program) {
+  Verb verb = program.add_verb("experiment",
+                               "Run an experiment of the literature or of our own, with a report");
+  verb.requires_verb();
+  verb.footer(
+      "Example:\n"
+      "  clothfit experiment louchet1995 --help");
+
+  add_identification_experiment(verb);
+  const auto options = std::make_shared<ExperimentVerbOptions>();
+  Verb louchet1995 = verb.add_verb(
+      "louchet1995", "The founding paper's identification of a simulated cloth, section 3");
+  louchet1995
+      .add_option("--seeds", &options->study.seeds,
+                  "Seeds of the recoveries; comparisons take a fifth")
+      .shows_default();
+  louchet1995.add_option("--seed", &options->study.seed, "The first of the seeds").shows_default();
+  louchet1995
+      .add_option("--threads", &options->study.threads, "Threads; 0 for as many as the machine has")
+      .shows_default()
+      .shapes_no_result();
+  louchet1995.add_flag("--quick", options->study.quick,
+                       "Coarse grids and short searches: to see what the report looks like");
+  louchet1995
+      .add_option("--journal", &options->journal,
+                  "File that keeps finished pieces, and stays (default: beside the results, gone "
+                  "with success)")
+      .shapes_no_result()
+      .type_name("FILE");
+  louchet1995.add_flag("--resume", options->resume, "Go on where the journal ends")
+      .shapes_no_result();
+  add_out_option(louchet1995, options->out, kDefaultFolder);
+  louchet1995.footer(
+      "Examples:\n"
+      "  clothfit experiment louchet1995\n"
+      "  clothfit experiment louchet1995 --quick --seeds 2 --out look");
+  louchet1995.runs([options, louchet1995] {
+    options->command = louchet1995.command_text();
+    return run_louchet1995(*options);
+  });
+}
+
+}  // namespace clothfit

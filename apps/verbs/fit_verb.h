@@ -1,0 +1,25 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "data/recording.h"
+#include "fit/interface/fit_options.h"
+
+namespace clothfit {
+
+struct FitVerbOptions {
+  std::filesystem::path recording;
+  FitOptions fit;
+  std::filesystem::path out;  ///< empty: NAME.fit
+  /// Verb and options as fit.json keeps them; nothing that leaves the result as it is (--out,
+  /// --threads).
+  std::string command;
+};
+
+/// Completes the recording, fits it, writes the result folder, prints the tables. Returns an exit
+/// code; throws InputError, NoResult, Cancelled.
+int run_fit(const FitVerbOptions& options);
+
+}  // namespace clothfit

@@ -1,0 +1,151 @@
+#include "apps/verbs/recover_undeclared.h"
+
+#include <fmt/format.h>
+
+#include "apps/report/study/undeclared_page.h"
+#include "apps/report/study/undeclared_tables.h"
+#include "apps/terminal/csv_table.h"
+#include "apps/terminal/exit_code.h"
+#include "apps/terminal/interrupt.h"
+#include "apps/terminal/progress_line.h"
+#include "apps/terminal/text_table.h"
+#include "apps/verbs/verb.h"
+#include "data/input_error.h"
+#include "data/output_folder.h"
+#include "data/text_file.h"
+
+namespace clothfit {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The library's laws, or those asked for: all that the library has of an effect, the effect's own
+/// where it has none, or the law that is named.
+std::vector<HiddenLaw> laws_asked_for(const std::vector<std::string>& asked,
+                                      ObservationKind observations) {
+  const std::vector<HiddenLaw> library = hidden_laws(observations);
+  if (asked.empty()) return library;
+  std::vector<HiddenLaw> result;
+  for (const std::string& text : asked) {
+    const size_t colon = text.find(':');
+    const std::string effect = text.substr(0, colon);
+    const std::string law = colon == std::string::npos ? "" : text.substr(colon + 1);
+    const EffectDescription described = describe_effect(effect);
+    std::vector<HiddenLaw> own;
+    for (const HiddenLaw& known : library)
+      if (known.effect == effect && law.empty()) own.push_back(known);
+    std::string names;
+    for (const EffectLaw& known : described.laws) {
+      names += (names.empty() ? "" : ", ") + known.name;
+      if (own.empty() && (law.empty() || known.name == law)) own.push_back({effect, known.name});
+      if (own.size() == 1 && !law.empty()) break;
+    }
+    if (described.laws.empty() && own.empty() && law.empty()) own.push_back({effect, ""});
+    if (own.empty())
+      throw InputError("--hidden", fmt::format("{} has no law '{}'", effect, law),
+                       names.empty() ? "no law: it has but one" : "one of " + names);
+    result.insert(result.end(), own.begin(), own.end());
+  }
+  return result;
+}
+
+UndeclaredOptions options_of(const UndeclaredFlags& flags, const UndeclaredRun& run) {
+  UndeclaredOptions options{.scene = run.scene, .diagnosis = {.fit = run.fit}};
+  options.diagnosis.lines = flags.lines;
+  options.diagnosis.refits = flags.refits;
+  options.scene.held_out_from =
+      flags.fitted > 0 ? flags.fitted : 1 + 3 * (run.scene.frames - 1) / 4;
+  if (flags.same_model)
+    options.scene.truth_mesh = run.fit.mesh_columns;
+  else if (flags.integrator == "runge-kutta")
+    options.scene.integrator = TruthIntegrator::runge_kutta;
+  using Hide = UndeclaredOptions::Hide;
+  options.hide = flags.clean      ? Hide::nothing
+                 : flags.pairs    ? Hide::pairs
+                 : flags.withhold ? Hide::withheld
+                                  : Hide::one;
+  if (!flags.clean) options.laws = laws_asked_for(flags.hidden, run.fit.observations);
+  options.draw = {.least = flags.least_sigmas, .most = flags.most_sigmas};
+  options.most_mimicked = flags.most_mimicked;
+  options.trials = run.trials;
+  options.seed = run.seed;
+  options.threads = run.threads;
+  return options;
+}
+
+}  // namespace
+
+void add_undeclared_options(Verb verb, UndeclaredFlags& flags) {
+  const Option undeclared = verb.add_flag("--undeclared", flags.undeclared,
+                                          "Hide effects that the recordings do not declare, and "
+                                          "diagnose them; --trials is of each law");
+  const auto add_flag = [&](const char* name, bool& value, const char* what) {
+    return verb.add_flag(name, value, what).needs(undeclared);
+  };
+  const auto add = [&](const char* name, auto& value, const char* what) {
+    return verb.add_option(name, &value, what).needs(undeclared).shows_default();
+  };
+  const Option hidden =
+      verb.add_option("--hidden", &flags.hidden,
+                      "Effect to hide, or one of its laws as EFFECT:LAW (default: the library)")
+          .needs(undeclared)
+          .type_name("EFFECT");
+  const Option clean = add_flag("--clean", flags.clean, "Hide nothing: count false alarms");
+  const Option pairs = add_flag("--pairs", flags.pairs, "Hide two effects at once");
+  const Option withhold = add_flag("--withhold", flags.withhold,
+                                   "Leave the hidden effect out of what the diagnosis knows");
+  add("--mimicked", flags.most_mimicked,
+      "Squared multiple correlation with all other effects, below which one is withheld");
+  clean.excludes(hidden).excludes(pairs).excludes(withhold);
+  pairs.excludes(withhold);
+  const Option same =
+      add_flag("--same-model", flags.same_model, "A truth of the fit's own mesh and integrator");
+  add("--integrator", flags.integrator, "How the truth is simulated")
+      .one_of({"euler", "runge-kutta"})
+      .excludes(same);
+  add("--fitted", flags.fitted, "Frames that are fitted; 0 for three quarters");
+  add("--least-sigmas", flags.least_sigmas, "Smallest amplitude, in its standard deviations");
+  add("--most-sigmas", flags.most_sigmas, "Largest amplitude");
+  add("--lines", flags.lines, "As in clothfit diagnose");
+  add("--refits", flags.refits, "As in clothfit diagnose");
+}
+
+int run_undeclared(const UndeclaredFlags& flags, const UndeclaredRun& run) {
+  const UndeclaredOptions options = options_of(flags, run);
+  options.validate();
+  OutputFolder out(out_folder(run.out, "recover"));
+  const fs::path journal_file =
+      run.journal.empty() ? fs::path(out.final_path().string() + ".journal") : run.journal;
+  Journal journal(journal_file, options.key(),
+                  run.resume ? JournalStart::resume : JournalStart::anew);
+  UndeclaredResult result;
+  {
+    ProgressLine line;
+    result = recover_undeclared(options, &journal, watch(line));
+  }
+  if (result.stop == ExecuteStop::cancelled || interrupted()) {
+    fmt::print(stderr, "{} of {} trials are kept in {}; the same command with --resume goes on\n",
+               journal.finished().size(), options.count(), shown_path(journal_file));
+    throw Cancelled();
+  }
+  const auto csv = [&](const Table& table, const char* name) {
+    write_csv_table(table.header, table.rows, out.path() / name);
+  };
+  const auto print = [](const Table& table) {
+    fmt::print("{}\n", text_table(table.header, table.rows));
+  };
+  const Table confusion = confusion_table(result);
+  csv(undeclared_trials_table(result), "trials.csv");
+  csv(undeclared_effects_table(result), "effects.csv");
+  csv(confusion, "confusion.csv");
+  write_text(undeclared_page_html(options, result, run.command), out.path() / "report.html");
+  out.publish();
+  if (run.journal.empty()) fs::remove(journal_file);
+  print(short_undeclared_trials_table(result));
+  print(confusion);
+  print(short_undeclared_effects_table(result));
+  fmt::print("Report: {}\n", shown_path(out.final_path() / "report.html"));
+  return kExitGood;
+}
+
+}  // namespace clothfit

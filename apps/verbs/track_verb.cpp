@@ -1,0 +1,101 @@
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <memory>
+
+#include "apps/steps/calibrate_step.h"
+#include "apps/steps/track_step.h"
+#include "apps/terminal/exit_code.h"
+#include "apps/terminal/number_text.h"
+#include "apps/terminal/progress_line.h"
+#include "apps/terminal/text_table.h"
+#include "apps/verbs/verb.h"
+#include "data/input_error.h"
+#include "data/output_folder.h"
+
+namespace clothfit {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct TrackVerbOptions {
+  fs::path recording;
+  TrackOptions track;
+  fs::path out;
+};
+
+void print_tracks(const CameraTracks& tracks, const Recording& recording) {
+  const TrackResult& result = tracks.result;
+  const auto good = std::count_if(result.tracks.begin(), result.tracks.end(),
+                                  [](const Position2d& row) { return row.rejected.empty(); });
+  const double possible =
+      static_cast<double>(result.frames) * static_cast<double>(recording.markers.markers.size());
+  fmt::print("\nCamera {}: {} of {:.0f} marker places in {} frames ({}%)\n{}\n", tracks.camera,
+             good, possible, result.frames,
+             significant(100 * static_cast<double>(good) / possible, 3), result.message);
+  if (!result.rejected.empty()) {
+    std::vector<std::vector<std::string>> rows;
+    for (const auto& [reason, count] : result.rejected) {
+      rows.push_back({reason, std::to_string(count)});
+    }
+    fmt::print("\n{}", text_table({"rejected because", "count"}, rows));
+  }
+  if (tracks.placement) fmt::print("\n{}\n", tracks.placement->message);
+}
+
+int run_track(const TrackVerbOptions& options) {
+  options.track.validate();
+  Recording recording = read_recording(recording_folder(options.recording));
+  const std::vector<std::string> cameras = cameras_to_track(recording, true);
+  if (cameras.empty()) {
+    throw InputError((recording.folder / "recording.yaml").string(), "no camera has pictures",
+                     "`images: FOLDER or VIDEO` in a camera's entry");
+  }
+
+  OutputFolder out(out_folder(options.out, recording.name + ".tracks"));
+  TrackStepResult step;
+  {
+    ProgressLine line;
+    const std::vector<std::string> uncalibrated = cameras_to_calibrate(recording, false);
+    if (!uncalibrated.empty()) {
+      const fs::path folder = out.path() / "steps" / "calibrated";
+      fs::create_directories(folder);
+      recording = calibrate_step(recording, uncalibrated, {}, folder, watch(line)).recording;
+    }
+    step = track_step(recording, cameras, options.track, out.path(), watch(line));
+  }
+  out.publish();
+
+  for (const CameraTracks& tracks : step.cameras) {
+    print_tracks(tracks, step.recording);
+    if (!tracks.not_placed.empty()) {
+      spdlog::warn("camera '{}' has no place in the world, which a fit needs: {}", tracks.camera,
+                   tracks.not_placed);
+    }
+  }
+  fmt::print("\nRecording with tracks: {}\n", shown_path(out.final_path()));
+  return kExitGood;
+}
+
+}  // namespace
+
+void add_track_verb(Verb program) {
+  const auto options = std::make_shared<TrackVerbOptions>();
+  Verb verb = program.add_verb(
+      "track", "Find the cloth's markers in the pictures and place the cameras in the world");
+  verb.add_option("recording", &options->recording, "Folder of the recording")
+      .required()
+      .type_name("RECORDING");
+  verb.add_option("--max-speed", &options->track.max_speed_px,
+                  "A marker that moved further than this between frames is doubted (px)")
+      .shows_default();
+  verb.add_option("--min-margin", &options->track.min_decision_margin,
+                  "Tag readings weaker than this are rejected")
+      .shows_default();
+  add_out_option(verb, options->out, "NAME.tracks");
+  verb.footer("Example:\n  clothfit track data/recordings/tags_onecam");
+  verb.runs([options] { return run_track(*options); });
+}
+
+}  // namespace clothfit

@@ -1,0 +1,14 @@
+#pragma once
+
+// Private to calib/.
+
+#include "calib/bundle/camera_estimate.h"
+
+namespace clothfit {
+
+/// A camera without distortion and a pose for each view, from closed forms: the focal length among
+/// a few candidates that explains the corners best. Views without a pose are left unused.
+CameraEstimate start_estimate(const BoardObservations& observations, CameraModel model,
+                              int distortion_count);
+
+}  // namespace clothfit

@@ -1,0 +1,152 @@
+#include "fit/jobs/executor.h"
+
+#include <fmt/format.h>
+#include <tbb/global_control.h>
+#include <tbb/info.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cassert>
+#include <exception>
+#include <mutex>
+#include <optional>
+
+#include "data/input_error.h"
+#include "fit/jobs/draws.h"
+
+namespace clothfit {
+namespace {
+
+/// What the threads of one call share.
+class Run {
+ public:
+  Run(int count, const Work& work, const ExecuteOptions& options, Journal* journal,
+      const ProgressCallback& progress)
+      : work_(work), options_(options), journal_(journal), progress_(progress), failed_(count) {
+    payloads_.resize(static_cast<std::size_t>(count));
+    for (int index = 0; index < count; ++index) {
+      if (journal_ != nullptr && journal_->finished().contains(index)) {
+        payload(index) = journal_->finished().at(index);
+      } else {
+        left_.push_back(index);
+      }
+    }
+    tell_progress();
+  }
+
+  int left() const { return static_cast<int>(left_.size()); }
+
+  /// Does pieces, one after another, until none is left to hand out.
+  void do_pieces() {
+    while (!stops_) {
+      const std::size_t turn = next_++;
+      if (turn >= left_.size()) return;
+      // A piece that was handed out is done whatever stops the others: the promise about the
+      // lowest index rests on it. In isolation, a thread that waits inside a piece finds no tasks
+      // but the piece's own.
+      tbb::this_task_arena::isolate([&] { do_piece(left_[turn]); });
+    }
+  }
+
+  ExecuteResult result() {
+    if (failure_) std::rethrow_exception(failure_);
+    ExecuteResult result;
+    result.resumed = static_cast<int>(payloads_.size()) - left();
+    result.performed = performed_;
+    result.message =
+        fmt::format("{} of {} {}", result.resumed + performed_, payloads_.size(), options_.unit);
+    if (result.resumed > 0) {
+      result.message +=
+          fmt::format(", {} of them from {}", result.resumed, journal_->file().string());
+    }
+    if (performed_ == left()) {
+      result.payloads = std::move(payloads_);
+    } else {
+      result.stop = ExecuteStop::cancelled;
+      result.message = "cancelled after " + result.message;
+    }
+    return result;
+  }
+
+ private:
+  std::string& payload(int index) { return payloads_[static_cast<std::size_t>(index)]; }
+
+  void do_piece(int index) {
+    try {
+      payload(index) = work_(index, derived_seed(options_.seed, index));
+      const std::lock_guard lock(mutex_);
+      if (journal_ != nullptr) journal_->append(index, payload(index));
+      ++performed_;
+      if (!stops_) tell_progress();
+    } catch (...) {
+      const std::lock_guard lock(mutex_);
+      stops_ = true;
+      if (index >= failed_) return;
+      failed_ = index;
+      failure_ = std::current_exception();
+    }
+  }
+
+  void tell_progress() {
+    if (!progress_) return;
+    const std::size_t done = payloads_.size() - left_.size() + static_cast<std::size_t>(performed_);
+    if (!progress_({.stage = options_.unit,
+                    .done = static_cast<double>(done),
+                    .total = static_cast<double>(payloads_.size()),
+                    .unit = options_.unit})) {
+      stops_ = true;
+    }
+  }
+
+  const Work& work_;
+  const ExecuteOptions& options_;
+  Journal* const journal_;
+  const ProgressCallback& progress_;
+
+  std::vector<int> left_;  ///< pieces to do, ascending
+  std::atomic<std::size_t> next_ = 0;
+  std::atomic<bool> stops_ = false;
+
+  std::mutex mutex_;                   ///< of all below, of the journal and of progress
+  std::vector<std::string> payloads_;  ///< each written by the one thread that does the piece
+  int performed_ = 0;
+  int failed_;  ///< lowest index that failed
+  std::exception_ptr failure_;
+};
+
+}  // namespace
+
+void ExecuteOptions::validate() const {
+  if (threads < 0) {
+    throw InputError("threads", "threads = " + std::to_string(threads),
+                     "0 (as many as the machine has), or 1 on");
+  }
+}
+
+ExecuteResult execute(int count, const Work& work, const ExecuteOptions& options, Journal* journal,
+                      const ProgressCallback& progress) {
+  options.validate();
+  assert(count >= 0);
+  using tbb::global_control;
+  const int threads = options.threads > 0 ? options.threads : tbb::info::default_concurrency();
+  // oneTBB gives no more threads than processors unless it is told that more are welcome.
+  std::optional<global_control> more;
+  if (static_cast<std::size_t>(threads) >
+      global_control::active_value(global_control::max_allowed_parallelism)) {
+    more.emplace(global_control::max_allowed_parallelism, threads);
+  }
+
+  Run run(count, work, options, journal, progress);
+  tbb::task_arena arena(threads);
+  arena.execute([&] {
+    // As many loops as threads, not a task for each piece: those would be split into ranges and
+    // not begun in order.
+    tbb::parallel_for(
+        0, std::min(threads, run.left()), [&](int) { run.do_pieces(); }, tbb::simple_partitioner());
+  });
+  return run.result();
+}
+
+}  // namespace clothfit

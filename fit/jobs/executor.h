@@ -1,0 +1,57 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "data/progress.h"
+#include "fit/jobs/journal.h"
+
+namespace clothfit {
+
+/// One piece of work: from its index and its seed to a payload of bytes, and from nothing else, so
+/// that it does not matter who does it, when, or on which machine. The seed is
+/// derived_seed(run seed, index). Several are at work at once.
+using Work = std::function<std::string(int index, std::uint64_t seed)>;
+
+struct ExecuteOptions {
+  int threads = 0;              ///< >= 0; 0: as many as the machine has
+  unsigned long long seed = 1;  ///< of the run
+  std::string unit = "trials";  ///< what progress calls the pieces
+  void validate() const;        ///< throws InputError
+};
+
+enum class ExecuteStop { finished, cancelled };
+
+struct ExecuteResult {
+  ExecuteStop stop = ExecuteStop::finished;
+  std::string message;  ///< one line for a person
+  /// By index. Empty when cancelled, for which pieces were finished is then a matter of chance;
+  /// they are in the journal.
+  std::vector<std::string> payloads;
+  int resumed = 0;    ///< pieces that the journal held
+  int performed = 0;  ///< pieces done by this call
+  bool usable() const { return stop == ExecuteStop::finished; }
+};
+
+/// Does the pieces 0 ... count - 1. The payloads are the same bytes for any number of threads, and
+/// whether or not a journal held some of them.
+///
+/// Pieces are handed out in the order of their indices, each thread doing one at a time. A piece
+/// may itself use oneTBB: while it waits for its own tasks its thread does nothing for other
+/// pieces, with one thread all of it stays on the calling thread, and threads that find no piece
+/// left help those at work.
+///
+/// When a piece throws, no more are handed out, those at work are finished, and the exception of
+/// the lowest index is rethrown. This is the exception that one thread alone would meet, for all
+/// pieces before it were handed out before it. Exceptions of `journal` and `progress` count as the
+/// piece's after which they arise.
+///
+/// `journal`, when given, holds pieces that need not be done again and receives those that are; its
+/// key must name the seed. `progress`, when given, is told at the start and after each piece, from
+/// the threads, one at a time; when it returns false, those at work are finished and kept.
+ExecuteResult execute(int count, const Work& work, const ExecuteOptions& options = {},
+                      Journal* journal = nullptr, const ProgressCallback& progress = {});
+
+}  // namespace clothfit

@@ -1,0 +1,18 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "calib/camera/rigid3.h"
+#include "fit/observe/observations.h"
+
+namespace clothfit {
+
+/// Where the flat, unstretched sheet lies: world_from_sheet (sheet axes: x along s, y along t) that
+/// brings the markers' flat places closest to where the first `frames` frames show them, over all
+/// sets and weighted by their sigma. `marker_m` holds (s, t) of every marker. Nothing when every
+/// set shows fewer than four markers there, or markers on a line only.
+std::optional<Rigid3> place_flat_sheet(const std::vector<ObservationSet>& sets,
+                                       const Eigen::Matrix2Xd& marker_m, int frames);
+
+}  // namespace clothfit

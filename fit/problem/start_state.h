@@ -1,0 +1,48 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "calib/camera/rigid3.h"
+#include "fit/observe/observations.h"
+#include "fit/problem/parameter_space.h"
+#include "model/topology/mesh.h"
+
+namespace clothfit {
+
+/// The state of a cloth that was already moving when its recording began: a first guess, and
+/// corrections of positions and velocities that are smooth over the cloth, each a parameter of the
+/// fit:
+///
+///   P(v) = guess + sum_k B(v, k) p_k,   V(v) = guess + sum_k B(v, k) w_k
+///
+/// B are the cardinal functions of a natural bicubic spline (model/topology/surface.h) with few
+/// nodes: the correction is p_k at node k. Shapes: 3 x vertices, world.
+struct StartState {
+  Eigen::Matrix3Xd position_m, velocity_m_per_s;  ///< the guess
+  Eigen::MatrixXd basis;                          ///< vertices x nodes; 0 nodes: nothing to correct
+  /// Of node k and axis c at 3 k + c.
+  std::vector<Binding> position, velocity;
+
+  int nodes() const { return static_cast<int>(basis.cols()); }
+};
+
+struct StartStateOptions {
+  int nodes = 8;                      ///< per side of the cloth, >= 2; more follow finer folds
+  double position_sigma_m = 0.03;     ///< of the correction at a node, for what is guessed well
+  double velocity_sigma_m_per_s = 1;  ///< the same
+};
+
+/// Guesses from the tracks and adds the corrections to `space`, with priors as wide as the guess
+/// may be wrong. In space the guess is the smoothed markers at the first frame, their velocities
+/// included; from pixels the shapes of the first frames (fit/observe/shape_from_pixels.h). Where
+/// neither works out it is the flat sheet, at rest, with priors as wide as a cloth can be away from
+/// that.
+StartState make_start_state(const std::vector<ObservationSet>& sets,
+                            const Eigen::Matrix2Xd& marker_m,
+                            const std::vector<double>& frame_time_s, int first_held_out,
+                            const Mesh& mesh, const Rigid3& world_from_sheet,
+                            const StartStateOptions& options, ParameterSpace& space,
+                            std::vector<GaussianPrior>& priors);
+
+}  // namespace clothfit

@@ -1,0 +1,9 @@
+#pragma once
+
+namespace clothfit {
+
+/// A time step is chosen this much shorter than the longest stable one: the estimate does not see
+/// violently crumpled cloth, and stiffness and damping may grow before a new one is chosen.
+inline constexpr double kStabilityMargin = 1.5;
+
+}  // namespace clothfit

@@ -1,0 +1,407 @@
+#include "fit/refine/pooled_fit.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "data/algebra/dense_factors.h"
+#include "data/input_error.h"
+#include "fit/cost/huber.h"
+#include "fit/problem/parameterised_model.h"
+#include "fit/problem/prior_cost.h"
+#include "fit/refine/refine.h"
+#include "model/cloth/stability.h"
+
+namespace clothfit {
+namespace {
+
+constexpr double kInfinite = std::numeric_limits<double>::infinity();
+
+TrajectoryObjective objective_of(const FitProblem& problem, const PooledPart& part) {
+  return {problem, part.frames, part.steps};
+}
+
+/// Amounts of the directions that leave least of a residual under weights.
+Eigen::VectorXd amounts_of(const Eigen::MatrixXd& directions, const Eigen::VectorXd& weight,
+                           const Eigen::VectorXd& residual) {
+  if (directions.cols() == 0) return {};
+  const Eigen::MatrixXd weighted = weight.asDiagonal() * directions;
+  Eigen::MatrixXd information = weighted.transpose() * directions;
+  information.diagonal().array() += 1;
+  return -SymmetricFactors(information).solve(weighted.transpose() * residual);
+}
+
+/// Fits the amounts of a part's directions to its residual; its cost then, priors included.
+double settle(const FitProblem& problem, PooledPart& part, double threshold) {
+  const TrajectoryObjective objective = objective_of(problem, part);
+  if (part.amounts.size() != part.directions.cols())
+    part.amounts = Eigen::VectorXd::Zero(part.directions.cols());
+  if (part.directions.cols() > 0)
+    part.amounts =
+        amounts_of(part.directions, huber_weights(objective, residual_of(part), threshold),
+                   corrected_residual(part));
+  return huber_cost(objective, residual_of(part), threshold) + 0.5 * part.amounts.squaredNorm() +
+         prior_cost(problem, part.values).cost;
+}
+
+/// A coordinate that a step must not change: at a bound that keeps it from a lower cost.
+std::vector<bool> held_at(const Eigen::VectorXd& x, const Eigen::VectorXd& lower,
+                          const Eigen::VectorXd& upper, const Eigen::VectorXd& gradient) {
+  std::vector<bool> held(static_cast<size_t>(x.size()));
+  for (Eigen::Index p = 0; p < x.size(); ++p) {
+    const double edge = 1e-12 * (upper[p] - lower[p]);
+    held[static_cast<size_t>(p)] =
+        gradient[p] > 0 ? x[p] - lower[p] <= edge : upper[p] - x[p] <= edge;
+  }
+  return held;
+}
+
+/// The recordings where they stand, and what is known of the derivatives there.
+class Pool {
+ public:
+  Pool(std::span<const FitProblem* const> problems, const PooledOptions& options,
+       std::vector<PooledPart> parts)
+      : problems_(problems), options_(options), parts_(std::move(parts)), exact_(parts_.size()) {}
+
+  const std::vector<PooledPart>& parts() const { return parts_; }
+  std::vector<PooledPart> release() { return std::move(parts_); }
+  std::vector<Eigen::VectorXd> values() const {
+    std::vector<Eigen::VectorXd> all;
+    for (const PooledPart& part : parts_) all.push_back(part.values);
+    return all;
+  }
+  double cost() const { return cost_; }
+  /// Chi-square per residual, where it is more than one.
+  double scatter() const {
+    Eigen::Index count = 0;
+    for (const PooledPart& part : parts_) count += part.linear.residual.size();
+    return std::max(1.0, 2 * cost_ / static_cast<double>(count));
+  }
+  bool is_linearised() const {
+    return std::ranges::all_of(parts_, [](const PooledPart& part) { return part.linear.usable; });
+  }
+  bool is_exact() const {
+    return std::ranges::all_of(exact_, [](bool exact) { return exact; });
+  }
+
+  /// Springs times time steps of all runs with derivatives so far.
+  double spring_steps() const { return spring_steps_; }
+
+  /// Time steps and Huber's threshold anew, and exact derivatives where there are none. False where
+  /// a recording cannot be simulated.
+  bool begin_round(bool first) {
+    for (size_t n = 0; n < parts_.size(); ++n) {
+      PooledPart& part = parts_[n];
+      if (part.frames == 0) part.frames = problems_[n]->first_held_out;
+      if (first && part.linear.usable) {
+        exact_[n] = !part.borrowed;
+        continue;
+      }
+      part.steps = stable_time_steps(problems_[n]->cloth, parameter_set(*problems_[n], part.values))
+                       .times(1 / options_.stability_margin);
+      part.linear = {};
+    }
+    if (!linearise()) return false;
+    threshold_ = kInfinite;
+    if (options_.loss == Loss::huber) threshold_ = kHuberScales * scale();
+    cost_ = total_cost(parts_);
+    return true;
+  }
+
+  /// Whether neither the time steps nor the loss would be chosen much otherwise now.
+  bool is_settled() const {
+    constexpr double kRoom = 1.05, kSameScale = 0.8;
+    for (size_t n = 0; n < parts_.size(); ++n) {
+      const TimeSteps largest =
+          stable_time_steps(problems_[n]->cloth, parameter_set(*problems_[n], parts_[n].values));
+      const bool rests = problems_[n]->start == StartKind::at_rest;
+      if (largest.run_s < kRoom * parts_[n].steps.run_s ||
+          (rests && largest.rest_s < kRoom * parts_[n].steps.rest_s))
+        return false;
+    }
+    return threshold_ == kInfinite || kHuberScales * scale() > kSameScale * threshold_;
+  }
+
+  PooledSpace::Expansion expand(const PooledSpace& space) const {
+    std::vector<Quadratic> quadratics(parts_.size());
+    tbb::parallel_for(size_t{0}, parts_.size(), [&](size_t n) {
+      quadratics[n] = quadratic_of(*problems_[n], parts_[n], threshold_);
+    });
+    return space.gather(quadratics);
+  }
+
+  /// Goes to `values` if that lowers the cost. Derivatives are kept, updated, or had anew there.
+  bool try_to_move(const std::vector<Eigen::VectorXd>& values) {
+    std::vector<PooledPart> there = parts_;
+    std::vector<char> usable(parts_.size(), 0);
+    const bool dear = options_.updated_within > 0;
+    tbb::parallel_for(size_t{0}, parts_.size(), [&](size_t n) {
+      PooledPart& part = there[n];
+      const TrajectoryObjective objective = objective_of(*problems_[n], part);
+      part.values = values[n];
+      if (dear) {
+        part.linear.residual = objective.residuals({values[n]}).front();
+        usable[n] = part.linear.residual.size() == objective.residual_count();
+      } else {
+        part.linear = objective.linearise(values[n]);
+        usable[n] = part.linear.usable;
+      }
+    });
+    if (std::ranges::find(usable, 0) != usable.end()) return false;
+    const double cost = total_cost(there);
+    if (!(cost <= cost_)) return false;
+    const std::vector<char> were_exact = exact_;
+    if (dear) carry_derivatives(there);
+    std::swap(parts_, there);
+    if (!linearise()) {
+      std::swap(parts_, there);
+      exact_ = were_exact;
+      return false;
+    }
+    cost_ = cost;
+    return true;
+  }
+
+  /// Exact derivatives where they were kept or updated.
+  bool make_exact() {
+    for (size_t n = 0; n < parts_.size(); ++n)
+      if (!exact_[n]) parts_[n].linear.usable = false;
+    return linearise();
+  }
+
+ private:
+  double scale() const {
+    double largest = 1;
+    for (const PooledPart& part : parts_)
+      largest = std::max(largest, robust_scale(residual_of(part)));
+    return largest;
+  }
+
+  double total_cost(std::vector<PooledPart>& parts) const {
+    std::vector<double> costs(parts.size());
+    tbb::parallel_for(size_t{0}, parts.size(),
+                      [&](size_t n) { costs[n] = settle(*problems_[n], parts[n], threshold_); });
+    double sum = 0;
+    for (const double cost : costs) sum += cost;
+    return sum;
+  }
+
+  /// The smallest change of each Jacobian that would have foretold the residuals `there`
+  /// [broyden1965], coordinates weighed by what they change; none where it foretold them well, and
+  /// no derivatives where it was far off, unless a rough fit goes on with them.
+  void carry_derivatives(std::vector<PooledPart>& there) {
+    for (size_t n = 0; n < parts_.size(); ++n) {
+      const ParameterSpace& space = problems_[n]->space;
+      Eigen::MatrixXd& jacobian = there[n].linear.residual_by_coordinate;
+      const Eigen::VectorXd way =
+          space.coordinates(there[n].values) - space.coordinates(parts_[n].values);
+      const Eigen::VectorXd change = jacobian * way;
+      const Eigen::VectorXd missed = there[n].linear.residual - parts_[n].linear.residual - change;
+      const double off = missed.norm() / std::max(change.norm(), 1e-300);
+      if (off <= options_.kept_within) continue;
+      if (off > options_.updated_within && !options_.rough) {
+        there[n].linear.usable = false;
+        continue;
+      }
+      const Eigen::VectorXd weighed =
+          jacobian.colwise().squaredNorm().transpose().cwiseProduct(way);
+      jacobian += missed * weighed.transpose() / way.dot(weighed);
+      exact_[n] = false;
+    }
+  }
+
+  /// Where there are no derivatives. Residuals are the same.
+  bool linearise() {
+    std::vector<char> usable(parts_.size(), 1);
+    std::vector<double> spring_steps(parts_.size(), 0);
+    tbb::parallel_for(size_t{0}, parts_.size(), [&](size_t n) {
+      if (parts_[n].linear.usable) return;
+      const TrajectoryObjective objective = objective_of(*problems_[n], parts_[n]);
+      parts_[n].linear = objective.linearise(parts_[n].values);
+      spring_steps[n] = parts_[n].linear.runs * objective.spring_steps_per_run();
+      usable[n] = parts_[n].linear.usable;
+      parts_[n].borrowed = false;
+      exact_[n] = true;
+    });
+    for (const double own : spring_steps) spring_steps_ += own;
+    return std::ranges::find(usable, 0) == usable.end();
+  }
+
+  std::span<const FitProblem* const> problems_;
+  const PooledOptions& options_;
+  std::vector<PooledPart> parts_;
+  std::vector<char> exact_;  ///< whether the derivatives are those of where the recording stands
+  double threshold_ = kInfinite, cost_ = 0;
+  double spring_steps_ = 0;
+};
+
+}  // namespace
+
+Eigen::VectorXd corrected_residual(const PooledPart& part) {
+  if (part.correction.size() == 0) return part.linear.residual;
+  return part.linear.residual + part.correction;
+}
+
+Eigen::VectorXd residual_of(const PooledPart& part) {
+  if (part.amounts.size() == 0) return corrected_residual(part);
+  return corrected_residual(part) + part.directions * part.amounts;
+}
+
+Quadratic quadratic_of(const FitProblem& problem, const PooledPart& part, double threshold) {
+  Quadratic result;
+  if (!part.linear.usable) return result;
+  const TrajectoryObjective objective = objective_of(problem, part);
+  const Eigen::VectorXd residual = residual_of(part);
+  const Eigen::VectorXd weight = huber_weights(objective, residual, threshold);
+  const Eigen::MatrixXd& jacobian = part.linear.residual_by_coordinate;
+  const Eigen::MatrixXd weighted = weight.asDiagonal() * jacobian;
+  const PriorCost prior = prior_cost(problem, part.values);
+  result.cost =
+      huber_cost(objective, residual, threshold) + 0.5 * part.amounts.squaredNorm() + prior.cost;
+  result.gradient = weighted.transpose() * residual + prior.gradient;
+  result.information = weighted.transpose() * jacobian + prior.information;
+  if (part.directions.cols() > 0) {
+    const Eigen::MatrixXd between = weighted.transpose() * part.directions;
+    Eigen::MatrixXd own = part.directions.transpose() * weight.asDiagonal() * part.directions;
+    own.diagonal().array() += 1;
+    const SymmetricFactors solver(own);
+    // Zero where the amounts are at their least, but for the weights' last change.
+    const Eigen::VectorXd pull =
+        part.directions.transpose() * weight.cwiseProduct(residual) + part.amounts;
+    result.gradient -= between * solver.solve(pull);
+    result.information -= between * solver.solve(between.transpose());
+  }
+  result.usable = true;
+  return result;
+}
+
+PooledFit fit_pooled(std::span<const FitProblem* const> problems, std::vector<PooledPart> start,
+                     const PooledOptions& options, const ProgressCallback& progress) {
+  constexpr double kLeastDamping = 1e-9, kMostDamping = 1e6;
+  constexpr int kRoughRefusals = 3;
+  const PooledSpace space(problems);
+  const Eigen::VectorXd lower = space.lower(), upper = space.upper();
+  /// How far the coordinates have moved by which it is judged whether a fit still moves.
+  const auto looked_at = [&](const Eigen::VectorXd& way) {
+    const int first = options.own_only ? space.shared() : 0;
+    const int count = options.own_only ? space.size() - first : space.shared();
+    return count > 0 ? way.segment(first, count).cwiseAbs().maxCoeff() : 0.0;
+  };
+  PooledFit result;
+  {
+    std::vector<Eigen::VectorXd> values;
+    for (const PooledPart& part : start) values.push_back(part.values);
+    const Eigen::VectorXd x = space.coordinates(values);
+    const Eigen::VectorXd inside = x.cwiseMax(lower).cwiseMin(upper);
+    values = space.values(inside);
+    for (size_t n = 0; n < start.size(); ++n) {
+      if (values[n].isApprox(start[n].values, 1e-12)) continue;
+      start[n].values = values[n];
+      start[n].linear = {};
+    }
+  }
+  Pool pool(problems, options, std::move(start));
+  int refusals = 0;
+  for (int round = 0; round < options.rounds; ++round) {
+    if (!pool.begin_round(round == 0)) {
+      result.usable = false;
+      result.message = "a recording cannot be simulated from the starting values";
+      return result;
+    }
+    Eigen::VectorXd x = space.coordinates(pool.values());
+    const Eigen::VectorXd began = x;
+    double damping = 1e-3;
+    bool settled = false;
+    // A step that is refused costs a run, one that is taken ten of them.
+    constexpr int kRefusals = 4;
+    const auto out_of_work = [&] { return pool.spring_steps() >= options.most_spring_steps; };
+    while (!settled && !out_of_work() && result.iterations < options.iterations &&
+           refusals < kRefusals * options.iterations) {
+      if (progress && !progress({.stage = "pooled fit",
+                                 .done = static_cast<double>(result.iterations),
+                                 .total = static_cast<double>(options.iterations),
+                                 .unit = "iterations",
+                                 .note = "cost " + std::to_string(pool.cost())})) {
+        result.cancelled = true;
+        result.usable = false;
+        result.message = "cancelled";
+        return result;
+      }
+      const PooledSpace::Expansion here = pool.expand(space);
+      if (!here.usable) break;
+      std::vector<bool> held = held_at(x, lower, upper, here.gradient);
+      if (options.own_only) std::fill_n(held.begin(), space.shared(), true);
+      const Eigen::VectorXd step = space.step(here, damping, held);
+      const Eigen::VectorXd next = (x + step).cwiseMax(lower).cwiseMin(upper);
+      const Eigen::VectorXd way = next - x;
+      const double foreseen = space.foreseen_fall(here, way);
+      const double moved = looked_at(way);
+      if (step.allFinite() && foreseen < options.least_fall * pool.scatter()) {
+        settled = true;
+        break;
+      }
+      const double before = pool.cost();
+      if (!step.allFinite() || !pool.try_to_move(space.values(next))) {
+        ++refusals;
+        // A step this short that rises is the cost's rounding.
+        settled = moved < options.least_step;
+        if (options.rough && refusals == kRoughRefusals) break;
+        if (!settled && !pool.is_exact() && !options.rough) {
+          if (!pool.make_exact()) break;
+          continue;
+        }
+        damping *= 10;
+        if (damping > kMostDamping) break;
+        continue;
+      }
+      ++result.iterations;
+      settled = moved < options.least_step;
+      x = next;
+      const double gained = before - pool.cost();
+      // A step that keeps a quarter of its promise was too long to be trusted so soon again.
+      damping = gained < 0.25 * foreseen ? std::min(10 * damping, 1.0)
+                                         : std::max(kLeastDamping, 0.1 * damping);
+    }
+    result.cost = pool.cost();
+    result.usable = pool.is_linearised();
+    if (!result.usable) {
+      result.message = "a recording has no derivatives";
+      return result;
+    }
+    // A round that hardly moved had the time steps of where it ended.
+    constexpr double kStill = 1e-4;
+    const bool still = looked_at(x - began) < kStill;
+    result.converged = settled && (still || (options.least_fall > 0 && pool.is_settled()));
+    if (result.converged || options.rough || result.iterations >= options.iterations ||
+        out_of_work())
+      break;
+  }
+  result.message = result.converged ? "converged" : "not converged";
+  result.parts = pool.release();
+  const ParameterSpace& first = problems.front()->space;
+  for (int p = 0; p < first.size(); ++p)
+    if (const FitParameter& parameter = first.parameters[static_cast<size_t>(p)];
+        is_physical(parameter.role))
+      result.shared[parameter.name] = result.parts.front().values[p];
+  return result;
+}
+
+PooledFit fit_pooled(std::span<const FitProblem* const> problems,
+                     const std::map<std::string, double>& start, const PooledOptions& options,
+                     const ProgressCallback& progress) {
+  std::vector<PooledPart> parts;
+  for (const FitProblem* problem : problems) {
+    parts.push_back({.values = problem->space.start(),
+                     .linear = {},
+                     .correction = {},
+                     .directions = {},
+                     .amounts = {}});
+    for (const auto& [name, value] : start)
+      if (const int p = problem->space.index(name); p >= 0) parts.back().values[p] = value;
+  }
+  return fit_pooled(problems, std::move(parts), options, progress);
+}
+
+}  // namespace clothfit

@@ -1,0 +1,84 @@
+#pragma once
+
+#include <map>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "data/progress.h"
+#include "fit/cost/objective.h"
+#include "fit/refine/pooled_space.h"
+
+namespace clothfit {
+
+/// One recording's part of a pooled fit.
+struct PooledPart {
+  Eigen::VectorXd values;  ///< of its problem's parameters
+  int frames = 0;          ///< looked at, from the first; 0: those that are not held out
+  TimeSteps steps = 0;     ///< 0: as stability asks
+  /// There, with these steps; where it is usable a fit begins with it. In the end of a fit: the
+  /// residuals, and exact derivatives or such as served (PooledOptions::kept_within).
+  Linearisation linear;
+  bool borrowed = false;  ///< the derivatives are those of another model, until a step fails
+  /// What the model is expected to err by, added to its residuals; empty: nothing.
+  Eigen::VectorXd correction;
+  /// Directions, residuals x any, in which it may err beyond that, each by a standard normal
+  /// amount: residuals are r + correction + directions * amount, and the amounts are fitted along.
+  Eigen::MatrixXd directions;
+  Eigen::VectorXd amounts;  ///< of the directions, as they were fitted
+};
+
+/// Residuals of a part with what it is expected to err by taken out.
+Eigen::VectorXd corrected_residual(const PooledPart& part);
+
+/// The same, and what its directions explain.
+Eigen::VectorXd residual_of(const PooledPart& part);
+
+struct PooledOptions {
+  int iterations = 60;       ///< in all, without steps that were refused
+  int rounds = 6;            ///< each with time steps and loss chosen anew, until one hardly moves
+  double least_step = 1e-7;  ///< it ends when no shared coordinate moves further,
+  /// or the next step promises no more of the cost than this, times chi-square per residual where
+  /// that is above one: the more is left, the less sure is any parameter.
+  double least_fall = 0;
+  double stability_margin = 1.5;
+  Loss loss = Loss::squared;
+  /// Exact derivatives are had anew, updated, or kept, as in a refinement (RefineOptions).
+  double kept_within = 0;
+  double updated_within = 0;
+  bool own_only = false;  ///< shared parameters stay where they are
+  /// Derivatives that a fit begins with are updated and never had anew: near the optimum for the
+  /// price of some runs. One round; `updated_within` must be more than 0.
+  bool rough = false;
+  /// Springs times time steps of the runs with derivatives: looked at after each iteration.
+  double most_spring_steps = 1e18;
+};
+
+struct PooledFit {
+  bool usable = false;
+  bool converged = false;
+  bool cancelled = false;
+  std::string message;
+  std::map<std::string, double> shared;  ///< values of the parameters of the physics, by name
+  std::vector<PooledPart> parts;         ///< where each recording ends
+  double cost = 0;                       ///< half the sum of squares, or Huber's, with the priors
+  int iterations = 0;
+};
+
+/// Several recordings of one cloth fitted together: the least of half the sum of squares of all
+/// that they leave, with their priors, by Levenberg and Marquardt's method. Parameters of the
+/// physics are shared (fit/refine/pooled_space.h). Recordings are simulated side by side; the bits
+/// are the same for any number of threads. Throws InputError as PooledSpace does.
+PooledFit fit_pooled(std::span<const FitProblem* const> problems, std::vector<PooledPart> start,
+                     const PooledOptions& options, const ProgressCallback& progress);
+
+/// The same from `start`, values by name; what it does not name starts where its problem has it.
+PooledFit fit_pooled(std::span<const FitProblem* const> problems,
+                     const std::map<std::string, double>& start, const PooledOptions& options,
+                     const ProgressCallback& progress);
+
+/// One recording's cost to second order where it was linearised, over its own space's parameters,
+/// amounts of its directions eliminated. `threshold`: Huber's, infinite for plain squares.
+Quadratic quadratic_of(const FitProblem& problem, const PooledPart& part, double threshold);
+
+}  // namespace clothfit

@@ -1,0 +1,111 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "data/progress.h"
+#include "fit/search/search_parameter.h"
+
+namespace clothfit {
+
+/// CMA-ES, an evolution strategy that adapts the covariance of its steps, with negative weights for
+/// the worse half [hansen2016], and restarts with growing populations from new random means
+/// [auger2005]. Only the ranks of costs guide it.
+///
+/// It works on shares of the ranges (logarithmic where a parameter is) without bounds; individuals
+/// are folded into the ranges as between mirrors, so that an optimum at an end is an inner one of
+/// the folded cost.
+struct CmaOptions {
+  int population = 0;  ///< of the first run; 0: 4 + floor(3 ln n) for n parameters; else >= 4
+  double initial_step = 0.3;  ///< standard deviation of the first generation, as a share of ranges
+  int restarts = 9;           ///< at most
+  double growth = 2;  ///< of the population from one restart to the next, up to most_evaluations
+  long most_evaluations = 100000;  ///< of all runs; the last generation may exceed it
+  /// Stops once the best cost is at or below this.
+  double cost_below = -std::numeric_limits<double>::infinity();
+  /// A run ends when the costs of some generations differ by less than this share of their largest
+  /// magnitude, or less than the smallest normal number.
+  double cost_tolerance = 1e-12;
+  /// A run ends when every standard deviation is below this share of the initial step.
+  double step_tolerance = 1e-12;
+  unsigned long long seed = 1;
+
+  int first_population(int parameters) const;
+  void validate() const;  ///< throws InputError
+};
+
+/// Why one run ended.
+enum class CmaEnd {
+  costs_equal,      ///< cost_tolerance
+  steps_small,      ///< step_tolerance
+  ill_conditioned,  ///< the covariance's condition number exceeds 1e14
+  too_long,         ///< more generations than such a run should take
+  nothing_finite    ///< no cost of a generation was finite
+};
+
+/// One optimum that a run ended in.
+struct CmaOptimum {
+  Eigen::VectorXd values;  ///< the best of the run, one per parameter, in its unit
+  double cost = std::numeric_limits<double>::infinity();
+  CmaEnd end = CmaEnd::costs_equal;
+  long evaluations = 0;  ///< of this run
+};
+
+/// All that the search knows between two generations: plain data, to be saved, resumed, compared.
+/// The randomness of an individual depends on (seed, generation, place in it) alone.
+struct CmaState {
+  int population = 0;
+  Eigen::VectorXd mean;        ///< shares of the ranges, unbounded
+  double step = 0;             ///< sigma
+  Eigen::MatrixXd covariance;  ///< C, n x n
+  Eigen::VectorXd covariance_path, step_path;
+  int generation = 0;               ///< of this run
+  std::vector<double> recent_best;  ///< best cost of this run's last generations
+  CmaOptimum so_far;                ///< of this run; `end` without meaning
+
+  std::vector<CmaOptimum> optima;  ///< of the runs that have ended
+  std::vector<double> best_cost;   ///< the best of all runs, after each generation
+  long evaluations = 0;
+  int generations() const { return static_cast<int>(best_cost.size()); }
+  const CmaOptimum& best() const;  ///< of all runs, the one at hand included
+};
+
+/// How far the individuals of a generation differ: sigma times the square root of the covariance's
+/// mean eigenvalue, the root mean square over the parameters of the individuals' standard deviation
+/// as a share of the range (before they are folded into it).
+double diversity(const CmaState& state);
+
+/// The start: nothing evaluated. The first mean is `given` (in the parameters' units, moved into
+/// the ranges), or the middle of the ranges.
+CmaState start_cma(const std::vector<SearchParameter>& parameters, const CmaOptions& options,
+                   const Eigen::VectorXd& given = {});
+
+/// One generation more; where it ends a run, the next begins (with the restarts used up, too).
+CmaState next_cma_generation(const std::vector<SearchParameter>& parameters,
+                             const CmaOptions& options, const GenerationCost& cost, CmaState state);
+
+enum class CmaStop { cost_below, most_evaluations, restarts_used, cancelled };
+
+struct CmaResult {
+  CmaStop stop = CmaStop::restarts_used;
+  std::string message;  ///< one line for a person
+  CmaState state;       ///< resume from here
+  bool usable() const;  ///< at least one finite cost
+};
+
+/// Sees the state after a generation, to save it, say.
+using CmaWatcher = std::function<void(const CmaState&)>;
+
+/// Generations until a stopping rule holds, from `state`: a start, or one that was saved, which
+/// leads to the same end as a search that was not interrupted. After each generation
+/// `after_generation`, when given, sees the state, then `progress`, when given,
+/// is told. Throws InputError for options or ranges that make no sense.
+CmaResult search_by_cma(const std::vector<SearchParameter>& parameters, const CmaOptions& options,
+                        const GenerationCost& cost, CmaState state,
+                        const ProgressCallback& progress = {},
+                        const CmaWatcher& after_generation = {});
+
+}  // namespace clothfit

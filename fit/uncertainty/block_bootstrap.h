@@ -1,0 +1,73 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <optional>
+
+#include "fit/uncertainty/linearised_fit.h"
+
+namespace clothfit {
+
+/// How a replicate differs from the recording.
+enum class BlockWeights {
+  /// Each block counts as often as it is drawn, of as many draws with replacement as there are
+  /// blocks [cameron2008].
+  resampled,
+  /// The residuals of a block are multiplied by one of six numbers of mean 0 and variance 1,
+  /// +- sqrt(1/2), +- 1, +- sqrt(3/2), equally likely [webb2014]; the Jacobian stays. For few
+  /// blocks, of which some drawings would leave out too many.
+  wild
+};
+
+struct BootstrapOptions {
+  BlockWeights weights = BlockWeights::wild;
+  int replicates = 999;  ///< >= 19; the ends of a 90 % interval scatter by 5 % of it at 999
+  unsigned long long seed = 1;
+
+  void validate() const;  ///< throws InputError
+};
+
+/// The numbers of the blocks in one replicate: they depend on (seed, replicate) and the number of
+/// blocks alone, so that no order of work changes them.
+Eigen::VectorXd block_weights(const BootstrapOptions& options, int blocks, int replicate);
+
+struct Bootstrap {
+  /// Estimate of each replicate less that of the recording, coordinates x replicates; NaN where a
+  /// replicate has no estimate.
+  Eigen::MatrixXd change;
+  /// The change divided by the replicate's own standard deviation; empty after a refit.
+  Eigen::MatrixXd studentised;
+  Eigen::VectorXd
+      sigma;       ///< of the recording, from its blocks (CR0), which `studentised` goes with
+  int failed = 0;  ///< replicates without an estimate
+};
+
+/// One Gauss-Newton step per replicate from the optimum at hand. `block` as for sum_over_blocks().
+/// Throws InputError as that does, and for options that make no sense.
+Bootstrap bootstrap_linearised(const LinearisedFit& fit, const Eigen::VectorXi& block,
+                               const BootstrapOptions& options);
+
+/// A whole fit of one replicate: the change of the coordinates for these numbers of the blocks
+/// (`resampled`: weights of their cost; `wild`: factors of the optimum's residuals, added to what
+/// it predicts). Nothing where the fit fails.
+using BlockRefit = std::function<std::optional<Eigen::VectorXd>(
+    const Eigen::VectorXd& block_weights, int replicate)>;
+
+/// The same with a whole fit per replicate. Throws InputError for options that make no sense, fewer
+/// than two blocks, and a change of another size than `coordinates`.
+Bootstrap bootstrap_by_refit(int coordinates, int blocks, const BootstrapOptions& options,
+                             const BlockRefit& refit);
+
+/// Ends of an interval for each coordinate, as differences from the estimate.
+struct ChangeIntervals {
+  Eigen::VectorXd lower, upper;  ///< NaN where fewer than 19 replicates have an estimate
+};
+
+/// From quantiles of the change.
+ChangeIntervals percentile_intervals(const Bootstrap& bootstrap, double level);
+
+/// From quantiles of the studentised change, which needs bootstrap_linearised(): wider where few
+/// blocks make sigma itself uncertain. Throws InputError without it.
+ChangeIntervals studentised_intervals(const Bootstrap& bootstrap, double level);
+
+}  // namespace clothfit

@@ -1,0 +1,163 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "model/fabric/fabric.h"
+#include "model/kernels/cloth_sweep.h"
+#include "model/kernels/lanes.h"
+#include "model/topology/mesh.h"
+
+namespace clothfit {
+
+struct Cloth;
+struct EffectLinearisation;
+
+/// How a fit walks along a parameter.
+enum class ParameterScale { linear, logarithmic };
+
+/// A parameter of an effect. Three named NAME_x, NAME_y, NAME_z are a vector's, which a recording
+/// may declare as NAME: [x, y, z].
+struct EffectParameter {
+  std::string name;
+  std::string unit;
+  double neutral = 0;
+  double lower = 0;  ///< bounds of a fit
+  double upper = 0;
+  double typical = 1;  ///< size of a change that matters, for scaling
+  ParameterScale scale = ParameterScale::linear;
+};
+
+/// How it is tested whether data ask for an effect.
+enum class EffectTest {
+  smooth,    ///< by the derivative at the neutral value
+  profiled,  ///< some parameters matter only away from neutral: over a grid of their values
+  finite     ///< no derivative at neutral: by fits at trial amplitudes
+};
+
+/// Values of a parameter that says how an effect is at work, not how much.
+struct ShapeGrid {
+  std::string parameter;
+  std::vector<double> values;  ///< in its unit, or as the two below say
+  bool per_duration = false;   ///< frequencies, in units of 1 / duration of the observed motion
+  bool of_duration = false;    ///< times since its first frame, as fractions of its duration
+  bool over_cloth = false;     ///< a place or a length on it
+};
+
+/// One law that an effect may follow: data are asked for each law by itself.
+struct EffectLaw {
+  std::string name;                     ///< such as "hem"; empty where an effect has but one
+  std::vector<std::string> amplitudes;  ///< parameters that say how much: neutral is absent
+  std::vector<ShapeGrid> shapes;        ///< tried at each combination; all others stay neutral
+};
+
+/// At the neutral values of all its parameters an effect leaves the trajectory bit-equal;
+/// parameters that say how, not how much, have a neutral value too, at which alone nothing need
+/// vanish.
+struct EffectDescription {
+  std::string name;
+  std::string summary;  ///< one line for a person, with the equation
+  std::vector<EffectParameter> parameters;
+  EffectTest test = EffectTest::smooth;
+  std::vector<EffectLaw> laws = {};  ///< none: one, of which all parameters are amplitudes
+};
+
+/// What an effect may look at: the state at the beginning of a step, in SI units, world.
+template <class L = ExactLanes>
+struct EffectScene {
+  const Cloth& cloth;
+  const LaneSprings<L>& springs;
+  const LaneVector<L>& gravity_m_per_s2;
+  const LaneVectors<L>& position_m;
+  const LaneVectors<L>& velocity_m_per_s;
+  double time_s = 0;  ///< the recording's, at the beginning of the step
+  double time_step_s = 0;
+};
+
+/// One effect's parameters in every lane, in the description's order and units.
+template <class L = ExactLanes>
+using EffectValues = std::vector<LaneValue<L>>;
+
+/// What an effect remembers from step to step: lanes x numbers; zero at the start unless
+/// ParameterSet::start_effect_memory says otherwise.
+template <class L = ExactLanes>
+using EffectMemory = LaneArray<L>;
+
+/// What an effect does to simulations in lanes of kind L. Each does some of three things; what it
+/// does not do, it leaves as it is.
+template <class L>
+class LaneEffect {
+ public:
+  virtual ~LaneEffect() = default;
+
+  /// Adds the effect's force on every vertex to `force_n` and moves its memory on.
+  virtual void add_force(const EffectScene<L>& /*scene*/, const EffectValues<L>& /*parameters*/,
+                         EffectMemory<L>& /*memory*/, LaneVectors<L>& /*force_n*/) const {}
+
+  /// Changes the sum F of all forces but the weight on every vertex, for inertia that is not the
+  /// vertices' mass m: the step accelerates a vertex by g + F / m.
+  virtual void change_force(const EffectScene<L>& /*scene*/, const EffectValues<L>& /*parameters*/,
+                            LaneVectors<L>& /*force_n*/) const {}
+
+  /// Shifts `target_m`, where each held point is placed at the end of the step (world), and moves
+  /// the memory on. `support_force_n`: what the cloth, its weight included, pulls each with.
+  virtual void shift_supports(const EffectScene<L>& /*scene*/,
+                              const EffectValues<L>& /*parameters*/,
+                              const LaneVectors<L>& /*support_force_n*/,
+                              EffectMemory<L>& /*memory*/, LaneVectors<L>& /*target_m*/) const {}
+};
+
+/// Bounds that a stable time step follows from.
+struct EffectRates {
+  double damping_per_s = 0;       ///< rate at which velocities are damped, at most
+  double frequency2_per_s2 = 0;   ///< added to the square of the largest angular frequency
+  double acceleration_ratio = 1;  ///< acceleration for a given force over that without the effect
+};
+
+/// What an effect does in lanes of the kinds L.
+template <class... L>
+class EffectInLanes : public LaneEffect<L>... {
+ public:
+  using LaneEffect<L>::add_force...;
+  using LaneEffect<L>::change_force...;
+  using LaneEffect<L>::shift_supports...;
+};
+
+/// One physical effect beyond springs, dampers along them, and gravity.
+class Effect : public EffectInLanes<ExactLanes, FastLanes, SingleLane> {
+ public:
+  /// Whether `change_force` and `shift_supports` do anything.
+  virtual bool changes_force() const { return false; }
+  virtual bool shifts_supports() const { return false; }
+
+  /// Whether it shifts supports before anything moves, too, by what depends on no memory: cloth
+  /// that starts at rest hangs from where they are then.
+  virtual bool shifts_supports_at_rest() const { return false; }
+
+  /// How many numbers it remembers of one simulation.
+  virtual int memory_size(const Cloth& /*cloth*/) const { return 0; }
+
+  /// Add the derivatives of `add_force`, `change_force` and `shift_supports` in one simulation, at
+  /// what these are given, to those there are.
+  virtual void linearise_force(const EffectScene<SingleLane>& /*scene*/,
+                               const EffectValues<SingleLane>& /*parameters*/,
+                               const EffectMemory<SingleLane>& /*memory*/,
+                               EffectLinearisation& /*derivatives*/) const {}
+  virtual void linearise_change(const EffectScene<SingleLane>& /*scene*/,
+                                const EffectValues<SingleLane>& /*parameters*/,
+                                const LaneVectors<SingleLane>& /*force_n*/,
+                                EffectLinearisation& /*derivatives*/) const {}
+  virtual void linearise_supports(const EffectScene<SingleLane>& /*scene*/,
+                                  const EffectValues<SingleLane>& /*parameters*/,
+                                  const LaneVectors<SingleLane>& /*support_force_n*/,
+                                  const EffectMemory<SingleLane>& /*memory*/,
+                                  EffectLinearisation& /*derivatives*/) const {}
+
+  /// `parameters` in the description's order.
+  virtual EffectRates rates(const Cloth& cloth, const SpringParameters& springs,
+                            const std::vector<double>& parameters) const = 0;
+};
+
+}  // namespace clothfit

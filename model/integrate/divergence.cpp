@@ -1,0 +1,104 @@
+#include "model/integrate/divergence.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+
+namespace clothfit {
+namespace {
+
+/// A cloth that is further than this many diagonals from its start, and whole, has flown away.
+constexpr double kFlownAway = 10;
+
+double length_m(const Eigen::Matrix3Xd& position_m, const Spring& spring) {
+  return (position_m.col(spring.b) - position_m.col(spring.a)).norm();
+}
+
+/// The spring that is longest for its natural length; nothing where only those `beyond_reason`
+/// count and there is none.
+std::optional<Divergence::StretchedSpring> most_stretched(const Cloth& cloth,
+                                                          const ParameterSet& parameters,
+                                                          const Eigen::Matrix3Xd& position_m,
+                                                          bool beyond_reason) {
+  std::optional<Divergence::StretchedSpring> worst;
+  for (int type = 0; type < kSpringTypes; ++type) {
+    const double natural_m = parameters.springs.natural_length_m[static_cast<size_t>(type)];
+    for (const Spring& spring : cloth.springs[static_cast<size_t>(type)]) {
+      const double now_m = length_m(position_m, spring);
+      const double reason_m =
+          kLengthBeyondReason * std::max(natural_m, length_m(parameters.start_position_m, spring));
+      if (beyond_reason && !(now_m > reason_m)) continue;
+      if (!worst || now_m / natural_m > worst->length_m / worst->natural_length_m)
+        worst = {type, spring, now_m, natural_m};
+    }
+  }
+  return worst;
+}
+
+Eigen::RowVectorXd distances_m(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to) {
+  return (to - from).colwise().norm();
+}
+
+/// First frame of a run that is not finite or holds a spring beyond reason; their number when none.
+size_t first_bad_frame(const Cloth& cloth, const ParameterSet& parameters,
+                       const SimulateResult& result) {
+  for (size_t f = 0; f < result.position_m.size(); ++f) {
+    const Eigen::Matrix3Xd& position_m = result.position_m[f];
+    if (!position_m.allFinite() || most_stretched(cloth, parameters, position_m, true)) return f;
+  }
+  return result.position_m.size();
+}
+
+/// The schedule up to frame `last`, with every step on the way there a frame of its own.
+Schedule with_steps_before(const Schedule& schedule, size_t last) {
+  Schedule fine{.frame_time_s = {schedule.frame_time_s.begin(),
+                                 schedule.frame_time_s.begin() + static_cast<std::ptrdiff_t>(last)},
+                .time_step_s = schedule.time_step_s};
+  const int steps = schedule.substeps(static_cast<int>(last));
+  const double from_s = schedule.frame_time_s[last - 1];
+  const double h = (schedule.frame_time_s[last] - from_s) / steps;
+  for (int n = 1; n <= steps; ++n) fine.frame_time_s.push_back(from_s + n * h);
+  return fine;
+}
+
+}  // namespace
+
+std::optional<Divergence> find_divergence(const Cloth& cloth, const ParameterSet& parameters,
+                                          const Schedule& schedule) {
+  const SimulateResult coarse = simulate(cloth, {&parameters, 1}, schedule).front();
+  const size_t frame = first_bad_frame(cloth, parameters, coarse);
+  if (frame == coarse.position_m.size()) return std::nullopt;
+  Divergence divergence{.frame = static_cast<int>(frame), .time_s = schedule.frame_time_s[frame]};
+  if (frame == 0) return divergence;
+
+  const Schedule fine = with_steps_before(schedule, frame);
+  const SimulateResult result = simulate(cloth, {&parameters, 1}, fine).front();
+  // Steps that end frames are rounded a little differently here: the last one is bad at the latest.
+  const size_t bad =
+      std::min(first_bad_frame(cloth, parameters, result), result.position_m.size() - 1);
+  for (size_t f = 1; f < frame; ++f) divergence.step += schedule.substeps(static_cast<int>(f));
+  divergence.step += static_cast<int>(bad - frame) + 1;
+  divergence.time_s = fine.frame_time_s[bad];
+  divergence.time_step_s = fine.frame_time_s[bad] - fine.frame_time_s[bad - 1];
+
+  if (result.position_m[bad].allFinite())
+    divergence.spring = most_stretched(cloth, parameters, result.position_m[bad], true);
+  if (divergence.spring) return divergence;
+  const Eigen::Matrix3Xd& before = result.position_m[bad - 1];
+  Eigen::Index furthest = 0;
+  const double away_m = distances_m(parameters.start_position_m, before).maxCoeff(&furthest);
+  if (away_m > kFlownAway * std::hypot(cloth.mesh.width_m, cloth.mesh.height_m)) {
+    divergence.vertex = static_cast<int>(furthest);
+  } else {
+    divergence.spring = most_stretched(cloth, parameters, before, false);
+  }
+  return divergence;
+}
+
+const char* spring_family(int type) {
+  assert(type >= 0 && type < kSpringTypes);
+  if (type <= structural_s) return "structural";
+  return type <= shear_up ? "shear" : "flexion";
+}
+
+}  // namespace clothfit

@@ -1,0 +1,439 @@
+#include "model/integrate/tangent_step.h"
+
+#include <algorithm>
+
+namespace clothfit {
+namespace {
+
+/// Of one group: at most kLanes directions.
+LaneParameters<> tangents_of(const Cloth& cloth, const ParameterSet& set,
+                             std::span<const Direction> directions) {
+  LaneParameters<> tangent;
+  const auto along = [&](const auto& component) {
+    LaneValue<> lanes = LaneValue<>::Zero();
+    for (size_t d = 0; d < directions.size(); ++d)
+      lanes[static_cast<Eigen::Index>(d)] = component(directions[d]);
+    return lanes;
+  };
+  for (size_t type = 0; type < kSpringTypes; ++type) {
+    const double natural_m = set.springs.natural_length_m[type];
+    const double critical = set.springs.critical_elongation[type];
+    tangent.springs.natural_length_m[type] =
+        along([&](const Direction& d) { return d.natural_length_m[type]; });
+    tangent.springs.stiffness_n_per_m[type] =
+        along([&](const Direction& d) { return d.stiffness_n_per_m[type]; });
+    tangent.springs.damping_ns_per_m[type] =
+        along([&](const Direction& d) { return d.damping_ns_per_m[type]; });
+    tangent.limits.longest_m[type] = along([&](const Direction& d) {
+      // Where there is no limit nothing changes it.
+      return std::isfinite(critical) ? d.natural_length_m[type] * (1 + critical) +
+                                           natural_m * d.critical_elongation[type]
+                                     : 0.0;
+    });
+  }
+  const auto gravity = [&](int axis) {
+    return along([&](const Direction& d) { return d.gravity_m_per_s2[axis]; });
+  };
+  tangent.gravity_m_per_s2 = {gravity(0), gravity(1), gravity(2)};
+  for (size_t e = 0; e < cloth.effects.size(); ++e) {
+    tangent.effects.emplace_back();
+    for (size_t n = 0; n < set.effects[e].size(); ++n)
+      tangent.effects.back().push_back(along([&](const Direction& d) {
+        return d.effects.empty() || d.effects[e].empty() ? 0.0 : d.effects[e][n];
+      }));
+  }
+  return tangent;
+}
+
+size_t groups_of(std::span<const Direction> directions) {
+  return std::max<size_t>(1, (directions.size() + kLanes - 1) / kLanes);
+}
+
+std::span<const Direction> group_of(std::span<const Direction> directions, size_t group) {
+  const size_t first = std::min(group * kLanes, directions.size());
+  return directions.subspan(first, std::min<size_t>(kLanes, directions.size() - first));
+}
+
+/// action += derivative * change in every lane.
+template <class Change>
+void add_product(const Eigen::Vector3d& derivative, const Change& change, int on,
+                 LaneVectors<>& action) {
+  action.x.col(on) += derivative.x() * change;
+  action.y.col(on) += derivative.y() * change;
+  action.z.col(on) += derivative.z() * change;
+}
+
+LaneValue<> product(const Eigen::RowVector3d& derivative, const LaneVectors<>& vectors, int of) {
+  return derivative.x() * vectors.x.col(of) + derivative.y() * vectors.y.col(of) +
+         derivative.z() * vectors.z.col(of);
+}
+
+/// How the parameter with a ParameterNumber changes.
+const LaneValue<>& parameter_change(const LaneParameters<>& tangent, size_t effect, int number) {
+  const auto of_type = [](int from) { return static_cast<size_t>(from % kSpringTypes); };
+  if (number < ParameterNumber::stiffness(0))
+    return tangent.springs.natural_length_m[of_type(number)];
+  if (number < ParameterNumber::damping(0))
+    return tangent.springs.stiffness_n_per_m[of_type(number)];
+  if (number < ParameterNumber::gravity(0))
+    return tangent.springs.damping_ns_per_m[of_type(number)];
+  if (number == ParameterNumber::gravity(0)) return tangent.gravity_m_per_s2.x;
+  if (number == ParameterNumber::gravity(1)) return tangent.gravity_m_per_s2.y;
+  if (number == ParameterNumber::gravity(2)) return tangent.gravity_m_per_s2.z;
+  return tangent.effects[effect][static_cast<size_t>(number - ParameterNumber::own(0))];
+}
+
+/// By parameter numbers, whether anything changes along the directions.
+void find_changing(const TangentParameters& parameters, size_t effect,
+                   std::vector<bool>& changing) {
+  const auto own = static_cast<int>(parameters.value.effects[effect].size());
+  changing.assign(static_cast<size_t>(ParameterNumber::own(own)), false);
+  for (int number = 0; number < ParameterNumber::own(own); ++number)
+    for (const LaneParameters<>& tangent : parameters.tangent)
+      if ((parameter_change(tangent, effect, number) != 0).any())
+        changing[static_cast<size_t>(number)] = true;
+}
+
+/// Adds a share of the difference of two fields to the derivatives along the direction of one lane.
+void add_share(double share, const LaneVectors<SingleLane>& to, const LaneVectors<SingleLane>& from,
+               Eigen::Index lane, LaneVectors<>& tangent) {
+  tangent.x.row(lane) += share * (to.x - from.x);
+  tangent.y.row(lane) += share * (to.y - from.y);
+  tangent.z.row(lane) += share * (to.z - from.z);
+}
+
+}  // namespace
+
+TangentParameters TangentParameters::of(const Cloth& cloth, const ParameterSet& set,
+                                        std::span<const Direction> directions) {
+  TangentParameters parameters{.value = lane_parameters<SingleLane>(cloth, {&set, 1}),
+                               .tangent = {}};
+  for (size_t g = 0; g < groups_of(directions); ++g)
+    parameters.tangent.push_back(tangents_of(cloth, set, group_of(directions, g)));
+  return parameters;
+}
+
+TangentState TangentState::of(const Cloth& cloth, const ParameterSet& set,
+                              std::span<const Direction> directions) {
+  TangentState state{.value = LaneState<SingleLane>::of(cloth), .tangent = {}};
+  set_start(0, set, state.value);
+  for (size_t g = 0; g < groups_of(directions); ++g) {
+    LaneState<>& tangent = state.tangent.emplace_back(LaneState<>::of(cloth));
+    const std::span<const Direction> group = group_of(directions, g);
+    for (size_t d = 0; d < group.size(); ++d) {
+      const auto lane = static_cast<int>(d);
+      if (group[d].start_position_m.cols() > 0)
+        tangent.position_m.set_lane(lane, group[d].start_position_m);
+      if (group[d].start_velocity_m_per_s.cols() > 0)
+        tangent.velocity_m_per_s.set_lane(lane, group[d].start_velocity_m_per_s);
+      for (size_t e = 0; e < group[d].start_effect_memory.size(); ++e)
+        tangent.effect_memory[e].row(lane) = group[d].start_effect_memory[e].transpose().array();
+    }
+  }
+  return state;
+}
+
+TangentStepper::TangentStepper(const Cloth& cloth, std::span<const Direction> directions)
+    : cloth_(cloth),
+      inverse_mass_per_kg_(cloth.mass_kg.cwiseInverse()),
+      held_value_(cloth),
+      held_tangent_(cloth),
+      sweep_(cloth.mesh),
+      tangent_sweep_(cloth.mesh),
+      limiter_(cloth.mesh, movable_inverse_mass(cloth, held_value_.touched())),
+      next_memory_(LaneState<>::of(cloth).effect_memory),
+      changed_n_(LaneVectors<>::zero(cloth.mesh.vertex_count())) {
+  const auto zero = [&](int count) {
+    return TangentVectors{
+        LaneVectors<SingleLane>::zero(count),
+        std::vector<LaneVectors<>>(groups_of(directions), LaneVectors<>::zero(count))};
+  };
+  force_n_ = zero(cloth.mesh.vertex_count());
+  pull_n_ = target_m_ = zero(held_value_.count());
+  emerged_n_ = force_n_.value;
+  emerged_target_m_ = target_m_.value;
+  const auto note = [&](const Effect& effect) {
+    changes_force_ = changes_force_ || effect.changes_force();
+    shifts_supports_ = shifts_supports_ || effect.shifts_supports();
+  };
+  for (const std::shared_ptr<const Effect>& effect : cloth.effects) note(*effect);
+  for (size_t d = 0; d < directions.size(); ++d) {
+    if (!directions[d].emerging) continue;
+    const EmergingEffect& from = *directions[d].emerging;
+    note(*from.effect);
+    Emerging emerging{.effect = from.effect,
+                      .direction = d,
+                      .per_change = 1 / from.change,
+                      .parameters = {},
+                      .memory = EffectMemory<SingleLane>::Zero(1, from.effect->memory_size(cloth))};
+    for (const double value : from.parameters)
+      emerging.parameters.push_back(LaneValue<SingleLane>::Constant(value));
+    if (from.start_memory.size() > 0)
+      emerging.memory.row(0) = from.start_memory.transpose().array();
+    emerging_.push_back(std::move(emerging));
+  }
+  if (!emerging_.empty()) carried_n_ = emerged_last_n_ = force_n_.tangent;
+}
+
+Eigen::VectorXd TangentStepper::emerging_memory(size_t direction) const {
+  for (const Emerging& emerging : emerging_)
+    if (emerging.direction == direction) return emerging.memory.row(0).matrix();
+  return {};
+}
+
+TangentVectors TangentStepper::locate(const TangentState& state) const {
+  TangentVectors places{held_value_.locate(state.value.position_m), {}};
+  for (const LaneState<>& tangent : state.tangent)
+    places.tangent.push_back(held_tangent_.locate(tangent.position_m));
+  return places;
+}
+
+void TangentStepper::step(const TangentParameters& parameters, const TangentVectors& held_target_m,
+                          double time_s, double time_step_s, TangentState& state) {
+  LaneVectors<SingleLane>&position = state.value.position_m,
+  &velocity = state.value.velocity_m_per_s;
+  const EffectScene<SingleLane> scene{cloth_,
+                                      parameters.value.springs,
+                                      parameters.value.gravity_m_per_s2,
+                                      position,
+                                      velocity,
+                                      time_s,
+                                      time_step_s};
+  const size_t groups = state.tangent.size();
+  const bool forces = !cloth_.effects.empty() || !emerging_.empty();
+  if (forces) add_effect_forces(parameters, scene, state);
+
+  const TangentSweep::State at{parameters.value.springs, position, velocity};
+  const TangentVectors* target_m = &held_target_m;
+  if (!changes_force_ && !shifts_supports_) {
+    for (size_t g = 0; g < groups; ++g)
+      tangent_sweep_.step_euler(at, parameters.tangent[g].springs,
+                                parameters.tangent[g].gravity_m_per_s2, inverse_mass_per_kg_,
+                                forces ? &force_n_.tangent[g] : nullptr, time_step_s,
+                                state.tangent[g].position_m, state.tangent[g].velocity_m_per_s);
+    sweep_.step_euler(parameters.value.springs, parameters.value.gravity_m_per_s2,
+                      inverse_mass_per_kg_, forces ? &force_n_.value : nullptr, time_step_s,
+                      position, velocity);
+  } else {
+    for (size_t g = 0; g < groups; ++g)
+      tangent_sweep_.add_spring_forces(at, parameters.tangent[g].springs,
+                                       state.tangent[g].position_m,
+                                       state.tangent[g].velocity_m_per_s, force_n_.tangent[g]);
+    sweep_.add_spring_forces(parameters.value.springs, position, velocity, force_n_.value);
+    if (shifts_supports_) {
+      target_m_ = held_target_m;
+      shift_supports(parameters, scene, state);
+      target_m = &target_m_;
+    }
+    if (changes_force_) change_forces(parameters, scene, state);
+    for (size_t g = 0; g < groups; ++g)
+      move_by_forces(force_n_.tangent[g], parameters.tangent[g].gravity_m_per_s2,
+                     inverse_mass_per_kg_, time_step_s, state.tangent[g].position_m,
+                     state.tangent[g].velocity_m_per_s);
+    move_by_forces(force_n_.value, parameters.value.gravity_m_per_s2, inverse_mass_per_kg_,
+                   time_step_s, position, velocity);
+  }
+  for (size_t g = 0; g < groups; ++g)
+    held_tangent_.place(target_m->tangent[g], time_step_s, state.tangent[g].position_m,
+                        state.tangent[g].velocity_m_per_s);
+  held_value_.place(target_m->value, time_step_s, position, velocity);
+  apply_limit(parameters, time_step_s, state);
+}
+
+void TangentStepper::add_effect_forces(const TangentParameters& parameters,
+                                       const EffectScene<SingleLane>& scene, TangentState& state) {
+  force_n_.value.set_zero();
+  for (LaneVectors<>& tangent : force_n_.tangent) tangent.set_zero();
+  for (size_t e = 0; e < cloth_.effects.size(); ++e) {
+    const Effect& effect = *cloth_.effects[e];
+    EffectMemory<SingleLane>& memory = state.value.effect_memory[e];
+    derivatives_.clear();
+    find_changing(parameters, e, derivatives_.looked_at);
+    effect.linearise_force(scene, parameters.value.effects[e], memory, derivatives_);
+    for (size_t g = 0; g < state.tangent.size(); ++g)
+      apply(e, parameters.tangent[g], nullptr, force_n_.tangent[g], state.tangent[g]);
+    effect.add_force(scene, parameters.value.effects[e], memory, force_n_.value);
+  }
+  if (!emerging_.empty()) add_emerging_forces(scene);
+}
+
+void TangentStepper::add_emerging_forces(const EffectScene<SingleLane>& scene) {
+  const auto add_to = [&](Emerging& emerging, std::vector<LaneVectors<>>& tangent) {
+    emerged_n_ = force_n_.value;
+    emerging.effect->add_force(scene, emerging.parameters, emerging.memory, emerged_n_);
+    add_share(emerging.per_change, emerged_n_, force_n_.value, emerging.lane(),
+              tangent[emerging.group()]);
+  };
+  // Half a step early rather than late.
+  if (!emerged_once_ || since_emerged_s_ + scene.time_step_s / 2 >= kEmergingInterval_s) {
+    std::swap(carried_n_, emerged_last_n_);
+    for (LaneVectors<>& tangent : emerged_last_n_) tangent.set_zero();
+    for (Emerging& emerging : emerging_)
+      if (!emerging.remembers()) add_to(emerging, emerged_last_n_);
+    // What was had last but one becomes the mean over the steps until the next time, along the line
+    // through both.
+    const double ahead =
+        emerged_once_ ? (since_emerged_s_ - scene.time_step_s) / (2 * since_emerged_s_) : 0;
+    const auto carry_on = [&](auto& before, const auto& last) {
+      before = last + ahead * (last - before);
+    };
+    for (size_t g = 0; g < carried_n_.size(); ++g) {
+      carry_on(carried_n_[g].x, emerged_last_n_[g].x);
+      carry_on(carried_n_[g].y, emerged_last_n_[g].y);
+      carry_on(carried_n_[g].z, emerged_last_n_[g].z);
+    }
+    emerged_once_ = true;
+    since_emerged_s_ = 0;
+  }
+  since_emerged_s_ += scene.time_step_s;
+  for (size_t g = 0; g < carried_n_.size(); ++g) {
+    force_n_.tangent[g].x += carried_n_[g].x;
+    force_n_.tangent[g].y += carried_n_[g].y;
+    force_n_.tangent[g].z += carried_n_[g].z;
+  }
+  for (Emerging& emerging : emerging_)
+    if (emerging.remembers()) add_to(emerging, force_n_.tangent);
+}
+
+void TangentStepper::shift_supports(const TangentParameters& parameters,
+                                    const EffectScene<SingleLane>& scene, TangentState& state) {
+  pull_n_.value.set_zero();
+  held_value_.add_pulls(force_n_.value, parameters.value.gravity_m_per_s2, pull_n_.value);
+  for (size_t g = 0; g < state.tangent.size(); ++g) {
+    pull_n_.tangent[g].set_zero();
+    held_tangent_.add_pulls(force_n_.tangent[g], parameters.tangent[g].gravity_m_per_s2,
+                            pull_n_.tangent[g]);
+  }
+  for (size_t e = 0; e < cloth_.effects.size(); ++e) {
+    const Effect& effect = *cloth_.effects[e];
+    if (!effect.shifts_supports()) continue;
+    EffectMemory<SingleLane>& memory = state.value.effect_memory[e];
+    derivatives_.clear();
+    find_changing(parameters, e, derivatives_.looked_at);
+    effect.linearise_supports(scene, parameters.value.effects[e], pull_n_.value, memory,
+                              derivatives_);
+    for (size_t g = 0; g < state.tangent.size(); ++g)
+      apply(e, parameters.tangent[g], &pull_n_.tangent[g], target_m_.tangent[g], state.tangent[g]);
+    effect.shift_supports(scene, parameters.value.effects[e], pull_n_.value, memory,
+                          target_m_.value);
+  }
+  for (Emerging& emerging : emerging_) {
+    if (!emerging.effect->shifts_supports()) continue;
+    emerged_target_m_ = target_m_.value;
+    emerging.effect->shift_supports(scene, emerging.parameters, pull_n_.value, emerging.memory,
+                                    emerged_target_m_);
+    add_share(emerging.per_change, emerged_target_m_, target_m_.value, emerging.lane(),
+              target_m_.tangent[emerging.group()]);
+  }
+}
+
+void TangentStepper::change_forces(const TangentParameters& parameters,
+                                   const EffectScene<SingleLane>& scene,
+                                   const TangentState& state) {
+  for (size_t e = 0; e < cloth_.effects.size(); ++e) {
+    const Effect& effect = *cloth_.effects[e];
+    if (!effect.changes_force()) continue;
+    derivatives_.clear();
+    find_changing(parameters, e, derivatives_.looked_at);
+    effect.linearise_change(scene, parameters.value.effects[e], force_n_.value, derivatives_);
+    for (size_t g = 0; g < state.tangent.size(); ++g) {
+      LaneVectors<>& tangent = force_n_.tangent[g];
+      changed_n_.set_zero();
+      add_products(derivatives_.by_force, tangent, changed_n_);
+      add_actions(e, parameters.tangent[g], state.tangent[g], changed_n_);
+      tangent = changed_n_;
+    }
+    effect.change_force(scene, parameters.value.effects[e], force_n_.value);
+  }
+  for (const Emerging& emerging : emerging_) {
+    if (!emerging.effect->changes_force()) continue;
+    emerged_n_ = force_n_.value;
+    emerging.effect->change_force(scene, emerging.parameters, emerged_n_);
+    add_share(emerging.per_change, emerged_n_, force_n_.value, emerging.lane(),
+              force_n_.tangent[emerging.group()]);
+  }
+}
+
+void TangentStepper::add_actions(size_t e, const LaneParameters<>& parameters,
+                                 const LaneState<>& state, LaneVectors<>& action) {
+  add_products(derivatives_.by_motion, state.position_m, state.velocity_m_per_s, action);
+  for (const EffectLinearisation::ByParameter& column : derivatives_.by_parameter)
+    add_product(column.derivative, parameter_change(parameters, e, column.parameter), column.on,
+                action);
+  const EffectMemory<>& memory = state.effect_memory[e];
+  for (const EffectLinearisation::ByMemory& column : derivatives_.by_memory)
+    add_product(column.derivative, memory.col(column.number), column.on, action);
+  if (derivatives_.by_spring.empty()) return;
+  const auto springs = static_cast<Eigen::Index>(derivatives_.by_spring.size());
+  if (tension_n_.cols() != springs) tension_n_ = LaneArray<>(kLanes, springs);
+  tension_n_.setZero();
+  for (const EffectLinearisation::TensionByParameter& of : derivatives_.tension_by_parameter)
+    tension_n_.col(of.spring) += of.derivative * parameter_change(parameters, e, of.parameter);
+  for (const EffectLinearisation::TensionByMemory& of : derivatives_.tension_by_memory)
+    tension_n_.col(of.spring) += of.derivative * memory.col(of.number);
+  add_products(derivatives_.by_spring, tension_n_, state.position_m, state.velocity_m_per_s,
+               action);
+}
+
+void TangentStepper::apply(size_t e, const LaneParameters<>& parameters,
+                           const LaneVectors<>* pull_n, LaneVectors<>& action, LaneState<>& state) {
+  add_actions(e, parameters, state, action);
+  if (pull_n != nullptr) add_products(derivatives_.by_force, *pull_n, action);
+
+  if (derivatives_.memory_by_memory.empty() && derivatives_.by_memory.empty()) return;
+  EffectMemory<>& memory = state.effect_memory[e];
+  EffectMemory<>& next = next_memory_[e];
+  next.setZero();
+  for (const EffectLinearisation::MemoryByMemory& entry : derivatives_.memory_by_memory)
+    next.col(entry.number) += entry.derivative * memory.col(entry.of);
+  for (const EffectLinearisation::MemoryByMotion& row : derivatives_.memory_by_motion)
+    next.col(row.number) += product(row.by_position, state.position_m, row.of) +
+                            product(row.by_velocity, state.velocity_m_per_s, row.of);
+  for (const EffectLinearisation::MemoryByParameter& entry : derivatives_.memory_by_parameter)
+    next.col(entry.number) += entry.derivative * parameter_change(parameters, e, entry.parameter);
+  if (pull_n != nullptr)
+    for (const EffectLinearisation::MemoryByForce& row : derivatives_.memory_by_force)
+      next.col(row.number) += product(row.derivative, *pull_n, row.of);
+  memory = next;
+}
+
+void TangentStepper::apply_limit(const TangentParameters& parameters, double time_step_s,
+                                 TangentState& state) {
+  const StrainLimit& limit = cloth_.strain_limit;
+  if (limit.mode == StrainLimitMode::off) return;
+  const bool correct_velocity = limit.mode == StrainLimitMode::consistent;
+  moves_.clear();
+  limiter_.limit(limit, parameters.value.limits, time_step_s, state.value.position_m,
+                 state.value.velocity_m_per_s, &moves_);
+
+  // With longest the length a spring may have, its ends move by shares of (1 - longest / l) L:
+  //   d((1 - longest / l) L) = (1 - longest / l) dL + (longest / l^3 (L . dL) - dlongest / l) L
+  for (size_t g = 0; g < state.tangent.size(); ++g) {
+    LaneVectors<>&p = state.tangent[g].position_m, &v = state.tangent[g].velocity_m_per_s;
+    for (const LimitMove& move : moves_) {
+      const int a = move.first, b = move.second;
+      const Eigen::Vector3d& along = move.along_m;
+      const LaneValue<> dx = p.x.col(b) - p.x.col(a), dy = p.y.col(b) - p.y.col(a),
+                        dz = p.z.col(b) - p.z.col(a);
+      const LaneValue<> stretch =
+          (1 - move.excess) * move.inverse_length_per_m * move.inverse_length_per_m *
+              (along.x() * dx + along.y() * dy + along.z() * dz) -
+          move.inverse_length_per_m *
+              parameters.tangent[g].limits.longest_m[static_cast<size_t>(move.type)];
+      const auto shift = [&](LaneArray<>& place, LaneArray<>& speed, const LaneValue<>& d,
+                             double component) {
+        const LaneValue<> change = move.excess * d + component * stretch;
+        place.col(a) += move.first_share * change;
+        place.col(b) -= move.second_share * change;
+        if (!correct_velocity) return;
+        speed.col(a) += move.first_share / time_step_s * change;
+        speed.col(b) -= move.second_share / time_step_s * change;
+      };
+      shift(p.x, v.x, dx, along.x());
+      shift(p.y, v.y, dy, along.y());
+      shift(p.z, v.z, dz, along.z());
+    }
+  }
+}
+
+}  // namespace clothfit

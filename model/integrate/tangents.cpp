@@ -1,0 +1,112 @@
+#include "model/integrate/tangents.h"
+
+#include <tbb/global_control.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace clothfit {
+namespace {
+
+/// One simulation and its derivatives along some directions.
+TangentResult run_chunk(const Cloth& cloth, const ParameterSet& set,
+                        std::span<const Direction> directions, const Schedule& schedule) {
+  TangentStepper stepper(cloth, directions);
+  const TangentParameters parameters = TangentParameters::of(cloth, set, directions);
+  TangentState state = TangentState::of(cloth, set, directions);
+  TangentVectors target_m = stepper.locate(state);
+  const auto aim = [&](double time_s) {
+    for (size_t h = 0; h < cloth.held.size(); ++h) {
+      if (!cloth.held[h].motion) continue;
+      const auto column = static_cast<Eigen::Index>(h);
+      const Eigen::Vector3d place = shifted(cloth.held[h].motion(time_s), set, h, time_s);
+      target_m.value.x(0, column) = place.x();
+      target_m.value.y(0, column) = place.y();
+      target_m.value.z(0, column) = place.z();
+      for (size_t d = 0; d < directions.size(); ++d) {
+        const auto& motion = directions[d].held_motion;
+        const Eigen::Vector3d change =
+            motion.empty() || !motion[h] ? Eigen::Vector3d::Zero() : motion[h](time_s);
+        const auto lane = static_cast<Eigen::Index>(d % kLanes);
+        LaneVectors<>& tangent = target_m.tangent[d / kLanes];
+        tangent.x(lane, column) = change.x();
+        tangent.y(lane, column) = change.y();
+        tangent.z(lane, column) = change.z();
+      }
+    }
+  };
+
+  TangentResult result;
+  result.position_tangent.resize(directions.size());
+  if (schedule.velocities) result.velocity_tangent.resize(directions.size());
+  const size_t frames = schedule.frame_time_s.size();
+  for (size_t frame = 0; frame < frames; ++frame) {
+    if (frame > 0 && result.run.usable()) {
+      const double from_s = schedule.frame_time_s[frame - 1];
+      const int steps = schedule.substeps(static_cast<int>(frame));
+      const double h = (schedule.frame_time_s[frame] - from_s) / steps;
+      for (int n = 0; n < steps; ++n) {
+        aim(from_s + (n + 1) * h);
+        stepper.step(parameters, target_m, from_s + n * h, h, state);
+      }
+    }
+    Eigen::Matrix3Xd now = state.value.position_m.lane(0);
+    if (result.run.usable() && left_the_scene(now, set.start_position_m, cloth.mesh)) {
+      result.run.reason = StopReason::diverged;
+      result.run.diverged_frame = static_cast<int>(frame);
+    }
+    if (!result.run.usable()) now.setConstant(NAN);
+    result.run.position_m.push_back(std::move(now));
+    for (size_t d = 0; d < directions.size(); ++d) {
+      Eigen::Matrix3Xd tangent =
+          state.tangent[d / kLanes].position_m.lane(static_cast<int>(d % kLanes));
+      if (!result.run.usable()) tangent.setConstant(NAN);
+      result.position_tangent[d].push_back(std::move(tangent));
+    }
+    if (!schedule.velocities) continue;
+    const auto kept = [&](Eigen::Matrix3Xd values) {
+      if (!result.run.usable()) values.setConstant(NAN);
+      return values;
+    };
+    result.run.velocity_m_per_s.push_back(kept(state.value.velocity_m_per_s.lane(0)));
+    for (size_t d = 0; d < directions.size(); ++d)
+      result.velocity_tangent[d].push_back(
+          kept(state.tangent[d / kLanes].velocity_m_per_s.lane(static_cast<int>(d % kLanes))));
+  }
+  return result;
+}
+
+/// Directions that share a run: as many as spread over the threads, within what stays near the
+/// processor.
+size_t directions_at_once(size_t directions) {
+  constexpr size_t kMostGroups = 8;
+  const size_t groups = (directions + kLanes - 1) / kLanes;
+  const auto threads =
+      tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
+  return kLanes * std::clamp<size_t>((groups + threads - 1) / threads, 1, kMostGroups);
+}
+
+}  // namespace
+
+TangentResult simulate_with_tangents(const Cloth& cloth, const ParameterSet& parameters,
+                                     std::span<const Direction> directions,
+                                     const Schedule& schedule) {
+  const size_t chunk = directions_at_once(directions.size());
+  const size_t chunks = std::max<size_t>(1, (directions.size() + chunk - 1) / chunk);
+  std::vector<TangentResult> results(chunks);
+  tbb::parallel_for(size_t{0}, chunks, [&](size_t c) {
+    const size_t first = c * chunk;
+    results[c] =
+        run_chunk(cloth, parameters,
+                  directions.subspan(first, std::min(chunk, directions.size() - first)), schedule);
+  });
+  TangentResult result = std::move(results.front());
+  for (size_t c = 1; c < chunks; ++c) {
+    std::ranges::move(results[c].position_tangent, std::back_inserter(result.position_tangent));
+    std::ranges::move(results[c].velocity_tangent, std::back_inserter(result.velocity_tangent));
+  }
+  return result;
+}
+
+}  // namespace clothfit

@@ -1,0 +1,42 @@
+#include "apps/report/diagnosis/diagnosis_tables.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace clothfit {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+Separation separation(std::vector<SeparatingRecording> recordings) {
+  return {.from = {.effect = "world_tilt"}, .now = 0.04, .recordings = std::move(recordings)};
+}
+
+TEST(SeparationTable, NamesNoRecordingThatTellsNothing) {
+  const std::vector<Separation> separations{
+      separation({{"shaken", 34.6}, {"turned", 1.2}, {"twice as long", 0.04}})};
+
+  EXPECT_THAT(separation_table(separations).rows,
+              ElementsAre(ElementsAre("world_tilt", "0.0", "shaken", "35"),
+                          ElementsAre("world_tilt", "0.0", "turned", "1.2")));
+}
+
+TEST(SeparationTable, SaysHowLittleTheBestRecordingTells) {
+  const std::vector<Separation> separations{separation({{"shaken", 0.3}, {"turned", 0.2}})};
+
+  EXPECT_THAT(separation_table(separations).rows,
+              ElementsAre(ElementsAre("world_tilt", "0.0", "shaken", "0.3")));
+  EXPECT_THAT(separation_text({.effect = "gravity_tilt"}, separations),
+              HasSubstr("at most 0.3 in recordings that were tried"));
+}
+
+TEST(SeparationText, NamesTheBestRecordingThatTells) {
+  const std::vector<Separation> separations{separation({{"shaken", 34.6}, {"turned", 6}})};
+
+  EXPECT_EQ(separation_text({.effect = "gravity_tilt"}, separations),
+            "gravity_tilt cannot be told from world_tilt (0.0 sigma; 35 sigma with: shaken)");
+}
+
+}  // namespace
+}  // namespace clothfit

@@ -1,0 +1,162 @@
+// The bootstrap over blocks, linearised and by refits of linear models. Not checked here: a cloth's
+// own refits, and how blocks are chosen (space_time_blocks_test.cpp).
+
+#include "fit/uncertainty/block_bootstrap.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <cmath>
+
+#include "data/input_error.h"
+#include "fit/uncertainty/cluster_covariance.h"
+#include "fit/uncertainty/space_time_blocks.h"
+#include "tests/fit/smooth_misfit.h"
+
+namespace clothfit {
+namespace {
+
+const BootstrapOptions kResampled{.weights = BlockWeights::resampled, .replicates = 199};
+const BootstrapOptions kWild{.weights = BlockWeights::wild, .replicates = 199};
+
+Eigen::VectorXi nine_blocks() {
+  return space_time_blocks(misfit_places(), {.along_s = 3, .along_t = 3}).block;
+}
+
+TEST(BlockBootstrap, GivesTheSameBytesForAnyOrder) {
+  Eigen::MatrixXd forward(9, 50), backward(9, 50);
+  for (const BootstrapOptions& options : {kResampled, kWild}) {
+    for (int k = 0; k < 50; ++k) forward.col(k) = block_weights(options, 9, k);
+    for (int k = 49; k >= 0; --k) backward.col(k) = block_weights(options, 9, k);
+    EXPECT_EQ(forward, backward);
+  }
+  const LinearisedFit fit = draw_misfit({}, 1, 0).fit;
+  BootstrapOptions fewer = kWild;
+  fewer.replicates = 50;
+  EXPECT_EQ(bootstrap_linearised(fit, nine_blocks(), kWild).change.leftCols(50),
+            bootstrap_linearised(fit, nine_blocks(), fewer).change);
+}
+
+TEST(BlockBootstrap, DrawsNumbersOfTheRightMeanAndVariance) {
+  SCOPED_TRACE("seed 1");
+  constexpr int kReplicates = 4000;
+  for (const BootstrapOptions& options : {kResampled, kWild}) {
+    const bool wild = options.weights == BlockWeights::wild;
+    double sum = 0, squares = 0;
+    for (int k = 0; k < kReplicates; ++k) {
+      const Eigen::VectorXd weights = block_weights(options, 9, k);
+      if (!wild) {
+        EXPECT_EQ(weights.sum(), 9);
+      }
+      sum += weights.sum() / (9.0 * kReplicates);
+      squares += weights.squaredNorm() / (9.0 * kReplicates);
+    }
+    // Of 36 000 numbers of variance 1: the mean scatters by 0.005, the mean square by less than
+    // 0.01.
+    EXPECT_NEAR(sum, wild ? 0 : 1, 0.025);
+    EXPECT_NEAR(squares, wild ? 1 : 2 - 1.0 / 9, 0.05);
+  }
+}
+
+TEST(BlockBootstrap, ByOneStepIsTheRefitOfALinearModel) {
+  const MisfitReplicate given = draw_misfit({}, 2, 0);
+  const Eigen::VectorXi block = nine_blocks();
+  const Eigen::MatrixXd& j = given.fit.jacobian;
+
+  const Bootstrap resampled = bootstrap_linearised(given.fit, block, kResampled);
+  const Bootstrap refitted = bootstrap_by_refit(
+      3, 9, kResampled, [&](const Eigen::VectorXd& weights, int) -> std::optional<Eigen::VectorXd> {
+        const Eigen::VectorXd rows = weights(block);
+        return -(j.transpose() * rows.asDiagonal() * j)
+                    .ldlt()
+                    .solve(j.transpose() * rows.cwiseProduct(given.fit.residual));
+      });
+  EXPECT_LT((resampled.change - refitted.change).norm(), 1e-9 * resampled.change.norm());
+
+  const Bootstrap wild = bootstrap_linearised(given.fit, block, kWild);
+  const Bootstrap redrawn = bootstrap_by_refit(
+      3, 9, kWild, [&](const Eigen::VectorXd& factors, int) -> std::optional<Eigen::VectorXd> {
+        const Eigen::VectorXd rows = factors(block);
+        return -(j.transpose() * j)
+                    .ldlt()
+                    .solve(j.transpose() * rows.cwiseProduct(given.fit.residual));
+      });
+  EXPECT_LT((wild.change - redrawn.change).norm(), 1e-9 * wild.change.norm());
+}
+
+TEST(BlockBootstrap, ScattersAsTheSandwichSays) {
+  SCOPED_TRACE("seed 3");
+  const LinearisedFit fit = draw_misfit({}, 3, 0).fit;
+  BootstrapOptions options = kWild;
+  options.replicates = 4000;
+
+  const Bootstrap bootstrap = bootstrap_linearised(fit, nine_blocks(), options);
+
+  const Eigen::MatrixXd expected =
+      cluster_covariance(fit, nine_blocks(), ClusterCorrection::none).covariance;
+  const Eigen::MatrixXd scatter =
+      bootstrap.change * bootstrap.change.transpose() / options.replicates;
+  // Standard deviations from 4000 replicates scatter by about 1 %.
+  for (int p = 0; p < 3; ++p) {
+    EXPECT_NEAR(std::sqrt(scatter(p, p) / expected(p, p)), 1, 0.05);
+    EXPECT_NEAR(bootstrap.sigma[p], std::sqrt(expected(p, p)), 1e-12);
+  }
+}
+
+TEST(BlockBootstrap, CoversByStudentisedChangesWhereThePercentilesAreTooNarrow) {
+  SCOPED_TRACE("seed 41");
+  constexpr int kReplicates = 300;
+  const Eigen::VectorXi block = nine_blocks();
+  double studentised = 0, percentile = 0;
+  for (int replicate = 0; replicate < kReplicates; ++replicate) {
+    const MisfitReplicate given = draw_misfit({}, 41, replicate);
+    BootstrapOptions options = kWild;
+    options.seed = static_cast<unsigned long long>(replicate);
+    const Bootstrap bootstrap = bootstrap_linearised(given.fit, block, options);
+    const ChangeIntervals by_t = studentised_intervals(bootstrap, 0.9);
+    const ChangeIntervals by_share = percentile_intervals(bootstrap, 0.9);
+    for (int p = 0; p < 3; ++p) {
+      const double truth = -given.estimate[p];
+      studentised += (by_t.lower[p] <= truth && truth <= by_t.upper[p]) / (3.0 * kReplicates);
+      percentile +=
+          (by_share.lower[p] <= truth && truth <= by_share.upper[p]) / (3.0 * kReplicates);
+    }
+  }
+
+  EXPECT_GE(studentised, 0.85);
+  EXPECT_LE(studentised, 0.95);
+  EXPECT_LT(percentile, studentised - 0.03);
+}
+
+TEST(BlockBootstrap, CountsReplicatesWithoutAnEstimate) {
+  const Bootstrap bootstrap = bootstrap_by_refit(
+      1, 4, kWild, [](const Eigen::VectorXd&, int replicate) -> std::optional<Eigen::VectorXd> {
+        if (replicate % 2 == 0) return std::nullopt;
+        return Eigen::VectorXd::Constant(1, replicate);
+      });
+
+  EXPECT_EQ(bootstrap.failed, 100);
+  // The odd numbers 1 ... 197: quantiles of those that are there.
+  const ChangeIntervals ends = percentile_intervals(bootstrap, 0.9);
+  EXPECT_NEAR(ends.lower[0], 0.05 * 198, 2);
+  EXPECT_NEAR(ends.upper[0], 0.95 * 198, 2);
+}
+
+TEST(BlockBootstrap, RefusesBadInput) {
+  const LinearisedFit fit = draw_misfit({}, 1, 0).fit;
+  BootstrapOptions few = kWild;
+  few.replicates = 10;
+  EXPECT_THROW(bootstrap_linearised(fit, nine_blocks(), few), InputError);
+  EXPECT_THROW(bootstrap_linearised(fit, Eigen::VectorXi::Zero(3), kWild), InputError);
+  const auto two = [](const Eigen::VectorXd&, int) -> std::optional<Eigen::VectorXd> {
+    return Eigen::VectorXd::Zero(2);
+  };
+  EXPECT_THROW(bootstrap_by_refit(3, 9, kWild, two), InputError);
+  EXPECT_THROW(bootstrap_by_refit(2, 1, kWild, two), InputError);
+  const Bootstrap refitted = bootstrap_by_refit(2, 9, kWild, two);
+  EXPECT_THROW(studentised_intervals(refitted, 0.9), InputError);
+  EXPECT_THROW(percentile_intervals(refitted, 1), InputError);
+}
+
+}  // namespace
+}  // namespace clothfit

@@ -1,0 +1,136 @@
+// Corners of a chessboard: order on drawn boards, precision on the bundled stills, whose boards'
+// places are known. What a calibration makes of them is in tests/calib.
+
+#include "vision/detect/chessboard.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "calib/camera/projection.h"
+#include "data/camera_parameters.h"
+#include "data/input_error.h"
+#include "vision/ingest/image_source.h"
+
+namespace clothfit {
+namespace {
+
+const std::filesystem::path kSource = CLOTHFIT_SOURCE_DIR;
+
+/// A board of squares of 20 px with its first inner corner at (60, 50), seen from the front.
+cv::Mat drawn_board(const BoardDescription& board) {
+  cv::Mat big(4 * 260, 4 * 320, CV_8UC1, cv::Scalar(230));
+  for (int r = 0; r <= board.rows; ++r) {
+    for (int c = 0; c <= board.columns; ++c) {
+      if ((r + c) % 2 != 0) continue;
+      // Four pixels of the big picture make one; corner (60, 50) lies between pixels there.
+      const cv::Rect square(4 * (40 + 20 * c) + 2, 4 * (30 + 20 * r) + 2, 80, 80);
+      cv::rectangle(big, square, cv::Scalar(30), cv::FILLED);
+    }
+  }
+  cv::Mat grey;
+  cv::resize(big, grey, cv::Size(320, 260), 0, 0, cv::INTER_AREA);
+  cv::GaussianBlur(grey, grey, cv::Size(), 0.6);
+  return grey;
+}
+
+TEST(Chessboard, NumbersCornersRowByRowWithoutMirroring) {
+  const BoardDescription board{.columns = 9, .rows = 6, .square_m = 0.02};
+  const cv::Mat upright = drawn_board(board);
+  cv::Mat turned;
+  for (int quarter = 0; quarter < 4; ++quarter) {
+    SCOPED_TRACE(quarter);
+    constexpr std::array kTurn = {-1, +cv::ROTATE_90_CLOCKWISE, +cv::ROTATE_180,
+                                  +cv::ROTATE_90_COUNTERCLOCKWISE};
+    if (quarter == 0) {
+      turned = upright.clone();
+    } else {
+      cv::rotate(upright, turned, kTurn[static_cast<std::size_t>(quarter)]);
+    }
+
+    const auto corners = find_chessboard(turned, board);
+
+    ASSERT_TRUE(corners);
+    ASSERT_EQ(corners->size(), 54U);
+    // Neighbours in a row, and in a column, are one square apart; rows then columns turn as x, y.
+    for (std::size_t i = 0; i + 1 < 54; ++i) {
+      if (i % 9 != 8) {
+        EXPECT_NEAR(((*corners)[i + 1] - (*corners)[i]).norm(), 20, 0.05);
+      }
+      if (i + 9 < 54) {
+        EXPECT_NEAR(((*corners)[i + 9] - (*corners)[i]).norm(), 20, 0.05);
+      }
+    }
+    const Eigen::Vector2d right = (*corners)[1] - (*corners)[0];
+    const Eigen::Vector2d down = (*corners)[9] - (*corners)[0];
+    EXPECT_GT(right.x() * down.y() - right.y() * down.x(), 0);
+    if (quarter == 0) {
+      EXPECT_NEAR((*corners)[0].x(), 60, 0.05);
+      EXPECT_NEAR((*corners)[0].y(), 50, 0.05);
+    }
+  }
+}
+
+TEST(Chessboard, IsNotFoundWhereItIsNotWhole) {
+  const BoardDescription board{.columns = 9, .rows = 6, .square_m = 0.02};
+  cv::Mat picture = drawn_board(board);
+  EXPECT_FALSE(find_chessboard(picture, {.columns = 8, .rows = 8, .square_m = 0.02}));
+  picture.colRange(0, 100).setTo(230);
+
+  EXPECT_FALSE(find_chessboard(picture, board));
+  EXPECT_THROW(find_chessboard(picture, {.columns = 1, .rows = 6, .square_m = 0.02}), InputError);
+}
+
+TEST(Chessboard, LiesWhereTheBundledStillsWereRendered) {
+  const std::filesystem::path truth = kSource / "tests/fixtures/truth/tags_onecam";
+  const CameraParameters camera = read_camera(truth / "truth_camera_front.yaml");
+  const nlohmann::json boards = nlohmann::json::parse(
+      std::ifstream(truth / "truth.json"))["cameras"]["front"]["calibration_boards_to_world"];
+  const BoardDescription board{.columns = 9, .rows = 6, .square_m = 0.025};
+  const auto stills = open_images(kSource / "data/recordings/tags_onecam/calibration/front");
+
+  std::vector<double> errors;
+  cv::Mat grey;
+  for (std::size_t i = 0; stills->next(grey); ++i) {
+    const auto corners = find_chessboard(grey, board);
+    ASSERT_TRUE(corners) << stills->current_name();
+    Eigen::Matrix4d world_from_board;
+    for (int r = 0; r < 4; ++r) {
+      for (int c = 0; c < 4; ++c) {
+        world_from_board(r, c) =
+            boards[i][static_cast<std::size_t>(r)][static_cast<std::size_t>(c)];
+      }
+    }
+    // The board's own axes start in its middle.
+    std::vector<Eigen::Vector2d> expected;
+    for (int r = 0; r < board.rows; ++r) {
+      for (int c = 0; c < board.columns; ++c) {
+        const Eigen::Vector4d point((c - 4.0) * board.square_m, (r - 2.5) * board.square_m, 0, 1);
+        const Eigen::Vector3d world = (world_from_board * point).head<3>();
+        expected.push_back(*project(camera, camera_from_world(camera) * world));
+      }
+    }
+    for (const Eigen::Vector2d& corner : *corners) {
+      double nearest = INFINITY;
+      for (const Eigen::Vector2d& place : expected) {
+        nearest = std::min(nearest, (corner - place).norm());
+      }
+      errors.push_back(nearest);
+    }
+  }
+
+  ASSERT_EQ(errors.size(), 15U * 54U);
+  std::sort(errors.begin(), errors.end());
+  RecordProperty("median_px", std::to_string(errors[errors.size() / 2]));
+  RecordProperty("p95_px", std::to_string(errors[errors.size() * 95 / 100]));
+  EXPECT_LT(errors[errors.size() / 2], 0.1);
+  EXPECT_LT(errors[errors.size() * 95 / 100], 0.25);
+}
+
+}  // namespace
+}  // namespace clothfit

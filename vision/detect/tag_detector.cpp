@@ -1,0 +1,117 @@
+#include "vision/detect/tag_detector.h"
+
+#include <apriltag/apriltag.h>
+
+#include <algorithm>
+#include <cassert>
+#include <map>
+#include <tuple>
+
+#include "vision/detect/tag_family.h"
+#include "vision/detect/tag_refine.h"
+
+namespace clothfit {
+namespace {
+
+/// The library keeps a table of every code with every correctable error, 16 bytes or more an entry.
+/// Bits that may be corrected before that table outgrows a few million entries.
+int affordable_corrected_bits(const apriltag_family_t& family) {
+  constexpr double kMaxEntries = 4e6;
+  const double codes = family.ncodes;
+  const double bits = family.nbits;
+  if (codes * (1 + bits + bits * (bits - 1) / 2) <= kMaxEntries) return 2;
+  return codes * (1 + bits) <= kMaxEntries ? 1 : 0;
+}
+
+/// What AprilTag's pixel coordinates have too much: it counts from the outer corner of the top left
+/// pixel, we from that pixel's centre. Its corners already come in our order.
+const Eigen::Vector2d kHalfPixel(0.5, 0.5);
+
+/// The library's homography with pixels in our convention.
+Eigen::Matrix3d pixel_from_tag(const matd_t& homography) {
+  using RowMajor = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+  Eigen::Matrix3d shift = Eigen::Matrix3d::Identity();
+  shift.topRightCorner<2, 1>() = -kHalfPixel;
+  return shift * Eigen::Map<const RowMajor>(homography.data);
+}
+
+/// A code with b wrong bits is still twice as near to its own word as to any other while
+/// 3 b < distance; a quarter of the distance leaves room for what is no tag at all.
+int safe_corrected_bits(const apriltag_family_t& family) {
+  return (static_cast<int>(family.h) - 1) / 4;
+}
+
+}  // namespace
+
+struct TagDetector::Library {
+  explicit Library(const std::string& name)
+      : family(make_tag_family(name)),
+        detector(apriltag_detector_create(), apriltag_detector_destroy) {}
+
+  const TagPattern& pattern(int id) {
+    const auto known = patterns.find(id);
+    if (known != patterns.end()) return known->second;
+    return patterns.emplace(id, printed_tag(*family, id)).first->second;
+  }
+
+  // The detector is destroyed first: it holds a pointer into the family.
+  TagFamily family;
+  std::unique_ptr<apriltag_detector_t, void (*)(apriltag_detector_t*)> detector;
+  std::map<int, TagPattern> patterns;  ///< of the tags seen so far
+};
+
+TagDetector::TagDetector(const std::string& family, int max_corrected_bits)
+    : library_(std::make_unique<Library>(family)) {
+  const apriltag_family_t& kind = *library_->family;
+  const int bits =
+      std::min({max_corrected_bits, safe_corrected_bits(kind), affordable_corrected_bits(kind)});
+  apriltag_detector_add_family_bits(library_->detector.get(), library_->family.get(), bits);
+  library_->detector->nthreads = 1;  // pictures are what runs in parallel
+  library_->detector->quad_decimate = 1;
+  library_->detector->refine_edges = true;
+}
+
+TagDetector::~TagDetector() = default;
+TagDetector::TagDetector(TagDetector&&) noexcept = default;
+TagDetector& TagDetector::operator=(TagDetector&&) noexcept = default;
+
+std::vector<TagDetection> TagDetector::detect(const cv::Mat& grey) {
+  assert(grey.type() == CV_8UC1 && !grey.empty());
+  image_u8_t picture{.width = grey.cols,
+                     .height = grey.rows,
+                     .stride = static_cast<int32_t>(grey.step),
+                     .buf = grey.data};
+  const std::unique_ptr<zarray_t, void (*)(zarray_t*)> found(
+      apriltag_detector_detect(library_->detector.get(), &picture), apriltag_detections_destroy);
+
+  std::vector<TagDetection> detections;
+  for (int i = 0; i < zarray_size(found.get()); ++i) {
+    apriltag_detection_t* raw = nullptr;
+    zarray_get(found.get(), i, &raw);
+    TagDetection detection;
+    detection.id = raw->id;
+    detection.corrected_bits = raw->hamming;
+    detection.decision_margin = raw->decision_margin;
+    for (std::size_t c = 0; c < 4; ++c) {
+      detection.corner_px[c] = Eigen::Vector2d(raw->p[c][0], raw->p[c][1]) - kHalfPixel;
+    }
+    const RefinedTag refined =
+        refine_tag(grey, library_->pattern(raw->id), pixel_from_tag(*raw->H));
+    detection.explained = refined.explained;
+    detection.refined = refined.usable;
+    if (refined.usable) {
+      detection.corner_px = refined.corner_px;
+      detection.sigma_px = refined.sigma_px;
+    }
+    detections.push_back(detection);
+  }
+  std::sort(detections.begin(), detections.end(), [](const TagDetection& a, const TagDetection& b) {
+    const auto key = [](const TagDetection& d) {
+      return std::tuple(d.id, d.corner_px[0].x(), d.corner_px[0].y());
+    };
+    return key(a) < key(b);
+  });
+  return detections;
+}
+
+}  // namespace clothfit

@@ -1,0 +1,117 @@
+#include "vision/track/tag_history.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+#include "vision/track/rejection.h"
+#include "vision/track/track_options.h"
+
+namespace clothfit {
+namespace {
+
+double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+  return a.x() * b.y() - a.y() * b.x();
+}
+
+/// True where two edges meet so flatly, or the quadrilateral is so thin, that corners slide along
+/// edges: an angle within `kSmallestAngle` of 0 or 180 degrees.
+bool nearly_degenerate(const std::array<Eigen::Vector2d, 4>& corner_px) {
+  constexpr double kSmallestAngle = 15 * M_PI / 180;
+  for (std::size_t c = 0; c < 4; ++c) {
+    const Eigen::Vector2d forward = corner_px[(c + 1) % 4] - corner_px[c];
+    const Eigen::Vector2d back = corner_px[(c + 3) % 4] - corner_px[c];
+    // Corners run counter-clockwise as seen, which is a negative turn with y pointing down.
+    const double sine = -cross(forward, back) / (forward.norm() * back.norm());
+    if (!(sine > std::sin(kSmallestAngle))) return true;
+  }
+  return false;
+}
+
+/// Reasons that show in one picture alone.
+void judge_alone(TagReading& reading, const TrackOptions& options, const cv::Size& size) {
+  const TagDetection& tag = reading.tag;
+  if (tag.decision_margin < options.min_decision_margin) reading.reject(rejection::kLowMargin);
+  if (tag.corrected_bits > options.max_corrected_bits) reading.reject(rejection::kCorrectedBits);
+  if (nearly_degenerate(tag.corner_px)) reading.reject(rejection::kTooOblique);
+  if (!tag.refined || tag.explained < options.min_explained) {
+    reading.reject(rejection::kPatternMismatch);
+  }
+  constexpr double kBorder = 2;  // px; what an edge's blur reaches
+  for (std::size_t c = 0; c < 4; ++c) {
+    const Eigen::Vector2d& corner = tag.corner_px[c];
+    const bool inside = corner.x() >= kBorder && corner.x() <= size.width - 1 - kBorder &&
+                        corner.y() >= kBorder && corner.y() <= size.height - 1 - kBorder;
+    if (!inside && reading.rejected[c].empty()) reading.rejected[c] = rejection::kTouchingBorder;
+    if (tag.sigma_px[c] > options.max_sigma_px && reading.rejected[c].empty()) {
+      reading.rejected[c] = rejection::kUncertain;
+    }
+  }
+}
+
+/// A tag read twice in a picture: no telling which is it. One row per frame stays, that of the
+/// clearest reading, rejected.
+void judge_duplicates(TagHistory& history) {
+  std::stable_sort(history.begin(), history.end(), [](const TagReading& a, const TagReading& b) {
+    if (a.frame != b.frame) return a.frame < b.frame;
+    if (a.good() != b.good()) return a.good();
+    return a.tag.decision_margin > b.tag.decision_margin;
+  });
+  TagHistory kept;
+  for (TagReading& reading : history) {
+    if (kept.empty() || kept.back().frame != reading.frame) {
+      kept.push_back(std::move(reading));
+    } else if (reading.good()) {
+      kept.back().reject(rejection::kDuplicateId);
+    }
+  }
+  history = std::move(kept);
+}
+
+/// A tag that is out of reach from where it was before and from where it is after. At the ends of
+/// its history the two next readings on the one side stand for both.
+void judge_jumps(TagHistory& history, double max_speed_px) {
+  std::vector<TagReading*> good;
+  for (TagReading& reading : history) {
+    if (reading.good()) good.push_back(&reading);
+  }
+  const auto out_of_reach = [&](std::size_t a, std::size_t b) {
+    const double frames = std::abs(good[a]->frame - good[b]->frame);
+    return (good[a]->centre_px() - good[b]->centre_px()).norm() > max_speed_px * frames;
+  };
+  if (good.size() < 3) return;
+  std::vector<bool> jumps(good.size());
+  const std::size_t last = good.size() - 1;
+  for (std::size_t i = 1; i < last; ++i) {
+    jumps[i] = out_of_reach(i, i - 1) && out_of_reach(i, i + 1);
+  }
+  jumps[0] = out_of_reach(0, 1) && out_of_reach(0, 2);
+  jumps[last] = out_of_reach(last, last - 1) && out_of_reach(last, last - 2);
+  for (std::size_t i = 0; i < good.size(); ++i) {
+    if (jumps[i]) good[i]->reject(rejection::kJump);
+  }
+}
+
+}  // namespace
+
+bool TagReading::good() const {
+  return std::ranges::any_of(rejected, [](const std::string& reason) { return reason.empty(); });
+}
+
+void TagReading::reject(const char* reason) {
+  for (std::string& corner : rejected) {
+    if (corner.empty()) corner = reason;
+  }
+}
+
+Eigen::Vector2d TagReading::centre_px() const {
+  return (tag.corner_px[0] + tag.corner_px[1] + tag.corner_px[2] + tag.corner_px[3]) / 4;
+}
+
+void judge(TagHistory& history, const TrackOptions& options, const cv::Size& size) {
+  for (TagReading& reading : history) judge_alone(reading, options, size);
+  judge_duplicates(history);
+  judge_jumps(history, options.max_speed_px);
+}
+
+}  // namespace clothfit

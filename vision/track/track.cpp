@@ -1,0 +1,312 @@
+#include "vision/track/track.h"
+
+#include <fmt/core.h>
+#include <fmt/ranges.h>
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/info.h>
+#include <tbb/parallel_pipeline.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <bit>
+#include <set>
+
+#include "data/input_error.h"
+#include "vision/detect/fixed_corner.h"
+#include "vision/detect/tag_detector.h"
+#include "vision/detect/tag_family.h"
+#include "vision/ingest/image_source.h"
+#include "vision/track/overlay.h"
+#include "vision/track/tag_history.h"
+
+namespace clothfit {
+namespace {
+
+constexpr int kNone = -1;
+
+/// Which marker (or reference point) each corner of a tag is; kNone where it is none.
+using PointsByTag = std::map<int, std::array<int, 4>>;
+
+template <class Point>
+PointsByTag points_by_tag(const std::vector<Point>& points, const std::string& file) {
+  PointsByTag by_tag;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Point& point = points[i];
+    if (!point.tag || !point.corner) continue;
+    std::array<int, 4>& corners =
+        by_tag.try_emplace(*point.tag, std::array{kNone, kNone, kNone, kNone}).first->second;
+    int& place = corners.at(static_cast<std::size_t>(*point.corner));
+    if (place != kNone) {
+      throw InputError(file,
+                       fmt::format("'{}' and '{}' are the same corner {} of tag {}",
+                                   points[static_cast<std::size_t>(place)].name, point.name,
+                                   *point.corner, *point.tag),
+                       "each corner of a tag once");
+    }
+    place = static_cast<int>(i);
+  }
+  return by_tag;
+}
+
+/// Readings of all listed tags in all pictures.
+struct Readings {
+  std::map<int, TagHistory> by_tag;
+  std::set<int> unlisted;  ///< tags that no marker and no reference point names
+  int frames = 0;
+  bool cancelled = false;
+  cv::Size size;
+  cv::Mat first_picture;
+  cv::Mat overlay_picture;
+  int overlay_frame = 0;
+};
+
+struct Picture {
+  int frame = 0;
+  cv::Mat grey;
+  std::vector<TagDetection> tags;
+};
+
+/// The picture to draw on is the middle one; where a video does not say how long it is, one between
+/// its half and its end or, at worst, its quarter.
+bool is_overlay_frame(int frame, int count) {
+  if (count > 0) return frame == count / 2;
+  return frame == 0 || std::has_single_bit(static_cast<unsigned>(frame));
+}
+
+Readings read_all(ImageSource& images, const std::string& family, const PointsByTag& markers,
+                  const PointsByTag& reference, const ProgressCallback& progress) {
+  Readings readings;
+  std::atomic<bool> cancelled = false;
+  tbb::enumerable_thread_specific<TagDetector> detectors([&] { return TagDetector(family); });
+
+  int next_frame = 0;
+  const auto load = [&](tbb::flow_control& control) {
+    Picture picture{.frame = next_frame++, .grey = {}, .tags = {}};
+    if (cancelled || !images.next(picture.grey)) control.stop();
+    return picture;
+  };
+  const auto detect = [&](Picture picture) {
+    picture.tags = detectors.local().detect(picture.grey);
+    return picture;
+  };
+  const auto collect = [&](const Picture& picture) {
+    if (cancelled) return;
+    if (picture.frame == 0) readings.first_picture = picture.grey;
+    readings.size = picture.grey.size();
+    if (is_overlay_frame(picture.frame, images.count())) {
+      readings.overlay_picture = picture.grey;
+      readings.overlay_frame = picture.frame;
+    }
+    for (const TagDetection& tag : picture.tags) {
+      if (markers.contains(tag.id) || reference.contains(tag.id)) {
+        readings.by_tag[tag.id].push_back({.frame = picture.frame, .tag = tag, .rejected = {}});
+      } else {
+        readings.unlisted.insert(tag.id);
+      }
+    }
+    readings.frames = picture.frame + 1;
+    const Progress report{.stage = "track",
+                          .done = static_cast<double>(readings.frames),
+                          .total = static_cast<double>(images.count()),
+                          .unit = "frames",
+                          .note = fmt::format("{} tags", picture.tags.size())};
+    if (progress && !progress(report)) cancelled = true;
+  };
+
+  const std::size_t in_flight = 2 * static_cast<std::size_t>(tbb::info::default_concurrency());
+  tbb::parallel_pipeline(
+      in_flight, tbb::make_filter<void, Picture>(tbb::filter_mode::serial_in_order, load) &
+                     tbb::make_filter<Picture, Picture>(tbb::filter_mode::parallel, detect) &
+                     tbb::make_filter<Picture, void>(tbb::filter_mode::serial_in_order, collect));
+  readings.cancelled = cancelled;
+  return readings;
+}
+
+/// "0 to 63" or "0, 4, 7": the numbers as a person would list them.
+std::string list_ids(const std::set<int>& ids) {
+  std::vector<std::string> parts;
+  for (auto it = ids.begin(); it != ids.end();) {
+    const int first = *it;
+    int last = first;
+    for (++it; it != ids.end() && *it == last + 1; ++it) last = *it;
+    parts.push_back(first == last ? fmt::format("{}", first)
+                                  : fmt::format("{} to {}", first, last));
+  }
+  return fmt::format("{}", fmt::join(parts, ", "));
+}
+
+/// What the first picture shows instead of the tags that were looked for, as a remedy.
+std::string what_appears_instead(const Readings& readings, const std::string& family) {
+  if (!readings.unlisted.empty()) {
+    return fmt::format("tags {} of that family do appear: check markers.csv",
+                       list_ids(readings.unlisted));
+  }
+  constexpr std::size_t kEnough = 3;   // fewer may be chance readings of a small code
+  constexpr double kClearMargin = 30;  // grey levels
+  for (const std::string& other : tag_families()) {
+    if (other == family) continue;
+    std::set<int> ids;
+    for (const TagDetection& tag : TagDetector(other, 0).detect(readings.first_picture)) {
+      if (tag.decision_margin > kClearMargin) ids.insert(tag.id);
+    }
+    if (ids.size() >= kEnough) {
+      return fmt::format("the first picture shows tags {} of {}: set that family in recording.yaml",
+                         list_ids(ids), other);
+    }
+  }
+  return "check the camera's `images`, the light, and that a tag is 30 pixels wide or more";
+}
+
+std::vector<ReferencePixel> average_reference(const Readings& readings,
+                                              const PointsByTag& reference) {
+  std::vector<ReferencePixel> result;
+  for (const auto& [id, points] : reference) {
+    const auto history = readings.by_tag.find(id);
+    if (history == readings.by_tag.end()) continue;
+    for (std::size_t c = 0; c < 4; ++c) {
+      std::vector<Eigen::Vector2d> pixels;
+      std::vector<double> sigmas;
+      for (const TagReading& reading : history->second) {
+        if (!reading.rejected[c].empty()) continue;
+        pixels.push_back(reading.tag.corner_px[c]);
+        sigmas.push_back(reading.tag.sigma_px[c]);
+      }
+      if (points[c] == kNone || pixels.empty()) continue;
+      const FixedCorner corner = average_fixed_corner(pixels, sigmas);
+      result.push_back({.point = points[c],
+                        .pixel_px = corner.pixel_px,
+                        .sigma_px = corner.sigma_px,
+                        .frames = corner.frames});
+    }
+  }
+  std::sort(result.begin(), result.end(),
+            [](const ReferencePixel& a, const ReferencePixel& b) { return a.point < b.point; });
+  return result;
+}
+
+Tracks2d collect_tracks(const Readings& readings, const PointsByTag& markers) {
+  Tracks2d tracks;
+  for (const auto& [id, points] : markers) {
+    const auto history = readings.by_tag.find(id);
+    if (history == readings.by_tag.end()) continue;
+    for (const TagReading& reading : history->second) {
+      for (std::size_t c = 0; c < 4; ++c) {
+        if (points[c] == kNone) continue;
+        tracks.push_back({.frame = reading.frame,
+                          .marker = points[c],
+                          .position_px = reading.tag.corner_px[c],
+                          .sigma_px = reading.tag.sigma_px[c],
+                          .rejected = reading.rejected[c]});
+      }
+    }
+  }
+  std::sort(tracks.begin(), tracks.end(), [](const Position2d& a, const Position2d& b) {
+    return a.frame != b.frame ? a.frame < b.frame : a.marker < b.marker;
+  });
+  return tracks;
+}
+
+cv::Mat draw(const Readings& readings, const TrackResult& result) {
+  std::vector<OverlayPoint> points;
+  for (const ReferencePixel& pixel : result.reference) {
+    points.push_back(
+        {.kind = OverlayPoint::Kind::reference, .pixel_px = pixel.pixel_px, .label = ""});
+  }
+  for (const Position2d& row : result.tracks) {
+    if (row.frame != readings.overlay_frame) continue;
+    points.push_back(
+        {.kind = row.rejected.empty() ? OverlayPoint::Kind::good : OverlayPoint::Kind::rejected,
+         .pixel_px = row.position_px,
+         .label = row.rejected});
+  }
+  return draw_overlay(readings.overlay_picture, points);
+}
+
+}  // namespace
+
+void TrackOptions::validate() const {
+  if (!(max_speed_px > 0)) {
+    throw InputError("max_speed_px", fmt::format("{}", max_speed_px), "pixels per frame, > 0");
+  }
+  if (!(min_decision_margin >= 0)) {
+    throw InputError("min_decision_margin", fmt::format("{}", min_decision_margin),
+                     "grey levels, >= 0");
+  }
+  if (!(min_explained >= 0 && min_explained <= 1)) {
+    throw InputError("min_explained", fmt::format("{}", min_explained), "a share, 0 to 1");
+  }
+  if (!(max_sigma_px > 0)) {
+    throw InputError("max_sigma_px", fmt::format("{}", max_sigma_px), "pixels, > 0");
+  }
+  if (max_corrected_bits < 0 || max_corrected_bits > 2) {
+    throw InputError("max_corrected_bits", fmt::format("{}", max_corrected_bits), "0, 1 or 2");
+  }
+}
+
+TrackResult track(const Recording& recording, const CameraEntry& camera,
+                  const TrackOptions& options, const ProgressCallback& progress) {
+  options.validate();
+  const std::string yaml = (recording.folder / "recording.yaml").string();
+  if (!camera.images) {
+    throw InputError(yaml, fmt::format("camera '{}' has no images", camera.name),
+                     "`images` with a folder or a video to track in");
+  }
+  const std::unique_ptr<ImageSource> images = open_images(*camera.images);
+  return track(recording, *images, camera.images->string(), options, progress);
+}
+
+TrackResult track(const Recording& recording, ImageSource& pictures, const std::string& where,
+                  const TrackOptions& options, const ProgressCallback& progress) {
+  options.validate();
+  const PointsByTag markers =
+      points_by_tag(recording.markers.markers, recording.markers_file.string());
+  if (markers.empty()) {
+    throw InputError(recording.markers_file.string(), "no marker is a corner of a tag",
+                     "markers with `tag` and `corner`", "tracking finds AprilTags");
+  }
+  const PointsByTag reference =
+      points_by_tag(recording.reference, recording.reference_file.value_or("reference").string());
+
+  Readings readings = read_all(pictures, recording.markers.family, markers, reference, progress);
+
+  TrackResult result;
+  result.frames = readings.frames;
+  result.image_width = readings.size.width;
+  result.image_height = readings.size.height;
+  if (readings.cancelled) {
+    result.cancelled = true;
+    result.message = fmt::format("cancelled after {} frames", readings.frames);
+    return result;
+  }
+
+  for (auto& [id, history] : readings.by_tag) judge(history, options, readings.size);
+  result.tracks = collect_tracks(readings, markers);
+  if (result.tracks.empty()) {
+    std::set<int> ids;
+    for (const auto& [id, points] : markers) ids.insert(id);
+    throw InputError(where,
+                     fmt::format("no tag of the cloth appears in {} pictures", readings.frames),
+                     fmt::format("tags {} of {}", list_ids(ids), recording.markers.family),
+                     what_appears_instead(readings, recording.markers.family));
+  }
+  result.reference = average_reference(readings, reference);
+
+  int good = 0;
+  for (const Position2d& row : result.tracks) {
+    if (row.rejected.empty()) {
+      ++good;
+    } else {
+      ++result.rejected[row.rejected];
+    }
+  }
+  result.overlay = draw(readings, result);
+  result.overlay_frame = readings.overlay_frame;
+  result.usable = good > 0;
+  result.message = fmt::format("{} corners in {} frames, {} rejected, {} of {} reference points",
+                               good, result.frames, static_cast<int>(result.tracks.size()) - good,
+                               result.reference.size(), recording.reference.size());
+  return result;
+}
+
+}  // namespace clothfit

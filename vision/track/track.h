@@ -1,0 +1,51 @@
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <opencv2/core.hpp>
+#include <string>
+#include <vector>
+
+#include "data/progress.h"
+#include "data/recording.h"
+#include "data/tracks.h"
+#include "vision/ingest/image_source.h"
+#include "vision/track/track_options.h"
+
+namespace clothfit {
+
+/// The mean place of a fixed reference point over all frames that show it.
+struct ReferencePixel {
+  int point = 0;  ///< index into Recording::reference
+  Eigen::Vector2d pixel_px = Eigen::Vector2d::Zero();
+  double sigma_px = 0;  ///< of the mean, systematic part of one detection included
+  int frames = 0;
+};
+
+struct TrackResult {
+  bool usable = false;
+  bool cancelled = false;
+  std::string message;
+  Tracks2d tracks;  ///< good and rejected rows of the cloth's markers
+  std::vector<ReferencePixel> reference;
+  int frames = 0;
+  int image_width = 0;
+  int image_height = 0;
+  std::map<std::string, int> rejected;  ///< reason (vision/track/rejection.h) -> rows of `tracks`
+  cv::Mat overlay;                      ///< one frame with its markers drawn, for the report
+  int overlay_frame = 0;
+};
+
+/// Finds the cloth's tags in every picture of one camera: the markers and reference points that
+/// carry a tag and a corner. Pictures are worked on in parallel; the result does not depend on the
+/// number of threads. `progress` (may be empty) is called once per picture, in order, by one thread
+/// at a time but not always the same. Throws InputError for pictures that cannot be read, are none,
+/// or differ in size, for markers without tags, and when no tag of the cloth ever appears.
+TrackResult track(const Recording& recording, const CameraEntry& camera,
+                  const TrackOptions& options, const ProgressCallback& progress);
+
+/// The same in pictures that come from elsewhere; refusals call them `where`.
+TrackResult track(const Recording& recording, ImageSource& pictures, const std::string& where,
+                  const TrackOptions& options, const ProgressCallback& progress);
+
+}  // namespace clothfit
