@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -134,34 +135,11 @@ Bootstrap bootstrap_linearised(const LinearisedFit& fit, const Eigen::VectorXi& 
   return result;
 }
 
-Bootstrap bootstrap_by_refit(int coordinates, int blocks, const BootstrapOptions& options,
-                             const BlockRefit& refit) {
-  options.validate();
-  if (blocks < 2) throw InputError("blocks", std::to_string(blocks), "at least two");
-  Bootstrap result;
-  result.change = Eigen::MatrixXd::Constant(coordinates, options.replicates, kNothing);
-  for (int replicate = 0; replicate < options.replicates; ++replicate) {
-    const std::optional<Eigen::VectorXd> change =
-        refit(block_weights(options, blocks, replicate), replicate);
-    if (!change || !change->allFinite()) {
-      ++result.failed;
-      continue;
-    }
-    if (change->size() != coordinates)
-      throw InputError("bootstrap", std::to_string(change->size()) + " coordinates from a refit",
-                       std::to_string(coordinates));
-    result.change.col(replicate) = *change;
-  }
-  return result;
-}
-
 ChangeIntervals percentile_intervals(const Bootstrap& bootstrap, double level) {
   return quantiles(bootstrap.change, level);
 }
 
 ChangeIntervals studentised_intervals(const Bootstrap& bootstrap, double level) {
-  if (bootstrap.studentised.cols() == 0)
-    throw InputError("bootstrap", "no studentised changes", "a bootstrap of the linearised fit");
   const ChangeIntervals factor = quantiles(bootstrap.studentised, level);
   return {-factor.upper.cwiseProduct(bootstrap.sigma), -factor.lower.cwiseProduct(bootstrap.sigma)};
 }

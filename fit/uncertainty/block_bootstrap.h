@@ -1,8 +1,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <functional>
-#include <optional>
 
 #include "fit/uncertainty/linearised_fit.h"
 
@@ -35,7 +33,7 @@ struct Bootstrap {
   /// Estimate of each replicate less that of the recording, coordinates x replicates; NaN where a
   /// replicate has no estimate.
   Eigen::MatrixXd change;
-  /// The change divided by the replicate's own standard deviation; empty after a refit.
+  /// The change divided by the replicate's own standard deviation.
   Eigen::MatrixXd studentised;
   Eigen::VectorXd
       sigma;       ///< of the recording, from its blocks (CR0), which `studentised` goes with
@@ -47,17 +45,6 @@ struct Bootstrap {
 Bootstrap bootstrap_linearised(const LinearisedFit& fit, const Eigen::VectorXi& block,
                                const BootstrapOptions& options);
 
-/// A whole fit of one replicate: the change of the coordinates for these numbers of the blocks
-/// (`resampled`: weights of their cost; `wild`: factors of the optimum's residuals, added to what
-/// it predicts). Nothing where the fit fails.
-using BlockRefit = std::function<std::optional<Eigen::VectorXd>(
-    const Eigen::VectorXd& block_weights, int replicate)>;
-
-/// The same with a whole fit per replicate. Throws InputError for options that make no sense, fewer
-/// than two blocks, and a change of another size than `coordinates`.
-Bootstrap bootstrap_by_refit(int coordinates, int blocks, const BootstrapOptions& options,
-                             const BlockRefit& refit);
-
 /// Ends of an interval for each coordinate, as differences from the estimate.
 struct ChangeIntervals {
   Eigen::VectorXd lower, upper;  ///< NaN where fewer than 19 replicates have an estimate
@@ -66,8 +53,7 @@ struct ChangeIntervals {
 /// From quantiles of the change.
 ChangeIntervals percentile_intervals(const Bootstrap& bootstrap, double level);
 
-/// From quantiles of the studentised change, which needs bootstrap_linearised(): wider where few
-/// blocks make sigma itself uncertain. Throws InputError without it.
+/// From quantiles of the studentised change: wider where few blocks make sigma itself uncertain.
 ChangeIntervals studentised_intervals(const Bootstrap& bootstrap, double level);
 
 }  // namespace clothfit

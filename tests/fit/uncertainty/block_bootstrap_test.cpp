@@ -1,5 +1,4 @@
-// The bootstrap over blocks, linearised and by refits of linear models. Not checked here: a cloth's
-// own refits, and how blocks are chosen (space_time_blocks_test.cpp).
+// The bootstrap over blocks. Not checked here: how blocks are chosen (space_time_blocks_test.cpp).
 
 #include "fit/uncertainty/block_bootstrap.h"
 
@@ -7,6 +6,7 @@
 
 #include <Eigen/Cholesky>
 #include <cmath>
+#include <limits>
 
 #include "data/input_error.h"
 #include "fit/uncertainty/cluster_covariance.h"
@@ -63,25 +63,20 @@ TEST(BlockBootstrap, ByOneStepIsTheRefitOfALinearModel) {
   const Eigen::VectorXi block = nine_blocks();
   const Eigen::MatrixXd& j = given.fit.jacobian;
 
+  const auto change = [&](const Eigen::MatrixXd& information, const Eigen::VectorXd& rows) {
+    return Eigen::VectorXd(
+        -information.ldlt().solve(j.transpose() * rows.cwiseProduct(given.fit.residual)));
+  };
   const Bootstrap resampled = bootstrap_linearised(given.fit, block, kResampled);
-  const Bootstrap refitted = bootstrap_by_refit(
-      3, 9, kResampled, [&](const Eigen::VectorXd& weights, int) -> std::optional<Eigen::VectorXd> {
-        const Eigen::VectorXd rows = weights(block);
-        return -(j.transpose() * rows.asDiagonal() * j)
-                    .ldlt()
-                    .solve(j.transpose() * rows.cwiseProduct(given.fit.residual));
-      });
-  EXPECT_LT((resampled.change - refitted.change).norm(), 1e-9 * resampled.change.norm());
-
   const Bootstrap wild = bootstrap_linearised(given.fit, block, kWild);
-  const Bootstrap redrawn = bootstrap_by_refit(
-      3, 9, kWild, [&](const Eigen::VectorXd& factors, int) -> std::optional<Eigen::VectorXd> {
-        const Eigen::VectorXd rows = factors(block);
-        return -(j.transpose() * j)
-                    .ldlt()
-                    .solve(j.transpose() * rows.cwiseProduct(given.fit.residual));
-      });
-  EXPECT_LT((wild.change - redrawn.change).norm(), 1e-9 * wild.change.norm());
+  for (int k = 0; k < kResampled.replicates; ++k) {
+    const Eigen::VectorXd weight = block_weights(kResampled, 9, k)(block);
+    const Eigen::VectorXd refitted = change(j.transpose() * weight.asDiagonal() * j, weight);
+    EXPECT_LT((resampled.change.col(k) - refitted).norm(), 1e-9 * refitted.norm());
+    const Eigen::VectorXd factor = block_weights(kWild, 9, k)(block);
+    const Eigen::VectorXd redrawn = change(j.transpose() * j, factor);
+    EXPECT_LT((wild.change.col(k) - redrawn).norm(), 1e-9 * redrawn.norm());
+  }
 }
 
 TEST(BlockBootstrap, ScattersAsTheSandwichSays) {
@@ -128,18 +123,24 @@ TEST(BlockBootstrap, CoversByStudentisedChangesWhereThePercentilesAreTooNarrow) 
   EXPECT_LT(percentile, studentised - 0.03);
 }
 
-TEST(BlockBootstrap, CountsReplicatesWithoutAnEstimate) {
-  const Bootstrap bootstrap = bootstrap_by_refit(
-      1, 4, kWild, [](const Eigen::VectorXd&, int replicate) -> std::optional<Eigen::VectorXd> {
-        if (replicate % 2 == 0) return std::nullopt;
-        return Eigen::VectorXd::Constant(1, replicate);
-      });
+TEST(BlockBootstrap, TakesQuantilesOfTheReplicatesThatHaveAnEstimate) {
+  Bootstrap bootstrap;
+  bootstrap.change.resize(1, 199);
+  for (int k = 0; k < 199; ++k)
+    bootstrap.change(0, k) = k % 2 == 0 ? std::numeric_limits<double>::quiet_NaN() : k;
 
-  EXPECT_EQ(bootstrap.failed, 100);
-  // The odd numbers 1 ... 197: quantiles of those that are there.
+  // The odd numbers 1 ... 197.
   const ChangeIntervals ends = percentile_intervals(bootstrap, 0.9);
   EXPECT_NEAR(ends.lower[0], 0.05 * 198, 2);
   EXPECT_NEAR(ends.upper[0], 0.95 * 198, 2);
+}
+
+TEST(BlockBootstrap, HasNoEstimateWhereTheDataSayNothing) {
+  LinearisedFit fit = draw_misfit({}, 1, 0).fit;
+  fit.jacobian.col(1).setZero();
+  const Bootstrap bootstrap = bootstrap_linearised(fit, nine_blocks(), kWild);
+  EXPECT_EQ(bootstrap.failed, kWild.replicates);
+  EXPECT_TRUE(std::isnan(studentised_intervals(bootstrap, 0.9).lower[0]));
 }
 
 TEST(BlockBootstrap, RefusesBadInput) {
@@ -148,14 +149,8 @@ TEST(BlockBootstrap, RefusesBadInput) {
   few.replicates = 10;
   EXPECT_THROW(bootstrap_linearised(fit, nine_blocks(), few), InputError);
   EXPECT_THROW(bootstrap_linearised(fit, Eigen::VectorXi::Zero(3), kWild), InputError);
-  const auto two = [](const Eigen::VectorXd&, int) -> std::optional<Eigen::VectorXd> {
-    return Eigen::VectorXd::Zero(2);
-  };
-  EXPECT_THROW(bootstrap_by_refit(3, 9, kWild, two), InputError);
-  EXPECT_THROW(bootstrap_by_refit(2, 1, kWild, two), InputError);
-  const Bootstrap refitted = bootstrap_by_refit(2, 9, kWild, two);
-  EXPECT_THROW(studentised_intervals(refitted, 0.9), InputError);
-  EXPECT_THROW(percentile_intervals(refitted, 1), InputError);
+  EXPECT_THROW(percentile_intervals(bootstrap_linearised(fit, nine_blocks(), kWild), 1),
+               InputError);
 }
 
 }  // namespace
