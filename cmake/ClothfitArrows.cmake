@@ -85,7 +85,7 @@ set(CLOTHFIT_TEST_ARROWS
   "tests/vision -> vision calib data tests/data"
   "tests/model  -> model data"
   "tests/fit    -> fit model calib data tests/data"
-  "tests/apps   -> apps fit model vision calib data"
+  "tests/apps   -> apps fit model vision calib data tests/data"
   "tests/bench  -> fit model tests/model"
 )
 

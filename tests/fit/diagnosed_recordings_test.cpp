@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "fit/diagnosis/diagnose.h"
+#include "tests/data/whole_runs.h"
 #include "tests/fit/whole_recording.h"
 
 namespace clothfit {
@@ -66,6 +67,7 @@ TEST(DiagnosedRecordings, SwingBreezeLacksItsWind) {
 }
 
 TEST(DiagnosedRecordings, SwingHemLacksTheMassOfItsHem) {
+  CLOTHFIT_ONLY_IN_WHOLE_RUNS();
   const double truth_kg = bundled_truth("swing_hem").at("hidden_effects").at(0).at("added_mass_kg");
 
   const Diagnosis diagnosis = diagnose(bundled_recording("swing_hem"), {}, {});

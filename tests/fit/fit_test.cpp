@@ -73,7 +73,8 @@ TEST(Fit, FindsDragWhenAskedForAndNeutralWhereThereIsNone) {
     FitOptions options = quick();
     options.effects = {"viscous_damping"};
 
-    const FitReport report = fit(synthetic_input({.drag_rate_per_s = rate}), options, {});
+    const FitReport report =
+        fit(synthetic_input({.drag_rate_per_s = rate, .mesh = 5}), options, {});
 
     ASSERT_TRUE(report.usable()) << report.message;
     ASSERT_EQ(report.result.effects.size(), 1u);
@@ -84,11 +85,13 @@ TEST(Fit, FindsDragWhenAskedForAndNeutralWhereThereIsNone) {
 }
 
 // A cloth in thick air, of which the model knows nothing.
-TEST(Fit, OnlyFollowsTheCoarseMeshWhereTheModelIsHopeless) {
+TEST(Fit, OnlyFollowsTheCoarseMeshWhereTheModelIsGrosslyMisfitting) {
   const FitInput input = synthetic_input(
       {.drag_rate_per_s = 8, .mesh = 9, .markers = 5, .frames = 20, .held_out_from = 16});
   FitOptions options = quick();
   options.refine_best = 1;
+  options.population = 20;
+  options.generations = 6;
   options.work = 0.05;
   const FitReport whole = fit(input, options, {});
   options.coarse_beyond = 10;

@@ -4,9 +4,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <string>
+#include <vector>
 
 #include "data/input_error.h"
 #include "fit/jobs/draws.h"
@@ -17,14 +19,28 @@ namespace {
 
 /// A cloth that is diagnosed soon, with drag that its recording does not declare.
 const SyntheticCloth kSmallWithDrag{
-    .drag_rate_per_s = 1.2, .mesh = 7, .markers = 5, .frames = 30, .held_out_from = 22};
+    .drag_rate_per_s = 1.2, .mesh = 5, .markers = 4, .frames = 30, .held_out_from = 24};
 
-DiagnoseOptions quick() {
+/// Every effect of the catalogue but those that compete for what these tests hide.
+std::vector<std::string> without_all_but_competitors() {
+  const std::vector<std::string> tested{"viscous_damping", "quadratic_drag", "wind",
+                                        "gravity_tilt",    "scale",          "marker_placement"};
+  std::vector<std::string> without;
+  for (const LawShapes& law : laws_to_test(synthetic_input(kSmallWithDrag), {}, 0.5))
+    if (std::ranges::find(tested, law.front().effect) == tested.end())
+      without.push_back(law.front().effect);
+  return without;
+}
+
+/// A short diagnosis on that cloth's mesh, which tests the drag and what competes with it.
+DiagnoseOptions diagnosis_of_small_cloth() {
   DiagnoseOptions options;
-  options.fit.mesh_columns = options.fit.mesh_rows = 7;
-  options.fit.generations = 10;
-  options.fit.population = 40;
+  options.fit.mesh_columns = options.fit.mesh_rows = 5;
+  options.fit.generations = 5;
+  options.fit.population = 30;
   options.fit.refine_best = 1;
+  options.fit.work = 0.01;
+  options.without = without_all_but_competitors();
   options.lines = 1;
   options.refits = 3;
   options.separate = false;  // tests/fit/diagnosis/separation_test.cpp
@@ -32,7 +48,9 @@ DiagnoseOptions quick() {
 }
 
 TEST(Diagnose, NamesAHiddenDragAndItsAmount) {
-  const Diagnosis diagnosis = diagnose(synthetic_input(kSmallWithDrag), quick(), {});
+  DiagnoseOptions options = diagnosis_of_small_cloth();
+  options.without.clear();  // the whole catalogue competes
+  const Diagnosis diagnosis = diagnose(synthetic_input(kSmallWithDrag), options, {});
 
   ASSERT_TRUE(diagnosis.usable()) << diagnosis.message;
   ASSERT_EQ(diagnosis.accepted.size(), 1u);
@@ -52,12 +70,14 @@ TEST(Diagnose, NamesAHiddenDragAndItsAmount) {
 TEST(Diagnose, FindsNothingWhereNothingIsHiddenAndSaysWhatItWouldHaveSeen) {
   SyntheticCloth cloth = kSmallWithDrag;
   cloth.drag_rate_per_s = 0;
-  const Diagnosis diagnosis = diagnose(synthetic_input(cloth), quick(), {});
+  DiagnoseOptions options = diagnosis_of_small_cloth();
+  options.without.clear();
+  const Diagnosis diagnosis = diagnose(synthetic_input(cloth), options, {});
 
   ASSERT_TRUE(diagnosis.usable()) << diagnosis.message;
   EXPECT_FALSE(diagnosis.changed());
   EXPECT_EQ(diagnosis.verdict, DiagnosisVerdict::adequate);
-  ASSERT_FALSE(diagnosis.limits.empty());
+  EXPECT_GT(diagnosis.limits.size(), 20u);
   for (const DetectionLimit& limit : diagnosis.limits)
     if (limit.term.effect == "viscous_damping") {
       EXPECT_GT(limit.limit[0], 0);
@@ -76,11 +96,11 @@ TEST(Diagnose, SaysThatMarkersAreSeenElsewhereWhereNoLawPutsThemThere) {
     for (double& coordinate : where) coordinate += kOff_m * draws.normal();
     return where;
   };
-  const Diagnosis diagnosis = diagnose(synthetic_input(cloth), quick(), {});
+  const Diagnosis diagnosis = diagnose(synthetic_input(cloth), diagnosis_of_small_cloth(), {});
 
   ASSERT_TRUE(diagnosis.usable()) << diagnosis.message;
   ASSERT_TRUE(diagnosis.seen_elsewhere);
-  // Of 49 markers' 147 numbers, less what the fit could follow.
+  // The rms of 16 markers' 48 numbers scatters by 10 %, and the fit follows a little of it.
   EXPECT_NEAR(diagnosis.seen_elsewhere->rms_m, kOff_m, 0.2 * kOff_m);
   EXPECT_TRUE(diagnosis.accepted.empty());
   EXPECT_EQ(diagnosis.verdict, DiagnosisVerdict::explained);
@@ -90,16 +110,16 @@ TEST(Diagnose, SaysThatMarkersAreSeenElsewhereWhereNoLawPutsThemThere) {
   EXPECT_LT(after.held_out.rms, 1.1 * after.noise);
 }
 
-constexpr double kTurn_rad = 0.05, kTooLarge = 0.02;
+constexpr double kTurn_rad = 0.06, kTooLarge = 0.02;
 
 /// A pattern that is turned on the cloth, in a world that is measured too large: constants of the
 /// markers do most of either.
 FitInput with_two_causes() {
-  SyntheticCloth cloth{.mesh = 7,
-                       .markers = 5,
+  SyntheticCloth cloth{.mesh = 5,
+                       .markers = 4,
                        .marker_margin_m = 0.03,
                        .frames = 30,
-                       .held_out_from = 22,
+                       .held_out_from = 24,
                        .scale = 1 + kTooLarge};
   cloth.seen = [](const SyntheticMotion& motion, double time_s, const Eigen::Vector2d& place_m) {
     const Eigen::Vector2d middle_m(0.2, 0.2);
@@ -108,15 +128,14 @@ FitInput with_two_causes() {
   return synthetic_input(cloth);
 }
 
-DiagnoseOptions quick_of_two_causes() {
-  DiagnoseOptions options = quick();
-  options.fit.work = 0.1;
+DiagnoseOptions diagnosis_of_two_causes() {
+  DiagnoseOptions options = diagnosis_of_small_cloth();
   options.refits = 2;
   return options;
 }
 
 TEST(Diagnose, NamesCausesThatConstantsMatchOneByOneButNotTogether) {
-  DiagnoseOptions options = quick_of_two_causes();
+  DiagnoseOptions options = diagnosis_of_two_causes();
   options.most_effects = 2;
   const Diagnosis diagnosis = diagnose(with_two_causes(), options, {});
 
@@ -138,7 +157,7 @@ TEST(Diagnose, NamesCausesThatConstantsMatchOneByOneButNotTogether) {
 }
 
 TEST(Diagnose, GivesUpACauseThatConstantsMatchWhereNoOtherMayBeNamedWithIt) {
-  DiagnoseOptions options = quick_of_two_causes();
+  DiagnoseOptions options = diagnosis_of_two_causes();
   options.most_effects = 1;
   const Diagnosis diagnosis = diagnose(with_two_causes(), options, {});
 
@@ -146,16 +165,6 @@ TEST(Diagnose, GivesUpACauseThatConstantsMatchWhereNoOtherMayBeNamedWithIt) {
   EXPECT_TRUE(diagnosis.seen_elsewhere);
   for (const AcceptedEffect& accepted : diagnosis.accepted)
     EXPECT_NE(accepted.trial.term.effect, "scale");
-}
-
-TEST(Diagnose, DoesNotNameWhatItWasNotToTest) {
-  DiagnoseOptions options = quick();
-  options.without = {"viscous_damping"};
-  options.most_effects = 1;
-  const Diagnosis diagnosis = diagnose(synthetic_input(kSmallWithDrag), options, {});
-
-  for (const LawScore& score : diagnosis.scores) EXPECT_NE(score.term.effect, "viscous_damping");
-  EXPECT_NE(diagnosis.verdict, DiagnosisVerdict::adequate);
 }
 
 TEST(Diagnose, FitsTwoRecordingsTogetherAndJudgesAThird) {
@@ -170,7 +179,7 @@ TEST(Diagnose, FitsTwoRecordingsTogetherAndJudgesAThird) {
   other.seed = 3;
   FitInput unseen = synthetic_input(other);
   for (Position3d& row : unseen.tracks3d) row.sigma_m = 0;  // a file that does not state it
-  DiagnoseOptions options = quick();
+  DiagnoseOptions options = diagnosis_of_small_cloth();
   options.refits = 2;
   const Diagnosis diagnosis = diagnose(fitted, {&unseen, 1}, options, {});
 
@@ -195,43 +204,59 @@ TEST(Diagnose, FitsTwoRecordingsTogetherAndJudgesAThird) {
   }
 }
 
+/// The drag is left: it is not to be tested, and no cause is to be named.
+DiagnoseOptions diagnosis_without_a_cause() {
+  DiagnoseOptions options = diagnosis_of_small_cloth();
+  options.without.push_back("viscous_damping");
+  options.most_effects = 0;
+  return options;
+}
+
+TEST(Diagnose, TestsNoEffectThatItIsToldToLeaveOutAndProposesALawForIt) {
+  DiagnoseOptions options = diagnosis_without_a_cause();
+  options.law_terms = 1;
+  const Diagnosis diagnosis = diagnose(synthetic_input(kSmallWithDrag), options, {});
+
+  EXPECT_FALSE(diagnosis.scores.empty());
+  for (const LawScore& score : diagnosis.scores) EXPECT_NE(score.term.effect, "viscous_damping");
+  EXPECT_EQ(diagnosis.verdict, DiagnosisVerdict::unexplained);
+  EXPECT_TRUE(diagnosis.law.found());
+}
+
 TEST(Diagnose, ProposesNoLawWhereItIsToldNotTo) {
-  DiagnoseOptions options = quick();
-  options.most_effects = 0;  // the drag is left
+  DiagnoseOptions options = diagnosis_without_a_cause();
   options.law_terms = 0;
   const Diagnosis diagnosis = diagnose(synthetic_input(kSmallWithDrag), options, {});
 
   EXPECT_EQ(diagnosis.verdict, DiagnosisVerdict::unexplained);
   EXPECT_TRUE(diagnosis.law.trials.empty());
   EXPECT_FALSE(diagnosis.law.found());
-
-  options.law_terms = 1;
-  EXPECT_TRUE(diagnose(synthetic_input(kSmallWithDrag), options, {}).law.found());
 }
 
 TEST(Diagnose, EndsSoonWhenItIsToldTo) {
   int calls = 0;
-  const Diagnosis diagnosis =
-      diagnose(synthetic_input({}), quick(), [&](const Progress&) { return ++calls < 5; });
+  const Diagnosis diagnosis = diagnose(synthetic_input({}), diagnosis_of_small_cloth(),
+                                       [&](const Progress&) { return ++calls < 5; });
   EXPECT_EQ(diagnosis.stop, FitStop::cancelled);
 }
 
 TEST(Diagnose, RefusesRecordingsOfTwoCloths) {
   std::vector<FitInput> inputs{synthetic_input({}), synthetic_input({})};
   inputs[1].recording.cloth.width_m *= 1.1;
-  EXPECT_THROW(diagnose(inputs, {}, quick(), {}), InputError);
-  EXPECT_THROW(diagnose({&inputs[0], 1}, {&inputs[1], 1}, quick(), {}), InputError);
-  EXPECT_THROW(diagnose({}, {&inputs[1], 1}, quick(), {}), InputError);
+  EXPECT_THROW(diagnose(inputs, {}, diagnosis_of_small_cloth(), {}), InputError);
+  EXPECT_THROW(diagnose({&inputs[0], 1}, {&inputs[1], 1}, diagnosis_of_small_cloth(), {}),
+               InputError);
+  EXPECT_THROW(diagnose({}, {&inputs[1], 1}, diagnosis_of_small_cloth(), {}), InputError);
 }
 
 TEST(Diagnose, RefusesOptionsThatMakeNoSense) {
-  DiagnoseOptions options = quick();
+  DiagnoseOptions options = diagnosis_of_small_cloth();
   options.lines = 0;
   EXPECT_THROW(diagnose(synthetic_input({}), options, {}), InputError);
-  options = quick();
+  options = diagnosis_of_small_cloth();
   options.law_terms = 11;
   EXPECT_THROW(diagnose(synthetic_input({}), options, {}), InputError);
-  options = quick();
+  options = diagnosis_of_small_cloth();
   options.without = {"aether"};
   EXPECT_THROW(diagnose(synthetic_input({}), options, {}), InputError);
 }

@@ -23,8 +23,15 @@ namespace {
 const FitOptions kScoreOptions{.loss = Loss::squared};
 
 DiagnosisSetup setup_of(std::span<const FitInput> inputs) {
-  return {.inputs = inputs, .options = kScoreOptions, .columns = 9, .rows = 9};
+  const ClothDescription& cloth = inputs.front().recording.cloth;
+  return {.inputs = inputs,
+          .options = kScoreOptions,
+          .columns = cloth.mesh_columns,
+          .rows = cloth.mesh_rows};
 }
+
+/// A cloth that is simulated soon.
+const SyntheticCloth kFewVertices{.mesh = 5};
 
 TEST(LawScore, ForeseesASmallDragAndItsSigma) {
   const SyntheticCloth cloth{.drag_rate_per_s = 0.05, .noise_m = 1e-4};
@@ -45,7 +52,7 @@ TEST(LawScore, ForeseesASmallDragAndItsSigma) {
 }
 
 TEST(LawScore, IsThatOfNoiseWhereNothingIsHidden) {
-  const SyntheticCloth cloth;
+  const SyntheticCloth cloth = kFewVertices;
   const FitInput input = synthetic_input(cloth);
   const DiagnosisSetup setup = setup_of({&input, 1});
   const ModelFit model = that_may_err(setup, true_model(setup, cloth));
@@ -145,7 +152,8 @@ TEST(LawDerivatives, AreThoseOfAModelThatHasTheLawAtItsNeutralValue) {
 
 TEST(Adequacy, HoldsForATrueModelAndNotForOneThatLacksDrag) {
   for (const double drag : {0.0, 1.0}) {
-    const SyntheticCloth cloth{.drag_rate_per_s = drag};
+    SyntheticCloth cloth = kFewVertices;
+    cloth.drag_rate_per_s = drag;
     const FitInput input = synthetic_input(cloth);
     const DiagnosisSetup setup = setup_of({&input, 1});
     const ModelFit model = that_may_err(setup, true_model(setup, cloth));
@@ -189,7 +197,7 @@ TEST(Adequacy, TakesLittleBesideTheDiscretisationsErrorForNoStructure) {
 // A model that is true foresees left-out frames to the noise; constants of markers, which nothing
 // asks for, and a last residual, which is noise, do worse.
 TEST(CrossValidation, OfATrueModelIsTheNoiseAndBeatsCorrectionsWithoutPhysics) {
-  const SyntheticCloth cloth;
+  const SyntheticCloth cloth = kFewVertices;
   const FitInput input = synthetic_input(cloth);
   const DiagnosisSetup setup = setup_of({&input, 1});
   const ModelFit model = true_model(setup, cloth);
@@ -207,7 +215,7 @@ TEST(CrossValidation, OfATrueModelIsTheNoiseAndBeatsCorrectionsWithoutPhysics) {
 // The same of a whole recording that took no part in finding the cloth's parameters: only where its
 // sheet lay is its own.
 TEST(CrossValidation, OfATrueModelForeseesAnotherRecordingToTheNoise) {
-  const SyntheticCloth cloth;
+  const SyntheticCloth cloth = kFewVertices;
   const std::vector<FitInput> inputs{synthetic_input({.seed = 1}), synthetic_input({.seed = 2})};
   const DiagnosisSetup setup = setup_of(inputs);
   const ModelFit model = true_model(setup, cloth);
@@ -243,7 +251,7 @@ TEST(CrossValidation, KeepsTheFramesThatShowAStartInMotion) {
 }
 
 TEST(Discretisation, ShowsWhatTheStepAndTheMeshAreWorth) {
-  const SyntheticCloth cloth;
+  const SyntheticCloth cloth = kFewVertices;
   const FitInput input = synthetic_input(cloth);
   const DiagnosisSetup setup = setup_of({&input, 1});
   const ModelFit model = true_model(setup, cloth);
@@ -265,7 +273,7 @@ TEST(Discretisation, ShowsWhatTheStepAndTheMeshAreWorth) {
 
 // The scheme is of first order: at an eighth of the step an eighth of the error is left.
 TEST(Discretisation, ExpectsOfTheStepWhatAFinerOneShows) {
-  const SyntheticCloth cloth;
+  const SyntheticCloth cloth = kFewVertices;
   const FitInput input = synthetic_input(cloth);
   const DiagnosisSetup setup = setup_of({&input, 1});
   const ModelFit model = true_model(setup, cloth);
@@ -314,7 +322,7 @@ TEST(Discretisation, OfAStartInMotionStopsShortOnlyAlongTheParameters) {
 
 // Where nothing is missing the amounts are those of noise, and a fit keeps its directions.
 TEST(Discretisation, OfATrueModelIsBelieved) {
-  const SyntheticCloth cloth;
+  const SyntheticCloth cloth = kFewVertices;
   const FitInput input = synthetic_input(cloth);
   const DiagnosisSetup setup = setup_of({&input, 1});
   ModelFit model = true_model(setup, cloth);
@@ -329,7 +337,9 @@ TEST(Discretisation, OfATrueModelIsBelieved) {
 }
 
 TEST(Discretisation, IsNotWhatAModelLacksThatIsFarOff) {
-  const SyntheticCloth cloth{.drag_rate_per_s = 2, .noise_m = 1e-4};
+  SyntheticCloth cloth = kFewVertices;
+  cloth.drag_rate_per_s = 2;
+  cloth.noise_m = 1e-4;
   const FitInput input = synthetic_input(cloth);
   const DiagnosisSetup setup = setup_of({&input, 1});
   ModelFit model = true_model(setup, cloth);

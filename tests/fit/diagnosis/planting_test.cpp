@@ -16,6 +16,9 @@ const FitOptions kPlantingOptions = [] {
   return options;
 }();
 
+/// A cloth that is searched soon.
+const SyntheticCloth kTwinCloth{.mesh = 5, .markers = 4, .frames = 26, .held_out_from = 20};
+
 /// A few laws of the air and of gravity.
 SearchOptions few_laws(const FitInput& input) {
   SearchOptions options{.laws = {},
@@ -32,10 +35,10 @@ SearchOptions few_laws(const FitInput& input) {
 }
 
 TEST(Planting, FindsThePlantedDragOnATwinAndNothingOnATwinWithoutIt) {
-  const SyntheticCloth cloth{};
+  const SyntheticCloth& cloth = kTwinCloth;
   const FitInput input = synthetic_input(cloth);
   const DiagnosisSetup setup{
-      .inputs = {&input, 1}, .options = kPlantingOptions, .columns = 9, .rows = 9};
+      .inputs = {&input, 1}, .options = kPlantingOptions, .columns = 5, .rows = 5};
   const ModelFit model = true_model(setup, cloth);
   const Plant drag{.term = drag_term(), .parameter = "rate", .beyond_neutral = 0.8};
 
@@ -50,10 +53,11 @@ TEST(Planting, FindsThePlantedDragOnATwinAndNothingOnATwinWithoutIt) {
 
 // A model that has the drag itself is the truth of a twin with drag: nothing is missing there.
 TEST(Planting, FindsNothingOnATwinOfWhatTheModelHas) {
-  const SyntheticCloth cloth{.drag_rate_per_s = 1};
+  SyntheticCloth cloth = kTwinCloth;
+  cloth.drag_rate_per_s = 1;
   const FitInput input = synthetic_input(cloth);
   const DiagnosisSetup setup{
-      .inputs = {&input, 1}, .options = kPlantingOptions, .columns = 9, .rows = 9};
+      .inputs = {&input, 1}, .options = kPlantingOptions, .columns = 5, .rows = 5};
   const ModelFit model = true_model(setup, cloth, {drag_term()});
 
   SearchOptions options = few_laws(input);

@@ -6,8 +6,10 @@
 
 #include <cmath>
 #include <limits>
+#include <vector>
 
 #include "fit/diagnosis/discretisation.h"
+#include "tests/data/whole_runs.h"
 #include "tests/fit/diagnosis/true_model.h"
 
 namespace clothfit {
@@ -72,10 +74,10 @@ TEST(WorthNaming, CountsLargeResidualsAsTheFitDoes) {
               0.05 * (blocks * threshold * (2 * length - threshold) + prior), 1e-9 * blocks);
 }
 
-/// A cloth that bounces a few times, so that a stiffer one fits it in a valley of its own.
+/// A cloth that bounces a few times, so that a stiffer one fits it in a basin of its own.
 const SyntheticCloth kBouncing{.mesh = 7, .markers = 5, .frames = 60, .held_out_from = 48};
 
-FitOptions quick() {
+FitOptions short_search() {
   FitOptions options;
   options.generations = 10;
   options.population = 40;
@@ -83,7 +85,7 @@ FitOptions quick() {
   return options;
 }
 
-/// The model without laws in that valley.
+/// The model without laws in that basin.
 ModelFit stiffer(const DiagnosisSetup& setup, SyntheticCloth cloth) {
   constexpr double kStiffer = 6;
   for (double* stiffness : {&cloth.fabric.tension_warp_n_per_m, &cloth.fabric.tension_weft_n_per_m,
@@ -99,9 +101,10 @@ SearchOptions only(const Term& law) {
   return {.laws = {{law}}, .lines = 1, .most_effects = 1, .threshold = kSquares};
 }
 
-TEST(SearchLaws, LeavesAValleyRatherThanNameALawForIt) {
+TEST(SearchLaws, LeavesABasinRatherThanNameALawForIt) {
+  CLOTHFIT_ONLY_IN_WHOLE_RUNS();
   const FitInput input = synthetic_input(kBouncing);
-  const FitOptions options = quick();
+  const FitOptions options = short_search();
   const DiagnosisSetup setup{.inputs = {&input, 1}, .options = options, .columns = 7, .rows = 7};
   const ModelFit base = stiffer(setup, kBouncing);
   ASSERT_TRUE(base.usable);
@@ -117,24 +120,36 @@ TEST(SearchLaws, LeavesAValleyRatherThanNameALawForIt) {
   EXPECT_LT(found.model.chi_square(kSquares), 1.2 * count);
 }
 
-// Of a cloth in thick air, what a coarse mesh finds that knows nothing of it.
-TEST(SearchLaws, ChoosesALawForAHopelessModelOnACoarserMesh) {
-  const SyntheticCloth cloth{
-      .drag_rate_per_s = 3, .mesh = 11, .markers = 5, .frames = 20, .held_out_from = 16};
-  const FitInput input = synthetic_input(cloth);
-  const FitOptions options = quick();
-  const DiagnosisSetup setup{.inputs = {&input, 1}, .options = options, .columns = 11, .rows = 11};
+/// A cloth in thick air.
+SyntheticCloth in_thick_air(int mesh, int markers) {
+  return {
+      .drag_rate_per_s = 3, .mesh = mesh, .markers = markers, .frames = 20, .held_out_from = 16};
+}
+
+/// What a coarser mesh finds that knows nothing of the air.
+std::vector<NamedValues> found_without_air(const DiagnosisSetup& setup,
+                                           const SyntheticCloth& cloth) {
   ModelFit coarse = true_model(with_coarse_mesh(setup), cloth);
   refine_model(coarse, with_coarse_mesh(setup), {}, {});
-  ASSERT_TRUE(coarse.usable);
-  const auto rough = [&](const std::vector<NamedValues>& values) {
-    ModelFit model = model_at(setup, {}, values);
-    linearise_model(model);
-    model.rough = true;
-    EXPECT_TRUE(model.is_hopeless());
-    return model;
-  };
-  const ModelFit base = rough(coarse.values());
+  EXPECT_TRUE(coarse.usable);
+  return coarse.values();
+}
+
+ModelFit grossly_misfitting(const DiagnosisSetup& setup, const std::vector<NamedValues>& values) {
+  ModelFit model = model_at(setup, {}, values);
+  linearise_model(model);
+  model.rough = true;
+  EXPECT_TRUE(model.is_hopeless());
+  return model;
+}
+
+// The mesh of half the cells, on which this one's errors are estimated, has few vertices.
+TEST(SearchLaws, ChoosesALawForAGrosslyMisfittingModelOnACoarserMesh) {
+  const SyntheticCloth cloth = in_thick_air(13, 4);
+  const FitInput input = synthetic_input(cloth);
+  const FitOptions options = short_search();
+  const DiagnosisSetup setup{.inputs = {&input, 1}, .options = options, .columns = 13, .rows = 13};
+  const ModelFit base = grossly_misfitting(setup, found_without_air(setup, cloth));
 
   const LawSearch found = search_laws(setup, base, only(drag_term()), {});
 
@@ -147,11 +162,17 @@ TEST(SearchLaws, ChoosesALawForAHopelessModelOnACoarserMesh) {
   EXPECT_NEAR(found.accepted.front().trial.fall,
               without.chi_square(kSquares) - found.model.chi_square(kSquares),
               0.01 * without.chi_square(kSquares));
+}
 
-  // Where no law is found it is refined on its own mesh.
-  std::vector<NamedValues> elsewhere = coarse.values();
+TEST(SearchLaws, RefinesAGrosslyMisfittingModelOnItsOwnMeshWhereNoLawIsFound) {
+  const SyntheticCloth cloth = in_thick_air(11, 5);
+  const FitInput input = synthetic_input(cloth);
+  const FitOptions options = short_search();
+  const DiagnosisSetup setup{.inputs = {&input, 1}, .options = options, .columns = 11, .rows = 11};
+  std::vector<NamedValues> elsewhere = found_without_air(setup, cloth);
   elsewhere.front().at("shear") *= 0.7;
-  const ModelFit off = rough(elsewhere);
+  const ModelFit off = grossly_misfitting(setup, elsewhere);
+
   const LawSearch refined = search_laws(setup, off, {.lines = 1, .threshold = kSquares}, {});
 
   ASSERT_TRUE(refined.base.usable);
@@ -159,11 +180,14 @@ TEST(SearchLaws, ChoosesALawForAHopelessModelOnACoarserMesh) {
   EXPECT_LT(refined.base.chi_square(kSquares), off.chi_square(kSquares));
 }
 
-TEST(SearchLaws, CreditsALawWithWhatItExplainsAndNotWithTheValley) {
+TEST(SearchLaws, CreditsALawWithWhatItExplainsAndNotWithTheBasin) {
   SyntheticCloth cloth = kBouncing;
   cloth.drag_rate_per_s = 1.5;
+  cloth.markers = 4;
+  cloth.frames = 44;
+  cloth.held_out_from = 36;
   const FitInput input = synthetic_input(cloth);
-  const FitOptions options = quick();
+  const FitOptions options = short_search();
   const DiagnosisSetup setup{.inputs = {&input, 1}, .options = options, .columns = 7, .rows = 7};
   const ModelFit base = stiffer(setup, cloth);
   ASSERT_TRUE(base.usable);
