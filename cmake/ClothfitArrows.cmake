@@ -72,9 +72,10 @@ set(CLOTHFIT_ARROWS
                            apps/study/trials apps/study/louchet1995 apps/study/recordings"
   "apps/verbs           -> data model/topology model/fabric model/cloth model/effects
                            model/integrate fit/interface fit/jobs fit/measurement_effects
-                           fit/problem fit/diagnosis apps/terminal apps/steps apps/report/page
-                           apps/report/fit apps/report/diagnosis apps/study/trials
-                           apps/study/louchet1995 apps/study/recordings apps/report/study"
+                           fit/problem fit fit/diagnosis apps/terminal apps/steps
+                           apps/report/page apps/report/fit apps/report/diagnosis
+                           apps/study/trials apps/study/louchet1995 apps/study/recordings
+                           apps/report/study"
   "apps                 -> data apps/terminal apps/verbs"
 )
 

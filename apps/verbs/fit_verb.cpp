@@ -25,6 +25,7 @@
 #include "data/number_text.h"
 #include "data/output_folder.h"
 #include "data/text_file.h"
+#include "fit/fit.h"
 
 namespace clothfit {
 namespace {

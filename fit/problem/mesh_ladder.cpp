@@ -1,5 +1,7 @@
 #include "fit/problem/mesh_ladder.h"
 
+#include <algorithm>
+
 namespace clothfit {
 
 std::pair<int, int> other_mesh_of(int columns, int rows, int least) {
