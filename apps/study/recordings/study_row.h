@@ -1,16 +1,9 @@
 #pragma once
 
-#include <filesystem>
 #include <map>
 #include <optional>
 #include <string>
 #include <vector>
-
-#include "apps/study/recordings/marker_weights.h"
-#include "apps/study/recordings/published_errors.h"
-#include "data/progress.h"
-#include "fit/fit.h"
-#include "fit/jobs/journal.h"
 
 namespace clothfit {
 

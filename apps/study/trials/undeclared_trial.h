@@ -7,7 +7,6 @@
 
 #include "apps/study/scene/releases.h"
 #include "fit/diagnosis/diagnose.h"
-#include "fit/jobs/executor.h"
 
 namespace clothfit {
 
