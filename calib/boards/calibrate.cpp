@@ -25,8 +25,9 @@ double robust_cost(const std::vector<Eigen::Vector2d>& residuals_px, double scal
   return cost;
 }
 
-/// A flat board far away looks nearly the same under two poses, and a view may have started in the
-/// wrong one: takes the other where it fits better. True when a view was changed.
+/// Gives a view the other of its two poses where that fits better; true when a view was changed. A
+/// flat board far away looks nearly the same under both, and a view may have started in the wrong
+/// one.
 bool turn_views_round(const BoardObservations& observations, double scale_px,
                       CameraEstimate& estimate) {
   const CameraParameters camera = to_camera(observations, estimate);
@@ -55,8 +56,8 @@ bool turn_views_round(const BoardObservations& observations, double scale_px,
   return changed;
 }
 
-/// Corners with a Cauchy loss whose scale follows the residuals down, so that gross errors lose
-/// their pull while the distortion finds its shape.
+/// Fits the corners under a Cauchy loss whose scale follows the residuals down. Gross errors then
+/// lose their pull while the distortion is still being found.
 bool refine_robustly(const BoardObservations& observations, CameraEstimate& estimate) {
   constexpr int kRounds = 8;
   constexpr double kCauchySigmas = 2;  // loses 5 % of efficiency on normal errors; no bias
@@ -74,9 +75,9 @@ bool refine_robustly(const BoardObservations& observations, CameraEstimate& esti
   return true;
 }
 
-/// Plain least squares on the corners within `outlier_sigmas` robust sigma, until that set no
-/// longer changes. A view with less than half of its corners good is left out as a whole: what else
-/// agrees there may well be chance.
+/// Fits by least squares the corners within `outlier_sigmas` robust sigma, until that set stays the
+/// same. A view with less than half of its corners good is left out as a whole: its good corners
+/// may well agree by chance.
 bool refine_on_good_corners(const BoardObservations& observations, double outlier_sigmas,
                             CameraEstimate& estimate) {
   constexpr int kRounds = 10;
@@ -108,7 +109,7 @@ std::vector<std::string> intrinsic_names(CameraModel model) {
   return {"fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"};
 }
 
-/// Largest angle between the planes of any two active views.
+/// Returns the largest angle between the planes of any two active views.
 double largest_tilt_rad(const CameraEstimate& estimate) {
   std::vector<Eigen::Vector3d> normals;
   for (std::size_t view = 0; view < estimate.used.size(); ++view) {
@@ -125,8 +126,8 @@ double largest_tilt_rad(const CameraEstimate& estimate) {
   return largest;
 }
 
-/// Whether each used corner's pixel leads back to where the corner was: not so where the distortion
-/// folds the picture over itself.
+/// Says whether each used corner's pixel leads back to that corner. It does not where the
+/// distortion folds the picture over itself.
 bool is_one_to_one(const BoardObservations& observations, const CameraEstimate& estimate) {
   const CameraParameters camera = to_camera(observations, estimate);
   for (std::size_t view = 0; view < observations.seen.size(); ++view) {
@@ -145,7 +146,7 @@ bool is_one_to_one(const BoardObservations& observations, const CameraEstimate& 
   return true;
 }
 
-/// What is wrong with the observations as given; empty when nothing is.
+/// Says what is wrong with the observations as given; empty when nothing is.
 std::string problem_with(const BoardDescription& board, const std::vector<BoardView>& views,
                          int image_width, int image_height) {
   if (board.columns < 3 || board.rows < 3 || !(board.square_m > 0)) {

@@ -9,8 +9,8 @@
 
 namespace clothfit {
 
-/// A board as one still shows it: the pixels of its inner corners, row by row, in the order of the
-/// board's own grid (corner r * columns + c lies at (c, r, 0) * square).
+/// A board as one still shows it. Corners are the pixels of its inner corners, row by row, in the
+/// order of the board's own grid: corner r * columns + c lies at (c, r, 0) * square.
 struct BoardView {
   std::string name;  ///< of the picture
   std::vector<Eigen::Vector2d> corners_px;
@@ -49,17 +49,18 @@ struct CalibrateResult {
   int corners_rejected = 0;
 };
 
-/// Intrinsics from views of one flat board: closed-form start from OpenCV [zhang2000], refined in
-/// Ceres over intrinsics and one pose per view, with a Cauchy loss first, then by least squares on
-/// the corners that lie within `outlier_sigmas`; a view with less than half of its corners good is
-/// left out. Sigmas are those of the inverse normal equations times the residuals' variance per
-/// degree of freedom. The denominator of brown_conrady with 8 coefficients (k4 k5 k6) is drawn to 0
-/// with a sigma of 1, because lenses with little distortion leave it undetermined.
+/// Estimates the intrinsics of a camera from views of one flat board. The start is closed-form,
+/// from OpenCV [zhang2000]; Ceres refines intrinsics and one pose per view, with a Cauchy loss
+/// first, then by least squares on the corners within `outlier_sigmas`. A view with less than half
+/// of its corners good is left out. Sigmas are those of the inverse normal equations times the
+/// residuals' variance per degree of freedom. The denominator of brown_conrady with 8 coefficients
+/// (k4 k5 k6) is drawn to 0 with a sigma of 1, because lenses with little distortion leave it
+/// undetermined.
 ///
-/// Not usable, with a message for a person: fewer than 3 views or a view with another number of
-/// corners than the board; boards so nearly parallel that the focal length stays open (sigma above
-/// 2 %); a distortion that folds the picture over itself. Throws InputError for options that
-/// validate() refuses, and nothing else.
+/// The result is not usable, with a message for a person, for fewer than 3 views; for a view with
+/// another number of corners than the board; for boards so nearly parallel that the focal length
+/// stays open (sigma above 2 %); and for a distortion that folds the picture over itself. Throws
+/// InputError only for options that validate() refuses.
 CalibrateResult calibrate(const BoardDescription& board, const std::vector<BoardView>& views,
                           int image_width, int image_height, const CalibrateOptions& options);
 

@@ -13,8 +13,9 @@
 namespace clothfit {
 namespace {
 
-/// Focal lengths worth a start: the closed form from the homographies' orthogonality [zhang2000],
-/// and, because it fails on views that are nearly parallel, a few that span usual lenses.
+/// Returns focal lengths worth a start. The first is the closed form from the homographies'
+/// orthogonality [zhang2000]; it fails on views that are nearly parallel, so a few that span usual
+/// lenses follow.
 std::vector<Eigen::Vector2d> focal_candidates(const BoardObservations& observations) {
   // A start has to live with distortion that is not known yet; gross errors are larger.
   const double tolerance_px =
@@ -58,8 +59,8 @@ std::vector<Eigen::Vector2d> focal_candidates(const BoardObservations& observati
   return candidates;
 }
 
-/// The camera without distortion at `focal_px` with the pose of each view; views without one are
-/// left unused.
+/// Returns the camera without distortion at `focal_px`, with the pose of each view. Views without a
+/// pose are left unused.
 CameraEstimate start_at(const BoardObservations& observations, CameraModel model,
                         int distortion_count, const Eigen::Vector2d& focal_px) {
   CameraEstimate start;

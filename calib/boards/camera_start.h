@@ -6,8 +6,9 @@
 
 namespace clothfit {
 
-/// A camera without distortion and a pose for each view, from closed forms: the focal length among
-/// a few candidates that explains the corners best. Views without a pose are left unused.
+/// Estimates a camera without distortion and a pose for each view from closed forms. The focal
+/// length is that of a few candidates which explains the corners best. Views without a pose are
+/// left unused.
 CameraEstimate start_estimate(const BoardObservations& observations, CameraModel model,
                               int distortion_count);
 

@@ -53,8 +53,8 @@ ceres::CostFunction* make_reprojection(const CameraEstimate& estimate,
 }
 
 /// Draws the denominator's coefficients of brown_conrady with 8 towards 0. Lenses with little
-/// distortion leave them undetermined, and then the ratio runs off to where a zero and a pole
-/// nearly cancel inside the picture.
+/// distortion leave them undetermined: a zero and a pole of the ratio then come to lie inside the
+/// picture, where they nearly cancel.
 struct RationalPrior {
   static constexpr double kSigma = 1;
   double weight_px;
@@ -65,8 +65,8 @@ struct RationalPrior {
   }
 };
 
-/// Adds every used corner; `cauchy_scale_px` 0 stands for plain least squares. The problem points
-/// into `estimate`.
+/// Adds every used corner to the problem, which points into `estimate`. `cauchy_scale_px` 0 stands
+/// for plain least squares.
 void build_problem(const BoardObservations& observations, double cauchy_scale_px,
                    CameraEstimate& estimate, ceres::Problem& problem) {
   for (std::size_t view = 0; view < observations.seen.size(); ++view) {
@@ -103,8 +103,8 @@ bool refine_camera(const BoardObservations& observations, double cauchy_scale_px
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::DENSE_SCHUR;
   options.max_num_iterations = 200;
-  // Without an upper bound the damping fades away in the valleys of long distortion series, and
-  // the normal equations become singular to rounding.
+  // Without an upper bound the damping vanishes in the long flat basins of long distortion series,
+  // and the normal equations become singular to rounding.
   options.max_trust_region_radius = 1e8;
   options.function_tolerance = 1e-12;
   options.parameter_tolerance = 1e-12;

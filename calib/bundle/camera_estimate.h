@@ -13,7 +13,7 @@
 
 namespace clothfit {
 
-/// What is given: a flat board's corners, and where each view shows them.
+/// The given data: a flat board's corners, and where each view shows them.
 struct BoardObservations {
   std::vector<Eigen::Vector2d> on_board_m;                ///< corners of the board, z = 0
   std::vector<const std::vector<Eigen::Vector2d>*> seen;  ///< per view, px
@@ -31,25 +31,26 @@ struct CameraEstimate {
   double corner_sigma_px = 0.1;              ///< weighs the corners against RationalPrior
 
   int intrinsics_count() const { return 4 + distortion_count; }
-  /// Whether any corner of the view takes part.
+  /// Says whether any corner of the view takes part.
   bool is_active(std::size_t view) const;
 };
 
-/// Least squares over intrinsics and poses on the used corners, under a Cauchy loss of this scale
-/// (0: none). False when the solver failed.
+/// Refines intrinsics and poses by least squares on the used corners, under a Cauchy loss of this
+/// scale (0: none). Returns false when the solver failed.
 bool refine_camera(const BoardObservations& observations, double cauchy_scale_px,
                    CameraEstimate& estimate);
 
-/// Observed minus projected, px, for every corner of a view; infinite where it lies behind the
-/// camera.
+/// Returns observed minus projected, px, for every corner of a view; infinite where it lies behind
+/// the camera.
 std::vector<Eigen::Vector2d> view_residuals(const BoardObservations& observations,
                                             const CameraEstimate& estimate, std::size_t view);
 
-/// Robust standard deviation per coordinate over all corners of the active views, good or bad.
+/// Estimates the robust standard deviation per coordinate over all corners, good or bad, of the
+/// active views.
 double robust_sigma_px(const BoardObservations& observations, const CameraEstimate& estimate);
 
-/// Standard deviations of the intrinsics: the inverse of the normal equations, times the variance
-/// per coordinate. Nothing when the normal equations are singular.
+/// Returns the standard deviations of the intrinsics: the inverse of the normal equations, times
+/// the variance per coordinate. Nothing when the normal equations are singular.
 std::optional<Eigen::VectorXd> intrinsic_sigmas(const BoardObservations& observations,
                                                 double variance_px2, CameraEstimate& estimate);
 

@@ -12,7 +12,7 @@
 namespace clothfit {
 namespace {
 
-/// Pixel of a point whose place is taken as exact; unknown is the camera's pose.
+/// The pixel residual of a point whose place is taken as exact; the camera's pose is unknown.
 struct PixelOfExactPoint {
   const FixedCamera* camera;
   const PlacedPixel* observed;

@@ -15,8 +15,8 @@
 
 namespace clothfit {
 
-// The camera's pose from points whose places are taken as exact. Inside calib/ only: place_sheet
-// and the start of place_world stand on it.
+// These functions find the camera's pose from points whose places are taken as exact. They are
+// inside calib/ only, the base of place_sheet and of the start of place_world.
 
 /// The camera with its numbers in the order that project() takes.
 struct FixedCamera {
@@ -29,7 +29,7 @@ struct FixedCamera {
         intrinsics(intrinsics_of(camera)),
         distortion_count(static_cast<int>(camera.distortion.size())) {}
 
-  /// (projected - observed) / sigma; false behind the camera.
+  /// Computes (projected - observed) / sigma; returns false behind the camera.
   template <class Real>
   bool residual(const Eigen::Matrix<Real, 3, 1>& in_camera, const PlacedPixel& observed,
                 Real* out) const {
@@ -44,23 +44,23 @@ struct FixedCamera {
   }
 };
 
-/// For problems of a few dozen unknowns, to the limits of rounding.
+/// Returns options for problems of a few dozen unknowns, solved to the limits of rounding.
 ceres::Solver::Options solver_options();
 
-/// Residuals of points taken as exact, in sigmas; infinite behind the camera.
+/// Returns residuals of points taken as exact, in sigmas; infinite behind the camera.
 std::vector<Eigen::Vector2d> standardised_residuals(const FixedCamera& camera,
                                                     const std::vector<PlacedPixel>& pixels,
                                                     const Rigid3& camera_from_world);
 
-/// Robust standard deviation per coordinate.
+/// Returns the robust standard deviation per coordinate.
 double robust_spread(const std::vector<Eigen::Vector2d>& residuals);
 
-/// Moves `camera_from_world` to the least squares of the pixels marked `used`; `cauchy_scale` 0
-/// stands for no robust loss.
+/// Moves `camera_from_world` to the least squares of the pixels marked `used`. A `cauchy_scale` of
+/// 0 stands for no robust loss.
 bool refine_pose(const FixedCamera& camera, const std::vector<PlacedPixel>& pixels,
                  const std::vector<char>& used, double cauchy_scale, Rigid3& camera_from_world);
 
-/// A pose refined with gross errors held off, and the robust spread it leaves (in sigmas).
+/// A pose refined with gross errors held off, and the robust spread of its residuals (in sigmas).
 struct RobustPose {
   Rigid3 camera_from_world;
   double spread = std::numeric_limits<double>::infinity();
@@ -70,12 +70,12 @@ struct RobustPose {
 RobustPose refine_pose_robustly(const FixedCamera& camera, const std::vector<PlacedPixel>& pixels,
                                 const Rigid3& start);
 
-/// Where the rays through the pixels meet the plane z = 1 in front of the camera; nothing where a
-/// pixel has no ray.
+/// Returns where the rays through the pixels meet the plane z = 1 in front of the camera; nothing
+/// where a pixel has no ray.
 std::optional<std::vector<Eigen::Vector2d>> on_image_plane(const CameraParameters& camera,
                                                            const std::vector<PlacedPixel>& pixels);
 
-/// Whether all numbers are finite and all sigmas > 0.
+/// Says whether all numbers are finite and all sigmas > 0.
 bool is_finite(const std::vector<PlacedPixel>& pixels);
 
 }  // namespace clothfit

@@ -27,7 +27,7 @@ inline Rigid3 from_block(const PoseBlock& block) {
           Eigen::Map<const Eigen::Vector3d>(block.data() + 4)};
 }
 
-/// The point `point_in_a` in frame b.
+/// Returns the point `point_in_a` in frame b.
 template <class Real>
 Eigen::Matrix<Real, 3, 1> transform(const Real* b_from_a,
                                     const Eigen::Matrix<Real, 3, 1>& point_in_a) {
@@ -36,8 +36,9 @@ Eigen::Matrix<Real, 3, 1> transform(const Real* b_from_a,
   return rotation * point_in_a + translation;
 }
 
-/// Perturbs a pose on the left, x <- (exp(w), d) x with tangent (w, d), so that covariances in the
-/// tangent space come out as CameraPose::covariance wants them; the same as turn_and_shift(w, d).
+/// Perturbs a pose on the left, x <- (exp(w), d) x with tangent (w, d), the same as
+/// turn_and_shift(w, d). Covariances in the tangent space are then those that
+/// CameraPose::covariance wants.
 struct PoseManifoldFunctor {
   template <class Real>
   bool Plus(const Real* x, const Real* tangent, Real* x_plus) const {
@@ -47,7 +48,7 @@ struct PoseManifoldFunctor {
     const Eigen::Map<const Eigen::Matrix<Real, 3, 1>> w(tangent);
     const Eigen::Map<const Eigen::Matrix<Real, 3, 1>> shift(tangent + 3);
     const Real half2 = Real(0.25) * w.squaredNorm();
-    // The root has no derivative at 0, the series has, and is exact to the last bit below 1e-8.
+    // The root has no derivative at 0; the series has one and is exact to the last bit below 1e-8.
     Real cosine = Real(1.0) - Real(0.5) * half2;
     Real sinc = Real(1.0) - half2 / Real(6.0);
     if (half2 > Real(1e-8)) {

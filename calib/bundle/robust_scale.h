@@ -12,8 +12,9 @@
 
 namespace clothfit {
 
-/// Standard deviation of normal errors around 0 of which up to half may be gross: from the median
-/// of their sizes. Not below `floor`, so that exact data do not make rounding look gross.
+/// Estimates the standard deviation of normal errors around 0 from the median of their sizes. Up to
+/// half of the errors may be gross. It is not below `floor`, so that exact data do not make
+/// rounding look gross.
 inline double robust_sigma(std::vector<double> errors, double floor = 1e-6) {
   if (errors.empty()) return std::numeric_limits<double>::infinity();
   for (double& error : errors) error = std::abs(error);

@@ -9,11 +9,10 @@
 
 namespace clothfit {
 
-/// Pixel of a point in camera axes (x right, y down, z forward; metres); pixel (0, 0) is the centre
-/// of the top left pixel. The one projection function of the program: `Real` is double,
-/// ceres::Jet or another number type. `intrinsics` holds fx, fy, cx, cy and then the distortion
-/// coefficients of `model` (`distortion_count` of them). Points with z <= 0 have no pixel: the
-/// caller checks.
+/// Returns the pixel of a point in camera axes (x right, y down, z forward; metres). Pixel (0, 0)
+/// is the centre of the top left pixel. This is the one projection function of the program: `Real`
+/// is double, ceres::Jet or another number type. `intrinsics` holds fx, fy, cx, cy and then the
+/// `distortion_count` coefficients of `model`. Points with z <= 0 have no pixel: the caller checks.
 ///
 ///   x = X / Z,  y = Y / Z,  r2 = x2 + y2,  pixel = (fx x' + cx, fy y' + cy)
 ///   pinhole:        x' = x,  y' = y
@@ -31,25 +30,25 @@ Eigen::Matrix<Real, 2, 1> project(CameraModel model, const Real* intrinsics, int
 /// fx, fy, cx, cy and up to 8 distortion coefficients.
 inline constexpr int kMaxIntrinsics = 12;
 
-/// A camera's intrinsics in the order that the projection above takes; unused places are 0.
+/// Returns a camera's intrinsics in the order that the projection above takes; unused places are 0.
 std::array<double, kMaxIntrinsics> intrinsics_of(const CameraParameters& camera);
 
-/// The same projection from a camera's parameters; nothing where the point lies behind the camera.
+/// Projects with a camera's parameters; nothing where the point lies behind the camera.
 std::optional<Eigen::Vector2d> project(const CameraParameters& camera,
                                        const Eigen::Vector3d& point_in_camera);
 
-/// The same with the derivative of the pixel by the point (2 x 3, px/m), exact to rounding.
+/// Projects and gives the derivative of the pixel by the point (2 x 3, px/m), exact to rounding.
 std::optional<Eigen::Vector2d> project(const CameraParameters& camera,
                                        const Eigen::Vector3d& point_in_camera,
                                        Eigen::Matrix<double, 2, 3>* pixel_by_point);
 
-/// Unit direction (camera axes) seen at a pixel; inverts the distortion by Newton's method, walking
-/// out from the image centre so that a distortion that folds back is never inverted on its far
-/// side. Nothing where no direction projects there.
+/// Returns the unit direction (camera axes) seen at a pixel; nothing where no direction projects
+/// there. The distortion is inverted by Newton's method, walking out from the image centre, so that
+/// a distortion that folds back is never inverted on its far side.
 std::optional<Eigen::Vector3d> unproject(const CameraParameters& camera,
                                          const Eigen::Vector2d& pixel);
 
-/// The pose as a transform. The camera must have one.
+/// Returns the pose as a transform. The camera must have one.
 Rigid3 camera_from_world(const CameraParameters& camera);
 
 }  // namespace clothfit

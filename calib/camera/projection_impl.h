@@ -2,12 +2,12 @@
 
 #include <cmath>
 
-// Included by calib/camera/projection.h only, behind the declarations.
+// Only calib/camera/projection.h includes this file, behind the declarations.
 
 namespace clothfit {
 namespace internal {
 
-/// Brown-Conrady on the plane z = 1, in place; `k` holds 4, 5 or 8 coefficients.
+/// Applies Brown-Conrady on the plane z = 1, in place; `k` holds 4, 5 or 8 coefficients.
 template <class Real>
 void distort_brown_conrady(const Real* k, int count, Real& x, Real& y) {
   const Real r2 = x * x + y * y;
@@ -21,14 +21,14 @@ void distort_brown_conrady(const Real* k, int count, Real& x, Real& y) {
   y = distorted_y;
 }
 
-/// Kannala-Brandt on the plane z = 1, in place; `k` holds 4 coefficients.
+/// Applies Kannala-Brandt on the plane z = 1, in place; `k` holds 4 coefficients.
 template <class Real>
 void distort_kannala_brandt(const Real* k, Real& x, Real& y) {
   using std::atan2;
   using std::sqrt;
   const Real r2 = x * x + y * y;
   Real scale = Real(1.0) + r2 * (k[0] - Real(1.0 / 3.0));
-  // Near the axis sqrt has no derivative; the series above is exact there to the last bit.
+  // Near the axis sqrt has no derivative; there the series above is exact to the last bit.
   if (r2 > Real(1e-8)) {
     const Real r = sqrt(r2);
     const Real theta = atan2(r, Real(1.0));

@@ -9,7 +9,7 @@ namespace clothfit {
 Rigid3 turn_and_shift(const Eigen::Vector3d& rotation_vector_rad,
                       const Eigen::Vector3d& translation_m) {
   const double half_angle = 0.5 * rotation_vector_rad.norm();
-  // sin(h) / h by its series near 0, where the quotient is undefined.
+  // Near 0 the quotient sin(h) / h is undefined and its series serves.
   const double sinc =
       half_angle > 1e-4 ? std::sin(half_angle) / half_angle : 1 - half_angle * half_angle / 6;
   Eigen::Quaterniond rotation;
@@ -45,7 +45,7 @@ Rigid3 fit_rigid(const Eigen::Matrix3Xd& a, const Eigen::Matrix3Xd& b,
   const Eigen::Matrix3d cross =
       (b.colwise() - b_mean) * share.asDiagonal() * (a.colwise() - a_mean).transpose();
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(cross, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  // The best orthogonal matrix may be a reflection (points in a plane, or much noise): turning the
+  // The best orthogonal matrix may be a reflection (points in a plane, or much noise). Turning the
   // weakest direction round makes it the best rotation.
   Eigen::Vector3d sign(1, 1, 1);
   if (svd.matrixU().determinant() * svd.matrixV().determinant() < 0) sign.z() = -1;

@@ -16,9 +16,9 @@ struct SheetPoseResult {
   double rms_px = 0;  ///< per coordinate, over the points that took part
 };
 
-/// Pose of a flat sheet from its pixels alone: at least 4 points, point_m is (s, t, 0). Both poses
-/// under which a flat figure looks nearly alike are refined and the better one is kept; points
-/// beyond 5 robust sigma of it take no part.
+/// Finds the pose of a flat sheet from its pixels alone. There are at least 4 points; point_m is
+/// (s, t, 0). A flat figure looks nearly alike under two poses: both are refined and the better one
+/// is kept. Points beyond 5 robust sigma of it take no part.
 SheetPoseResult place_sheet(const CameraParameters& camera, const std::vector<PlacedPixel>& sheet);
 
 }  // namespace clothfit

@@ -9,7 +9,7 @@
 namespace clothfit {
 namespace {
 
-/// The best square through four surveyed points, in whatever order they come.
+/// Fits the best square through four surveyed points, in whatever order they come.
 TagSquare fit_square(const std::vector<PlacedPixel>& reference,
                      const std::array<std::size_t, 4>& points) {
   TagSquare best;

@@ -1,6 +1,6 @@
 #pragma once
 
-// Private to calib/: the tags among surveyed reference points.
+// Private to calib/: finds the tags among surveyed reference points.
 
 #include <Eigen/Core>
 #include <array>
@@ -21,12 +21,12 @@ struct TagSquare {
   std::size_t alike = 0;  ///< tags of one size share this number
 };
 
-/// Corner `k` (0 to 3, going round) of a square of side 1 about the origin.
+/// Returns corner `k` (0 to 3, going round) of a square of side 1 about the origin.
 Eigen::Vector3d unit_square_corner(std::size_t k);
 
-/// The groups of four reference points that are squares by their survey. Tags whose sides differ by
-/// less than 4 sigma of the survey are taken to be of one size; `common_sides_m` becomes the mean
-/// side of each size.
+/// Finds the groups of four reference points that are squares by their survey. If the sides of tags
+/// differ by less than 4 sigma of the survey, they are taken to be of one size; `common_sides_m`
+/// becomes the mean side of each size.
 std::vector<TagSquare> find_tag_squares(const std::vector<PlacedPixel>& reference,
                                         std::vector<double>& common_sides_m);
 

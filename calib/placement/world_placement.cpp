@@ -82,8 +82,8 @@ struct SurveyOfSquare {
   }
 };
 
-/// Standard deviation of the sides of tags printed alike, relative: what a printer keeps, and the
-/// detector's bias from one tag to the next.
+/// Relative standard deviation of the sides of tags printed alike. It covers the accuracy of a
+/// printer and the detector's bias from one tag to the next.
 constexpr double kPrintTolerance = 1e-3;
 
 /// All unknowns of the placement.
@@ -99,12 +99,12 @@ struct WorldUnknowns {
 /// The two standard deviations that the data themselves decide.
 struct Spread {
   double survey_sigma_m = 1e-3;
-  /// Pixels of squares, in units of the stated sigma, >= 1: paper that is not quite flat and tags
-  /// that are not quite alike show here.
+  /// Pixels of squares, in units of the stated sigma, >= 1. Paper that is not quite flat and tags
+  /// that are not quite alike raise it.
   double square_factor = 1;
 };
 
-/// What one solve leaves.
+/// The state after one solve.
 struct WorldSolve {
   bool usable = false;
   double survey_sum = 0;         ///< of squared standardised residuals of the survey
@@ -200,7 +200,7 @@ WorldSolve solve_world(const FixedCamera& camera, const std::vector<PlacedPixel>
   return result;
 }
 
-/// Camera poses that the surveyed places allow, taken as exact, best first found by robust cost.
+/// Finds the camera pose with the lowest robust spread, the surveyed places taken as exact.
 std::optional<Rigid3> start_world(const CameraParameters& parameters, const FixedCamera& camera,
                                   const std::vector<PlacedPixel>& reference) {
   const auto image = on_image_plane(parameters, reference);
@@ -214,7 +214,7 @@ std::optional<Rigid3> start_world(const CameraParameters& parameters, const Fixe
   std::vector<Rigid3> candidates;
   if (const auto pose = point_pose(in_world_m, *image)) candidates.push_back(*pose);
 
-  // Points in nearly one plane look nearly the same under two poses: both are tried.
+  // Points in nearly one plane look nearly the same under two poses, so both are tried.
   const Eigen::Vector3d middle = points.rowwise().mean();
   const SingularVectors svd = left_singular_vectors(points.colwise() - middle);
   if (svd.values[1] < 1e-3 * svd.values[0]) return std::nullopt;  // on a line
@@ -238,9 +238,9 @@ std::optional<Rigid3> start_world(const CameraParameters& parameters, const Fixe
   return best->camera_from_world;
 }
 
-/// The reference points that agree with the pose. A corner misread or a place written down wrongly
-/// is off by centimetres; others by the survey's error, whose size is not known yet, seen across
-/// the ray.
+/// Returns the reference points that agree with the pose. A corner misread or a place written down
+/// wrongly is off by centimetres. Other points are off by the survey's error, whose size is not
+/// known yet, seen across the ray.
 std::vector<PlacedPixel> without_blunders(const FixedCamera& camera,
                                           const std::vector<PlacedPixel>& reference,
                                           const Rigid3& camera_from_world) {
@@ -279,7 +279,7 @@ WorldUnknowns first_unknowns(const std::vector<PlacedPixel>& reference,
   return unknowns;
 }
 
-/// Solves for the unknowns and, in turn, for the two spreads, until these settle.
+/// Solves in turn for the unknowns and for the two spreads, until the spreads converge.
 WorldSolve solve_with_spread(const FixedCamera& camera, const std::vector<PlacedPixel>& reference,
                              WorldUnknowns& unknowns, Spread& spread) {
   constexpr double kSmallestSurveySigmaM = 1e-6;
