@@ -7,8 +7,8 @@
 
 namespace clothfit {
 
-/// The measured motion of a rigid body: x_world = rotation * x_body + position_m, at times of the
-/// body's own clock, which rise.
+/// The measured motion of a rigid body: x_world = rotation * x_body + position_m. Times are of the
+/// body's own clock and rise.
 struct BodyPath {
   std::vector<double> time_s;
   std::vector<Eigen::Vector3d> position_m;

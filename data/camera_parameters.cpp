@@ -23,7 +23,7 @@ std::vector<std::pair<std::string, CameraModel>> camera_model_words() {
           {"kannala_brandt", CameraModel::kannala_brandt}};
 }
 
-/// How many distortion coefficients each model may have; the first stands for "none given".
+/// Returns how many distortion coefficients a model may have; the first count means "none given".
 std::vector<std::size_t> distortion_counts(CameraModel model) {
   switch (model) {
     case CameraModel::pinhole:
@@ -53,8 +53,8 @@ std::vector<double> read_distortion(const YamlValue* value, CameraModel model,
 constexpr int kPoseSize = 6;
 constexpr std::size_t kTriangleSize = 21;  ///< of a symmetric 6 x 6 matrix
 
-/// A covariance may be singular but has no negative variance in any direction. Judged after
-/// scaling to correlations, since radians and metres differ in size.
+/// Says whether a matrix may be a covariance: singular, but without negative variance in any
+/// direction. It is judged after scaling to correlations, since radians and metres differ in size.
 bool is_covariance(const Eigen::Matrix<double, 6, 6>& matrix) {
   if (matrix.diagonal().minCoeff() < 0) return false;
   const Eigen::Matrix<double, 6, 1> scale =

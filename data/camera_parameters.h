@@ -11,7 +11,7 @@ namespace clothfit {
 
 enum class CameraModel { pinhole, brown_conrady, kannala_brandt };
 
-/// Where a camera stands: x_camera = rotation * x_world + translation_m.
+/// The place of a camera: x_camera = rotation * x_world + translation_m.
 struct CameraPose {
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
   Eigen::Vector3d translation_m = Eigen::Vector3d::Zero();
@@ -20,8 +20,8 @@ struct CameraPose {
   std::optional<Eigen::Matrix<double, 6, 6>> covariance;
 };
 
-/// What a camera file holds (formats: clothfit-camera/1). Camera axes: x right, y down, z forward;
-/// pixel (0, 0) is the centre of the top left pixel, as in OpenCV.
+/// The content of a camera file (formats: clothfit-camera/1). Camera axes: x right, y down, z
+/// forward; pixel (0, 0) is the centre of the top left pixel, as in OpenCV.
 struct CameraParameters {
   std::string name;
   CameraModel model = CameraModel::pinhole;

@@ -11,7 +11,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Whether a file is a table; `frame` is the number that names it, -1 where none does.
+/// Says whether a file is a table; `frame` is the number that names it, -1 where none does.
 bool is_table(const fs::path& file, int& frame) {
   std::string name = file.filename().string();
   if (name.ends_with(".gz")) name.resize(name.size() - 3);

@@ -6,7 +6,7 @@
 
 namespace clothfit {
 
-/// Frame -> measured points of the surface, 3 x n, m.
+/// Measured points of the surface by frame, 3 x n, m.
 using PointClouds = std::map<int, Eigen::Matrix3Xd>;
 
 /// Reads the clouds of a folder: one table x, y, z per frame, named by its number, such as

@@ -12,9 +12,10 @@ struct CsvColumn {
   bool required = true;
 };
 
-/// A comma-separated table, split into fields and found by the names of its first line: columns in
-/// any order, `#` comment lines and empty lines skipped, blanks around a field dropped, no quoting
-/// (names hold no comma). Every refusal is an InputError that names the file and the line.
+/// A comma-separated table whose columns are found by the names of its first line. Columns come in
+/// any order, `#` comment lines and empty lines are skipped, blanks around a field are dropped.
+/// There is no quoting (names hold no comma). Every refusal is an InputError that names the file
+/// and the line.
 class CsvTable {
  public:
   /// Reads and splits. Refuses unknown, missing and doubled columns and lines with another number
@@ -26,16 +27,17 @@ class CsvTable {
   int rows() const { return static_cast<int>(line_.size()); }
   int line(int row) const { return line_[static_cast<std::size_t>(row)]; }
 
-  /// `column` counts in the constructor's list. Empty where the file lacks an optional column.
+  /// Returns a field; `column` counts in the constructor's list. Empty where the file lacks an
+  /// optional column.
   std::string_view text(int row, int column) const;
   bool empty(int row, int column) const { return text(row, column).empty(); }
-  /// A finite number.
+  /// Returns a finite number.
   double number(int row, int column) const;
-  /// A finite number above that of the row before.
+  /// Returns a finite number above that of the row before.
   double rising_number(int row, int column) const;
-  /// A whole number, `least` or more.
+  /// Returns a whole number, `least` or more.
   int whole_number(int row, int column, int least) const;
-  /// A name: not empty, nothing that cannot be printed, no `#` in front (a comment would read so).
+  /// Returns a name: printable, not empty, no `#` in front, which would read as a comment.
   std::string name(int row, int column) const;
 
   /// Refuses a row.

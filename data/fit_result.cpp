@@ -143,7 +143,7 @@ class JsonValue {
   std::string place_;
 };
 
-/// Nothing where there is no such key.
+/// Reads an interval; nothing where there is no such key.
 std::optional<Interval> read_interval(const JsonValue& json, const std::string& key) {
   if (!json.has(key)) return std::nullopt;
   const JsonValue list = json.at(key);

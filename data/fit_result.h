@@ -27,7 +27,7 @@ struct ParameterEstimate {
   std::optional<Interval> interval_90 = std::nullopt;   ///< of 90 %; where it was fitted
   bool interval_by_profile = false;                     ///< its ends are those of the profiled cost
   std::optional<Interval> bootstrap_90 = std::nullopt;  ///< where it was asked for
-  /// Its value on a mesh of another resolution less this one, where that was asked for.
+  /// Value on a mesh of another resolution less this one, where that was asked for.
   std::optional<double> mesh_shift = std::nullopt;
 };
 
@@ -36,9 +36,9 @@ struct EffectEstimate {
   std::vector<ParameterEstimate> parameters;
 };
 
-/// A place in the space of parameters where runs of a search, or refinements of what it found,
-/// ended. Several of them say that the recording can be explained in several ways, or that the
-/// search did not get through.
+/// A place in the space of parameters where runs of a search, or their refinements, ended. Several
+/// basins say that the recording can be explained in several ways, or that the search did not
+/// converge.
 struct Basin {
   struct Number {
     std::string name;  ///< of a spring parameter, or EFFECT.PARAMETER
@@ -74,7 +74,7 @@ struct ObservationErrors {
   TrivialErrors trivial;
 };
 
-/// How far the model's surface is from measured clouds (fit/observe/cloud_errors.h).
+/// Distance of the model's surface from measured clouds (fit/observe/cloud_errors.h).
 struct CloudErrors {
   /// Chamfer distance, the mean over frames that have a cloud.
   struct Summary {
@@ -84,13 +84,13 @@ struct CloudErrors {
   Summary fitted, held_out, all;
 };
 
-/// A constant by which a marker was seen beside the place that the model gives it.
+/// The constant offset of a marker from the place that the model gives it.
 struct MarkerOffset {
   std::string marker;
   Eigen::Vector3d offset_m;  ///< observed - predicted; world
 };
 
-/// What fit.json holds (format clothfit-fit/1).
+/// The content of fit.json (format clothfit-fit/1).
 struct FitResult {
   std::string recording;
   std::string version;
@@ -119,7 +119,7 @@ struct FitResult {
 /// Writes fit.json; numbers that are not finite are a programming error.
 void write_fit_result(const FitResult& result, const std::filesystem::path& file);
 
-/// Reads it back; unknown keys are ignored, missing ones are an InputError.
+/// Reads fit.json; unknown keys are ignored, missing ones are an InputError.
 FitResult read_fit_result(const std::filesystem::path& file);
 
 }  // namespace clothfit

@@ -20,7 +20,7 @@ constexpr int kArrayBuffer = 34962, kElementArrayBuffer = 34963;
 constexpr std::uint32_t kMagic = 0x46546C67, kVersion = 2;
 constexpr std::uint32_t kJsonChunk = 0x4E4F534A, kBinaryChunk = 0x004E4942;
 
-/// The turn that takes a direction to +y; where it points to -y, half a turn about x.
+/// Returns the turn that takes a direction to +y; half a turn about x where it points to -y.
 Eigen::Quaterniond turn_to_y(const Eigen::Vector3d& direction) {
   const Eigen::Vector3d from = direction.normalized(), to = Eigen::Vector3d::UnitY();
   const double cosine = to.dot(from);
@@ -91,7 +91,7 @@ struct Part {
   std::size_t targets() const { return last - first; }
 };
 
-/// Parts meet in a common frame.
+/// Divides the frames into parts; neighbouring parts share a frame.
 std::vector<Part> parts_of(std::size_t frames) {
   std::vector<Part> parts;
   std::size_t first = 0;
@@ -104,7 +104,7 @@ std::vector<Part> parts_of(std::size_t frames) {
   return parts;
 }
 
-/// Seconds from the first frame, 1 x frames of the part.
+/// Returns the seconds from the first frame, 1 x frames of the part.
 Eigen::MatrixXf times_of(const MeshSequence& mesh, const Part& part) {
   Eigen::MatrixXf times(1, static_cast<Eigen::Index>(part.targets() + 1));
   for (std::size_t f = part.first; f <= part.last; ++f) {
@@ -184,7 +184,7 @@ class GlbWriter {
     samplers_.push_back({{"input", input}, {"output", output}, {"interpolation", interpolation}});
   }
 
-  /// Key k gives target k - 1 all the weight, key 0 none.
+  /// Adds keys: key k gives target k - 1 all the weight, key 0 none.
   void add_weights(const Part& part, int node) {
     const auto targets = static_cast<Eigen::Index>(part.targets());
     Eigen::MatrixXf weights = Eigen::MatrixXf::Zero(targets, targets + 1);
@@ -195,7 +195,7 @@ class GlbWriter {
     add_channel(node, "weights", input, output, "LINEAR");
   }
 
-  /// A node that is scaled to nothing is not drawn.
+  /// Hides a part outside its frames: a node that is scaled to nothing is not drawn.
   void add_visibility(const Part& part, int node, bool is_last) {
     const Eigen::MatrixXf times = times_of(mesh_, part);
     std::vector<std::pair<float, float>> keys;  // from when on, scale
@@ -213,8 +213,9 @@ class GlbWriter {
     add_channel(node, "scale", input, output, "STEP");
   }
 
-  /// The container: header, JSON chunk padded with blanks, binary chunk. Every number written takes
-  /// four bytes, so the binary chunk needs no padding. Empty where it would be too long.
+  /// Returns the container: header, JSON chunk padded with blanks, binary chunk. Every number
+  /// written takes four bytes, so the binary chunk needs no padding. Empty where it would be too
+  /// long.
   std::string packed(std::string json) const {
     json.resize((json.size() + 3) / 4 * 4, ' ');
     const std::size_t length = 12 + 8 + json.size() + 8 + buffer_.bytes().size();

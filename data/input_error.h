@@ -5,7 +5,7 @@
 
 namespace clothfit {
 
-/// A mistake in what the user gave, told so that the user can mend it:
+/// A mistake of the user's, told so that the user can correct it:
 ///
 ///   cloth.yaml:12: mass = -0.02; a mass is in kilograms, > 0; weigh the dry cloth
 ///
@@ -16,7 +16,7 @@ class InputError : public std::runtime_error {
   /// `where` is FILE, FILE:LINE or an option's name; `remedy` may be empty.
   InputError(const std::string& where, const std::string& problem, const std::string& expected,
              const std::string& remedy = "");
-  /// The same for line `line` (counted from 1) of `file`.
+  /// Refuses line `line` (counted from 1) of `file`.
   InputError(const std::string& file, int line, const std::string& problem,
              const std::string& expected, const std::string& remedy = "");
 };

@@ -6,7 +6,7 @@
 
 namespace clothfit {
 
-/// Append numbers to a binary file's bytes, lowest byte first whatever the machine's own order.
+/// Appends a number to a binary file's bytes, lowest byte first on every machine.
 inline void append_uint32(std::uint32_t value, std::string& bytes) {
   for (int shift = 0; shift < 32; shift += 8) bytes += static_cast<char>((value >> shift) & 0xffu);
 }

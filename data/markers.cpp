@@ -29,7 +29,7 @@ void read_tag(const CsvTable& table, int row, int tag_column, int corner_column,
   }
 }
 
-/// Refuses what names the same thing twice: a point's name, or the corner of a tag.
+/// Refuses a second use of a point's name or of a tag's corner.
 class NamesSoFar {
  public:
   template <class Point>

@@ -8,8 +8,8 @@
 
 namespace clothfit {
 
-/// A point of the cloth that can be measured, in material coordinates: s along the columns (to the
-/// right on the printed side), t along the rows (down), metres on the flat cloth.
+/// A point of the cloth that can be measured, in material coordinates: metres on the flat cloth. s
+/// runs along the columns (to the right on the printed side), t along the rows (down).
 struct Marker {
   std::string name;
   double s_m = 0;
@@ -27,9 +27,9 @@ struct MarkerSet {
   std::unordered_map<std::string, int> index;  ///< name -> place in `markers`
 };
 
-inline constexpr double kPlaceRounding_m = 1e-6;  ///< what a place may be off by rounding
+inline constexpr double kPlaceRounding_m = 1e-6;  ///< largest rounding error of a place
 
-/// Whether (s, t) lies on a cloth of width x height metres, its edges included.
+/// Says whether (s, t) lies on a cloth of width x height metres, its edges included.
 bool lies_on_cloth(double s_m, double t_m, double width_m, double height_m);
 
 /// Reads the rows of markers.csv. Refuses duplicate names, a tag without a corner, and a marker

@@ -17,7 +17,7 @@
 namespace clothfit {
 namespace {
 
-/// Beyond these a number is a slip in the unit or the exponent.
+/// Numbers beyond these are slips in the unit or the exponent.
 constexpr double kStiffest_n_per_m = 1e9;
 constexpr double kLongestRetardation_s = 1e3;
 constexpr double kLongest_s = 1e6;
@@ -71,7 +71,7 @@ ModelSprings read_springs(const YamlValue& value) {
   return springs;
 }
 
-/// The fabric, or the springs instead.
+/// Reads the fabric, or the springs instead.
 void read_cloth_springs(const YamlMap& map, ModelDescription& model) {
   const YamlValue* springs = map.find("springs");
   if (springs == nullptr) {
@@ -127,7 +127,7 @@ SheetPose read_sheet(const YamlMap& start) {
   return sheet;
 }
 
-/// Position and velocity of every vertex.
+/// Reads position and velocity of every vertex.
 ModelStartState read_start_state(const std::filesystem::path& file, int columns, int rows) {
   enum Column { kRow, kColumn, kX, kY, kZ, kVx, kVy, kVz };
   const CsvTable table(file, {{"row"}, {"column"}, {"x"}, {"y"}, {"z"}, {"vx"}, {"vy"}, {"vz"}});

@@ -71,7 +71,7 @@ void write_times(const std::vector<double>& time_s, const std::filesystem::path&
   write_text(text, file);
 }
 
-/// Whether a rate and a duration say the same frames, bit for bit.
+/// Says whether a rate and a duration give the same frames, bit for bit.
 bool are_even(const ModelDescription& model) {
   return model.frame_rate_hz &&
          frame_times(*model.frame_rate_hz, model.frame_time_s.back()) == model.frame_time_s;

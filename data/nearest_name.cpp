@@ -6,7 +6,7 @@
 namespace clothfit {
 namespace {
 
-/// Insertions, deletions, replacements and swaps of neighbours that turn `a` into `b`.
+/// Counts the insertions, deletions, replacements and swaps of neighbours that turn `a` into `b`.
 std::size_t edit_distance(const std::string& a, const std::string& b) {
   std::vector<std::size_t> before_last(b.size() + 1);
   std::vector<std::size_t> last(b.size() + 1);

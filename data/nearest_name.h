@@ -5,7 +5,7 @@
 
 namespace clothfit {
 
-/// Says which names are known, the nearest to a mistyped one first where it is near enough:
+/// Lists the known names, the nearest to a mistyped one first where it is near enough:
 ///
 ///   did you mean `rows`? known are `columns`, `rows`
 ///

@@ -6,12 +6,12 @@
 
 namespace clothfit {
 
-/// The number that the whole of `text` spells, correctly rounded and whatever the locale; nothing
-/// when it spells none, one that is not finite, or one that does not fit.
+/// Returns the number that the whole of `text` spells, correctly rounded and whatever the locale.
+/// Nothing when it spells none, one that is not finite, or one that does not fit.
 std::optional<double> parse_number(std::string_view text);
 std::optional<int> parse_whole_number(std::string_view text);
 
-/// The shortest text that reads back as the same double.
+/// Returns the shortest text that reads back as the same double.
 std::string number_text(double value);
 
 }  // namespace clothfit

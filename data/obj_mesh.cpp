@@ -17,10 +17,10 @@
 namespace clothfit {
 namespace {
 
-/// Beyond this a coordinate is a slip in the unit or the exponent.
+/// A coordinate beyond this is a slip in the unit or the exponent.
 constexpr double kFarthest_m = 1e6;
 
-/// The next word of `rest`, which shrinks to what follows it; empty at the end.
+/// Takes the next word off the beginning of `rest`; empty at the end.
 std::string_view next_word(std::string_view& rest) {
   constexpr std::string_view kBlank = " \t";
   rest.remove_prefix(std::min(rest.find_first_not_of(kBlank), rest.size()));

@@ -12,14 +12,13 @@ struct SurfaceMesh {
   Eigen::Matrix3Xi triangle;
 };
 
-/// Reads the vertices (`v x y z`, metres, world axes) and faces (`f a b c ...`) of a Wavefront OBJ
-/// file; everything else in it (normals, texture, groups, materials) is passed over. Faces with
+/// Reads the vertices and faces of a Wavefront OBJ file: `v x y z`, metres, world axes; `f a b c
+/// ...`. Everything else in it (normals, texture, groups, materials) is passed over. Faces with
 /// more than three corners are cut into triangles from their first corner, which must see all of
-/// the face. Indices count from 1, or backwards from the last vertex so far where they are
-/// negative.
+/// the face. Indices count from 1; negative ones count backwards from the last vertex so far.
 ///
-/// Throws InputError: no file, no face or none with an area, a number that is none or farther than
-/// any scene, an index of no vertex.
+/// Throws InputError for a missing file, for no face or none with an area, for a number that is
+/// none or farther than any scene, and for an index of no vertex.
 SurfaceMesh read_obj(const std::filesystem::path& file);
 
 /// Writes a Wavefront OBJ file that read_obj reads back to the last bit.

@@ -29,7 +29,7 @@ std::string partial_prefix(const fs::path& final_path) {
   return fmt::format(".{}.partial-", final_path.filename().string());
 }
 
-/// Where a link points to when it is one: the folder is replaced, never the link.
+/// Follows a link: the folder that it points to is replaced, never the link.
 fs::path resolved(const fs::path& given) {
   std::error_code error;
   fs::path path = fs::weakly_canonical(fs::absolute(given), error);
@@ -53,8 +53,8 @@ void require_replaceable(const fs::path& final_path) {
   }
 }
 
-/// Removes what runs that were killed left beside `final_path`. A folder that cannot be removed
-/// stands in nobody's way.
+/// Removes the folders that killed runs left beside `final_path`. A folder that cannot be removed
+/// does no harm.
 void remove_stale(const fs::path& final_path) {
   const std::string prefix = partial_prefix(final_path);
   std::error_code error;
@@ -65,7 +65,7 @@ void remove_stale(const fs::path& final_path) {
     if (!name.starts_with(prefix)) continue;
     const std::optional<int> owner =
         parse_whole_number(std::string_view(name).substr(prefix.size()));
-    // One of our own number was left by an earlier process that bore it.
+    // A folder with our own process number is left from an earlier process of that number.
     if (!owner || *owner <= 0) continue;
     const bool is_dead = kill(*owner, 0) != 0 && errno == ESRCH;
     if (is_dead || *owner == getpid()) stale.push_back(entry->path());
@@ -90,7 +90,7 @@ void sync_tree(const fs::path& folder) {
   sync(folder);
 }
 
-/// Swaps two folders in one step, or in two where the file system knows no swap.
+/// Swaps two folders in one step, or in two where the file system cannot swap.
 bool exchange(const fs::path& a, const fs::path& b) {
   if (renameat2(AT_FDCWD, a.c_str(), AT_FDCWD, b.c_str(), RENAME_EXCHANGE) == 0) return true;
   if (errno != EINVAL && errno != ENOSYS) return false;
@@ -106,7 +106,7 @@ bool exchange(const fs::path& a, const fs::path& b) {
   return rename(aside.c_str(), a.c_str()) == 0;
 }
 
-/// Moves a folder to a place where nothing is.
+/// Moves a folder to a free place.
 bool move_to_free(const fs::path& from, const fs::path& to) {
   if (renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0) return true;
   if (errno != EINVAL && errno != ENOSYS) return false;

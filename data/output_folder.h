@@ -4,20 +4,20 @@
 
 namespace clothfit {
 
-/// A result folder that appears whole or not at all: files are written into a hidden folder beside
-/// it, synced to disk and renamed by `publish`. A destructor without `publish` removes what was
+/// A result folder that appears whole or not at all. Files are written into a hidden folder beside
+/// it, which `publish` syncs to disk and renames. Without `publish` the destructor removes what was
 /// written and leaves an older result as it was.
 class OutputFolder {
  public:
-  /// Throws InputError when the parent does not exist or cannot be written, or when `final_path`
-  /// exists and is not a folder that an earlier run of this program published (a file named
-  /// `.clothfit` marks those): nothing of the user's is ever replaced.
+  /// Throws InputError when the parent does not exist or cannot be written. Throws it also when
+  /// `final_path` exists but no earlier run of this program published it, which a file named
+  /// `.clothfit` shows: nothing of the user's is ever replaced.
   explicit OutputFolder(std::filesystem::path final_path);
   ~OutputFolder();
   OutputFolder(const OutputFolder&) = delete;
   OutputFolder& operator=(const OutputFolder&) = delete;
 
-  /// Where to write.
+  /// Returns the folder to write to.
   const std::filesystem::path& path() const { return work_path_; }
   const std::filesystem::path& final_path() const { return final_path_; }
 

@@ -5,9 +5,9 @@
 
 namespace clothfit {
 
-/// What a long call reports: `done` of `total` units of `stage`. `note` is one short phrase such as
-/// the best cost so far. Returning false asks the call to stop soon; it then returns a result that
-/// says it was cancelled.
+/// A report of a long call: `done` of `total` units of `stage`. `note` is one short phrase such as
+/// the best cost so far. If the callback returns false, the call stops soon; its result then says
+/// that it was cancelled.
 struct Progress {
   std::string stage;
   double done = 0;

@@ -15,7 +15,7 @@ namespace clothfit {
 /// `by_area`: an edge vertex weighs half, a corner a quarter. `equal`: as in the founding paper.
 enum class MassDistribution { by_area, equal };
 
-/// The largest mesh that a fit takes, 256 x 256: what it keeps of one run is some gigabytes then.
+/// The largest mesh that a fit takes, 256 x 256; it then keeps some gigabytes of one run.
 inline constexpr int kMostMeshVertices = 65'536;
 constexpr bool is_possible_mesh(int columns, int rows) {
   return columns >= 2 && rows >= 2 && columns <= kMostMeshVertices / rows;
@@ -30,8 +30,8 @@ struct ClothDescription {
   int mesh_rows = 17;     ///< >= 2
 };
 
-/// Inner corners along a side of a board: fewer cannot be told from other corners, more are finer
-/// than any picture shows.
+/// Bounds of the inner corners along a side of a board. Fewer cannot be told from other corners,
+/// more are finer than any picture shows.
 inline constexpr int kFewestBoardCorners = 3;
 inline constexpr int kMostBoardCorners = 200;
 
@@ -51,8 +51,8 @@ struct CalibrationStills {
   BoardDescription board;
 };
 
-/// Paths are absolute once read. A camera of a recording of tracks alone has no images; a camera
-/// without a file has stills to calibrate from.
+/// A camera of a recording. Paths are absolute once read. Without images it belongs to a recording
+/// of tracks alone; without a file it has stills to calibrate from.
 struct CameraEntry {
   std::string name;
   std::optional<std::filesystem::path> file;
@@ -102,7 +102,7 @@ struct Clouds {
   std::filesystem::path folder;
 };
 
-/// What recording.yaml says, checked, with markers, times, reference points and the obstacle read
+/// The checked content of recording.yaml, with markers, times, reference points and obstacle read
 /// in. Tracks, cameras and pictures are read when they are needed. Paths are absolute.
 struct Recording {
   std::filesystem::path folder;
@@ -111,9 +111,9 @@ struct Recording {
   ClothDescription cloth;
   std::filesystem::path markers_file;
   MarkerSet markers;
-  std::optional<double> frame_rate_hz;              ///< constant rate, or
-  std::optional<std::filesystem::path> times_file;  ///< the file that
-  std::vector<double> times_s;                      ///< these were read from; rising
+  std::optional<double> frame_rate_hz;              ///< where the rate is constant
+  std::optional<std::filesystem::path> times_file;  ///< else: the file of `times_s`
+  std::vector<double> times_s;                      ///< rising
   Eigen::Vector3d gravity_m_per_s2{0, 0, -9.81};
   std::vector<CameraEntry> cameras;
   std::optional<std::filesystem::path> tracks3d;
@@ -123,14 +123,14 @@ struct Recording {
   std::vector<RigidBody> bodies;
   std::optional<Clouds> clouds;
   std::optional<std::filesystem::path> obstacle_file;
-  std::optional<SurfaceMesh> obstacle;  ///< read from it: what the effect contact_mesh touches
+  std::optional<SurfaceMesh> obstacle;  ///< read from its file; touched by the effect contact_mesh
   std::vector<HeldPoint> held;
   StartKind start = StartKind::at_rest;
   std::vector<DeclaredEffect> declared;
   std::optional<int> held_out_from_frame;  ///< no fit and no decision uses frames from this one on
 
-  /// Time of a frame; frame 0 need not be at 0. Throws InputError where the times file ends before
-  /// this frame: the tracks then name one that was never timed.
+  /// Returns the time of a frame; frame 0 need not be at 0. Throws InputError where the times file
+  /// ends before this frame: the tracks then name one that was never timed.
   double frame_time_s(int frame) const;
   const CameraEntry* find_camera(const std::string& camera_name) const;
 };
@@ -138,16 +138,15 @@ struct Recording {
 /// Reads `folder`/recording.yaml and the small tables and the surface it names. Throws InputError.
 Recording read_recording(const std::filesystem::path& folder);
 
-/// Writes `folder`/recording.yaml. Files inside `folder` are named relative to it; others are named
-/// relative to it as well ("../..."), so that pictures are used where they lie.
-/// Does not copy any file.
+/// Writes `folder`/recording.yaml and copies no file. All files are named relative to `folder`,
+/// those outside it too ("../..."), so that pictures are used where they lie.
 void write_recording(const Recording& recording, const std::filesystem::path& folder);
 
 /// Reads a held point's path (columns time,x,y,z). Throws InputError.
 HeldPath read_held_path(const std::filesystem::path& file);
 void write_held_path(const HeldPath& path, const std::filesystem::path& file);
 
-/// Text forms used in recording.yaml.
+/// Each returns the word that recording.yaml uses.
 std::string to_string(MarkerKind kind);
 std::string to_string(HeldMotion motion);
 std::string to_string(StartKind start);

@@ -13,7 +13,7 @@
 namespace clothfit {
 namespace {
 
-/// Whoever fits the recording has to simulate all of it.
+/// Bounds an interval, because a fit has to simulate all of it.
 constexpr double kLongestInterval_s = 1000;
 
 void require(const YamlValue& value, bool found, const std::string& expected) {

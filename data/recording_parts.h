@@ -12,9 +12,9 @@
 
 namespace clothfit {
 
-/// What recording.yaml and model files have in common. Inside data/ only.
+/// The common parts of recording.yaml and model files. Inside data/ only.
 
-/// Sizes of a cloth or a board's square beyond these are slips in the unit or the exponent.
+/// Sizes of a cloth or of a board's square beyond these are slips in the unit or the exponent.
 inline constexpr double kSmallest_m = 1e-4;
 inline constexpr double kLargest_m = 1e3;
 
@@ -49,18 +49,18 @@ class RelativePaths {
   std::filesystem::path folder_;
 };
 
-/// A name that can name files.
+/// Reads a name that can name files.
 std::string read_file_name(const YamlValue& value);
 ClothDescription read_cloth(const YamlValue& value);
 Eigen::Vector3d read_gravity(const YamlValue& value);
 double read_frame_rate(const YamlValue& value);
-/// Columns and rows of a mesh.
+/// Reads columns and rows of a mesh.
 std::pair<int, int> read_mesh(const YamlValue& value);
-/// A table of frame times.
+/// Reads a table of frame times.
 std::vector<double> read_times(const std::filesystem::path& file);
-/// A place (s, t) on the cloth.
+/// Reads a place (s, t) on the cloth.
 Eigen::Vector2d read_place(const YamlValue& value, const ClothDescription& cloth);
-/// Held points and edges; `motions` are the words that may stand there.
+/// Reads held points and edges; `motions` are the allowed words.
 std::vector<HeldPoint> read_held(const YamlValue& value, const RecordingFiles& files,
                                  const ClothDescription& cloth,
                                  const std::vector<std::pair<std::string, HeldMotion>>& motions);
@@ -78,7 +78,7 @@ void write_mesh(YamlWriter& out, int columns, int rows);
 void write_held_point(YamlWriter& out, const HeldPoint& point, const RelativePaths& relative);
 void write_declared_effect(YamlWriter& out, const DeclaredEffect& effect);
 
-/// A list with an item per line; `[]` when there is none.
+/// Writes a list with an item per line; `[]` when there is none.
 template <class Item, class WriteItem>
 void write_list(YamlWriter& out, const std::string& key, const std::vector<Item>& items,
                 const WriteItem& write_item) {

@@ -8,8 +8,8 @@
 
 namespace clothfit {
 
-/// A callback that several threads may call at once: they wait for each other, and once it has said
-/// to stop it is not asked again. Nothing where there is none.
+/// Wraps a callback so that several threads may call it at once. They wait for each other, and once
+/// it has said to stop it is not asked again. Empty where `progress` is.
 inline ProgressCallback for_threads(ProgressCallback progress) {
   if (!progress) return progress;
   struct State {

@@ -5,7 +5,7 @@
 
 namespace clothfit {
 
-/// What an error message shows of a user's text, whatever it holds: one short line.
+/// Returns a user's text for an error message, whatever it holds: one short line.
 inline std::string shown_text(std::string_view text) {
   constexpr std::size_t kLongest = 60;
   std::string shown(text.substr(0, kLongest));

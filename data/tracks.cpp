@@ -24,11 +24,11 @@ int read_marker(const CsvTable& table, int row, int column, const MarkerSet& mar
   return found->second;
 }
 
-/// Far beyond what is measured in metres or pixels: slips in the exponent.
+/// Numbers beyond these, far from any measurement in metres or pixels, are slips in the exponent.
 constexpr double kSmallestSigma = 1e-9;
 constexpr double kLargestSigma = 1e6;
 
-/// 0 where the file does not say.
+/// Reads a sigma; 0 where the file does not say.
 double read_sigma(const CsvTable& table, int row, int column, const std::string& unit) {
   if (table.empty(row, column)) return 0;
   const double sigma = table.number(row, column);
@@ -41,7 +41,7 @@ double read_sigma(const CsvTable& table, int row, int column, const std::string&
   return sigma;
 }
 
-/// The reason of `rejected:REASON`; empty for `ok`.
+/// Returns the reason of `rejected:REASON`; empty for `ok`.
 std::string read_status(const CsvTable& table, int row, int column) {
   const std::string_view status = table.text(row, column);
   if (status.empty() || status == "ok") return "";
@@ -53,11 +53,11 @@ std::string read_status(const CsvTable& table, int row, int column) {
   return table.name(row, column).substr(kRejected.size());
 }
 
-/// More frames than this without any row are a frame number mistyped, not a pause: whoever fits the
-/// tracks has to simulate all of them.
+/// A longer gap without any row is a mistyped frame number, not a pause. It is refused because a
+/// fit has to simulate all of its frames.
 constexpr int kLongestGap = 10'000;
 
-/// Sorts rows (given in the table's order) by frame, then marker; refuses a pair that comes twice
+/// Sorts rows (given in the table's order) by frame, then marker. Refuses a pair that comes twice
 /// and a frame far beyond the one before.
 template <class Position>
 std::vector<Position> sorted(const CsvTable& table, std::vector<Position> rows,

@@ -29,9 +29,9 @@ struct Position2d {
 using Tracks3d = std::vector<Position3d>;  ///< sorted by frame, then marker
 using Tracks2d = std::vector<Position2d>;  ///< sorted by frame, then marker
 
-/// Read measured tracks (CSV, gzip-compressed when the name ends in .gz). Refuse what the format
+/// Reads measured tracks (CSV, gzip-compressed when the name ends in .gz). Refuses what the format
 /// does not allow: unknown or missing columns, unknown markers, duplicate rows, numbers that are
-/// not finite, negative sigma or frame, a frame thousands after the one before. Throw InputError
+/// not finite, negative sigma or frame, a frame thousands after the one before. Throws InputError
 /// with file and line.
 Tracks3d read_tracks3d(const std::filesystem::path& file, const MarkerSet& markers);
 Tracks2d read_tracks2d(const std::filesystem::path& file, const MarkerSet& markers);

@@ -166,7 +166,7 @@ std::vector<std::pair<std::string, YamlValue>> YamlValue::entries() const {
             "every key once", "remove one of the two");
       }
     }
-    // An empty value bears no place of its own worth pointing at: the key's line serves.
+    // An empty value has no useful place of its own, so the key's line serves.
     entries.emplace_back(
         key, YamlValue(entry.second, file_, name_.empty() ? key : name_ + "." + key, line));
   }
@@ -216,8 +216,8 @@ YamlValue read_yaml(const std::filesystem::path& file) {
   const auto name = std::make_shared<const std::string>(file.string());
   const std::string text = read_text(file);
   try {
-    // YAML::LoadAll never returns on some damaged files (yaml-cpp 0.7 stands still at a stray
-    // comma), and YAML::Load drops whatever follows the first document without a word.
+    // YAML::LoadAll hangs on some damaged files (yaml-cpp 0.7 at a stray comma). YAML::Load
+    // silently drops whatever follows the first document.
     const int last_line = require_one_document(text, *name);
     const YAML::Node root = YAML::Load(text);
     if (root.IsNull()) {

@@ -16,8 +16,8 @@ namespace clothfit {
 
 class YamlMap;
 
-/// A value of a YAML file that knows where it stands and what it is called, so that whatever is
-/// wrong with it is refused with file, line and name. Inside data/ only.
+/// A value of a YAML file that knows its place and its name. Every refusal can therefore say file,
+/// line and name. Inside data/ only.
 class YamlValue {
  public:
   YamlValue(YAML::Node node, std::shared_ptr<const std::string> file, std::string name, int line);
@@ -30,26 +30,26 @@ class YamlValue {
   bool is_word(const std::string& word) const;
   bool is_list() const { return node_.IsSequence(); }
 
-  /// A scalar that is not empty.
+  /// Returns a scalar that is not empty.
   std::string text() const;
   double number() const;
-  /// A number from `least` to `most`; `what` says of what, for the message: a slip of the keyboard
-  /// in an exponent would otherwise be simulated.
+  /// Returns a number from `least` to `most`; `what` names the quantity in the message. The bounds
+  /// catch slips in an exponent, which would otherwise be simulated.
   double number_between(double least, double most, const std::string& what) const;
   int whole_number(int least, int most = std::numeric_limits<int>::max()) const;
   std::vector<double> numbers() const;
-  /// Exactly N numbers.
+  /// Returns exactly N numbers.
   template <std::size_t N>
   std::array<double, N> numbers() const;
-  /// Exactly N numbers, each from `least` to `most`.
+  /// Returns exactly N numbers, each from `least` to `most`.
   template <std::size_t N>
   std::array<double, N> numbers_between(double least, double most, const std::string& what) const;
   std::vector<YamlValue> items() const;
-  /// A map of known keys.
+  /// Returns a map of known keys.
   YamlMap map(const std::vector<std::string>& known_keys) const;
-  /// A map whose keys are the user's names, in their order.
+  /// Returns a map whose keys are the user's names, in their order.
   std::vector<std::pair<std::string, YamlValue>> entries() const;
-  /// One word of a list.
+  /// Returns the choice that one word of a list stands for.
   template <class Choice>
   Choice one_of(const std::vector<std::pair<std::string, Choice>>& choices) const;
 
@@ -59,7 +59,7 @@ class YamlValue {
  private:
   std::vector<double> numbers_of(std::size_t count) const;
   std::size_t place_of(const std::vector<std::string>& words) const;
-  /// `NAME = value`, as an error message shows it.
+  /// Returns `NAME = value`, as an error message shows it.
   std::string shown() const;
 
   YAML::Node node_;
@@ -72,9 +72,9 @@ class YamlValue {
 class YamlMap {
  public:
   YamlMap(YamlValue whole, std::vector<std::pair<std::string, YamlValue>> entries);
-  /// Refuses a missing or empty value.
+  /// Returns a value; refuses a missing or empty one.
   const YamlValue& at(const std::string& key) const;
-  /// Nothing when the value is missing or null.
+  /// Returns a value; nothing when it is missing or null.
   const YamlValue* find(const std::string& key) const;
   const YamlValue& whole() const { return whole_; }
 
@@ -83,7 +83,7 @@ class YamlMap {
   std::vector<std::pair<std::string, YamlValue>> entries_;
 };
 
-/// Reads a file of one YAML document. Throws InputError, for what YAML's own grammar refuses too.
+/// Reads a file of one YAML document. Throws InputError, also for what YAML's own grammar refuses.
 YamlValue read_yaml(const std::filesystem::path& file);
 
 template <std::size_t N>

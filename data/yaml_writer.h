@@ -30,7 +30,7 @@ class YamlWriter {
   YamlWriter& value(std::span<const double> numbers);
   YamlWriter& null();
 
-  /// The whole document, ending with a new line.
+  /// Returns the whole document, ending with a new line.
   std::string text() const;
 
  private:

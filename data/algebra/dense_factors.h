@@ -15,16 +15,16 @@ struct SymmetricEigen {
   Eigen::MatrixXd vectors;
 };
 
-/// Looks at the lower triangle only.
+/// Decomposes a symmetric matrix; looks at its lower triangle only.
 SymmetricEigen symmetric_eigen(const Eigen::MatrixXd& matrix);
 
-/// Rising.
+/// Returns the eigenvalues, rising.
 Eigen::VectorXd symmetric_eigenvalues(const Eigen::MatrixXd& matrix);
 
 namespace internal {
 
-/// Solves for right sides that are vectors (n) or matrices (n x m), each by its own routine, and
-/// rows as rows where a class knows how: Eigen's sums, and so the last bit, depend on it.
+/// Solves for right sides that are vectors (n) or matrices (n x m), each by its own routine. Rows
+/// are solved as rows where a class knows how: Eigen's sums, and so the last bit, depend on it.
 template <class Factors>
 class Solves {
  public:
@@ -46,7 +46,7 @@ class SymmetricFactors : public internal::Solves<SymmetricFactors> {
   SymmetricFactors() = default;
   explicit SymmetricFactors(const Eigen::MatrixXd& matrix);
 
-  /// Whether all of D is above 0.
+  /// Says whether all of D is above 0.
   bool is_positive_definite() const;
   Eigen::VectorXd solve_vector(const Eigen::VectorXd& right) const;
   Eigen::MatrixXd solve_matrix(const Eigen::MatrixXd& right) const;
@@ -61,9 +61,9 @@ class CholeskyFactors : public internal::Solves<CholeskyFactors> {
   CholeskyFactors() = default;
   explicit CholeskyFactors(const Eigen::MatrixXd& matrix);
 
-  /// Whether the matrix was positive definite; where it was not, nothing else may be asked.
+  /// Says whether the matrix was positive definite. If it was not, nothing else may be asked.
   bool usable() const;
-  /// Reciprocal of the condition number, estimated.
+  /// Estimates the reciprocal of the condition number.
   double reciprocal_condition() const;
   Eigen::VectorXd solve_vector(const Eigen::VectorXd& right) const;
   Eigen::MatrixXd solve_matrix(const Eigen::MatrixXd& right) const;
@@ -91,7 +91,7 @@ class PivotedQr : public internal::Solves<PivotedQr> {
   Eigen::ColPivHouseholderQR<Eigen::MatrixXd> factors_;
 };
 
-/// The solution of least norm of least squares, whatever the rank.
+/// Solves least squares with the solution of least norm, whatever the rank.
 class LeastNormFactors : public internal::Solves<LeastNormFactors> {
  public:
   explicit LeastNormFactors(const Eigen::MatrixXd& matrix);
@@ -105,7 +105,7 @@ class LeastNormFactors : public internal::Solves<LeastNormFactors> {
   Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> factors_;
 };
 
-/// Columns span what the matrix takes to 0; one column of zeros where that is nothing.
+/// Returns columns that span the null space; one column of zeros where that is empty.
 Eigen::MatrixXd null_space(const Eigen::MatrixXd& matrix);
 
 /// Singular values, falling, and vectors of one side as columns of a square matrix.
