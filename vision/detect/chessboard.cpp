@@ -12,7 +12,7 @@
 namespace clothfit {
 namespace {
 
-/// Smallest distance of neighbours in the grid.
+/// Returns the smallest distance of neighbours in the grid.
 double smallest_spacing_px(const std::vector<cv::Point2f>& corners, int columns, int rows) {
   double smallest = INFINITY;
   for (int r = 0; r < rows; ++r) {
@@ -31,8 +31,8 @@ double smallest_spacing_px(const std::vector<cv::Point2f>& corners, int columns,
   return smallest;
 }
 
-/// True where columns (right) and rows (down) turn as they do on a board seen from its front in a
-/// picture with y downwards.
+/// Says whether columns (right) and rows (down) turn as on a board seen from its front. y of the
+/// picture points down.
 bool turns_like_the_board(const std::vector<cv::Point2f>& corners, int columns, int rows) {
   const auto at = [&](int r, int c) { return corners[static_cast<std::size_t>(r * columns + c)]; };
   const cv::Point2f along_row = at(0, columns - 1) - at(0, 0);
@@ -61,14 +61,14 @@ std::optional<std::vector<Eigen::Vector2d>> find_chessboard(const cv::Mat& grey,
   cv::cornerSubPix(grey, corners, cv::Size(half, half), cv::Size(-1, -1),
                    cv::TermCriteria(cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 50, 1e-3));
 
-  // Seen from the front, the grid cannot be mirrored: swap the direction of each row if it is.
+  // Seen from the front the grid cannot be mirrored, so a mirrored one has each row reversed.
   if (!turns_like_the_board(corners, board.columns, board.rows)) {
     for (int r = 0; r < board.rows; ++r) {
       const auto begin = corners.begin() + r * board.columns;
       std::reverse(begin, begin + board.columns);
     }
   }
-  // Of the two readings that differ by half a turn, the one that starts nearer the top left.
+  // Two readings differ by half a turn: the one that starts nearer the top left is taken.
   const cv::Point2f across = corners.back() - corners.front();
   if (across.x + across.y < 0) std::reverse(corners.begin(), corners.end());
 

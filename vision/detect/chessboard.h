@@ -9,8 +9,8 @@
 
 namespace clothfit {
 
-/// Inner corners of a chessboard in a grey picture, row by row, refined to a fraction of a pixel;
-/// nothing when the whole board is not seen.
+/// Finds the inner corners of a chessboard in a grey picture, row by row, to a fraction of a pixel.
+/// Nothing when the whole board is not seen.
 std::optional<std::vector<Eigen::Vector2d>> find_chessboard(const cv::Mat& grey,
                                                             const BoardDescription& board);
 

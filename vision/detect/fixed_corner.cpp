@@ -17,8 +17,8 @@ FixedCorner average_fixed_corner(const std::vector<Eigen::Vector2d>& pixels,
   const Eigen::Vector2d centre(median(u), median(v));
   for (const Eigen::Vector2d& pixel : pixels) distance.push_back((pixel - centre).norm());
 
-  // Something that passes in front bends a corner off its place for a few frames: detections
-  // further off than 5 sigma are left out. The median distance of a normal scatter is 1.18 sigma.
+  // Something that passes in front shifts a corner for a few frames, so detections further off than
+  // 5 sigma are left out. The median distance of a normal scatter is 1.18 sigma.
   const double reach = 5 * std::max(median(distance) / 1.18, median(sigmas));
   Eigen::Vector2d sum = Eigen::Vector2d::Zero();
   double square_sigma_sum = 0;

@@ -11,9 +11,9 @@ struct FixedCorner {
   int frames = 0;       ///< detections that took part
 };
 
-/// The mean place of a corner that does not move, from its detections (one or more, with their
-/// sigmas). Only the scatter from frame to frame averages out: ragged edges and the pixel grid are
-/// the same in every picture of a fixed tag, so that the detections' own sigma stays.
+/// Averages the detections (one or more, with their sigmas) of a corner that does not move. Only
+/// the scatter from frame to frame averages out. Ragged edges and the pixel grid are the same in
+/// every picture of a fixed tag, so the detections' own sigma stays.
 FixedCorner average_fixed_corner(const std::vector<Eigen::Vector2d>& pixels,
                                  const std::vector<double>& sigmas);
 

@@ -13,8 +13,8 @@
 namespace clothfit {
 namespace {
 
-/// The library keeps a table of every code with every correctable error, 16 bytes or more an entry.
-/// Bits that may be corrected before that table outgrows a few million entries.
+/// Returns how many bits may be corrected before the library's table outgrows a few million
+/// entries. The table holds every code with every correctable error, 16 bytes or more an entry.
 int affordable_corrected_bits(const apriltag_family_t& family) {
   constexpr double kMaxEntries = 4e6;
   const double codes = family.ncodes;
@@ -23,11 +23,11 @@ int affordable_corrected_bits(const apriltag_family_t& family) {
   return codes * (1 + bits) <= kMaxEntries ? 1 : 0;
 }
 
-/// What AprilTag's pixel coordinates have too much: it counts from the outer corner of the top left
-/// pixel, we from that pixel's centre. Its corners already come in our order.
+/// Offset of AprilTag's pixel coordinates from ours. AprilTag counts from the outer corner of the
+/// top left pixel, we from that pixel's centre. Its corners already come in our order.
 const Eigen::Vector2d kHalfPixel(0.5, 0.5);
 
-/// The library's homography with pixels in our convention.
+/// Returns the library's homography with pixels in our convention.
 Eigen::Matrix3d pixel_from_tag(const matd_t& homography) {
   using RowMajor = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
   Eigen::Matrix3d shift = Eigen::Matrix3d::Identity();
@@ -35,8 +35,9 @@ Eigen::Matrix3d pixel_from_tag(const matd_t& homography) {
   return shift * Eigen::Map<const RowMajor>(homography.data);
 }
 
-/// A code with b wrong bits is still twice as near to its own word as to any other while
-/// 3 b < distance; a quarter of the distance leaves room for what is no tag at all.
+/// Returns how many wrong bits may be corrected safely: a quarter of the codes' distance. A code
+/// with b wrong bits is twice as near to its own word as to any other while 3 b < distance; a
+/// quarter leaves room for pictures of no tag at all.
 int safe_corrected_bits(const apriltag_family_t& family) {
   return (static_cast<int>(family.h) - 1) / 4;
 }

@@ -9,8 +9,8 @@
 
 namespace clothfit {
 
-/// A tag as one picture shows it, in this program's conventions: pixel (0, 0) is the centre of the
-/// top left pixel; corners are those of the tag's border, 0 bottom left, 1 bottom right, 2 top
+/// A tag as one picture shows it, in this program's conventions. Pixel (0, 0) is the centre of the
+/// top left pixel. Corners are those of the tag's border, 0 bottom left, 1 bottom right, 2 top
 /// right, 3 top left as the printed tag is seen upright.
 struct TagDetection {
   int id = 0;
@@ -22,18 +22,18 @@ struct TagDetection {
   double explained = 0;  ///< share of the tag's pixels that its pattern explains; about 0.9 is all
 };
 
-/// Reads the tags of one family in pictures. Not to be shared between threads: each has its own.
+/// Reads the tags of one family in pictures. Each thread needs its own detector.
 class TagDetector {
  public:
-  /// `max_corrected_bits` is at most 2; families whose codes lie close together correct fewer, as
-  /// do large ones for the sake of memory. Throws InputError for a family that is not known,
-  /// listing those that are.
+  /// `max_corrected_bits` is at most 2. Families correct fewer where their codes lie close
+  /// together, and large ones to save memory. Throws InputError for an unknown family and lists the
+  /// known ones.
   explicit TagDetector(const std::string& family, int max_corrected_bits = 2);
   ~TagDetector();
   TagDetector(TagDetector&&) noexcept;
   TagDetector& operator=(TagDetector&&) noexcept;
 
-  /// Tags in an 8-bit grey picture, sorted by id, then by place.
+  /// Finds tags in an 8-bit grey picture, sorted by id, then by place.
   std::vector<TagDetection> detect(const cv::Mat& grey);
 
  private:

@@ -10,17 +10,17 @@ struct apriltag_family;  // AprilTag's own; its headers stay out of ours
 
 namespace clothfit {
 
-/// Names of all tag families that can be read and printed, such as tag36h11; alphabetical.
+/// Returns all tag families that can be read and printed, such as tag36h11; alphabetical.
 std::vector<std::string> tag_families();
 
 /// AprilTag's description of a family, freed with it.
 using TagFamily = std::unique_ptr<apriltag_family, void (*)(apriltag_family*)>;
 
-/// Throws InputError for a family that is not known, listing those that are.
+/// Makes the family of that name. Throws InputError for an unknown one and lists the known ones.
 TagFamily make_tag_family(const std::string& name);
 
-/// Tag `id` of a family as it is printed, the white around it included. Throws InputError when the
-/// family has no such tag.
+/// Returns tag `id` of a family as it is printed, the white around it included. Throws InputError
+/// when the family has no such tag.
 TagPattern printed_tag(apriltag_family& family, int id);
 
 }  // namespace clothfit

@@ -25,14 +25,14 @@ using Terms = Eigen::Matrix<double, kTerms, 1>;
 using Unknowns = Eigen::Matrix<double, kUnknowns, 1>;
 using Normal = Eigen::Matrix<double, kUnknowns, kUnknowns>;
 
-/// Polynomials up to degree 3 in tag coordinates.
+/// Returns the polynomials up to degree 3 in tag coordinates.
 Terms polynomials(double x, double y) {
   Terms terms;
   terms << 1, x, y, x * x, x * y, y * y, x * x * x, x * x * y, x * y * y, y * y * y;
   return terms;
 }
 
-/// Derivatives of `polynomials` by x and y.
+/// Returns the derivatives of `polynomials` by x and y.
 Eigen::Matrix<double, kTerms, 2> polynomial_slopes(double x, double y) {
   Eigen::Matrix<double, kTerms, 2> slopes;
   slopes.col(0) << 0, 1, 0, 2 * x, y, 0, 3 * x * x, 2 * x * y, y * y, 0;
@@ -40,10 +40,11 @@ Eigen::Matrix<double, kTerms, 2> polynomial_slopes(double x, double y) {
   return slopes;
 }
 
-/// Smooth bending: each degree's coefficients are about this much of the degree's before.
+/// Ratio of each degree's coefficients to those of the degree before: the bending is smooth.
 constexpr double kDegreeRatio = 0.2;
 
-/// Precision (1 / sd^2) of each unknown before the picture is seen. Lengths are in half tags.
+/// Returns the precision (1 / sd^2) of each unknown before the picture is seen. Lengths are in half
+/// tags.
 Unknowns prior_precision() {
   constexpr double kQuadratic = 0.03;  // bends to radii of some ten tags, seen askew
   const auto precision = [](double sd) { return 1 / (sd * sd); };
@@ -57,7 +58,7 @@ Unknowns prior_precision() {
   return prior;                                         // light: free
 }
 
-/// Cumulative normal distribution and density by table: the fit asks for them millions of times.
+/// Cumulative normal distribution and density by table, since the fit needs them millions of times.
 /// Linear between entries 1/64 apart; errors below 1e-5.
 class NormalTable {
  public:
@@ -96,14 +97,14 @@ struct AxisWeights {
   std::array<double, kMaxCells> by_log_blur{};
 };
 
-/// The first and the last cell reach on beyond the pattern.
+/// Weighs the cells under the blur; the first and the last cell reach on beyond the pattern.
 AxisWeights axis_weights(const TagPattern& pattern, double place, double blur) {
   static const NormalTable normal;
   constexpr double kReach = 4;  // standard deviations
   const double cell = pattern.cell();
   const double origin = -0.5 * cell * pattern.total_cells;
   const auto cell_at = [&](double x) {
-    // Clamped before it is cast: a poor step may ask for any place.
+    // Clamped before the cast, because a poor step may need any place.
     return static_cast<int>(std::clamp((x - origin) / cell, 0.0, pattern.total_cells - 1.0));
   };
   AxisWeights result;
@@ -178,7 +179,8 @@ Eigen::Vector2d through(const Eigen::Matrix3d& homography, const Eigen::Vector2d
 
 std::vector<Sample> pixels_of_tag(const cv::Mat& grey, const TagPattern& pattern,
                                   const Eigen::Matrix3d& pixel_from_tag) {
-  // Outside the border a cell of quiet zone is known; the blur of what follows must stay out.
+  // Outside the border only a cell of quiet zone is known, so the blur of its surroundings must
+  // stay out.
   const double reach = 1 + 0.75 * pattern.cell();
   Eigen::AlignedBox2d box;
   for (const double x : {-reach, reach}) {
@@ -202,10 +204,10 @@ std::vector<Sample> pixels_of_tag(const cv::Mat& grey, const TagPattern& pattern
   return samples;
 }
 
-/// One row per sample; single precision is ample for grey levels of 8 bits and twice as fast.
+/// One row per sample. Single precision suffices for grey levels of 8 bits and is twice as fast.
 using Rows = Eigen::Matrix<float, Eigen::Dynamic, kUnknowns, Eigen::RowMajor>;
 
-/// The fit's state and what its last evaluation gave, one entry per sample.
+/// The fit's state and the result of its last evaluation, one entry per sample.
 struct Fit {
   Unknowns unknowns = Unknowns::Zero();
   Rows jacobian;
@@ -219,12 +221,12 @@ double square(double x) {
   return x * x;
 }
 
-/// Weights for residuals whose spread grows with the slope of the picture,
+/// Weighs residuals, whose spread grows with the slope of the picture,
 ///
 ///   variance = noise^2 + (roughness * slope)^2,
 ///
 /// because edges are ragged (print, weave, sampling) by some share of a pixel. Both are estimated
-/// from medians over this tag. Cauchy loss on top.
+/// from medians over this tag. A Cauchy loss comes on top.
 void weigh(Fit& fit) {
   const double steepest = fit.slope.maxCoeff();
   std::vector<double> flat, rough, inverse_square_slope;
@@ -284,8 +286,8 @@ void evaluate(const TagPattern& pattern, const std::vector<Sample>& samples,
   weigh(fit);
 }
 
-/// Samples that say little are thinned out: of the flat ones, which only tell the light, one in
-/// four stays; of a large tag's, `kEnough` in all. Sigma answers for what was left out.
+/// Thins out samples that say little. Flat ones tell only the light, and one in four of them stays;
+/// of a large tag's samples `kEnough` stay in all. Sigma accounts for the samples left out.
 void thin_out(std::vector<Sample>& samples, const Fit& fit) {
   constexpr std::size_t kEnough = 4000;
   const double flat = 0.03 * fit.slope.maxCoeff();
@@ -306,8 +308,8 @@ void resize(Fit& fit, std::size_t count) {
   fit.slope.resize(rows);
 }
 
-/// Adds one Gauss-Newton step to `fit.unknowns`, sets `covariance` to the posterior's. Returns the
-/// length of the step in standard deviations per unknown; not finite when there is no step.
+/// Adds one Gauss-Newton step to `fit.unknowns` and sets `covariance` to the posterior's. Returns
+/// the length of the step in standard deviations per unknown; not finite when there is no step.
 double step(const Unknowns& prior_mean, const Unknowns& prior, Fit& fit, Normal& covariance) {
   const Rows whitened = fit.weight.cwiseSqrt().cast<float>().asDiagonal() * fit.jacobian;
   Eigen::Matrix<float, kUnknowns, kUnknowns> lower =
@@ -326,7 +328,7 @@ double step(const Unknowns& prior_mean, const Unknowns& prior, Fit& fit, Normal&
   return std::sqrt(change.dot(gradient) / kUnknowns);
 }
 
-/// A corner of the border: its pixel and the pixel's derivative by the unknowns.
+/// A corner of the border: its pixel, and the pixel's derivative by the unknowns.
 struct Corner {
   Eigen::Vector2d pixel;
   Eigen::Matrix<double, 2, kUnknowns> by_unknowns;
@@ -360,8 +362,8 @@ Corner corner_of(const Unknowns& unknowns, const Eigen::Vector2d& corner,
   return result;
 }
 
-/// Variance (px^2 per coordinate) that bending of degree 4 and more may add at a corner: what the
-/// two highest degrees found here let expect of the next.
+/// Returns the variance (px^2 per coordinate) that bending of degree 4 and more may add at a
+/// corner. It is extrapolated from the two highest degrees found here.
 double left_out_variance(const Unknowns& unknowns, const Eigen::Matrix2d& pixel_by_tag) {
   const auto size = [&](int first, int count) {
     Eigen::Matrix2Xd bend(2, count);
@@ -383,7 +385,7 @@ RefinedTag refine_tag(const cv::Mat& grey, const TagPattern& pattern,
   constexpr std::size_t kFewest = 4 * kUnknowns;
   if (samples.size() < kFewest) return result;
 
-  // Start: no bending, a sharp lens and a square pixel, light from the extremes.
+  // The start has no bending, a sharp lens and a square pixel, and light from the extremes.
   Eigen::Matrix2d pixel_by_tag;  // in the middle
   pixel_by_tag.col(0) = (through(pixel_from_tag, {1, 0}) - through(pixel_from_tag, {-1, 0})) / 2;
   pixel_by_tag.col(1) = (through(pixel_from_tag, {0, 1}) - through(pixel_from_tag, {0, -1})) / 2;

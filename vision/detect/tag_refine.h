@@ -26,20 +26,21 @@ struct RefinedTag {
   double explained = 0;
 };
 
-/// Places a printed tag on a picture: least squares on the grey levels of every pixel that shows
-/// the tag, over a smoothly bent map. Fitting straight lines to the border instead is biased where
-/// cloth bends, and uses a fraction of the edges that a tag has.
+/// Places a printed tag on a picture by least squares on the grey levels of all its pixels. The map
+/// to the picture is smoothly bent. Fitting straight lines to the border instead is biased where
+/// cloth bends, and uses a fraction of the tag's edges.
 ///
 ///   grey(p) = a(q) + c(q) T(q'),   q = homography^-1(p),   q' = q + d(q)
 ///
-/// T is the pattern, blurred by a Gaussian whose widths along the tag's two axes are estimated
-/// along (optics, pixel size and motion); a and c are linear (light); d holds all polynomials up to
+/// T is the pattern, blurred by a Gaussian whose widths along the tag's two axes (optics, pixel
+/// size and motion) are estimated too. a and c are linear (light). d holds all polynomials up to
 /// degree 3 with a normal prior: place, size and shear nearly free, the higher degrees small. Noise
 /// grows with the slope of the picture, as ragged edges make it; both parts are estimated. Pixels
-/// that the pattern does not explain (something in front, a fold) lose their weight (Cauchy loss),
-/// so that a hidden corner is placed by the rest of the tag, with the sigma this deserves.
+/// that the pattern does not explain (something in front, a fold) lose their weight (Cauchy loss).
+/// A hidden corner is therefore placed by the rest of the tag, with the sigma that this implies.
 ///
-/// Sigma is the posterior's, and what the next degree of bending may add by the size of the last.
+/// Sigma is the posterior's plus the size that the next degree of bending may have by the last
+/// one's.
 ///
 /// `pixel_from_tag` maps tag coordinates to pixels (pixel (0, 0) is the centre of the top left one)
 /// and must be right to a third of a cell.

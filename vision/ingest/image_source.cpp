@@ -46,7 +46,7 @@ class PictureFolder : public ImageSource {
   bool next(cv::Mat& grey) override {
     if (next_ == files_.size()) return false;
     const fs::path& file = files_[next_];
-    // A turn noted in the file's metadata is not applied: the camera file describes the sensor as
+    // A turn noted in the file's metadata is not applied. The camera file describes the sensor as
     // it is read out, and stills and video of one camera must agree.
     grey = cv::imread(file.string(), cv::IMREAD_GRAYSCALE | cv::IMREAD_IGNORE_ORIENTATION);
     if (grey.empty()) {
@@ -73,7 +73,8 @@ class PictureFolder : public ImageSource {
 
 class VideoFile : public ImageSource {
  public:
-  // One named backend: which others OpenCV would try, and what they print, depends on the machine.
+  // The backend is named, because the others that OpenCV would try, and their output, depend on the
+  // machine.
   explicit VideoFile(const fs::path& file) : file_(file.string()), capture_(file_, cv::CAP_FFMPEG) {
     capture_.set(cv::CAP_PROP_ORIENTATION_AUTO, 0);  // as for pictures
     if (!capture_.isOpened() || !capture_.read(picture_) || picture_.empty()) {

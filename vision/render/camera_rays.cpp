@@ -14,8 +14,8 @@ namespace {
 
 constexpr double kSpacing_px = 4;
 
-/// Of the four nodes around a place between the second and third (0 <= x <= 1): the weights of the
-/// cubic through their values.
+/// Returns the weights of four nodes for the cubic through their values. The place lies between the
+/// second and third (0 <= x <= 1).
 Eigen::Vector4d cubic_weights(double x) {
   return {-x * (x - 1) * (x - 2) / 6, (x + 1) * (x - 1) * (x - 2) / 2, -(x + 1) * x * (x - 2) / 2,
           (x + 1) * x * (x - 1) / 6};
@@ -81,7 +81,7 @@ void CameraRays::row(std::span<const double> u_px, double v_px,
     return value;
   };
 
-  // Of the four node columns around the current cell.
+  // Values at the four node columns around the current cell.
   Eigen::Matrix<double, 2, 4> values = Eigen::Matrix<double, 2, 4>::Zero();
   int current = -1;
   for (std::size_t i = 0; i < u_px.size(); ++i) {

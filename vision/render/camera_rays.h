@@ -8,10 +8,11 @@
 
 namespace clothfit {
 
-/// The line of sight of every place of a camera's picture. `unproject` (calib/camera/projection.h)
-/// finds one by Newton's method, which is too slow for millions; here it is asked at nodes some
-/// pixels apart, once per camera, and interpolated cubically between them. Where that is off by
-/// more than 1e-4 px, measured in the middle between nodes, it is asked at every place.
+/// Gives the line of sight of every place of a camera's picture. `unproject`
+/// (calib/camera/projection.h) finds one by Newton's method, which is too slow for millions. Here
+/// it is computed once per camera at nodes some pixels apart, and interpolated cubically between
+/// them. Where the interpolation is off by more than 1e-4 px, measured in the middle between nodes,
+/// `unproject` is called for every place.
 class CameraRays {
  public:
   /// Covers the picture and `margin_px` (>= 0) around it. The camera is copied.
@@ -20,9 +21,9 @@ class CameraRays {
   const CameraParameters& camera() const { return camera_; }
   int margin_px() const { return margin_px_; }
 
-  /// Directions (x, y, 1) in camera axes at the pixels (u, v_px) of one row; x is NaN where no
-  /// direction projects there. Pixels lie within the picture's outer edge and the margin, or up to
-  /// one to the right of it and below. `direction` has as many entries as `u_px`.
+  /// Gives directions (x, y, 1) in camera axes at the pixels (u, v_px) of one row. x is NaN where
+  /// no direction projects there. Pixels lie within the picture's outer edge and the margin, or up
+  /// to one to the right of it and below. `direction` has as many entries as `u_px`.
   void row(std::span<const double> u_px, double v_px, std::span<Eigen::Vector2d> direction) const;
 
  private:

@@ -17,8 +17,8 @@ namespace {
 
 constexpr double kReach = 4;  // standard deviations of the point spread that count
 
-/// Samples along one axis of the picture: `samples` to a pixel, and as many pixels around the
-/// picture as the point spread reaches.
+/// Samples along one axis of the picture: `samples` to a pixel. As many pixels surround the picture
+/// as the point spread reaches.
 struct SampleAxis {
   int samples = 0;
   int margin_px = 0;
@@ -34,11 +34,11 @@ struct SampleAxis {
     for (double& w : weight) w /= sum;
   }
 
-  /// Sample k lies here, where pixel 0 is at 0.
+  /// Returns the place of sample k, where pixel 0 is at 0.
   double place_px(int k) const { return -0.5 - margin_px + (k + 0.5) / samples; }
   int count(int size_px) const { return (size_px + 2 * margin_px) * samples; }
 
-  /// The pixel's area (a box of width 1) blurred by a Gaussian, at `x_px` from its middle.
+  /// Returns the pixel's area (a box of width 1) blurred by a Gaussian, at `x_px` from its middle.
   static double pixel_response(double x_px, double blur_px) {
     if (blur_px == 0) return std::abs(x_px) < 0.5 ? 1 : 0;
     const auto below = [&](double x) { return 0.5 * std::erfc(-x / blur_px * M_SQRT1_2); };
@@ -46,12 +46,13 @@ struct SampleAxis {
   }
 };
 
-/// Light that comes from what a line of sight meets, in grey levels.
+/// Light in grey levels from the surface that a line of sight meets.
 struct Lighting {
   const RenderOptions& options;
   Eigen::Vector3d towards_light;  ///< camera axes, length 1
 
-  /// `step`: how far it is to the next samples across and down, as directions (x, y) in columns.
+  /// `step` holds the distances to the next samples across and down, as directions (x, y) in
+  /// columns.
   double level(const SheetHit& hit, const Eigen::Matrix2d& step,
                std::span<const PlacedSheet> sheets) const {
     if (hit.sheet < 0) return options.background_level;
@@ -64,7 +65,7 @@ struct Lighting {
   }
 };
 
-/// Rows of samples, blurred along the row: one value per pixel across, `axis.count(height)` rows.
+/// Samples rows, blurred along the row: one value per pixel across, `axis.count(height)` rows.
 cv::Mat sample_rows(const CameraRays& rays, std::span<const std::vector<PlacedSheet>> instants,
                     const std::vector<SheetScene>& scenes, const Lighting& lighting,
                     const SampleAxis& axis) {
@@ -109,7 +110,7 @@ cv::Mat sample_rows(const CameraRays& rays, std::span<const std::vector<PlacedSh
   return rows;
 }
 
-/// Random numbers of one row of one picture, whichever thread draws them.
+/// Returns the generator of one row of one picture, the same on whichever thread.
 std::mt19937_64 row_generator(std::uint64_t noise_seed, int row) {
   std::seed_seq seed{static_cast<std::uint32_t>(noise_seed),
                      static_cast<std::uint32_t>(noise_seed >> 32), static_cast<std::uint32_t>(row)};

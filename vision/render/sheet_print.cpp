@@ -30,7 +30,7 @@ std::map<int, Corners> corners_by_tag(const MarkerSet& markers) {
   return by_tag;
 }
 
-/// Where a tag's border lies: its top left corner and its edges to the right and down.
+/// The place of a tag's border: its top left corner and its edges to the right and down.
 struct Border {
   Eigen::Vector2d top_left_m, right_m, down_m;
 };
@@ -61,7 +61,8 @@ Border border_of(int tag, const Corners& corners) {
   return border;
 }
 
-/// The share of [low, high] that lies in cell `index`, [index, index + 1]; of a point, all of it.
+/// Returns the share of [low, high] that lies in cell `index`, [index, index + 1]; of a point, all
+/// of it.
 double share(double low, double high, int index) {
   if (!(high > low)) return 1;
   return std::max(0.0, std::min(high, index + 1.0) - std::max(low, index + 0.0)) / (high - low);
@@ -153,7 +154,7 @@ int SheetPrint::bin_along(double x_m, double length_m) const {
 
 void SheetPrint::list_in_bins(const Eigen::Vector2d& low_m, const Eigen::Vector2d& high_m, int item,
                               std::vector<int> Bin::*list) {
-  // A bin more on each side, for footprints that reach over the item's edge.
+  // Footprints reach over the item's edge, so a bin more on each side is taken.
   const auto first = [](int bin) { return std::max(bin - 1, 0); };
   const auto last = [](int bin) { return std::min(bin + 1, kBinsAcross - 1); };
   for (int row = first(bin_along(low_m.y(), height_m_));

@@ -15,8 +15,8 @@ struct PrintOptions {
   void validate() const;       ///< throws InputError
 };
 
-/// What a sheet shows on its printed side, as reflectance over material coordinates (s to the
-/// right, t down, metres).
+/// The printed side of a sheet, as reflectance over material coordinates (s to the right, t down,
+/// metres).
 ///
 /// Markers of kind `apriltag` are corners of tags: the printed tag, whose border ends at the four
 /// corners, is laid out between them, with the cells outside the border that its family has. Ink
@@ -24,21 +24,21 @@ struct PrintOptions {
 /// circles, those of kind `none` show nothing.
 class SheetPrint {
  public:
-  /// Throws InputError for a cloth without size, an unknown family, a tag that it does not have or
-  /// that lacks one of its four corners, corners that are not those of a rectangle in the order of
-  /// data/markers.h, and markers of kind `texture`.
+  /// Throws InputError for a cloth without size, for an unknown family, for a tag that the family
+  /// lacks or that lacks one of its four corners, for corners that are not those of a rectangle in
+  /// the order of data/markers.h, and for markers of kind `texture`.
   SheetPrint(const MarkerSet& markers, double width_m, double height_m,
              const PrintOptions& options = {});
 
   double width_m() const { return width_m_; }
   double height_m() const { return height_m_; }
-  /// Of the other side, which is blank.
+  /// Returns the reflectance of the other side, which is blank.
   double back_reflectance() const { return options_.paper; }
-  /// Mean around a place, over the parallelogram that the columns of `footprint_m` span and that
-  /// the place is the middle of; zero: at the place itself. Edges that cross it are weighed by what
-  /// they cover of a rectangle along the tag's own axes (of a dot: along its radius) with the same
-  /// second moments: where an edge seems to lie is exact, its softness nearly so. Footprints reach
-  /// no further than a hundredth of the sheet.
+  /// Returns the mean around a place over a parallelogram, whose middle the place is. The columns
+  /// of `footprint_m` span it; zero stands for the place itself. Edges that cross it are weighed by
+  /// their cover of a rectangle along the tag's own axes (of a dot: along its radius) with the same
+  /// second moments. The apparent place of an edge is exact, its softness nearly so. Footprints
+  /// reach no further than a hundredth of the sheet.
   double reflectance(const Eigen::Vector2d& place_m,
                      const Eigen::Matrix2d& footprint_m = Eigen::Matrix2d::Zero()) const;
 
@@ -59,7 +59,8 @@ class SheetPrint {
 
     double ink_share(const Eigen::Vector2d& place_m, const Eigen::Matrix2d& footprint_m) const;
   };
-  /// What may cover a place: the sheet is divided into bins so that a look-up reads few items.
+  /// The items that may cover a place. The sheet is divided into bins so that a look-up reads few
+  /// items.
   struct Bin {
     std::vector<int> tags;
     std::vector<int> dots;

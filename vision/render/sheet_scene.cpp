@@ -26,8 +26,8 @@ struct Sheet {
   Eigen::Vector3d vertex(int i, int j) const { return position_m.col(i * columns + j); }
 };
 
-/// Half of a mesh cell: P = corner + x along + y down, 0 <= x, y, x + y <= 1, for the upper one
-/// (`lower` false) from [i, j], for the lower one from [i + 1, j + 1] backwards.
+/// Half of a mesh cell: P = corner + x along + y down, 0 <= x, y, x + y <= 1. The upper one
+/// (`lower` false) starts from [i, j], the lower one from [i + 1, j + 1] backwards.
 struct Triangle {
   int i = 0, j = 0;  ///< of the cell
   bool lower = false;
@@ -43,14 +43,14 @@ struct Triangle {
   Eigen::Vector3d outward() const { return down.cross(along); }  // t x s, in both halves
 };
 
-/// Triangle numbers as Embree knows them: two per cell, the upper first.
+/// Returns the triangle of Embree's number: two per cell, the upper first.
 Triangle triangle_of(const Sheet& sheet, unsigned number) {
   const int cell = static_cast<int>(number / 2);
   const int cells_across = sheet.columns - 1;
   return {sheet, cell / cells_across, cell % cells_across, number % 2 == 1};
 }
 
-/// Normals at the vertices by central differences, one-sided at the edges.
+/// Returns normals at the vertices by central differences, one-sided at the edges.
 Eigen::Matrix3Xd vertex_normals(const Sheet& sheet) {
   Eigen::Matrix3Xd outward(3, sheet.position_m.cols());
   for (int i = 0; i < sheet.rows; ++i) {
@@ -99,14 +99,14 @@ RTCRayHit sight_line(const Eigen::Vector3f& direction, float far) {
   return line;
 }
 
-/// Where the line from the origin along a direction meets a triangle's plane.
+/// The place where the line from the origin along a direction meets a triangle's plane.
 struct PlaneHit {
   Eigen::Vector2d place;         ///< (x, y) of the triangle
   Eigen::Matrix2d by_direction;  ///< its derivative by the direction's x and y
 };
 
-/// In double, moved onto the triangle where rounding puts it beside; `rough` where the plane is
-/// seen edge on.
+/// Computes the place in double, moved onto the triangle where rounding puts it beside. If the
+/// plane is seen edge on, the place is `rough`.
 PlaneHit meet(const Triangle& triangle, const Eigen::Vector3d& direction,
               const Eigen::Vector2d& rough) {
   // direction depth = corner + x along + y down, by Cramer's rule.
@@ -192,8 +192,8 @@ SheetScene::SheetScene(std::span<const PlacedSheet> sheets, const Rigid3& camera
   for (const Sheet& sheet : traced_->sheets) {
     attach(traced_->device.get(), traced_->scene.get(), sheet);
   }
-  // One thread, so that the tree, and with it which of two triangles a line of sight through their
-  // common edge meets, is always the same.
+  // One thread builds the tree, so that it is always the same. With it, a line of sight through the
+  // common edge of two triangles always meets the same one.
   tbb::task_arena(1).execute([&] { rtcCommitScene(traced_->scene.get()); });
   if (rtcGetDeviceError(traced_->device.get()) != RTC_ERROR_NONE) {
     throw std::runtime_error("Embree cannot arrange the sheets");

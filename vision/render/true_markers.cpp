@@ -7,8 +7,8 @@
 namespace clothfit {
 namespace {
 
-/// The pixel of a point, unless it lies where the lens' formula folds back: there it names a pixel
-/// that shows something else.
+/// Returns the pixel of a point, unless the lens' formula folds back there. Where it does, it names
+/// a pixel that shows something else.
 std::optional<Eigen::Vector2d> true_pixel(const CameraParameters& camera,
                                           const Eigen::Vector3d& point_in_camera) {
   constexpr double kSame = 1e-6;  // on the plane z = 1: a thousandth of a pixel

@@ -10,7 +10,7 @@
 
 namespace clothfit {
 
-/// Whether a camera sees a marker, or the first reason why not in this order.
+/// Says whether a camera sees a marker; if not, the first reason in this order.
 enum class MarkerSight {
   seen,
   behind_camera,    ///< or so far aside that the lens maps nothing there
@@ -24,9 +24,9 @@ struct TrueMarker {
   Eigen::Vector2d pixel_px = Eigen::Vector2d::Zero();  ///< unset where it is `behind_camera`
 };
 
-/// Where the markers of `sheets[sheet]` truly are in a picture of all `sheets`: projections of
-/// their points of the same surface that render_cloth draws. For a picture that motion blurs, the
-/// sheets at the middle of the exposure. The camera must have a pose.
+/// Returns the true places of the markers of `sheets[sheet]` in a picture of all `sheets`. They are
+/// projections of their points of the same surface that render_cloth draws. For a picture that
+/// motion blurs, give the sheets at the middle of the exposure. The camera must have a pose.
 std::vector<TrueMarker> true_markers(const CameraParameters& camera,
                                      std::span<const PlacedSheet> sheets, int sheet,
                                      std::span<const Marker> markers);

@@ -15,9 +15,9 @@ struct OverlayPoint {
   std::string label;  ///< reason of a rejection or a short name; may be empty
 };
 
-/// The grey picture in colour (8-bit BGR) with green crosses on good points, red ones with their
-/// reason on rejected points, blue ones on reference points. Points outside the picture are left
-/// out. The size of the crosses grows with the picture's.
+/// Draws the grey picture in colour (8-bit BGR) with crosses on points. Good points have green
+/// ones, rejected points red ones with their reason, reference points blue ones. Points outside the
+/// picture are left out. The size of the crosses grows with the picture's.
 cv::Mat draw_overlay(const cv::Mat& grey, const std::vector<OverlayPoint>& points);
 
 }  // namespace clothfit

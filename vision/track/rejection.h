@@ -5,14 +5,14 @@
 
 namespace clothfit {
 
-/// A reason for which a detected point is kept out of every fit: `code` is what tracks files hold
-/// after `rejected:`.
+/// A reason that keeps a detected point out of every fit. `code` follows `rejected:` in tracks
+/// files.
 struct RejectionReason {
   std::string code;
   std::string meaning;  ///< one sentence for a person
 };
 
-/// Every reason that tracking gives, in the order in which they are tried.
+/// Returns every reason that tracking gives, in the order in which they are tried.
 const std::vector<RejectionReason>& rejection_reasons();
 
 /// The codes, one name each.

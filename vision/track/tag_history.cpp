@@ -14,8 +14,8 @@ double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
   return a.x() * b.y() - a.y() * b.x();
 }
 
-/// True where two edges meet so flatly, or the quadrilateral is so thin, that corners slide along
-/// edges: an angle within `kSmallestAngle` of 0 or 180 degrees.
+/// Says whether corners may slide along edges: where two edges meet flatly, or the quadrilateral is
+/// thin. An angle is then within `kSmallestAngle` of 0 or 180 degrees.
 bool nearly_degenerate(const std::array<Eigen::Vector2d, 4>& corner_px) {
   constexpr double kSmallestAngle = 15 * M_PI / 180;
   for (std::size_t c = 0; c < 4; ++c) {
@@ -28,7 +28,7 @@ bool nearly_degenerate(const std::array<Eigen::Vector2d, 4>& corner_px) {
   return false;
 }
 
-/// Reasons that show in one picture alone.
+/// Rejects for the reasons that show in one picture alone.
 void judge_alone(TagReading& reading, const TrackOptions& options, const cv::Size& size) {
   const TagDetection& tag = reading.tag;
   if (tag.decision_margin < options.min_decision_margin) reading.reject(rejection::kLowMargin);
@@ -37,7 +37,7 @@ void judge_alone(TagReading& reading, const TrackOptions& options, const cv::Siz
   if (!tag.refined || tag.explained < options.min_explained) {
     reading.reject(rejection::kPatternMismatch);
   }
-  constexpr double kBorder = 2;  // px; what an edge's blur reaches
+  constexpr double kBorder = 2;  // px; reach of an edge's blur
   for (std::size_t c = 0; c < 4; ++c) {
     const Eigen::Vector2d& corner = tag.corner_px[c];
     const bool inside = corner.x() >= kBorder && corner.x() <= size.width - 1 - kBorder &&
@@ -49,8 +49,8 @@ void judge_alone(TagReading& reading, const TrackOptions& options, const cv::Siz
   }
 }
 
-/// A tag read twice in a picture: no telling which is it. One row per frame stays, that of the
-/// clearest reading, rejected.
+/// Rejects a tag read twice in a picture, as nothing tells which reading is it. One row per frame
+/// stays, that of the clearest reading, rejected.
 void judge_duplicates(TagHistory& history) {
   std::stable_sort(history.begin(), history.end(), [](const TagReading& a, const TagReading& b) {
     if (a.frame != b.frame) return a.frame < b.frame;
@@ -68,8 +68,8 @@ void judge_duplicates(TagHistory& history) {
   history = std::move(kept);
 }
 
-/// A tag that is out of reach from where it was before and from where it is after. At the ends of
-/// its history the two next readings on the one side stand for both.
+/// Rejects a tag that is out of reach both from its place before and from its place after. At the
+/// ends of its history the two next readings on the one side stand for both.
 void judge_jumps(TagHistory& history, double max_speed_px) {
   std::vector<TagReading*> good;
   for (TagReading& reading : history) {

@@ -11,13 +11,13 @@ namespace clothfit {
 
 struct TrackOptions;
 
-/// One reading of a tag and why it, or single corners of it, are doubted (empty: they are not).
+/// One reading of a tag. `rejected` says why corners are doubted; empty where they are not.
 struct TagReading {
   int frame = 0;
   TagDetection tag;
   std::array<std::string, 4> rejected;  ///< a code of vision/track/rejection.h per corner
 
-  /// Whether any corner is left.
+  /// Says whether any corner is left.
   bool good() const;
   /// Rejects the corners that are not rejected yet.
   void reject(const char* reason);
@@ -27,8 +27,8 @@ struct TagReading {
 /// The readings of one tag, sorted by frame.
 using TagHistory = std::vector<TagReading>;
 
-/// Rejects readings and corners that one picture shows to be doubtful, tags that were read twice in
-/// a picture, and tags that jump; one reading per frame stays. `size` is that of the pictures.
+/// Rejects readings and corners that one picture shows to be doubtful, tags read twice in a
+/// picture, and tags that jump. One reading per frame stays. `size` is that of the pictures.
 void judge(TagHistory& history, const TrackOptions& options, const cv::Size& size);
 
 }  // namespace clothfit

@@ -25,7 +25,7 @@ namespace {
 
 constexpr int kNone = -1;
 
-/// Which marker (or reference point) each corner of a tag is; kNone where it is none.
+/// The marker (or reference point) of each corner of a tag; kNone where there is none.
 using PointsByTag = std::map<int, std::array<int, 4>>;
 
 template <class Point>
@@ -67,8 +67,8 @@ struct Picture {
   std::vector<TagDetection> tags;
 };
 
-/// The picture to draw on is the middle one; where a video does not say how long it is, one between
-/// its half and its end or, at worst, its quarter.
+/// Says whether a frame is drawn on: the middle one is. If a video does not say how long it is, one
+/// between its half and its end serves or, at worst, its quarter.
 bool is_overlay_frame(int frame, int count) {
   if (count > 0) return frame == count / 2;
   return frame == 0 || std::has_single_bit(static_cast<unsigned>(frame));
@@ -123,7 +123,7 @@ Readings read_all(ImageSource& images, const std::string& family, const PointsBy
   return readings;
 }
 
-/// "0 to 63" or "0, 4, 7": the numbers as a person would list them.
+/// Lists numbers as a person would: "0 to 63" or "0, 4, 7".
 std::string list_ids(const std::set<int>& ids) {
   std::vector<std::string> parts;
   for (auto it = ids.begin(); it != ids.end();) {
@@ -136,7 +136,7 @@ std::string list_ids(const std::set<int>& ids) {
   return fmt::format("{}", fmt::join(parts, ", "));
 }
 
-/// What the first picture shows instead of the tags that were looked for, as a remedy.
+/// Says, as a remedy, which tags the first picture shows instead of those that were looked for.
 std::string what_appears_instead(const Readings& readings, const std::string& family) {
   if (!readings.unlisted.empty()) {
     return fmt::format("tags {} of that family do appear: check markers.csv",

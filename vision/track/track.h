@@ -36,15 +36,16 @@ struct TrackResult {
   int overlay_frame = 0;
 };
 
-/// Finds the cloth's tags in every picture of one camera: the markers and reference points that
-/// carry a tag and a corner. Pictures are worked on in parallel; the result does not depend on the
-/// number of threads. `progress` (may be empty) is called once per picture, in order, by one thread
-/// at a time but not always the same. Throws InputError for pictures that cannot be read, are none,
-/// or differ in size, for markers without tags, and when no tag of the cloth ever appears.
+/// Finds the cloth's tags in every picture of one camera. They are the markers and reference points
+/// that carry a tag and a corner. Pictures are worked on in parallel; the result does not depend on
+/// the number of threads. `progress` (may be empty) is called once per picture, in order, by one
+/// thread at a time but not always the same. Throws InputError for pictures that cannot be read,
+/// are none, or differ in size, for markers without tags, and when no tag of the cloth ever
+/// appears.
 TrackResult track(const Recording& recording, const CameraEntry& camera,
                   const TrackOptions& options, const ProgressCallback& progress);
 
-/// The same in pictures that come from elsewhere; refusals call them `where`.
+/// Finds them in pictures that come from elsewhere; refusals call the pictures `where`.
 TrackResult track(const Recording& recording, ImageSource& pictures, const std::string& where,
                   const TrackOptions& options, const ProgressCallback& progress);
 

@@ -3,12 +3,12 @@
 namespace clothfit {
 
 struct TrackOptions {
-  /// px per frame, > 0: a tag that is further than this both from where it was before and from
-  /// where it is after is rejected. Higher values let wrongly read tags through.
+  /// px per frame, > 0: a tag is rejected if it is further than this both from its place before and
+  /// from its place after. Higher values let wrongly read tags through.
   double max_speed_px = 60;
   /// Grey levels, >= 0: weaker readings of a tag's bits are rejected.
   double min_decision_margin = 20;
-  /// 0 to 1: a tag of whose pixels the printed pattern explains less is rejected; a clean one has
+  /// 0 to 1: a tag is rejected if the printed pattern explains less of its pixels. A clean one has
   /// 0.9.
   double min_explained = 0.7;
   /// px, > 0: corners that are placed worse are rejected.
