@@ -13,7 +13,7 @@ Eigen::Matrix4Xi quads(const MeshSequence& mesh) {
   for (int i = 0; i + 1 < mesh.rows; ++i) {
     for (int j = 0; j + 1 < mesh.columns; ++j) {
       const int corner = i * mesh.columns + j;
-      // Down along t, right along s, up again.
+      // The corners run down along t, right along s and up again.
       cells.col(i * (mesh.columns - 1) + j) << corner, corner + mesh.columns,
           corner + mesh.columns + 1, corner + 1;
     }

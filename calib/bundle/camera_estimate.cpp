@@ -103,8 +103,8 @@ bool refine_camera(const BoardObservations& observations, double cauchy_scale_px
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::DENSE_SCHUR;
   options.max_num_iterations = 200;
-  // Without an upper bound the damping vanishes in the long flat basins of long distortion series,
-  // and the normal equations become singular to rounding.
+  // Without an upper bound the damping vanishes in the flat basins of long distortion series. The
+  // normal equations then become singular to rounding.
   options.max_trust_region_radius = 1e8;
   options.function_tolerance = 1e-12;
   options.parameter_tolerance = 1e-12;

@@ -6,7 +6,7 @@
 
 namespace clothfit {
 
-/// Largest time step at which the Euler scheme is stable for this cloth and these parameters.
+/// Returns the largest time step at which the Euler scheme is stable for this cloth and parameters.
 ///
 /// With gamma the damping rate and omega the frequency of the stiffest mode, the scheme
 /// V += h (-omega^2 P - gamma V), P += h V is stable while 2 h gamma + h^2 omega^2 < 4 (both roots

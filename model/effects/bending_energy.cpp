@@ -8,8 +8,8 @@
 namespace clothfit::bending_energy {
 namespace {
 
-/// E = B / 2 sum |q|^2 over places, q = sum of constants times positions: a second difference times
-/// the root of the area that it stands for.
+/// The energy is E = B / 2 sum |q|^2 over places. q, a sum of constants times positions, is a
+/// second difference times the root of the area that it stands for.
 struct Law {
   static constexpr int kParameters = 1, kVertices = 4;
 
@@ -48,7 +48,8 @@ struct Law {
     return {Real(-c[0]) * moment, Real(-c[1]) * moment, Real(-c[2]) * moment, Real(-c[3]) * moment};
   }
 
-  /// The largest row sum of M^-1 K (Gershgorin); K is the same in every shape of the cloth.
+  /// The frequency is bounded by the largest row sum of M^-1 K (Gershgorin); K is the same in every
+  /// shape of the cloth.
   static EffectRates rates(const Cloth& cloth, const SpringParameters&,
                            const std::vector<double>& b_nm) {
     Eigen::VectorXd row = Eigen::VectorXd::Zero(cloth.mesh.vertex_count());

@@ -9,19 +9,20 @@
 
 namespace clothfit {
 
-/// What a vertex feels of an obstacle.
+/// The force of an obstacle on a vertex.
 ///
 ///   F = N n - friction N v_t / sqrt(v_t^2 + (friction N / (rate m))^2)
 ///   N = A max(stiffness depth - damping v_n, 0) where depth > 0, else 0
 ///
 /// depth (m): how far the vertex is inside the obstacle; n: the obstacle's outward unit normal
-/// there; v_n = n . v and v_t = v - v_n n: of the vertex against the obstacle, which rests; A: the
-/// area that belongs to the vertex in the flat cloth; m its mass. The obstacle pushes, never pulls.
+/// there; v_n = n . v and v_t = v - v_n n: velocity of the vertex against the obstacle, which
+/// rests; A: the area that belongs to the vertex in the flat cloth; m its mass. The obstacle
+/// pushes, never pulls.
 ///
 /// Source: penalty of the depth with a dashpot, Coulomb's friction. Friction is smoothed where
 /// sliding changes its sign, at the speed below which it would damp faster than `rate`: there it is
-/// viscous, -rate m v_t. So steps stay stable whatever presses, and cloth that should stick creeps,
-/// on a slope of angle a at g sin(a) / rate times 1 / sqrt(1 - (tan(a) / friction)^2).
+/// viscous, -rate m v_t. So steps stay stable whatever presses. Cloth that should stick creeps, on
+/// a slope of angle a at g sin(a) / rate times 1 / sqrt(1 - (tan(a) / friction)^2).
 struct Contact {
   static constexpr int kParameters = 3;  ///< stiffness, damping, friction come first
   static constexpr double kFrictionRate_per_s = 2000;
@@ -35,7 +36,7 @@ struct Contact {
     const Real none(0.0);
     const Real leaving = dot(normal, velocity_m_per_s);
     Real pressure = stiffness_pa_per_m * depth_m - damping_pa_s_per_m * leaving;
-    // At neutral, where it is exactly nothing, its derivative by the stiffness is that of a push.
+    // At neutral the force is exactly nothing; its derivative by the stiffness is that of a push.
     pressure = select(pressure < none, none, pressure);
     const Real press_n = Real(area_m2) * select(depth_m > none, pressure, none);
 
@@ -49,12 +50,12 @@ struct Contact {
     return press_n * normal - drag * sliding;
   }
 
-  /// `parameters`: stiffness, damping, friction, and whatever follows.
+  /// `parameters` are stiffness, damping, friction, and whatever follows.
   static EffectRates rates(const Cloth& cloth, const std::vector<double>& parameters) {
     const auto [stiffness, damping, friction] =
         std::array{parameters[0], parameters[1], parameters[2]};
-    // Friction grows with what presses, so that it adds to the force by which motion along the
-    // normal is answered.
+    // Friction grows with the pressure, so it adds to the force that answers motion along the
+    // normal.
     const double most = (1 + friction) * largest_area_per_mass(cloth);
     const bool rubs = friction > 0 && (stiffness > 0 || damping > 0);
     return {.damping_per_s = most * damping + (rubs ? kFrictionRate_per_s : 0),

@@ -18,10 +18,10 @@ Vector3<Real> vector(const Eigen::Vector3d& v) {
 
 struct Law {
   static constexpr int kParameters = Contact::kParameters;
-  /// What a force is differentiated by: position, velocity, mass, own parameters.
+  /// Numbers that a force is differentiated by: position, velocity, mass, own parameters.
   static constexpr int kMass = 6, kOwn = 7;
 
-  /// The force on a vertex below the part `surface` of the obstacle.
+  /// Returns the force on a vertex below the part `surface` of the obstacle.
   template <class Real>
   static Vector3<Real> force(const Nearest& surface, const Vector3<Real>& position_m,
                              const Vector3<Real>& velocity_m_per_s, double area_m2,
@@ -34,7 +34,7 @@ struct Law {
                           p[2]);
   }
 
-  /// Calls `visit(vertex, part of the surface, position, area)` for every vertex that is below it.
+  /// Calls `visit(vertex, part of the surface, position, area)` for every vertex below the surface.
   template <class Vectors, class Visit>
   static void for_contacts(const Cloth& cloth, const Vectors& position_m, const Visit& visit) {
     if (!cloth.obstacle) return;
@@ -50,7 +50,7 @@ struct Law {
   template <class Real, class Vectors, class Add>
   static void forces(const Cloth& cloth, const Vectors& position_m, const Vectors& velocity_m_per_s,
                      const std::array<Real, kParameters>& p, const Add& add) {
-    // Nothing to search for; but at neutral there are derivatives.
+    // At neutral there is no force to search for, but there are derivatives.
     if (std::is_same_v<Real, double> && p[0] == Real(0.0) && p[1] == Real(0.0)) return;
     for_contacts(cloth, position_m,
                  [&](int k, const Nearest& surface, const Vector3<Real>& x, double area_m2) {

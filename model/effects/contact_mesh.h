@@ -4,7 +4,7 @@
 
 #include "model/cloth/effect.h"
 
-/// An obstacle of triangles that the cloth cannot pass: the cloth's `obstacle`
+/// Keeps the cloth out of an obstacle of triangles: the cloth's `obstacle`
 /// (model/topology/obstacle.h). A vertex below its surface feels the force of contact_law.h towards
 /// the nearest point of the surface; a cloth without an obstacle feels nothing.
 ///

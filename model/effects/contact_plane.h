@@ -4,8 +4,8 @@
 
 #include "model/cloth/effect.h"
 
-/// A plane that the cloth cannot pass: floor, table, wall. A vertex at x is depth = offset - n . x
-/// below it and feels the force of contact_law.h.
+/// Keeps the cloth on one side of a plane: floor, table, wall. A vertex at x is depth = offset - n
+/// . x below it and feels the force of contact_law.h.
 ///
 /// Parameters: stiffness (Pa/m), damping (Pa s/m), friction (ratio), neutral at 0; n_x, n_y, n_z,
 /// whose direction is the plane's normal n, towards the free side; offset (m), the plane's distance

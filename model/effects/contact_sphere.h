@@ -4,7 +4,7 @@
 
 #include "model/cloth/effect.h"
 
-/// A ball that the cloth cannot pass. A vertex at x is depth = radius - |x - centre| inside it and
+/// Keeps the cloth out of a ball. A vertex at x is depth = radius - |x - centre| inside it and
 /// feels the force of contact_law.h along n = (x - centre) / |x - centre|.
 ///
 /// Parameters: stiffness (Pa/m), damping (Pa s/m), friction (ratio), neutral at 0; centre_x,

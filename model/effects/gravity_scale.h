@@ -4,8 +4,8 @@
 
 #include "model/cloth/effect.h"
 
-/// Gravity that is stronger or weaker than stated: F = excess m g at every vertex. Parameter:
-/// excess (ratio), neutral at 0. Ours.
+/// Makes gravity stronger or weaker than stated: F = excess m g at every vertex. Parameter: excess
+/// (ratio), neutral at 0. Ours.
 ///
 /// A clock that runs wrong looks the same: with still supports and free stiffness and damping,
 /// t -> a t maps g to a^2 g.

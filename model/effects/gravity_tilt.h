@@ -4,7 +4,7 @@
 
 #include "model/cloth/effect.h"
 
-/// Gravity in a direction other than the stated one: F = m (R g - g), R the turn about the
+/// Turns gravity away from the stated direction: F = m (R g - g). R is the turn about the
 /// horizontal axes x and y of the world by two small angles.
 ///
 /// R is the rational rotation (Cayley's) of w = (about_x, about_y, 0) / 2,

@@ -4,7 +4,7 @@
 
 #include "model/cloth/effect.h"
 
-/// A gust: wind that comes and goes, at every vertex F = A [n . q sin(2 pi (f t + phase))] n.
+/// Adds a gust, wind that comes and goes: F = A [n . q sin(2 pi (f t + phase))] n at every vertex.
 ///
 /// Ours: the founding paper's fluid force on a sheet at rest, A (n . q) n [louchet1995, section
 /// 2.2], with one harmonic in time t (s, the recording's); the drag that goes with it is wind's. A

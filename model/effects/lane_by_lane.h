@@ -20,7 +20,7 @@ struct OneLane {
   }
 };
 
-/// What a search goes by: a number without its derivatives.
+/// Returns the number that a search compares: without its derivatives.
 inline double value_of(double x) {
   return x;
 }
@@ -36,8 +36,8 @@ Vector3<double> value_of(const Vector3<Real>& v) {
   return {value_of(v.x), value_of(v.y), value_of(v.z)};
 }
 
-/// An effect that has to search, for what it touches, so that each simulation walks its own path:
-/// lanes are taken one after the other. A Law has
+/// An effect that has to search for contacts, so that each simulation takes its own path. Lanes are
+/// taken one after the other. A Law has
 ///   static constexpr int kParameters;
 ///   // `position_m` and `velocity_m_per_s` give a vertex's Vector3<Real> (Real is double or a dual
 ///   // number); calls add(vertex, Vector3<Real>) with forces (N)

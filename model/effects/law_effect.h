@@ -6,8 +6,8 @@
 
 namespace clothfit {
 
-/// Overrides what an effect does in lanes of each of the kinds L by what `Adapter` says once for
-/// all of them, in the templates that LawEffect names.
+/// Overrides an effect's functions in lanes of each of the kinds L. `Adapter` states them once for
+/// all kinds, in the templates that LawEffect names.
 template <class Adapter, class... L>
 class AdapterInLanes : public Effect {};
 
@@ -36,8 +36,8 @@ class AdapterInLanes<Adapter, L, More...> : public AdapterInLanes<Adapter, More.
 };
 
 /// Base of the adapters, which make an effect of a Law: VertexLawEffect<Law> and its like. Virtual
-/// functions cannot be templates over the kind of lanes; an adapter writes the templates, each of
-/// which hides the one below, that does nothing.
+/// functions cannot be templates over the kind of lanes. An adapter therefore writes the templates,
+/// each of which hides the one below, which does nothing.
 template <class Adapter, class Law>
 class LawEffect : public AdapterInLanes<Adapter, ExactLanes, FastLanes, SingleLane> {
  public:

@@ -8,7 +8,7 @@
 
 namespace clothfit {
 
-/// The parameters that a simulation depends on have numbers: the springs' constants, gravity, then
+/// Numbers of the parameters that a simulation depends on: the springs' constants, gravity, then
 /// the effect's own.
 struct ParameterNumber {
   static constexpr int natural_length(int type) { return type; }
@@ -18,14 +18,14 @@ struct ParameterNumber {
   static constexpr int own(int parameter) { return 3 * kSpringTypes + 3 + parameter; }
 };
 
-/// The derivatives of what an effect does to one simulation, as lists of small blocks that tangents
-/// and the adjoint multiply by. `on` names what is acted on: a vertex where forces are, a held
-/// point where the supports are. Several blocks in the same place add up.
+/// The derivatives of an effect's action on one simulation, as lists of small blocks. Tangents and
+/// the adjoint multiply by them. `on` names the target: a vertex where forces are, a held point
+/// where the supports are. Several blocks in the same place add up.
 struct EffectLinearisation {
   using ByMotion = MotionBlock;
   using BySpring = SpringJacobian;
-  /// What the tension of spring `spring` of `by_spring` changes by with a parameter, with a number
-  /// that is remembered.
+  /// The derivative of the tension of spring `spring` of `by_spring` by a parameter, and by a
+  /// number that is remembered.
   struct TensionByParameter {
     int spring, parameter;  ///< a ParameterNumber
     double derivative;
@@ -44,7 +44,7 @@ struct EffectLinearisation {
   };
   /// By the force on the same vertex, or the pull on the same held point.
   using ByForce = ForceBlock;
-  /// By the mass of the same vertex (1/kg times what is acted on).
+  /// By the mass of the same vertex (1/kg times the action).
   struct ByMass {
     int on;
     Eigen::Vector3d derivative;
@@ -58,7 +58,7 @@ struct EffectLinearisation {
   std::vector<ByForce> by_force;
   std::vector<ByMass> by_mass;
 
-  // What the effect remembers after the step; without an entry a number stays as it is.
+  // These give the memory after the step; without an entry a number stays as it is.
   struct MemoryByMotion {
     int number, of;
     Eigen::RowVector3d by_position, by_velocity;
@@ -80,7 +80,7 @@ struct EffectLinearisation {
   std::vector<MemoryByMemory> memory_by_memory;
   std::vector<MemoryByForce> memory_by_force;
 
-  /// Whose derivatives are looked at, by parameter numbers; others may be left out. Empty: all.
+  /// Parameter numbers whose derivatives are looked at; others may be left out. Empty: all.
   std::vector<bool> looked_at;
 
   bool asks_for(int parameter) const {

@@ -31,8 +31,8 @@ struct Law {
     return -at.stiffness_n_per_m * at.natural_length_m * change(at.type, along);
   }
 
-  // A constant pull stiffens a spring across itself, by k l0 |e| / l. Where springs are shorter
-  // than l0 that is more than is said here, but then they are stiff along themselves only.
+  // A constant pull stiffens a spring across itself, by k l0 |e| / l. Springs shorter than l0 are
+  // stiffened more than this bound, but they are then stiff along themselves only.
   static EffectRates rates(const Cloth& cloth, const SpringParameters& springs,
                            const std::vector<double>& p) {
     const std::array<double, 2> along{p[0], p[1]};

@@ -9,13 +9,13 @@
 
 namespace clothfit {
 
-/// Finds points that are near each other: cells as wide as the distance, kept in a hash table.
+/// Finds points that are near each other by cells as wide as the distance, kept in a hash table.
 /// Holds its memory between calls, so that nothing is allocated once it has seen as many points.
 class NearPairs {
  public:
-  /// Calls `visit(a, b, vector from a to b, squared distance)` once for every two of `count` points
-  /// closer than `distance_m` > 0. Points that are not finite have no pairs. The order of the calls
-  /// depends on the positions alone.
+  /// Calls `visit(a, b, vector from a to b, squared distance)` once for every pair closer than
+  /// `distance_m` > 0. There are `count` points; those that are not finite have no pairs. The order
+  /// of the calls depends on the positions alone.
   template <class Positions, class Visit>
   void for_pairs(int count, const Positions& position_m, double distance_m, const Visit& visit) {
     sort_into_cells(count, position_m, distance_m);
@@ -23,13 +23,14 @@ class NearPairs {
     for (int a = 0; a < count; ++a) {
       const Point& from = points_[static_cast<size_t>(a)];
       if (!from.finite) continue;
-      // The own cell, and of the 26 around it the half that comes after: the others see this one.
+      // Visited are the own cell and, of the 26 around it, the half that comes after: the others
+      // see this one.
       for (size_t c = 0; c < kCells.size(); ++c) {
         const size_t bucket = bucket_of(from.hash + step_hash_[c]);
         for (int n = first_[bucket]; n < first_[bucket + 1]; ++n) {
           const int b = members_[static_cast<size_t>(n)];
           const Point& to = points_[static_cast<size_t>(b)];
-          // Other cells share the bucket; of its own cell each point sees those after it.
+          // Other cells share the bucket. In its own cell each point sees those after it.
           const Cell& step = kCells[c];
           if (to.cell[0] - from.cell[0] != step[0] || to.cell[1] - from.cell[1] != step[1] ||
               to.cell[2] - from.cell[2] != step[2] || (c == 0 && b <= a))
@@ -65,8 +66,8 @@ class NearPairs {
                                                    {0, 1, 1},
                                                    {0, 0, 1}}};
 
-  /// A sum, so that a neighbouring cell's is the own one's plus that of the step there; of odd
-  /// factors, so that neighbouring cells fall into different buckets.
+  /// Hashes by a sum, so that a neighbouring cell's hash is the own one's plus that of the step
+  /// there. The factors are odd, so that neighbouring cells fall into different buckets.
   static constexpr std::uint64_t hash_of(const Cell& cell) {
     return static_cast<std::uint64_t>(cell[0]) * 0x9E3779B97F4A7C15u +
            static_cast<std::uint64_t>(cell[1]) * 0xC2B2AE3D27D4EB4Fu +
@@ -94,7 +95,8 @@ class NearPairs {
       point.hash = hash_of(point.cell);
       ++first_[bucket_of(point.hash)];
     }
-    // Counting sort: each bucket's end, then filled from there so that members come in order.
+    // This is a counting sort: each bucket's end comes first, then members are filled in from
+    // there, in order.
     for (size_t bucket = 1; bucket < first_.size(); ++bucket) first_[bucket] += first_[bucket - 1];
     for (int k = count - 1; k >= 0; --k) {
       const Point& point = points_[static_cast<size_t>(k)];

@@ -7,7 +7,7 @@
 #include "model/cloth/effect.h"
 #include "model/kernels/lanes.h"
 
-/// The numbers that the laws of effects are written over, so that each is written once: `double`, a
+/// The numbers over which the laws of effects are written, each law once. They are `double`, a
 /// number in every lane, or a dual number that carries derivatives (ceres::Jet).
 namespace clothfit {
 
@@ -52,14 +52,14 @@ struct LaneNumber {
   }
 };
 
-/// `a` where the condition holds, else `b`: laws do not branch, so that every lane walks the same
-/// path.
+/// Returns `a` where the condition holds, else `b`. Laws do not branch, so that every lane takes
+/// the same path.
 template <class Real>
 Real select(bool where, const Real& a, const Real& b) {
   return where ? a : b;
 }
 
-/// What a law computes with in lanes of kind L.
+/// The number that a law computes with in lanes of kind L.
 template <class L>
 using RealOf = std::conditional_t<L::kCount == 1, typename L::Number, LaneNumber<L>>;
 
@@ -86,8 +86,8 @@ Vector3<Real> cross(const Vector3<Real>& a, const Vector3<Real>& b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 
-/// The vector's direction, or nothing where it is shorter than 1e-15: a search that tries poor
-/// parameters meets surfaces that are folded to nothing, and needs to carry on.
+/// Returns the vector's direction, or nothing where it is shorter than 1e-15. A search that tries
+/// poor parameters meets surfaces that are folded to nothing, and needs to carry on.
 template <class Real>
 Vector3<Real> direction(const Vector3<Real>& v) {
   using std::sqrt;
@@ -98,7 +98,7 @@ Vector3<Real> direction(const Vector3<Real>& v) {
   return inverse * v;
 }
 
-/// The nearest whole number.
+/// Returns the nearest whole number.
 inline double nearest_whole(double x) {
   return std::round(x);
 }
@@ -106,7 +106,7 @@ template <class L>
 LaneNumber<L> nearest_whole(const LaneNumber<L>& x) {
   return LaneValue<L>(x.lanes.round());
 }
-/// Of a dual number; constant almost everywhere.
+/// Returns that of a dual number; constant almost everywhere.
 template <class Dual>
 requires requires(Dual x) {
   x.a;
@@ -115,8 +115,8 @@ Dual nearest_whole(const Dual& x) {
   return Dual(std::round(x.a));
 }
 
-/// sin(2 pi turns) to 1e-13, of plain arithmetic: the C library's own differs in its last bits from
-/// processor to processor.
+/// Returns sin(2 pi turns) to 1e-13, by plain arithmetic. The C library's own differs in its last
+/// bits from processor to processor.
 template <class Real>
 Real sine_of_turns(const Real& turns) {
   const Real rest = turns - nearest_whole(turns);  // within half a turn
@@ -129,7 +129,7 @@ Real sine_of_turns(const Real& turns) {
     sum = Real(1.0) - square * sum / Real(static_cast<double>(n * (n + 1)));
   return x * sum;
 }
-/// Of a dual number, by the chain rule.
+/// Returns that of a dual number, by the chain rule.
 template <class Dual>
 requires requires(Dual x) {
   x.a;
@@ -139,7 +139,7 @@ Dual sine_of_turns(const Dual& turns) {
   return Dual(sine_of_turns(turns.a), slope * turns.v);
 }
 
-// From lanes to numbers and back.
+// These functions turn lanes into numbers and back.
 
 template <class L>
 Vector3<RealOf<L>> vector_at(const LaneVectors<L>& vectors, int k) {

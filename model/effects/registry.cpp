@@ -17,7 +17,7 @@ namespace clothfit {
 
 namespace {
 
-// A visible table: self-registering statics would be dropped by the linker from a static library.
+// The table is visible, because the linker drops self-registering statics from a static library.
 constexpr std::array kEffects = {
 #define EFFECT(name) EffectEntry{#name, name::describe, name::make},
 #include "model/effects/table.inc"

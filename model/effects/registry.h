@@ -15,18 +15,18 @@ struct EffectEntry {
   std::unique_ptr<Effect> (*make)();
 };
 
-/// Every motion effect the program knows, in alphabetical order.
+/// Returns every motion effect the program knows, in alphabetical order.
 std::span<const EffectEntry> effect_registry();
 
-/// Their names, for a message.
+/// Returns their names, for a message.
 std::string effect_names();
 
-/// The entry called `name`. Throws InputError at `where` that lists the known names.
+/// Returns the entry called `name`. Throws InputError at `where` that lists the known names.
 const EffectEntry& find_effect(const std::string& name, const std::string& where);
 
-/// Adds the effect called `name` to a cloth. Throws InputError at `where` for a name that is not
-/// known (it lists those that are), and for contact_mesh on a cloth whose `obstacle` is not set
-/// yet: it would touch nothing without a word.
+/// Adds the effect called `name` to a cloth. Throws InputError at `where` for an unknown name and
+/// lists the known ones. Throws it also for contact_mesh on a cloth whose `obstacle` is not set
+/// yet, which would silently touch nothing.
 void add_effect(Cloth& cloth, const std::string& name, const std::string& where);
 
 }  // namespace clothfit

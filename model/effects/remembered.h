@@ -8,15 +8,15 @@
 
 namespace clothfit {
 
-/// Numbers that follow from an effect's parameters and the mesh alone: simulations ask for the same
-/// at every step, derivatives by several parameter sets for each of theirs in turn. The last `most`
-/// are kept.
+/// Keeps numbers that follow from an effect's parameters and the mesh alone. Simulations need the
+/// same ones at every step; derivatives need those of several parameter sets in turn. The last
+/// `most` are kept.
 template <class Number, size_t count, size_t most>
 class Remembered {
  public:
   using Parameters = std::array<double, count>;
 
-  /// `compute()`: the numbers.
+  /// Returns the numbers; `compute()` makes them.
   template <class Compute>
   const std::vector<Number>& at(const Mesh& mesh, const Parameters& p, const Compute& compute) {
     const std::array<double, 4> sheet = {mesh.width_m, mesh.height_m,

@@ -53,9 +53,9 @@ struct Law {
             along_t * n - turn_t, along_t * n + turn_t};
   }
 
-  /// dW . dn is the largest part of the energy's second derivative: with |dn| at most
-  /// |dp| / (2 a_s) + |dq| / (2 a_t) in a cell that is not folded, row sums as for bending_energy.
-  /// Folded cells turn more easily: twice that.
+  /// The largest part of the energy's second derivative is dW . dn. |dn| is at most |dp| / (2 a_s)
+  /// + |dq| / (2 a_t) in a cell that is not folded; row sums are as for bending_energy. Folded
+  /// cells turn more easily: twice that.
   static EffectRates rates(const Cloth& cloth, const SpringParameters&,
                            const std::vector<double>& m_n) {
     constexpr double kFolded = 2;

@@ -12,7 +12,7 @@
 
 namespace clothfit {
 
-/// What a law sees of a spring.
+/// A spring as a law sees it.
 template <class Real>
 struct SpringSight {
   Real length_m, stretching_m_per_s;  ///< l and dl/dt
@@ -22,16 +22,16 @@ struct SpringSight {
   double time_step_s = 0;
 };
 
-/// The middle of a spring in shares of the cloth's width and height.
+/// Returns the middle of a spring in shares of the cloth's width and height.
 inline std::array<double, 2> middle_of(const Mesh& mesh, const Spring& spring) {
   const auto middle = [](int a, int b, int count) { return 0.5 * (a + b) / (count - 1); };
   return {middle(spring.a % mesh.columns, spring.b % mesh.columns, mesh.columns),
           middle(spring.a / mesh.columns, spring.b / mesh.columns, mesh.rows)};
 }
 
-/// Calls `visit(number, spring, rate, direction, sight)` for every spring, type by type: the
-/// velocity of its end b relative to a (m/s), and its direction from a to b, zero where it has no
-/// length (there it pulls at nothing).
+/// Calls `visit(number, spring, rate, direction, sight)` for every spring, type by type. `rate` is
+/// the velocity of its end b relative to a (m/s), `direction` goes from a to b, zero where it has
+/// no length (there it pulls at nothing).
 template <class L, class Visit>
 void for_springs(const EffectScene<L>& scene, const Visit& visit) {
   using Real = RealOf<L>;
@@ -58,7 +58,7 @@ void for_springs(const EffectScene<L>& scene, const Visit& visit) {
   }
 }
 
-/// An effect inside the springs: tension (> 0 pulls) beyond k (l - l0) + c dl/dt. A Law has
+/// Makes an effect inside the springs: tension (> 0 pulls) beyond k (l - l0) + c dl/dt. A Law has
 ///   static constexpr int kParameters, kMemory;   // kMemory numbers are remembered per spring
 ///   template <class Real> static Real tension(const SpringSight<Real>&,
 ///       const std::array<Real, kParameters>&, std::array<Real, kMemory>& memory);  // N
@@ -112,7 +112,7 @@ class SpringLawEffect final : public LawEffect<SpringLawEffect<Law>, Law> {
                        const EffectValues<SingleLane>& parameters,
                        const EffectMemory<SingleLane>& memory,
                        EffectLinearisation& derivatives) const override {
-    // What a tension depends on: five numbers of the spring, the parameters, the memory.
+    // A tension depends on five numbers of the spring, the parameters and the memory.
     constexpr int kOwn = 5, kMemory = kOwn + Law::kParameters, kCount = kMemory + Law::kMemory;
     using Dual = ceres::Jet<double, kCount>;
     std::array<Dual, Law::kParameters> p;
@@ -193,7 +193,7 @@ class SpringLawEffect final : public LawEffect<SpringLawEffect<Law>, Law> {
     Law::of_place(0.0, 0.0, p);
   };
 
-  /// Law::of_place of every spring.
+  /// Returns Law::of_place of every spring.
   template <class Real>
   static std::vector<Real> places_of(const Cloth& cloth,
                                      const std::array<Real, Law::kParameters>& p) {

@@ -19,7 +19,7 @@ struct Stencil {
   std::array<double, 4> constants;  ///< whatever the law needs to know of this place
 };
 
-/// An effect between a few vertices each, such as bending. A Law has
+/// Makes an effect between a few vertices each, such as bending. A Law has
 ///   static constexpr int kParameters, kVertices;
 ///   // calls visit(Stencil<kVertices>) where it acts; a vertex may stand in it twice
 ///

@@ -4,9 +4,9 @@
 
 #include "model/cloth/effect.h"
 
-/// The held points drift, all alike, beside what is known of their motion: shift(t) = velocity t,
-/// with t the recording's time (s). Parameters: velocity_x, velocity_y, velocity_z (m/s), neutral
-/// at 0. Ours.
+/// Lets the held points drift, all alike, beside their known motion: shift(t) = velocity t, with t
+/// the recording's time (s). Parameters: velocity_x, velocity_y, velocity_z (m/s), neutral at 0.
+/// Ours.
 namespace clothfit::support_drift {
 
 EffectDescription describe();

@@ -11,21 +11,21 @@
 
 namespace clothfit {
 
-/// What a law sees of a held point.
+/// A held point as a law sees it.
 template <class Real>
 struct SupportSight {
   Vector3<Real> pull_n;  ///< of the cloth, its weight included
   int number = 0;        ///< which held point
-  bool driven = false;   ///< whether that follows a motion of its own, or rests where it started
-  /// To the only other driven point, where there is just one, as their motions have them then
-  /// (world, m), and over the flat cloth; for laws that ask for it, nothing for others.
+  bool driven = false;   ///< follows a motion of its own; else rests where it started
+  /// Vector to the only other driven point, where there is just one (world, m), and its length over
+  /// the flat cloth. Their motions give it; it is set for laws that ask for it, nothing for others.
   Eigen::Vector3d to_partner_m = Eigen::Vector3d::Zero();
   double partner_over_cloth_m = 0;
   double end_time_s = 0;  ///< when it will be where the law places it
   double time_step_s = 0;
 };
 
-/// An effect on the places of the held points. A Law has
+/// Makes an effect on the places of the held points. A Law has
 ///   static constexpr int kParameters, kMemory;   // kMemory numbers are remembered per held point
 ///   static constexpr bool kAtRest;               // whether it shifts before anything moves, too
 ///   static constexpr bool kOfTwo;                // whether it asks for the partner
@@ -40,7 +40,7 @@ class SupportLawEffect final : public LawEffect<SupportLawEffect<Law>, Law> {
     return point.motion && !point.rests;
   }
 
-  /// The only other driven point; -1 where there is none, or more than one.
+  /// Returns the only other driven point; -1 where there is none, or more than one.
   static int partner_of(const Cloth& cloth, int held) {
     int partner = -1;
     for (int h = 0; h < static_cast<int>(cloth.held.size()); ++h) {

@@ -4,17 +4,17 @@
 
 #include "model/cloth/effect.h"
 
-/// The held points creep where the cloth pulls them: with the velocity
+/// Lets the held points creep where the cloth pulls them, with the velocity
 ///
 ///   mobility max(|F| - threshold, 0) F / |F|
 ///
-/// F (N): what the cloth, its weight included, pulls a held point with at the beginning of the
-/// step. What a point has crept is remembered. Parameters: mobility (m/(N s)), neutral at 0;
-/// threshold (N), the pull up to which the point holds, which matters only where mobility does.
-/// Ours: dry friction in a clamp, then viscous.
+/// F (N) is the cloth's pull on a held point, the weight included, at the beginning of the step.
+/// The creep of a point is remembered. Parameters: mobility (m/(N s)), neutral at 0; threshold (N),
+/// the pull up to which the point holds, which matters only where mobility does. Ours: dry friction
+/// in a clamp, then viscous.
 ///
-/// Dashpots pull on a support that creeps: mobility times a support's damping (N s/m) must stay
-/// below 1, which the mobility's bounds see to for cloth.
+/// Dashpots pull on a support that creeps. Mobility times a support's damping (N s/m) must
+/// therefore stay below 1; the mobility's bounds ensure this for cloth.
 namespace clothfit::support_slip {
 
 EffectDescription describe();

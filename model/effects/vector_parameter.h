@@ -6,8 +6,8 @@
 
 namespace clothfit {
 
-/// The three parameters of a vector, which are alike but for their names: NAME_x, NAME_y, NAME_z
-/// for the one called NAME that is given.
+/// Returns the three parameters of a vector, which are alike but for their names. They are NAME_x,
+/// NAME_y, NAME_z for the given one called NAME.
 inline std::vector<EffectParameter> vector_parameter(const EffectParameter& of_each) {
   std::vector<EffectParameter> three(3, of_each);
   three[0].name += "_x";

@@ -14,7 +14,7 @@
 
 namespace clothfit {
 
-/// What a law sees at a vertex.
+/// A vertex as a law sees it.
 template <class Real>
 struct VertexSight {
   Vector3<Real> position_m, velocity_m_per_s;
@@ -29,8 +29,8 @@ struct VertexSight {
   double time_s = 0;  ///< the recording's, at the beginning of the step
 };
 
-/// The vector area at vertex [i, j], from differences to the neighbours on both sides, or the one
-/// there is at an edge; in a flat cloth a cell's area inside, half of one at an edge, a quarter at
+/// The vector area at vertex [i, j], from differences to the neighbours on both sides, or to the
+/// one at an edge. In a flat cloth it is a cell's area inside, half of one at an edge, a quarter at
 /// a corner.
 struct AreaStencil {
   int right, left, below, above;  ///< area = (x_right - x_left) x (x_below - x_above) / 4
@@ -49,13 +49,13 @@ Vector3<RealOf<L>> vector_area(const LaneVectors<L>& position_m, const AreaStenc
   return RealOf<L>(0.25) * cross(along_s, along_t);
 }
 
-/// The area that belongs to vertex [i, j] in the flat cloth.
+/// Returns the area that belongs to vertex [i, j] in the flat cloth.
 inline double flat_area_m2(const Mesh& mesh, int i, int j) {
   return mesh.spacing_s_m() * mesh.spacing_t_m() * (i % (mesh.rows - 1) == 0 ? 0.5 : 1.0) *
          (j % (mesh.columns - 1) == 0 ? 0.5 : 1.0);
 }
 
-/// The largest area per mass of any vertex, stretched as far as cloth stretches (m2/kg).
+/// Returns the largest area per mass of any vertex, stretched as far as cloth stretches (m2/kg).
 inline double largest_area_per_mass(const Cloth& cloth) {
   constexpr double kStretched = 1.5;  // of the flat area
   const Eigen::VectorXd area_m2 =
@@ -63,7 +63,7 @@ inline double largest_area_per_mass(const Cloth& cloth) {
   return kStretched * area_m2.cwiseQuotient(cloth.mass_kg).maxCoeff();
 }
 
-/// Calls `visit(vertex, stencil, sight)` for every vertex, with what a law sees there.
+/// Calls `visit(vertex, stencil, sight)` for every vertex, with its sight for a law.
 template <class L, class Visit>
 void for_vertices(const EffectScene<L>& scene, const Visit& visit) {
   const Cloth& cloth = scene.cloth;
@@ -88,12 +88,12 @@ void for_vertices(const EffectScene<L>& scene, const Visit& visit) {
   }
 }
 
-/// What a law looks at, of what it sees: derivatives by anything else are not taken.
+/// The parts of a sight that a law looks at: derivatives by others are not taken.
 struct LooksAt {
   bool position = false, velocity = false, area = false, gravity = false, mass = false;
 };
 
-/// As a law says it, kLooksAt, or everything.
+/// Returns a law's own kLooksAt, or everything.
 template <class Law>
 constexpr LooksAt looks_at() {
   if constexpr (requires { Law::kLooksAt; })
@@ -102,7 +102,7 @@ constexpr LooksAt looks_at() {
     return {.position = true, .velocity = true, .area = true, .gravity = true, .mass = true};
 }
 
-/// A sight in another kind of number, with these vectors.
+/// Returns a sight in another kind of number, with these vectors.
 template <class Number>
 VertexSight<Number> with_vectors(const VertexSight<double>& at, const Vector3<Number>& position_m,
                                  const Vector3<Number>& velocity_m_per_s,
@@ -120,7 +120,7 @@ VertexSight<Number> with_vectors(const VertexSight<double>& at, const Vector3<Nu
           .time_s = at.time_s};
 }
 
-/// What a law sees, and parameters, as numbers that derivatives are not taken by.
+/// Returns a sight, and parameters, as numbers that derivatives are not taken by.
 template <class Number>
 Vector3<Number> constant(const Vector3<double>& v) {
   return {Number(v.x), Number(v.y), Number(v.z)};
@@ -137,7 +137,7 @@ std::array<Number, count> constants(const EffectValues<SingleLane>& values) {
   return result;
 }
 
-/// Dual numbers over what a vertex law looks at: position, velocity, area, gravity, then `more`
+/// Dual numbers over the inputs of a vertex law: position, velocity, area, gravity, then `more`
 /// numbers, then the effect's parameters. The mass stands apart (MassDual).
 template <LooksAt at, int more, int parameters>
 struct VertexDual {
@@ -229,8 +229,8 @@ struct MassDual {
   }
 };
 
-/// What a law's parameters come to at a moment, the same for all vertices: what the law makes of
-/// them, or themselves.
+/// Returns a law's parameters at a moment, the same for all vertices. They are the law's at_moment,
+/// or the parameters themselves.
 template <class Law, class Real, size_t count>
 auto at_moment(const std::array<Real, count>& parameters, double time_s) {
   if constexpr (requires { Law::at_moment(parameters, time_s); })
@@ -239,15 +239,15 @@ auto at_moment(const std::array<Real, count>& parameters, double time_s) {
     return parameters;
 }
 
-/// An effect whose force on a vertex follows from what is seen there. A Law has
+/// Makes an effect whose force on a vertex follows from its sight. A Law has
 ///   static constexpr int kParameters;
 ///   template <class Real> static Vector3<Real> force(const VertexSight<Real>&,
 ///                                                    const std::array<Real, kParameters>&);  // N
 ///   static EffectRates rates(const Cloth&, const SpringParameters&, const std::vector<double>&);
-/// Where the parameters act through something that changes with time alone, it may have that too,
-/// which `force` is then given in their place:
+/// Where the parameters act through something that changes with time alone, it may have that too.
+/// `force` then gets its result in their place:
 ///   template <class Real> static T at_moment(const std::array<Real, kParameters>&, double time_s);
-/// And so that derivatives are taken only by what it looks at, it may say what that is:
+/// It may say what it looks at, so that derivatives are taken only by that:
 ///   static constexpr LooksAt kLooksAt;
 /// Lanes, tangents and the adjoint follow from these.
 template <class Law>
@@ -265,7 +265,7 @@ class VertexLawEffect final : public LawEffect<VertexLawEffect<Law>, Law> {
   void linearise_force(const EffectScene<SingleLane>& scene,
                        const EffectValues<SingleLane>& parameters, const EffectMemory<SingleLane>&,
                        EffectLinearisation& derivatives) const override {
-    constexpr int kFew = 10;  // Beside what is seen: a second look at the law costs as much
+    constexpr int kFew = 10;  // parameters in one pass; a second look at the law costs as much
     if constexpr (Law::kParameters > kFew) {
       linearise_by_many(scene, parameters, derivatives);
     } else {
@@ -289,8 +289,8 @@ class VertexLawEffect final : public LawEffect<VertexLawEffect<Law>, Law> {
  private:
   static constexpr LooksAt kAt = looks_at<Law>();
 
-  /// By what is seen, then by a few parameters at a time, of those that are asked for: of many,
-  /// hardly any are.
+  /// Takes derivatives by the sight, then by a few of the requested parameters at a time: of many,
+  /// hardly any are requested.
   static void linearise_by_many(const EffectScene<SingleLane>& scene,
                                 const EffectValues<SingleLane>& parameters,
                                 EffectLinearisation& derivatives) {
@@ -329,7 +329,7 @@ class VertexLawEffect final : public LawEffect<VertexLawEffect<Law>, Law> {
   }
 };
 
-/// An effect of inertia beyond the vertices' mass, which changes the sum of forces. A Law has
+/// Makes an effect of inertia beyond the vertices' mass, which changes the sum of forces. A Law has
 ///   static constexpr int kParameters;
 ///   template <class Real> static Vector3<Real> change(const VertexSight<Real>&,
 ///       const Vector3<Real>& force_n, const std::array<Real, kParameters>&);  // N

@@ -4,7 +4,7 @@
 
 #include "model/cloth/effect.h"
 
-/// Viscous damping by the surrounding air: F = -rate m v at every vertex.
+/// Damps viscously by the surrounding air: F = -rate m v at every vertex.
 ///
 /// Source: the founding paper's F = -C v [louchet1995, section 2.2] with C = rate m, an amplitude
 /// per mass, so that it survives a change of mesh. Parameter: rate (1/s), neutral at 0.

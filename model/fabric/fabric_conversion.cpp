@@ -8,7 +8,7 @@
 namespace clothfit {
 namespace {
 
-/// Which of the fabric's stiffnesses a type has.
+/// Index of a type's stiffness among the fabric's.
 constexpr std::array<int, kSpringTypes> kStiffnessOf = {0, 1, 2, 2, 3, 4};
 
 /// Shares of the warp's and the weft's retardation time in a type's.
@@ -21,7 +21,7 @@ Shares damping_shares() {
 using DampingMatrix = Eigen::Matrix<double, kSpringTypes, 2>;
 
 struct Parts {
-  Eigen::Matrix<double, kSpringTypes, 1> stiffness;  ///< that the nearest fabric gives each type
+  Eigen::Matrix<double, kSpringTypes, 1> stiffness;  ///< of each type in the nearest fabric
   Eigen::Matrix<double, kSpringTypes, 1> damping;
   DampingMatrix by_times;
 };
@@ -77,7 +77,7 @@ Nearest<Fabric> nearest_fabric(const SpringParameters& springs, const Mesh& mesh
   FabricVector numbers;
   numbers << parts.stiffness[0], parts.stiffness[1], parts.stiffness[2], parts.stiffness[4],
       parts.stiffness[5], 0, 0;
-  // Of times that no stiffness asks for, the smallest.
+  // If no stiffness determines a time, the smallest time is taken.
   const LeastNormFactors solver(parts.by_times);
   numbers.tail<2>() = solver.solve(parts.damping);
   if (solver.rank() == 0 && parts.damping.cwiseAbs().maxCoeff() > 0)
@@ -97,7 +97,7 @@ Eigen::Matrix<double, kFabricNumbers, kSpringNumbers> fabric_by_springs(
     const bool shear = type == shear_down || type == shear_up;
     result(kStiffnessOf[static_cast<size_t>(type)], stiffness_block + type) = shear ? 0.5 : 1;
   }
-  // Times x solve A' A x = A' c with A = diag(k) S, so that
+  // The times x solve A' A x = A' c with A = diag(k) S, so that
   //   A' A dx = dA' (c - A x) + A' (dc - dA x).
   const Parts parts = parts_of(springs);
   const DampingMatrix& a = parts.by_times;

@@ -5,7 +5,7 @@
 namespace clothfit {
 namespace {
 
-/// Where the set's blocks lie in the springs' numbers.
+/// Places of the set's blocks in the springs' numbers.
 constexpr std::array<SpringBlock, 3> kBlocks = {stiffness_block, natural_length_block,
                                                 elongation_block};
 

@@ -22,16 +22,16 @@ struct Louchet18 {
 Louchet18::Vector to_vector(const Louchet18& set);
 Louchet18 louchet18_of(const Louchet18::Vector& numbers);
 
-/// Six types of springs of this set. Throws nothing: see require_possible.
+/// Returns the six types of springs of this set. Throws nothing: see require_possible.
 SpringParameters spring_parameters(const Louchet18& set);
 
-/// d springs / d set. Constant: each of the springs' numbers is one of the set's, or 0.
+/// Returns d springs / d set. Constant: each of the springs' numbers is one of the set's, or 0.
 Eigen::Matrix<double, kSpringNumbers, Louchet18::kCount> springs_by_louchet18();
 
-/// The set of given springs: the same ones but for dashpots, which it lacks.
+/// Returns the set of given springs: the same ones but for dashpots, which it lacks.
 Nearest<Louchet18> nearest_louchet18(const SpringParameters& springs);
 
-/// d set / d springs. Constant.
+/// Returns d set / d springs. Constant.
 Eigen::Matrix<double, Louchet18::kCount, kSpringNumbers> louchet18_by_springs();
 
 }  // namespace clothfit

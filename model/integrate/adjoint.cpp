@@ -30,7 +30,7 @@ Vectors vectors_of(const Eigen::Matrix3Xd& values) {
 /// One time step of a schedule.
 struct Step {
   double time_s = 0, end_s = 0, time_step_s = 0;
-  int frame = 0;  ///< that it leads to
+  int frame = 0;  ///< the step leads to it
   bool ends_frame = false;
 };
 
@@ -46,11 +46,11 @@ std::vector<Step> steps_of(const Schedule& schedule) {
   return steps;
 }
 
-/// What is known about a step when it is taken back.
+/// The state of a step that is kept for the way back.
 struct Record {
   LaneState<SingleLane> before;
   std::vector<LimitMove> moves;
-  /// Of the vertices that held points touch, in their order, once these are placed.
+  /// Velocities of the vertices that held points touch, in their order, once these are placed.
   std::vector<Eigen::Vector3d> placed_velocity_m_per_s;
   Vectors driven_velocity_m_per_s;
 };
@@ -109,7 +109,7 @@ class Run {
     by_state_.position_m.z.row(0) += by_position.row(2).array();
   }
 
-  /// From derivatives by the state after a step to those by the state before it.
+  /// Turns derivatives by the state after a step into those by the state before it.
   void backward(const Step& step, const Record& record) {
     take_back_limit(record.moves, step.time_step_s);
     take_back_placement(step.time_step_s, record);
@@ -150,7 +150,8 @@ class Run {
   void take_back_limit(const std::vector<LimitMove>& moves, double time_step_s) {
     const bool velocities = cloth_.strain_limit.mode == StrainLimitMode::consistent;
     for (auto move = moves.rbegin(); move != moves.rend(); ++move) {
-      // x_a += s_a m, x_b -= s_b m, and over h the velocities, with m = (1 - longest / l) L
+      // The ends move by x_a += s_a m, x_b -= s_b m, the velocities by the same over h, with m = (1
+      // - longest / l) L.
       const auto by_end = [&](int k) -> Eigen::Vector3d {
         Eigen::Vector3d sum = at(by_state_.position_m, k);
         if (velocities) sum += at(by_state_.velocity_m_per_s, k) / time_step_s;
@@ -165,7 +166,7 @@ class Run {
                                                                     move->along_m;
       gradient_.by_longest_m[static_cast<size_t>(move->type)] -= inverse * along_move;
       if (move->first_share > 0 && move->second_share > 0) {
-        // s_a = m_b / (m_a + m_b) = 1 - s_b; beside a held end the shares are 1 and 0
+        // s_a = m_b / (m_a + m_b) = 1 - s_b; beside a held end the shares are 1 and 0.
         const double by_first_share = move->excess * (by_first + by_second).dot(move->along_m) /
                                       (cloth_.mass_kg[move->first] + cloth_.mass_kg[move->second]);
         gradient_.by_mass_kg[move->first] -= move->first_share * by_first_share;
@@ -177,7 +178,7 @@ class Run {
   }
 
   void take_back_placement(double time_step_s, const Record& record) {
-    // P += C (target - A P), V += the same / h
+    // The step made P += C (target - A P), V += the same / h.
     const HeldPlacement<SingleLane>& held = stepper_.held();
     by_target_.set_zero();
     for (size_t n = 0; n < held.touched().size(); ++n) {
@@ -214,7 +215,7 @@ class Run {
                                         before.velocity_m_per_s,
                                         step.time_s,
                                         h};
-    // P += h V with the new V; V += h (g + F / m)
+    // The step made P += h V with the new V, after V += h (g + F / m).
     Vectors &by_position = by_state_.position_m, &by_velocity = by_state_.velocity_m_per_s;
     const Vectors &velocity = before.velocity_m_per_s, &driven = record.driven_velocity_m_per_s;
     const LaneVector<SingleLane>& g = parameters_.gravity_m_per_s2;
@@ -242,14 +243,14 @@ class Run {
         by_position, by_velocity, gradient_.by_springs);
   }
 
-  /// Effects that look at the sum of forces, in the reverse of the order in which they act.
+  /// Takes back the effects that look at the sum of forces, in the reverse of their order.
   void take_back_inertia_and_supports(const Step& step, const EffectScene<SingleLane>& scene,
                                       const LaneState<SingleLane>& before) {
     bool any = false;
     for (const std::shared_ptr<const Effect>& effect : cloth_.effects)
       any = any || effect->changes_force() || effect->shifts_supports();
     if (!any) return;
-    // The sum of forces before each effect that changes it, and in the end.
+    // The sum of forces is kept before each effect that changes it, and in the end.
     std::vector<EffectMemory<SingleLane>> memory = before.effect_memory;
     const int vertices = cloth_.mesh.vertex_count();
     Vectors force_n =
@@ -303,8 +304,9 @@ class Run {
     }
   }
 
-  /// Adds what `derivatives_` of effect `e` make of the derivatives by what it acts on (forces, or
-  /// places of held points) to those by the state before, the parameters and its memory.
+  /// Multiplies by the transpose of `derivatives_` of effect `e`. From derivatives by its action
+  /// (forces, or places of held points) it adds those by the state before, the parameters and its
+  /// memory.
   void apply_transposed(size_t e, const Vectors& by_action) {
     LaneState<SingleLane>& by = by_state_;
     for (const EffectLinearisation::ByMotion& block : derivatives_.by_motion) {
@@ -422,7 +424,7 @@ GradientResult simulate_with_gradient(const Cloth& cloth, const ParameterSet& pa
       std::max<size_t>(1, static_cast<size_t>(std::ceil(std::sqrt(steps.size()))));
   Run run(cloth, parameters, fields, static_cast<int>(schedule.frame_time_s.size()) - 1);
 
-  // Forwards, with a checkpoint every `stride` steps.
+  // Forwards, a checkpoint is kept every `stride` steps.
   Frames frames(cloth, parameters);
   frames.add(run.state());
   std::vector<LaneState<SingleLane>> checkpoints;
@@ -442,7 +444,7 @@ GradientResult simulate_with_gradient(const Cloth& cloth, const ParameterSet& pa
   for (size_t frame = 0; frame < result.run.position_m.size(); ++frame)
     by_position.push_back(cost_by_position(static_cast<int>(frame), result.run.position_m[frame]));
 
-  // And back.
+  // Backwards, one stretch after the other is taken back.
   for (size_t stretch = checkpoints.size(); stretch-- > 0;) {
     const size_t first = stretch * stride, end = std::min(first + stride, steps.size());
     if (stretch != last_stretch) {

@@ -10,7 +10,7 @@
 
 namespace clothfit {
 
-/// What one simulation may be given for single springs, vertices and times.
+/// Inputs of one simulation for single springs, vertices and times.
 struct SimulationFields {
   /// Factors on single springs' constants; absent: ones.
   std::shared_ptr<const SpringFactors<SingleLane>> spring_factors;
@@ -23,13 +23,14 @@ struct SimulationFields {
 using CostByPosition =
     std::function<Eigen::Matrix3Xd(int frame, const Eigen::Matrix3Xd& position_m)>;
 
-/// A cost's derivatives by what a simulation depends on, the paths of held points excepted.
+/// A cost's derivatives by the inputs of a simulation, the paths of held points excepted.
 struct CostGradient {
   TangentSweep::SpringGradients by_springs;  ///< by every single spring's constants
-  /// What effects add to that, by their types' constants alone: a ParameterNumber each.
+  /// Parts that effects add, by their types' constants alone: a ParameterNumber each.
   std::array<double, 3 * kSpringTypes> by_types{};
-  std::array<double, kSpringTypes> by_longest_m{};  ///< by the length that the limit leaves a type
-  Eigen::VectorXd by_mass_kg;                       ///< per vertex
+  std::array<double, kSpringTypes>
+      by_longest_m{};          ///< by the longest length of a type under the limit
+  Eigen::VectorXd by_mass_kg;  ///< per vertex
   Eigen::Vector3d by_gravity = Eigen::Vector3d::Zero();
   Eigen::Matrix3Xd by_start_position, by_start_velocity;  ///< 3 x vertices
   std::vector<Eigen::VectorXd> by_start_effect_memory;    ///< [effect], as in ParameterSet
@@ -42,15 +43,15 @@ struct GradientResult {
   CostGradient gradient;  ///< without meaning where the run has diverged
 };
 
-/// Simulates one parameter set and differentiates a cost of its frames by whole fields, by the
-/// adjoint of each step: exact for the discrete scheme wherever it is smooth, at the price of a few
-/// simulations whatever the number of derivatives. The state is kept every sqrt(n) of n steps and
-/// computed anew between, so memory grows with sqrt(n) states.
+/// Simulates one parameter set and differentiates a cost of its frames by whole fields. The adjoint
+/// of each step is exact for the discrete scheme wherever it is smooth. It costs a few simulations
+/// whatever the number of derivatives. The state is kept every sqrt(n) of n steps and computed
+/// again between, so memory grows with sqrt(n) states.
 GradientResult simulate_with_gradient(const Cloth& cloth, const ParameterSet& parameters,
                                       const Schedule& schedule, const SimulationFields& fields,
                                       const CostByPosition& cost_by_position);
 
-/// The simulation alone.
+/// Runs the simulation alone.
 SimulateResult simulate_with_fields(const Cloth& cloth, const ParameterSet& parameters,
                                     const Schedule& schedule, const SimulationFields& fields);
 

@@ -7,15 +7,15 @@
 namespace clothfit {
 namespace {
 
-/// A cloth that is further than this many diagonals from its start, and whole, has flown away.
+/// A whole cloth further than this many diagonals from its start has flown away.
 constexpr double kFlownAway = 10;
 
 double length_m(const Eigen::Matrix3Xd& position_m, const Spring& spring) {
   return (position_m.col(spring.b) - position_m.col(spring.a)).norm();
 }
 
-/// The spring that is longest for its natural length; nothing where only those `beyond_reason`
-/// count and there is none.
+/// Returns the spring that is longest for its natural length. If only those `beyond_reason` count
+/// and there is none, nothing.
 std::optional<Divergence::StretchedSpring> most_stretched(const Cloth& cloth,
                                                           const ParameterSet& parameters,
                                                           const Eigen::Matrix3Xd& position_m,
@@ -39,7 +39,8 @@ Eigen::RowVectorXd distances_m(const Eigen::Matrix3Xd& from, const Eigen::Matrix
   return (to - from).colwise().norm();
 }
 
-/// First frame of a run that is not finite or holds a spring beyond reason; their number when none.
+/// Returns the first frame of a run that is not finite or holds a spring beyond reason; their
+/// number when there is none.
 size_t first_bad_frame(const Cloth& cloth, const ParameterSet& parameters,
                        const SimulateResult& result) {
   for (size_t f = 0; f < result.position_m.size(); ++f) {
@@ -49,7 +50,7 @@ size_t first_bad_frame(const Cloth& cloth, const ParameterSet& parameters,
   return result.position_m.size();
 }
 
-/// The schedule up to frame `last`, with every step on the way there a frame of its own.
+/// Returns the schedule up to frame `last`, with every step of its interval a frame of its own.
 Schedule with_steps_before(const Schedule& schedule, size_t last) {
   Schedule fine{.frame_time_s = {schedule.frame_time_s.begin(),
                                  schedule.frame_time_s.begin() + static_cast<std::ptrdiff_t>(last)},
@@ -73,7 +74,8 @@ std::optional<Divergence> find_divergence(const Cloth& cloth, const ParameterSet
 
   const Schedule fine = with_steps_before(schedule, frame);
   const SimulateResult result = simulate(cloth, {&parameters, 1}, fine).front();
-  // Steps that end frames are rounded a little differently here: the last one is bad at the latest.
+  // Steps that end frames are rounded a little differently here, so the last one is bad at the
+  // latest.
   const size_t bad =
       std::min(first_bad_frame(cloth, parameters, result), result.position_m.size() - 1);
   for (size_t f = 1; f < frame; ++f) divergence.step += schedule.substeps(static_cast<int>(f));

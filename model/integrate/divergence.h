@@ -6,10 +6,10 @@
 
 namespace clothfit {
 
-/// Where a run went wrong first.
+/// The place where a run first went wrong.
 struct Divergence {
   int step = 0;   ///< from 1, over the whole run; 0: the start itself is not finite
-  int frame = 0;  ///< that the step leads to
+  int frame = 0;  ///< the step leads to it
   double time_s = 0;
   double time_step_s = 0;  ///< of that step
 
@@ -20,26 +20,27 @@ struct Divergence {
     double length_m = 0;
     double natural_length_m = 0;
   };
-  /// Nothing where no spring did: the cloth as a whole left the scene, driven by an effect or a
-  /// held point, or the start is not finite.
+  /// Nothing where no spring did. The cloth as a whole then left the scene, driven by an effect or
+  /// a held point, or the start is not finite.
   std::optional<StretchedSpring> spring;
   int vertex = -1;  ///< without a spring: the vertex that was furthest away
 };
 
-/// A spring this many times as long as at rest and as at the start is out of all reason: the fabric
-/// would have torn, and what a linear spring does there says nothing.
+/// A spring this many times as long as at rest and as at the start is beyond all reason. The fabric
+/// would have torn, and a linear spring says nothing there.
 inline constexpr double kLengthBeyondReason = 5;
 
 /// Runs the schedule and finds the first step after which a spring is longer than
-/// kLengthBeyondReason allows, and of those springs the one that is longest for its natural length;
-/// where a vertex leaves the scene or ceases to be finite within one step, the spring that was
-/// longest for its natural length before it. Nothing for a run that stays within reason.
+/// kLengthBeyondReason allows. Of those springs it gives the one that is longest for its natural
+/// length. If a vertex leaves the scene or ceases to be finite within one step, it gives the spring
+/// that was longest for its natural length before it. Nothing for a run that stays within reason.
 ///
-/// Costs two runs, the second only up to there and with every step of the last frame interval kept.
+/// Costs two runs, the second only up to that step and with every step of the last frame interval
+/// kept.
 std::optional<Divergence> find_divergence(const Cloth& cloth, const ParameterSet& parameters,
                                           const Schedule& schedule);
 
-/// "structural", "shear" or "flexion".
+/// Returns "structural", "shear" or "flexion".
 const char* spring_family(int type);
 
 }  // namespace clothfit

@@ -11,7 +11,7 @@
 namespace clothfit {
 namespace {
 
-/// The effects' forces (N), 3 x vertices; what effects remember moves on.
+/// Returns the effects' forces (N), 3 x vertices, and advances their memories.
 Eigen::Matrix3Xd effect_forces_n(const Cloth& cloth, const ParameterSet& parameters, double time_s,
                                  double time_step_s, ImplicitState& state) {
   const LaneParameters<SingleLane> lane = lane_parameters<SingleLane>(cloth, {&parameters, 1});
@@ -30,7 +30,7 @@ Eigen::Matrix3Xd effect_forces_n(const Cloth& cloth, const ParameterSet& paramet
   return force.lane(0);
 }
 
-/// What one spring brings to its ends: its pull on the first, and how it resists.
+/// A spring's contribution to its ends: its pull on the first, and its resistance.
 struct SpringLoad {
   Eigen::Vector3d pull_n;
   Eigen::Matrix3d stiffness_n_per_m;  ///< clamped: positive semidefinite
@@ -72,7 +72,7 @@ bool ImplicitStepper::step(const ParameterSet& parameters, const Eigen::Matrix3X
   if (!cloth_.effects.empty())
     force_n += effect_forces_n(cloth_, parameters, time_s, time_step_s, state);
 
-  // The matrix M - h D - h^2 K, and the impulse h (f + h K v).
+  // The system is the matrix M - h D - h^2 K and the impulse h (f + h K v).
   std::vector<Eigen::Triplet<double>> entries;
   entries.reserve(36 * cloth_.spring_count() + 3 * static_cast<size_t>(p.cols()));
   for (int n = 0; n < p.cols(); ++n)
@@ -101,7 +101,7 @@ bool ImplicitStepper::step(const ParameterSet& parameters, const Eigen::Matrix3X
   Sparse matrix(3 * p.cols(), 3 * p.cols());
   matrix.setFromTriplets(entries.begin(), entries.end());
 
-  // Held points have to be at their targets at the end: that much of dv is given.
+  // Held points must be at their targets at the end, which fixes their part of dv.
   const FieldLayout layout = FieldLayout::of(cloth_.mesh);
   MeshField given(layout);
   if (held_.count() > 0) {

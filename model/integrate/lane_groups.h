@@ -11,12 +11,12 @@
 
 namespace clothfit {
 
-/// Calls `run.operator()<L>(group, first)` for every group of parameter sets, in parallel: as many
-/// at once as lanes of a kind hold, a few left over one by one.
+/// Calls `run.operator()<L>(group, first)` for every group of parameter sets, in parallel. A group
+/// has as many as lanes of a kind hold; a few left over run one by one.
 template <class L, class Run>
 void for_lane_groups(std::span<const ParameterSet> parameters, const Run& run) {
   const size_t whole = parameters.size() / L::kCount, left = parameters.size() % L::kCount;
-  // What all lanes cost is what about this many simulations vectorised over the cloth cost.
+  // All lanes cost about as much as this many simulations vectorised over the cloth.
   constexpr size_t kWorthAGroup = std::is_same_v<L, FastLanes> ? 3 : 5;
   const size_t groups = whole + (left > kWorthAGroup ? 1 : 0);
   const size_t in_groups = std::min(groups * L::kCount, parameters.size());

@@ -13,9 +13,9 @@
 namespace clothfit {
 namespace {
 
-/// The retardation time of springs while they relax, as a share of the time step: it calms motions
-/// that are as fast as the step can follow, and costs a tenth of the step. Slower ones the air
-/// calms.
+/// The retardation time of springs while they relax, as a share of the time step. It calms motions
+/// that are as fast as the step can follow, and costs a tenth of the step. The air calms slower
+/// ones.
 constexpr double kRetardationShare = 0.125;
 
 std::array<double, kSpringTypes> calm(const std::array<double, kSpringTypes>& stiffness_n_per_m,
@@ -26,25 +26,25 @@ std::array<double, kSpringTypes> calm(const std::array<double, kSpringTypes>& st
   return damping_ns_per_m;
 }
 
-/// Whether an effect shifts supports in time, which stands still while a cloth relaxes.
+/// Says whether an effect shifts supports in time, which stands still while a cloth relaxes.
 bool moves_supports(const Effect& effect) {
   return effect.shifts_supports() && !effect.shifts_supports_at_rest();
 }
 
-/// A cloth with calm springs in heavy air: that of `cloth`, held where motions have its points at
-/// one time, with its own effects but those that move supports. The air takes a share of all
-/// velocities before each step.
+/// A cloth with calm springs in heavy air. It is `cloth`, held where motions have its points at one
+/// time, with its own effects but those that move supports. The air takes a share of all velocities
+/// before each step.
 struct HeavyAir {
   Cloth cloth;
-  std::vector<size_t> kept;  ///< effects of the cloth, in the order they have here
-  double slowing = 1;        ///< what the air leaves of a velocity in a step
+  std::vector<size_t> kept;  ///< effects of the cloth, in their order here
+  double slowing = 1;        ///< share of a velocity that the air leaves in a step
   double time_step_s = 0;
   int steps = 0;
 
   HeavyAir(const Cloth& light, double pendulum_gravity_m_per_s2, double time_s,
            double longest_step_s)
       : cloth(light) {
-    constexpr double kPendulumTimes = 7;  // (1 + 7) exp(-7) is left of the distance: 0.7 %
+    constexpr double kPendulumTimes = 7;  // (1 + 7) exp(-7) of the distance remains: 0.7 %
     const double pendulum_rate =
         std::sqrt(std::max(pendulum_gravity_m_per_s2, 1e-3) / light.mesh.height_m);
     const double duration_s = kPendulumTimes / pendulum_rate;
@@ -90,19 +90,19 @@ struct HeavyAir {
     return direction;
   }
 
-  /// Held points glide from where they are to where they belong over the first fifth: a jump would
-  /// hit the cloth like a hammer. What effects shift them by, centimetres at most, is there from
-  /// the first step on. The share of the way after step `n`.
+  /// Returns the share of the way after step `n`. Held points glide from their places to their
+  /// targets over the first fifth: a jump would hit the cloth like a hammer. Shifts by effects,
+  /// centimetres at most, act from the first step on.
   double way(int n) const { return std::min(1.0, 5.0 * (n + 1) / steps); }
 };
 
-/// Where a point is after `share` of the way; exactly there in the end.
+/// Returns the place after `share` of the way; exactly the target in the end.
 template <class Number>
 Number on_the_way(Number from, Number to, double share) {
   return share == 1 ? to : from + static_cast<Number>(share) * (to - from);
 }
 
-/// Of numbers remembered in `heavy` air, those of each of the cloth's own effects.
+/// Returns the memory of each of the cloth's own effects from that in `heavy` air.
 template <class Remembered>
 std::vector<Eigen::VectorXd> memory_of(const Cloth& cloth, const HeavyAir& heavy,
                                        const Remembered& remembered) {
@@ -153,7 +153,7 @@ void settle(const HeavyAir& heavy, double time_s, std::span<const ParameterSet> 
   }
 }
 
-/// One simulation and its derivatives.
+/// Relaxes one simulation and its derivatives.
 void settle(const HeavyAir& heavy, double time_s, const ParameterSet& set,
             std::span<const Direction> directions, TangentStepper& stepper, TangentState& state) {
   state = TangentState::of(heavy.cloth, set, directions);

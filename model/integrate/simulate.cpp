@@ -28,8 +28,8 @@ class LaneRun {
 
   const LaneState<L>& state() const { return state_; }
 
-  /// Advances from `from_s` to `to_s` in `steps` equal steps, held points where they are at the end
-  /// of each step.
+  /// Advances from `from_s` to `to_s` in `steps` equal steps. Held points are placed at the end of
+  /// each step.
   void advance(double from_s, double to_s, int steps) {
     const double h = (to_s - from_s) / steps;
     for (int n = 0; n < steps; ++n) {
@@ -39,7 +39,7 @@ class LaneRun {
     }
   }
 
-  /// Steps that left the strain limit unmet.
+  /// Returns the number of steps that left the strain limit unmet.
   int unmet_steps(int lane) const { return static_cast<int>(unmet_[lane]); }
 
  private:
@@ -79,7 +79,7 @@ class LaneRun {
   LaneValue<L> unmet_ = LaneValue<L>::Zero();
 };
 
-/// Largest elongation of any spring beyond its critical one; 0 where none is.
+/// Returns the largest elongation of any spring beyond its critical one; 0 where none is.
 double largest_excess(const Cloth& cloth, const SpringParameters& springs,
                       const Eigen::Matrix3Xd& position_m) {
   double largest = 0;

@@ -8,13 +8,13 @@
 
 namespace clothfit {
 
-/// When positions are wanted and how finely time is cut between.
+/// The times of wanted positions, and how finely time is cut between.
 struct Schedule {
   std::vector<double> frame_time_s;  ///< rising; the first is the start
   double time_step_s = 0;            ///< at most this; each frame interval is cut into equal steps
   bool velocities = false;           ///< hand on velocities beside positions
 
-  /// Equal steps in the interval that ends at frame `frame` >= 1.
+  /// Returns the equal steps in the interval that ends at frame `frame` >= 1.
   int substeps(int frame) const;
 };
 
@@ -23,7 +23,7 @@ enum class StopReason { reached_end, diverged, cancelled };
 struct SimulateResult {
   StopReason reason = StopReason::reached_end;
   int diverged_frame = -1;  ///< first frame that is not finite or left the scene
-  /// How well the strain limit was kept; 0 without one.
+  /// Measures of how well the strain limit was kept; 0 without one.
   double largest_excess = 0;  ///< elongation beyond the critical one, of any spring at any frame
   int unmet_steps = 0;        ///< of `consistent`: steps after which a spring was intolerably long
   /// Positions at every frame, 3 x vertices (world, m); NaN from where it diverged or was
@@ -33,14 +33,14 @@ struct SimulateResult {
   bool usable() const { return reason == StopReason::reached_end; }
 };
 
-/// Whether a run has diverged: a vertex is not finite or further than a hundred cloth diagonals
-/// from where it started. All 3 x vertices.
+/// Says whether a run has diverged: a vertex is not finite or a hundred cloth diagonals from its
+/// start. All 3 x vertices.
 bool left_the_scene(const Eigen::Matrix3Xd& now, const Eigen::Matrix3Xd& start, const Mesh& mesh);
 
-/// `exact`: strict double, the same bits on every processor; what results come from. `fast`: float
-/// (a few left-over sets in double), for screening; after a second of a swinging cloth within
-/// 3 mm of `exact` without a strain limit, within 3 cm with one (docs/theory/model.md has what was
-/// seen), and not the same bits on every processor.
+/// `exact`: strict double, the same bits on every processor, for all results. `fast`: float (a few
+/// left-over sets in double), for screening, and not the same bits on every processor. After a
+/// second of a swinging cloth it is within 3 mm of `exact` without a strain limit, within 3 cm with
+/// one (docs/theory/model.md has the measurements).
 enum class Precision { exact, fast };
 
 /// Called after each frame of each group of lanes, by several threads at once where there are

@@ -53,7 +53,7 @@ HeldPlacement<L>::HeldPlacement(const Cloth& cloth)
   Eigen::MatrixXd inverse_mass_a = a.transpose();
   for (Eigen::Index n = 0; n < touched; ++n)
     inverse_mass_a.row(n) /= cloth.mass_kg[touched_[static_cast<size_t>(n)]];
-  // Two held points in the same place would make this singular; the pseudo-inverse lets them share.
+  // Two held points in the same place would make this singular. The pseudo-inverse lets them share.
   correction_ = inverse_mass_a * LeastNormFactors(a * inverse_mass_a).pseudo_inverse();
 }
 

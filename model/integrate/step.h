@@ -24,7 +24,7 @@ struct LaneState {
   LaneVectors<L> velocity_m_per_s;
   std::vector<EffectMemory<L>> effect_memory;  ///< of each effect of the cloth
 
-  /// At rest, nothing remembered; positions are for the caller to set.
+  /// Makes a state at rest, with nothing remembered; the caller sets the positions.
   static LaneState of(const Cloth& cloth);
 };
 
@@ -37,14 +37,14 @@ template <class L>
 void set_lane(int lane, const SpringParameters& springs, const StrainLimit& strain_limit,
               LaneParameters<L>& parameters);
 
-/// The parameters of as many sets as there are lanes; a missing set repeats the last one, so that
-/// every lane computes something finite.
+/// Collects the parameters of as many sets as there are lanes. A missing set repeats the last one,
+/// so that every lane computes something finite.
 template <class L>
 LaneParameters<L> lane_parameters(const Cloth& cloth, std::span<const ParameterSet> sets);
 
 /// Puts held points where they belong.
 ///
-/// The smallest correction in the masses' norm that satisfies all held points at once:
+/// The correction is the smallest in the masses' norm that satisfies all held points at once:
 ///   P += M^-1 A' (A M^-1 A')^-1 (target - A P),  V += the same / h,
 /// with A the interpolation weights. Held points at vertices, the common case, are simply placed.
 template <class L = ExactLanes>
@@ -52,22 +52,21 @@ class HeldPlacement {
  public:
   explicit HeldPlacement(const Cloth& cloth);
   int count() const { return static_cast<int>(held_.size()); }
-  /// Vertices with a weight in any held point, rising.
+  /// Returns the vertices with a weight in any held point, rising.
   const std::vector<int>& touched() const { return touched_; }
 
-  /// Where the held points are in the given positions.
+  /// Returns where the held points are in the given positions.
   LaneVectors<L> locate(const LaneVectors<L>& position_m) const;
 
   /// Moves the state so that the held points are at `target_m`; `time_step_s` > 0.
   void place(const LaneVectors<L>& target_m, double time_step_s, LaneVectors<L>& position_m,
              LaneVectors<L>& velocity_m_per_s);
 
-  /// What the cloth pulls each held point with: of a vertex's force and weight, the share that the
-  /// point has of it.
+  /// Adds the cloth's pull on each held point: its share of each vertex's force and weight.
   void add_pulls(const LaneVectors<L>& force_n, const LaneVector<L>& gravity_m_per_s2,
                  LaneVectors<L>& pull_n) const;
 
-  /// A' x: what `place` adds to the vertices for one correction of each held point.
+  /// Returns the matrix from a correction of each held point to the vertices' shifts in `place`.
   const Eigen::MatrixXd& correction() const { return correction_; }
   const std::vector<HeldVertexWeights>& points() const { return held_; }
 
@@ -76,26 +75,26 @@ class HeldPlacement {
   std::vector<int> touched_;
   Eigen::VectorXd mass_kg_;
   Eigen::MatrixXd correction_;  ///< touched x held
-  LaneArray<L> missing_m_;      ///< scratch: one coordinate of what each held point lacks
+  LaneArray<L> missing_m_;  ///< scratch: one coordinate of each held point's distance to its target
 };
 
-/// Inverse masses, 0 at the vertices that a held point touches: the strain limit must not move
-/// them.
+/// Returns inverse masses, 0 at the vertices that a held point touches: the strain limit must not
+/// move them.
 Eigen::VectorXd movable_inverse_mass(const Cloth& cloth, const std::vector<int>& touched);
 
-/// Velocities and positions from forces that are known in full: V += h (g + F / m), P += h V.
+/// Advances velocities and positions from forces known in full: V += h (g + F / m), P += h V.
 template <class L>
 void move_by_forces(const LaneVectors<L>& force_n, const LaneVector<L>& gravity_m_per_s2,
                     const Eigen::VectorXd& inverse_mass_per_kg, double time_step_s,
                     LaneVectors<L>& position_m, LaneVectors<L>& velocity_m_per_s);
 
-/// What a step may be given beyond parameters, and asked for; each may be null.
+/// Further inputs and outputs of a step; each may be null.
 template <class L = ExactLanes>
 struct StepExtras {
   const SpringFactors<L>* factors = nullptr;
   const LaneVectors<L>* force_n = nullptr;  ///< on every vertex, beside all others
   std::vector<LimitMove>* moves = nullptr;  ///< a single simulation's strain limit adds its moves
-  /// Set to the velocities as forces have made them, before held points are placed.
+  /// Set to the velocities that forces have made, before held points are placed.
   LaneVectors<L>* driven_velocity_m_per_s = nullptr;
 };
 
@@ -108,14 +107,14 @@ class EulerStepper {
 
   const HeldPlacement<L>& held() const { return held_; }
 
-  /// One time step of the founding paper's scheme [louchet1995, section 2.3], in every lane:
+  /// Takes one time step of the founding paper's scheme [louchet1995, section 2.3], in every lane:
   /// forces at (P, V, t) -> V += h F / m -> P += h V -> held points placed -> springs limited.
-  /// `held_target_m` belongs to t + h. Vertices that a held point touches are not moved by the
-  /// strain limit.
+  /// `held_target_m` belongs to t + h. The strain limit does not move vertices that a held point
+  /// touches.
   void step(const LaneParameters<L>& parameters, const LaneVectors<L>& held_target_m, double time_s,
             double time_step_s, LaneState<L>& state, const StepExtras<L>& extras = {});
 
-  /// What the last step's strain limit found.
+  /// Returns what the last step's strain limit found.
   const LimitOutcome<L>& limit_outcome() const { return limit_outcome_; }
 
  private:

@@ -5,7 +5,7 @@
 namespace clothfit {
 namespace {
 
-/// Of one group: at most kLanes directions.
+/// Returns the tangents of one group: at most kLanes directions.
 LaneParameters<> tangents_of(const Cloth& cloth, const ParameterSet& set,
                              std::span<const Direction> directions) {
   LaneParameters<> tangent;
@@ -25,7 +25,7 @@ LaneParameters<> tangents_of(const Cloth& cloth, const ParameterSet& set,
     tangent.springs.damping_ns_per_m[type] =
         along([&](const Direction& d) { return d.damping_ns_per_m[type]; });
     tangent.limits.longest_m[type] = along([&](const Direction& d) {
-      // Where there is no limit nothing changes it.
+      // Without a limit nothing changes the longest length.
       return std::isfinite(critical) ? d.natural_length_m[type] * (1 + critical) +
                                            natural_m * d.critical_elongation[type]
                                      : 0.0;
@@ -68,7 +68,7 @@ LaneValue<> product(const Eigen::RowVector3d& derivative, const LaneVectors<>& v
          derivative.z() * vectors.z.col(of);
 }
 
-/// How the parameter with a ParameterNumber changes.
+/// Returns the change of the parameter with a ParameterNumber.
 const LaneValue<>& parameter_change(const LaneParameters<>& tangent, size_t effect, int number) {
   const auto of_type = [](int from) { return static_cast<size_t>(from % kSpringTypes); };
   if (number < ParameterNumber::stiffness(0))
@@ -83,7 +83,7 @@ const LaneValue<>& parameter_change(const LaneParameters<>& tangent, size_t effe
   return tangent.effects[effect][static_cast<size_t>(number - ParameterNumber::own(0))];
 }
 
-/// By parameter numbers, whether anything changes along the directions.
+/// Finds the parameter numbers that change along any direction.
 void find_changing(const TangentParameters& parameters, size_t effect,
                    std::vector<bool>& changing) {
   const auto own = static_cast<int>(parameters.value.effects[effect].size());
@@ -264,13 +264,13 @@ void TangentStepper::add_emerging_forces(const EffectScene<SingleLane>& scene) {
     add_share(emerging.per_change, emerged_n_, force_n_.value, emerging.lane(),
               tangent[emerging.group()]);
   };
-  // Half a step early rather than late.
+  // The force is computed half a step early rather than late.
   if (!emerged_once_ || since_emerged_s_ + scene.time_step_s / 2 >= kEmergingInterval_s) {
     std::swap(carried_n_, emerged_last_n_);
     for (LaneVectors<>& tangent : emerged_last_n_) tangent.set_zero();
     for (Emerging& emerging : emerging_)
       if (!emerging.remembers()) add_to(emerging, emerged_last_n_);
-    // What was had last but one becomes the mean over the steps until the next time, along the line
+    // The older force becomes the mean over the steps until the next time, on the straight line
     // through both.
     const double ahead =
         emerged_once_ ? (since_emerged_s_ - scene.time_step_s) / (2 * since_emerged_s_) : 0;

@@ -14,23 +14,23 @@
 
 namespace clothfit {
 
-/// How long forces of effects that emerge are carried on (EmergingEffect).
+/// Interval over which forces of effects that emerge are carried on (EmergingEffect).
 inline constexpr double kEmergingInterval_s = 1e-3;
 
-/// An effect that the cloth does not have, near its neutral values: what it does for a small change
-/// of one parameter, over that change, is how a simulation begins to change. Its own derivatives
-/// are not asked for, so it costs what it costs in one simulation; and where steps are far shorter
-/// than cloth takes to move, a force that depends on nothing remembered is had once in
-/// kEmergingInterval_s and carried on between, to second order in that.
+/// An effect that the cloth does not have, near its neutral values. The ratio of its action to a
+/// small change of one parameter is how a simulation begins to change. Its own derivatives are not
+/// needed, so it costs as much as in one simulation. Steps are far shorter than cloth takes to
+/// move; a force that depends on no memory is therefore computed once in kEmergingInterval_s and
+/// carried on between, to second order in that.
 struct EmergingEffect {
   std::shared_ptr<const Effect> effect;
-  std::vector<double> parameters;  ///< neutral, but for the change of one
-  double change = 0;               ///< along the direction, whose unit may be another than its
-  Eigen::VectorXd start_memory;    ///< empty: zeros
+  std::vector<double> parameters;  ///< neutral, but for one
+  double change = 0;  ///< along the direction, whose unit may differ from the parameter's
+  Eigen::VectorXd start_memory;  ///< empty: zeros
 };
 
-/// How one simulation changes along a direction: the derivatives of a ParameterSet and of what else
-/// it depends on. What is left empty does not change.
+/// The change of one simulation along a direction: the derivatives of a ParameterSet and of its
+/// other inputs. Members left empty do not change.
 struct Direction {
   std::array<double, kSpringTypes> natural_length_m{}, stiffness_n_per_m{}, damping_ns_per_m{};
   std::array<double, kSpringTypes> critical_elongation{};
@@ -38,14 +38,14 @@ struct Direction {
   std::vector<std::vector<double>> effects;  ///< parameters of each effect of the cloth
   Eigen::Matrix3Xd start_position_m, start_velocity_m_per_s;  ///< 3 x vertices
   std::vector<Eigen::VectorXd> start_effect_memory;           ///< of each effect of the cloth
-  /// Of each held point, how its place changes (m); a point without a motion of its own moves with
-  /// the start positions.
+  /// The change of each held point's place (m). A point without a motion of its own moves with the
+  /// start positions.
   std::vector<std::function<Eigen::Vector3d(double time_s)>> held_motion;
   std::optional<EmergingEffect> emerging;
 };
 
-/// The parameters of one simulation and their changes along directions, kLanes in each group; what
-/// is missing in the last group is zero.
+/// The parameters of one simulation and their changes along directions, kLanes in each group.
+/// Missing directions of the last group are zero.
 struct TangentParameters {
   LaneParameters<SingleLane> value;
   std::vector<LaneParameters<>> tangent;  ///< of each group
@@ -65,27 +65,27 @@ struct TangentState {
   LaneState<SingleLane> value;
   std::vector<LaneState<>> tangent;  ///< of each group
 
-  /// Where they start; one group at least.
+  /// Returns their start; one group at least.
   static TangentState of(const Cloth& cloth, const ParameterSet& set,
                          std::span<const Direction> directions);
 };
 
-/// Steps one simulation together with its derivatives along any number of directions: exact for the
-/// discrete scheme, the springs at their strain limit included, where it is smooth. What effects do
-/// is linearised once for all of them. The simulation itself has the bits that EulerStepper gives
-/// it. Holds scratch memory: one object per thread.
+/// Steps one simulation together with its derivatives along any number of directions. They are
+/// exact for the discrete scheme, the springs at their strain limit included, where it is smooth.
+/// The action of effects is linearised once for all of them. The simulation itself has the bits
+/// that EulerStepper gives it. Holds scratch memory: one object per thread.
 class TangentStepper {
  public:
-  /// `cloth` must outlive the stepper. Of the directions, the effects that emerge along them.
+  /// `cloth` must outlive the stepper. `directions` name the effects that emerge along them.
   explicit TangentStepper(const Cloth& cloth, std::span<const Direction> directions = {});
 
-  /// What the effect that emerges along a direction remembers; empty where none does.
+  /// Returns the memory of the effect that emerges along a direction; empty where none does.
   Eigen::VectorXd emerging_memory(size_t direction) const;
 
-  /// Where the held points are.
+  /// Returns where the held points are.
   TangentVectors locate(const TangentState& state) const;
 
-  /// One time step, as EulerStepper::step takes it.
+  /// Takes one time step, as EulerStepper::step does.
   void step(const TangentParameters& parameters, const TangentVectors& held_target_m, double time_s,
             double time_step_s, TangentState& state);
 
@@ -110,10 +110,11 @@ class TangentStepper {
                       TangentState& state);
   void change_forces(const TangentParameters& parameters, const EffectScene<SingleLane>& scene,
                      const TangentState& state);
-  /// Adds what `derivatives_` of effect `e` make of a group's tangents to those of what it acts on.
+  /// Adds the products of `derivatives_` of effect `e` with a group's tangents to those of its
+  /// action.
   void add_actions(size_t e, const LaneParameters<>& parameters, const LaneState<>& state,
                    LaneVectors<>& action);
-  /// The same for what also moves its memory on; `pull_n` of held points, or null.
+  /// Adds them and advances the memory too; `pull_n` of held points, or null.
   void apply(size_t e, const LaneParameters<>& parameters, const LaneVectors<>* pull_n,
              LaneVectors<>& action, LaneState<>& state);
   void apply_limit(const TangentParameters& parameters, double time_step_s, TangentState& state);
@@ -131,12 +132,12 @@ class TangentStepper {
   EffectLinearisation derivatives_;
   std::vector<EffectMemory<>> next_memory_;  ///< of each effect
   std::vector<Emerging> emerging_;
-  /// Of each group, what emerges in the steps until it is had again, and when it was had last.
+  /// For each group: the emerging force until it is computed again, and when that last was.
   std::vector<LaneVectors<>> carried_n_, emerged_last_n_;
   double since_emerged_s_ = 0;
   bool emerged_once_ = false;
   LaneVectors<> changed_n_;
-  LaneArray<> tension_n_;  ///< changes of what one effect's springs pull with
+  LaneArray<> tension_n_;  ///< changes of the pulls of one effect's springs
   LaneVectors<SingleLane> emerged_n_, emerged_target_m_;
 };
 

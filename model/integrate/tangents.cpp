@@ -9,7 +9,7 @@
 namespace clothfit {
 namespace {
 
-/// One simulation and its derivatives along some directions.
+/// Runs one simulation and its derivatives along some directions.
 TangentResult run_chunk(const Cloth& cloth, const ParameterSet& set,
                         std::span<const Direction> directions, const Schedule& schedule) {
   TangentStepper stepper(cloth, directions);
@@ -77,8 +77,7 @@ TangentResult run_chunk(const Cloth& cloth, const ParameterSet& set,
   return result;
 }
 
-/// Directions that share a run: as many as spread over the threads, within what stays near the
-/// processor.
+/// Returns how many directions share a run: they spread over the threads and stay in the cache.
 size_t directions_at_once(size_t directions) {
   constexpr size_t kMostGroups = 8;
   const size_t groups = (directions + kLanes - 1) / kLanes;

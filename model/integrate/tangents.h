@@ -12,15 +12,15 @@ struct TangentResult {
   SimulateResult run;
   /// [direction][frame]: derivative of the positions, 3 x vertices; from a diverged frame on NaN.
   std::vector<std::vector<Eigen::Matrix3Xd>> position_tangent;
-  /// The same of the velocities, where the schedule asks for them.
+  /// [direction][frame]: derivative of the velocities, where the schedule asks for them.
   std::vector<std::vector<Eigen::Matrix3Xd>> velocity_tangent;
 };
 
 /// Simulates one parameter set together with the derivatives of its positions along every
-/// direction, by forward differentiation of each step: exact for the discrete scheme wherever it is
-/// smooth. Directions that share a run share its cost and what effects
-/// are linearised for; such groups run in parallel. The bits of a result do not depend on the
-/// other directions or on the number of threads; `run` has the bits that simulate() gives.
+/// direction. Each step is differentiated forwards: exact for the discrete scheme wherever it is
+/// smooth. Directions that share a run share its cost and the linearisation of effects; such groups
+/// run in parallel. The bits of a result do not depend on the other directions or on the number of
+/// threads; `run` has the bits that simulate() gives.
 TangentResult simulate_with_tangents(const Cloth& cloth, const ParameterSet& parameters,
                                      std::span<const Direction> directions,
                                      const Schedule& schedule);

@@ -7,10 +7,9 @@
 
 namespace clothfit {
 
-/// An Eigen array of `rows` x a number of columns set when it is made, in aligned memory. Reads and
-/// writes like any other; assigning another array or expression takes on its size. A vector that
-/// begins inside may reach up to kPadding numbers past the last one; what stands there counts for
-/// nothing.
+/// An Eigen array of `rows` x a number of columns set when it is made, in aligned memory. It reads
+/// and writes like any other; an assigned array or expression sets its size. A vector that begins
+/// inside may reach up to kPadding numbers past the last one; their values count for nothing.
 template <class Number, int rows>
 class AlignedArray : public Eigen::Map<Eigen::Array<Number, rows, Eigen::Dynamic>> {
   using Plain = Eigen::Array<Number, rows, Eigen::Dynamic>;
@@ -47,7 +46,7 @@ class AlignedArray : public Eigen::Map<Eigen::Array<Number, rows, Eigen::Dynamic
   }
 
  private:
-  /// Leaves zeros.
+  /// Resizes and leaves zeros.
   void resize(Eigen::Index columns) {
     numbers_ = AlignedNumbers<Number>(static_cast<std::size_t>(rows * columns + kPadding));
     look_at(columns);
@@ -58,7 +57,7 @@ class AlignedArray : public Eigen::Map<Eigen::Array<Number, rows, Eigen::Dynamic
     look_at(other.cols());
     other.look_at(columns);
   }
-  /// Eigen's way to have a Map look elsewhere.
+  /// Points the Map elsewhere, in Eigen's way.
   void look_at(Eigen::Index columns) noexcept {
     new (static_cast<Map*>(this)) Map(numbers_.data(), rows, columns);
   }

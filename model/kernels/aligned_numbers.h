@@ -6,8 +6,8 @@
 
 namespace clothfit {
 
-/// Gives memory that begins where a cache line does: a vector of lanes then never lies across two,
-/// which would cost as much as two (a quarter of a time step).
+/// Gives memory that begins at a cache line. A vector of lanes then never lies across two, which
+/// would cost as much as two (a quarter of a time step).
 template <class Number>
 struct CacheLineAllocator {
   using value_type = Number;

@@ -28,15 +28,14 @@ namespace HWY_NAMESPACE {
 using LanesTag = Tag<ExactLanes>;
 using LaneNumbers = Vector<ExactLanes>;
 
-/// Calls `visit(first)` for each vector that the lanes consist of, with the place of its first
-/// number.
+/// Calls `visit(first)` for each vector of the lanes, with the place of its first number.
 template <class Visit>
 HWY_INLINE void for_parts(const Visit& visit) {
   const auto step = static_cast<std::ptrdiff_t>(hn::Lanes(LanesTag()));
   for (std::ptrdiff_t lane = 0; lane < kLanes; lane += step) visit(lane);
 }
 
-/// a b + c, a vector times a number.
+/// Returns a b + c, a vector times a number.
 HWY_INLINE Vector3<LaneNumbers> scaled_sum(const Eigen::Vector3d& a, const LaneNumbers& b,
                                            const Vector3<LaneNumbers>& c) {
   const LanesTag d;
@@ -44,7 +43,7 @@ HWY_INLINE Vector3<LaneNumbers> scaled_sum(const Eigen::Vector3d& a, const LaneN
           hn::MulAdd(hn::Set(d, a.z()), b, c.z)};
 }
 
-/// a . b + c
+/// Returns a . b + c.
 HWY_INLINE LaneNumbers product_sum(const Eigen::Vector3d& a, const Vector3<LaneNumbers>& b,
                                    const LaneNumbers& c) {
   const LanesTag d;
@@ -52,7 +51,7 @@ HWY_INLINE LaneNumbers product_sum(const Eigen::Vector3d& a, const Vector3<LaneN
                     hn::MulAdd(hn::Set(d, a.y()), b.y, hn::MulAdd(hn::Set(d, a.x()), b.x, c)));
 }
 
-/// A b + c
+/// Returns A b + c.
 HWY_INLINE Vector3<LaneNumbers> product_sum(const Eigen::Matrix3d& a, const Vector3<LaneNumbers>& b,
                                             const Vector3<LaneNumbers>& c) {
   return scaled_sum(a.col(2), b.z, scaled_sum(a.col(1), b.y, scaled_sum(a.col(0), b.x, c)));

@@ -18,7 +18,7 @@ namespace clothfit {
 namespace {
 namespace HWY_NAMESPACE {
 
-/// One row of a sweep, with `kBelow` rows below it, or more.
+/// Sweeps one row that has `kBelow` rows below it, or more.
 template <class L, int kBelow, bool kFactors, class Sink>
 HWY_INLINE void sweep_row(const SweepArrays<L>& arrays,
                           const SpringConstants<Vector<L>> (&constants)[kSpringTypes],
@@ -27,13 +27,13 @@ HWY_INLINE void sweep_row(const SweepArrays<L>& arrays,
   using V = Vector<L>;
   const Tag<L> d;
   const std::ptrdiff_t columns = arrays.mesh.columns, width = columns * L::kCount;
-  // Copies, because the compiler must take a store for one that may change what `arrays` holds.
+  // These are copies, because the compiler must assume that a store changes what `arrays` holds.
   const std::array<const Number*, 3> positions = arrays.position_m;
   const std::array<const Number*, 3> velocities = arrays.velocity_m_per_s;
   const std::array<Number*, 3> from_above = scratch_rows(arrays, 0);
   const std::array<Number*, 3> from_two_above = scratch_rows(arrays, i % 2 == 0 ? 1 : 2);
 
-  // Those of kLeaving that this row has, and the constants of their types.
+  // The springs of kLeaving that this row has, and the constants of their types.
   constexpr size_t kCount = kBelow == 2 ? 6 : kBelow == 1 ? 5 : 2;
   constexpr size_t kTwoDown = 2, kDownLeft = kBelow == 2 ? 3 : 2, kDown = kDownLeft + 1,
                    kDownRight = kDownLeft + 2;
@@ -44,13 +44,13 @@ HWY_INLINE void sweep_row(const SweepArrays<L>& arrays,
     springs[s] = constants[types[s]];
   }
   const Pull<V> none{hn::Zero(d), zero(d)};
-  // What the vertices just passed sent to the right, and below to the right.
+  // Pulls of the vertices just passed to the right, and below to the right.
   Pull<V> right = none, right_two = none, right_two_next = none, down_right = none;
-  Vector3<V> to_below = zero(d);  // what the vertex below the one just passed has got so far
+  Vector3<V> to_below = zero(d);  // sum so far for the vertex below the one just passed
   for (std::ptrdiff_t j = 0; j < columns; ++j) {
     const std::ptrdiff_t at = j * L::kCount + lane, self = i * width + at;
     const std::ptrdiff_t vertex = i * columns + j;
-    // A spring that the cloth's edge leaves no room for ends where it begins: it pulls with zero.
+    // A spring that would cross the cloth's edge ends where it begins: it pulls with zero.
     const std::ptrdiff_t one_right = j + 1 < columns ? L::kCount : 0;
     std::ptrdiff_t to[kCount];
     to[0] = self + one_right;
@@ -101,8 +101,8 @@ HWY_INLINE void sweep_row(const SweepArrays<L>& arrays,
 }
 
 /// Calls `sink(tag, vertex, element, force, velocity, position)` for every vertex in row-major
-/// order, for as many lanes at once as a vector holds. The sink may move the vertex: no spring of a
-/// later one reaches back to it.
+/// order. A call takes as many lanes as a vector holds. The sink may move the vertex: no spring of
+/// a later one reaches back to it.
 template <class L, bool kFactors, class Sink>
 HWY_INLINE void sweep(const SweepArrays<L>& arrays, const Sink& sink) {
   const Tag<L> d;

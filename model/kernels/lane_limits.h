@@ -9,17 +9,17 @@
 
 namespace clothfit {
 
-/// How springs are kept from stretching beyond their critical elongation after each time step.
+/// Says how springs are kept within their critical elongation after each time step.
 enum class StrainLimitMode {
   off,
   positions,    ///< the founding paper's: one sweep over the springs, velocities untouched
-  rates_first,  ///< the same, but which springs are too long is found out before any is moved
+  rates_first,  ///< the same, but the springs that are too long are found before any is moved
   consistent  ///< sweeps until no spring is longer than tolerated; velocities follow the positions
 };
 
 struct StrainLimit {
   StrainLimitMode mode = StrainLimitMode::off;
-  double tolerance = 1e-3;  ///< `consistent`: elongation beyond the critical one that may remain
+  double tolerance = 1e-3;  ///< `consistent`: largest remaining elongation beyond the critical one
   int most_sweeps = 100;    ///< `consistent`: of one time step
 };
 
@@ -31,8 +31,8 @@ struct LaneLimits {
       tolerated_m;  ///< `consistent` sweeps until none exceeds this
 };
 
-/// Shares of a correction that the first and the second ends of a type's springs take, by the
-/// vertex that a spring leaves.
+/// Shares of a correction for the first and the second ends of a type's springs, by the vertex that
+/// a spring leaves.
 template <class Number>
 struct SpringShares {
   std::vector<Number> first, second;
@@ -41,21 +41,21 @@ struct SpringShares {
 /// Springs of one type that share no vertex, by the vertices that they leave.
 using SpringGroup = std::vector<std::int32_t>;
 
-/// Two of each type, in the order in which a sweep takes them: type t has 2 t and 2 t + 1.
+/// Two groups for each type, in the order in which a sweep takes them: type t has 2 t and 2 t + 1.
 inline constexpr size_t kSpringGroups = 2 * kSpringTypes;
 
-/// A set of vertices: bit v % 64 of word v / 64. A word more than that, so that one can read past
-/// the last vertex.
+/// A set of vertices: bit v % 64 of word v / 64. It has a word more, so that one can read past the
+/// last vertex.
 using VertexSet = std::vector<std::uint64_t>;
 
-/// Which springs to visit, for a single simulation: the vertices that they leave.
+/// The springs to visit in a single simulation, by the vertices that they leave.
 struct SingleLimitSets {
   std::array<VertexSet, kSpringGroups> groups;
   std::array<VertexSet, kSpringTypes> too_long;  ///< at the first look
   VertexSet moved;                               ///< vertices that have moved since
 };
 
-/// One spring that a limit has shortened: its ends have moved by shares of `excess` times `along`
+/// One spring that a limit has shortened. Its ends have moved by shares of `excess` times `along`
 /// towards each other.
 struct LimitMove {
   int type = 0;
@@ -66,7 +66,7 @@ struct LimitMove {
   double inverse_length_per_m = 0;
 };
 
-/// What a limit found, in every lane.
+/// The findings of a limit, in every lane.
 template <class L = ExactLanes>
 struct LimitOutcome {
   LaneValue<L> too_long = LaneValue<L>::Zero();  ///< springs that the first sweep shortened

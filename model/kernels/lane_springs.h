@@ -15,16 +15,16 @@ struct LaneSprings {
   std::array<LaneValue<L>, kSpringTypes> damping_ns_per_m;
 };
 
-/// Factors on the constants of single springs, the same in every lane. By type and by the vertex
-/// that a spring leaves to the right or down (of shear_up: [i, j], which it leaves for
-/// [i+1, j-1]); where no spring leaves, the number counts for nothing.
+/// Factors on the constants of single springs, the same in every lane. They are by type and by the
+/// vertex that a spring leaves to the right or down (of shear_up: [i, j], which it leaves for [i+1,
+/// j-1]). Where no spring leaves, the number counts for nothing.
 template <class L = ExactLanes>
 struct SpringFactors {
   using PerVertex = Eigen::Array<typename L::Number, Eigen::Dynamic, 1>;
   std::array<PerVertex, kSpringTypes> stiffness;
   std::array<PerVertex, kSpringTypes> natural_length;
 
-  /// Entries that vectors over vertices may read beyond the last one: make factors by `ones`.
+  /// Entries beyond the last one that vectors over vertices may read: make factors by `ones`.
   static constexpr int kPadding = 8;
 
   static SpringFactors ones(const Mesh& mesh) {

@@ -67,12 +67,12 @@ HWY_INLINE Vector3<V> operator*(const V& a, const Vector3<V>& b) {
   return {hn::Mul(a, b.x), hn::Mul(a, b.y), hn::Mul(a, b.z)};
 }
 
-/// `double` is for exact results, where a product is rounded before it is added to; `float` is for
-/// speed, where it need not be.
+/// Says whether a product may be fused with a sum. It may in `float`, which is for speed. In
+/// `double`, which is for exact results, a product is rounded first.
 template <class V>
 constexpr bool kMayContract = std::is_same_v<hn::TFromD<hn::DFromV<V>>, float>;
 
-/// a b + c.
+/// Returns a b + c.
 template <class V>
 HWY_INLINE V mul_add(const V& a, const V& b, const V& c) {
   if constexpr (kMayContract<V>)
@@ -81,7 +81,7 @@ HWY_INLINE V mul_add(const V& a, const V& b, const V& c) {
     return hn::Add(hn::Mul(a, b), c);
 }
 
-/// c - a b.
+/// Returns c - a b.
 template <class V>
 HWY_INLINE V minus_product(const V& c, const V& a, const V& b) {
   if constexpr (kMayContract<V>)
@@ -100,7 +100,7 @@ HWY_INLINE Vector3<V> minus_product(const Vector3<V>& c, const V& a, const Vecto
   return {minus_product(c.x, a, b.x), minus_product(c.y, a, b.y), minus_product(c.z, a, b.z)};
 }
 
-/// `a` where `mask` holds, else `b`.
+/// Returns `a` where `mask` holds, else `b`.
 template <class M, class V>
 HWY_INLINE Vector3<V> select(const M& mask, const Vector3<V>& a, const Vector3<V>& b) {
   return {hn::IfThenElse(mask, a.x, b.x), hn::IfThenElse(mask, a.y, b.y),
@@ -112,12 +112,12 @@ HWY_INLINE V dot(const Vector3<V>& a, const Vector3<V>& b) {
   return mul_add(a.z, b.z, mul_add(a.y, b.y, hn::Mul(a.x, b.x)));
 }
 
-/// 1 / sqrt(x) to 3e-16 for x from 1e-290 on; below that, its value there. A guess from the bits of
-/// the exponent, then Newton's steps: only operations that IEEE 754 rounds correctly, so that the
-/// bits are the same everywhere, and none that go through the divider, which would take longer than
-/// all the rest of a spring.
+/// Returns 1 / sqrt(x) to 3e-16 for x from 1e-290 on; below that, its value there. A guess from the
+/// bits of the exponent is followed by Newton's steps. IEEE 754 rounds all of these operations
+/// correctly, so the bits are the same everywhere. None goes through the divider, which would take
+/// longer than all the rest of a spring.
 ///
-/// Several at once, each step for all of them: those of one wait for each other.
+/// Several are computed at once, each step for all of them: the steps of one wait for each other.
 template <class V, size_t n>
 HWY_INLINE void inverse_square_roots(const V (&x)[n], V (&y)[n]) {
   const hn::DFromV<V> d;
@@ -145,7 +145,8 @@ HWY_INLINE V inverse_square_root(const V& x) {
   return ys[0];
 }
 
-/// 2 / sqrt(x) in `float` to 4e-7 for normal x > 0: the processor's estimate and a Newton step.
+/// Returns 2 / sqrt(x) in `float` to 4e-7 for normal x > 0: the processor's estimate and a Newton
+/// step.
 template <class V, size_t n>
 HWY_INLINE void twice_inverse_square_roots(const V (&x)[n], V (&y)[n]) {
   const hn::DFromV<V> d;
@@ -160,7 +161,7 @@ HWY_INLINE void twice_inverse_square_roots(const V (&x)[n], V (&y)[n]) {
   for (size_t s = 0; s < n; ++s) y[s] = hn::Mul(y[s], square[s]);
 }
 
-/// |a|^2; in `float` at least 1e-30, so that it has an inverse square root.
+/// Returns |a|^2; in `float` at least 1e-30, so that it has an inverse square root.
 template <class V>
 HWY_INLINE V squared_length(const Vector3<V>& a) {
   if constexpr (kMayContract<V>)
@@ -170,7 +171,7 @@ HWY_INLINE V squared_length(const Vector3<V>& a) {
     return dot(a, a);
 }
 
-/// The same with fused operations where there are any, in `double` too: not the same bits
+/// Returns |a|^2 with fused operations where there are any, in `double` too: not the same bits
 /// everywhere.
 template <class V>
 HWY_INLINE V fused_squared_length(const Vector3<V>& a) {

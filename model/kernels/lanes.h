@@ -7,16 +7,16 @@
 
 namespace clothfit {
 
-/// Several simulations run side by side, one parameter set each: number l of every group of `count`
+/// Several simulations run side by side, one parameter set each. Number l of every group of `count`
 /// neighbouring numbers belongs to lane l. Lanes never exchange anything, so a lane's result does
-/// not depend on what the others carry.
+/// not depend on the others.
 template <class NumberType, int count>
 struct Lanes {
   using Number = NumberType;
   static constexpr int kCount = count;
 };
 
-using ExactLanes = Lanes<double, 8>;  ///< strict IEEE: what results come from
+using ExactLanes = Lanes<double, 8>;  ///< strict IEEE, for all results
 using FastLanes = Lanes<float, 16>;   ///< estimates and contraction allowed: for screening
 using SingleLane = Lanes<double, 1>;  ///< one simulation, `exact` to the same bits
 

@@ -14,7 +14,7 @@ inline std::ptrdiff_t offset_of(const Mesh& mesh, size_t type) {
   return kSpringReach[type].offset(mesh);
 }
 
-/// As many bytes as a mask of lanes is read from.
+/// Bytes from which a mask of lanes is read.
 constexpr size_t kMaskBytes = 8;
 
 enum class LimitPass {
@@ -23,8 +23,8 @@ enum class LimitPass {
   check         ///< only looks for springs that are longer than tolerated
 };
 
-/// What the passes over the springs work on; element (vertex * kCount + lane) of each array is one
-/// vertex in one lane.
+/// Inputs and outputs of the passes over the springs. Element (vertex * kCount + lane) of each
+/// array is one vertex in one lane.
 template <class L>
 struct LimitArrays {
   using Number = typename L::Number;
@@ -58,7 +58,7 @@ inline void insert(VertexSet& set, std::ptrdiff_t first, std::uint64_t bits) {
   if (beyond != 0) set[word + 1] |= beyond;
 }
 
-/// Word `w` of the set of vertices v with v + offset in `set`.
+/// Returns word `w` of the set of vertices v with v + offset in `set`.
 inline std::uint64_t word_before(const VertexSet& set, size_t w, std::ptrdiff_t offset) {
   const size_t at = w + static_cast<size_t>(offset / 64);
   const auto shift = static_cast<int>(offset % 64);

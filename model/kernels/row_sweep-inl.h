@@ -1,5 +1,5 @@
-// The walk over the cloth's springs in lanes, in the order of cloth_sweep.cpp: included once for
-// each instruction set.
+// This file walks over the cloth's springs in lanes, in the order of cloth_sweep.cpp. It is
+// included once for each instruction set.
 #if defined(CLOTHFIT_MODEL_KERNELS_ROW_SWEEP_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef CLOTHFIT_MODEL_KERNELS_ROW_SWEEP_INL_H_
 #undef CLOTHFIT_MODEL_KERNELS_ROW_SWEEP_INL_H_
@@ -24,11 +24,10 @@ HWY_INLINE Vector3<V> force(const Vector3<V>& pull) {
 }
 
 /// Walks over the vertices in row-major order, for the lanes from `lane` on that fit into a vector.
-/// `here_at(vertex, self)` is what is read of a vertex whose element is `self`;
-/// `pull_to(type, vertex, here, element)` is what the spring of that type that leaves it for the
-/// vertex of `element` pulls it with, added to and subtracted from a Vector3;
-/// `sink(vertex, self, here, sum)` takes the sum over its springs. The sink may move the vertex: no
-/// spring of a later one reaches back to it.
+/// `here_at(vertex, self)` reads the vertex whose element is `self`. `pull_to(type, vertex, here,
+/// element)` is the pull of the spring of that type that leaves it for the vertex of `element`,
+/// added to and subtracted from a Vector3. `sink(vertex, self, here, sum)` takes the sum over its
+/// springs. The sink may move the vertex: no spring of a later one reaches back to it.
 template <class L, class Here, class PullTo, class Sink>
 HWY_INLINE void sweep_rows(const Mesh& mesh, std::ptrdiff_t lane, typename L::Number* scratch,
                            const Here& here_at, const PullTo& pull_to, const Sink& sink) {
@@ -49,9 +48,9 @@ HWY_INLINE void sweep_rows(const Mesh& mesh, std::ptrdiff_t lane, typename L::Nu
   for (std::ptrdiff_t i = 0; i < rows; ++i) {
     const std::array<Number*, 3> from_two_above = scratch_rows(i % 2 == 0 ? 3 : 6);
     const bool one_below = i + 1 < rows, two_below = i + 2 < rows;
-    // What the vertices just passed sent to the right, and below to the right.
+    // Pulls of the vertices just passed to the right, and below to the right.
     Pull right = none, right_two = none, right_two_next = none, down_right = none;
-    Vector3<V> to_below = zero(d);  // what the vertex below the one just passed has got so far
+    Vector3<V> to_below = zero(d);  // sum so far for the vertex below the one just passed
     for (std::ptrdiff_t j = 0; j < columns; ++j) {
       const std::ptrdiff_t at = j * kLaneCount + lane, self = i * width + at;
       const std::ptrdiff_t vertex = i * columns + j;

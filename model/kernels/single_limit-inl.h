@@ -1,4 +1,4 @@
-// The strain limit of one simulation: included once for each instruction set.
+// This file limits the strain of one simulation. It is included once for each instruction set.
 #if defined(CLOTHFIT_MODEL_KERNELS_SINGLE_LIMIT_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef CLOTHFIT_MODEL_KERNELS_SINGLE_LIMIT_INL_H_
 #undef CLOTHFIT_MODEL_KERNELS_SINGLE_LIMIT_INL_H_
@@ -26,7 +26,7 @@ HWY_INLINE std::uint64_t bits_of(const hn::Mask<Neighbours>& mask) {
   return bits[0];
 }
 
-/// Forgets what has moved and finds the springs that are too long.
+/// Forgets the vertices that have moved and finds the springs that are too long.
 HWY_INLINE void look_along(LimitArrays<SingleLane>& arrays) {
   const Neighbours d;
   const auto size = static_cast<std::ptrdiff_t>(hn::Lanes(d));
@@ -128,7 +128,7 @@ HWY_INLINE void visit_along(LimitArrays<SingleLane>& arrays, size_t type) {
         if (arrays.moves != nullptr) note_moves(arrays, type, at, found, along, excess, inverse);
         const auto move = [&](const std::array<double*, 3>& of, const Vector3<V>& from,
                               const Vector3<V>& to, const V& share) HWY_ATTR {
-          // Neither end of a spring is among the other ends, so what is stored second stands.
+          // Neither end of a spring is among the other ends, so the second store stands.
           store_where(exceeds, mul_add(hn::Mul(share, first_share), along, from), d, of, at);
           store_where(exceeds, minus_product(to, hn::Mul(share, second_share), along), d, of,
                       at + offset);

@@ -1,4 +1,4 @@
-// The walk over the springs of one simulation: included once for each instruction set.
+// This file walks over the springs of one simulation. It is included once for each instruction set.
 #if defined(CLOTHFIT_MODEL_KERNELS_SINGLE_SWEEP_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef CLOTHFIT_MODEL_KERNELS_SINGLE_SWEEP_INL_H_
 #undef CLOTHFIT_MODEL_KERNELS_SINGLE_SWEEP_INL_H_
@@ -16,9 +16,9 @@ namespace clothfit {
 namespace {
 namespace HWY_NAMESPACE {
 
-/// What a type's springs pull with, kept until the vertices that they end at are reached: of the
-/// last vertices, in a ring. A vector that begins near the end of the ring goes on behind it, where
-/// the ring's beginning is written a second time.
+/// The pulls of a type's springs in a ring, kept until the vertices that they end at are reached. A
+/// vector that begins near the end of the ring goes on behind it, where the ring's beginning is
+/// written a second time.
 struct PullRing {
   std::array<double*, 3> pulls;
   std::ptrdiff_t length;
@@ -30,10 +30,10 @@ struct PullRing {
   }
 };
 
-/// As `sweep` for lanes, but the numbers of a vector are neighbouring vertices of the one
-/// simulation. What a spring that would cross an edge of the cloth pulls with is put out; sums run
-/// in the same order. Vertices are moved one vector behind the springs, so that what they gather
-/// has long been written.
+/// Sweeps as `sweep` for lanes does, but the numbers of a vector are neighbouring vertices of the
+/// one simulation. A spring that would cross an edge of the cloth pulls with zero; sums run in the
+/// same order. Vertices are moved one vector behind the springs, so that all pulls on them are
+/// written by then.
 template <bool kFactors, class Sink>
 HWY_INLINE void sweep_single(const SweepArrays<SingleLane>& arrays, const Sink& sink) {
   const Tag<ExactLanes> d;
@@ -71,7 +71,7 @@ HWY_INLINE void sweep_single(const SweepArrays<SingleLane>& arrays, const Sink& 
       Vector3<V> rate[kCount];
       for (size_t s = 0; s < kCount; ++s) {
         const std::ptrdiff_t other = ahead + rings[s].offset;
-        const std::ptrdiff_t at = other < vertices ? other : ahead;  // there is none
+        const std::ptrdiff_t at = other < vertices ? other : ahead;  // at the end there is none
         pulls[s].along = load(d, positions, at) - position;
         rate[s] = load(d, velocities, at) - velocity;
       }
@@ -92,7 +92,7 @@ HWY_INLINE void sweep_single(const SweepArrays<SingleLane>& arrays, const Sink& 
       }
       for (size_t s = 0; s < kCount; ++s) {
         PullRing& ring = rings[s];
-        // Nothing where no spring leaves, whatever stands beyond the last vertex.
+        // Nothing is kept where no spring leaves, whatever stands beyond the last vertex.
         const auto leaves = hn::LoadMaskBits(d, leaving[s] + ahead);
         const Vector3<V> all = force(pulls[s]);
         const Vector3<V> pulled{hn::IfThenElseZero(leaves, all.x),

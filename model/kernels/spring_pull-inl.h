@@ -1,4 +1,4 @@
-// What springs pull with: included once for each instruction set.
+// This file computes the pulls of springs. It is included once for each instruction set.
 #if defined(CLOTHFIT_MODEL_KERNELS_SPRING_PULL_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef CLOTHFIT_MODEL_KERNELS_SPRING_PULL_INL_H_
 #undef CLOTHFIT_MODEL_KERNELS_SPRING_PULL_INL_H_
@@ -32,7 +32,7 @@ HWY_INLINE SpringConstants<V> spring_constants(const V& stiffness, const V& damp
   return spring;
 }
 
-/// What a spring exerts: `strength` times `along`.
+/// The pull of a spring: `strength` times `along`.
 template <class V>
 struct Pull {
   V strength;
@@ -54,9 +54,9 @@ HWY_INLINE Vector3<V> force(const Pull<V>& pull) {
   return pull.strength * pull.along;
 }
 
-/// The pulls of several springs from a vertex to those at `along`, which move with `rate`, both
-/// relative to its own. Step by step for all of them: a spring's operations wait for each other, so
-/// that a processor that looks ahead a spring or two would find little to do.
+/// Computes the pulls of several springs from a vertex to those at `along`, which move with `rate`.
+/// Both are relative to the vertex. Each step is taken for all springs, because the operations of
+/// one wait for each other: a processor that looks ahead a spring or two would find little to do.
 template <class V, size_t n>
 HWY_INLINE void set_strengths(const SpringConstants<V> (&springs)[n], const Vector3<V> (&rate)[n],
                               Pull<V> (&pulls)[n]) {

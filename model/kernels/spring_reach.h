@@ -6,13 +6,13 @@
 
 namespace clothfit {
 
-/// Where the springs of a type lead from the vertex that they leave to the right or down: from
-/// [i, j] to [i + down, j + right]. (Types 0 to 5; of shear_up this is [i+1, j-1] to [i, j] read
-/// backwards.)
+/// The place where the springs of a type end, from the vertex that they leave to the right or down:
+/// from [i, j] to [i + down, j + right]. (Types 0 to 5; of shear_up this is [i+1, j-1] to [i, j]
+/// read backwards.)
 struct SpringReach {
   int down = 0, right = 0;
 
-  /// How many vertices further on, in row-major order, they end; positive.
+  /// Returns how many vertices further on they end, in row-major order; positive.
   std::ptrdiff_t offset(const Mesh& mesh) const {
     return static_cast<std::ptrdiff_t>(down) * mesh.columns + right;
   }
@@ -24,9 +24,9 @@ struct SpringReach {
 inline constexpr SpringReach kSpringReach[kSpringTypes] = {{1, 0},  {0, 1}, {1, 1},
                                                            {1, -1}, {2, 0}, {0, 2}};
 
-/// Rows of scratch memory that the walk in row_sweep-inl.h takes: three coordinates of the forces
-/// that arrive from one row above, and twice three of those from two rows above, one for the row at
-/// hand, one for the next.
+/// Rows of scratch memory that the walk in row_sweep-inl.h takes. There are three coordinates of
+/// the forces from one row above, and twice three from two rows above, one for the row at hand, one
+/// for the next.
 inline constexpr int kRowSweepScratchRows = 9;
 
 }  // namespace clothfit

@@ -18,7 +18,7 @@ namespace clothfit {
 namespace {
 namespace HWY_NAMESPACE {
 
-/// What the springs of one group are held to, in the lanes from `lane` on.
+/// The bounds of the springs of one group, in the lanes from `lane` on.
 template <class L>
 struct GroupLimit {
   std::ptrdiff_t lane;
@@ -29,9 +29,9 @@ struct GroupLimit {
   const typename L::Number* second_share;
 };
 
-/// Lists the springs of `group` that may be longer than allowed in any lane, without a branch,
-/// which would be hard to foresee. Returns how many. They are measured again, to the bit, before
-/// anything is done, so this may round as it likes, if only it allows for more than that.
+/// Lists the springs of `group` that may be longer than allowed in any lane and returns how many.
+/// It takes no branch, which would be hard to predict. The springs are measured again, to the bit,
+/// before anything is done, so this may round as it likes within its margin.
 template <class L>
 HWY_INLINE size_t list_long(const std::array<const typename L::Number*, 3>& position_m,
                             const GroupLimit<L>& limit, const SpringGroup& group,
@@ -52,7 +52,7 @@ HWY_INLINE size_t list_long(const std::array<const typename L::Number*, 3>& posi
   return count;
 }
 
-/// The lanes in which the spring that leaves `vertex` is longer than allowed.
+/// Returns the lanes in which the spring that leaves `vertex` is longer than allowed.
 template <class L>
 HWY_INLINE hn::Mask<Tag<L>> exceeds(const std::array<const typename L::Number*, 3>& position,
                                     const GroupLimit<L>& limit, std::int32_t vertex) {
@@ -63,7 +63,7 @@ HWY_INLINE hn::Mask<Tag<L>> exceeds(const std::array<const typename L::Number*, 
 }
 
 /// Shortens the springs of one group that leave `n` vertices, in the lanes in which they are too
-/// long, or, where `lanes` is not null, in those that it names, kMaskBytes for each.
+/// long. If `lanes` is not null it names the lanes, kMaskBytes for each.
 template <class L, size_t n>
 HWY_INLINE void shorten(LimitArrays<L>& arrays, const GroupLimit<L>& limit,
                         const std::int32_t* vertices, const std::uint8_t* lanes,
@@ -298,7 +298,8 @@ StrainLimiter<L>::StrainLimiter(const Mesh& mesh, const Eigen::VectorXd& inverse
         groups_[2 * type + static_cast<size_t>(place % 2)].push_back(vertex);
       }
     }
-    // To and fro: what the end of one walk has brought into the cache, the next begins with.
+    // The walk goes to and fro: the next begins with what the end of the last brought into the
+    // cache.
     std::ranges::reverse(groups_[2 * type]);
   }
   size_t springs = 0;
@@ -384,7 +385,8 @@ LimitOutcome<L> StrainLimiter<L>::limit_consistently(const LaneLimits<L>& limits
     arrays.shortened.setZero();
     sweep(arrays);
     if (n == 0) outcome.too_long = arrays.shortened;
-    // A correction may lengthen springs that were visited before: look at all of them again.
+    // A correction may lengthen springs that were visited before, so all of them are looked at
+    // again.
     arrays.active = (arrays.shortened > 0).select(arrays.active, 0);
     if (!(arrays.active > 0).any()) return outcome;
     arrays.intolerable.setZero();

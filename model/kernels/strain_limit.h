@@ -14,9 +14,9 @@ template <class L>
 struct LimitArrays;
 
 /// Sets springs that are longer than `longest_m` to exactly that by moving their two ends along
-/// them [louchet1995, section 2.4; provot1995], by shares in proportion to the inverse masses, so
-/// that equal ends move half each and a held one not at all; a spring held at both ends is left
-/// out. Momentum is kept between free ends.
+/// them [louchet1995, section 2.4; provot1995]. The shares are in proportion to the inverse masses:
+/// equal ends move half each and a held one not at all. A spring held at both ends is left out.
+/// Momentum is kept between free ends.
 ///
 /// A sweep takes the springs one after the other, each as those before have left it, in an order
 /// that is part of the model: types 0 to 5; of types 0, 2 and 3 first the springs that start in
@@ -24,35 +24,35 @@ struct LimitArrays;
 /// (columns) 0, 1, 4, 5, 8, ..., then the others. The springs of one such group share no vertex, so
 /// their order among themselves does not matter.
 ///
-/// In lanes each spring is measured once, as its group's turn comes or before. For a single
-/// simulation, most of whose springs are within their limits at most times, one look finds those
-/// that are not, and the sweeps then visit these and what hangs on a vertex that has moved since.
+/// In lanes each spring is measured once, as its group's turn comes or before. In a single
+/// simulation most springs are within their limits at most times. There one look finds those that
+/// are not; the sweeps then visit these and the springs of vertices that have moved since.
 ///
-/// In `double` strict IEEE, the same bits on every instruction set. A lane's result does not depend
-/// on what the others carry. Holds scratch memory: one object per thread.
+/// In `double` the arithmetic is strict IEEE, with the same bits on every instruction set. A lane's
+/// result does not depend on the others. Holds scratch memory: one object per thread.
 template <class L = ExactLanes>
 class StrainLimiter {
  public:
   /// `inverse_mass_per_kg` is 0 where a vertex must not move.
   StrainLimiter(const Mesh& mesh, const Eigen::VectorXd& inverse_mass_per_kg);
 
-  /// Limits as `how` says. A single simulation may ask for its moves, in the order in which they
-  /// were made, here and below.
+  /// Limits as `how` says. Here and below a single simulation may ask for its moves, in the order
+  /// in which they were made.
   LimitOutcome<L> limit(const StrainLimit& how, const LaneLimits<L>& limits, double time_step_s,
                         LaneVectors<L>& position_m, LaneVectors<L>& velocity_m_per_s,
                         std::vector<LimitMove>* moves = nullptr);
 
-  /// One sweep over positions alone; `unmet` is not looked at.
+  /// Sweeps once over positions alone; `unmet` is not looked at.
   LimitOutcome<L> limit_positions(const LaneLimits<L>& limits, LaneVectors<L>& position_m,
                                   std::vector<LimitMove>* moves = nullptr);
 
-  /// The same, but the springs that are too long before any is moved are those that are set to
+  /// Sweeps once over the springs that are too long before any is moved. They are set to
   /// `longest_m`, in the same order, even where others have shortened them meanwhile.
   LimitOutcome<L> limit_by_first_rates(const LaneLimits<L>& limits, LaneVectors<L>& position_m,
                                        std::vector<LimitMove>* moves = nullptr);
 
-  /// Sweeps until no spring of a lane is longer than tolerated, at most `most_sweeps` times; what a
-  /// vertex is moved by, over the time step, is added to its velocity. Held points that are further
+  /// Sweeps until no spring of a lane is longer than tolerated, at most `most_sweeps` times. A
+  /// vertex's shift, over the time step, is added to its velocity. Held points that are further
   /// apart than the springs between them may reach leave the limit unmet; a spring that is held at
   /// both ends is not looked at.
   LimitOutcome<L> limit_consistently(const LaneLimits<L>& limits, int most_sweeps,

@@ -10,7 +10,7 @@
 
 namespace clothfit {
 
-/// What a sweep works on; element (vertex * kCount + lane) of each array is one vertex in one lane.
+/// Inputs and outputs of a sweep; element (vertex * kCount + lane) is one vertex in one lane.
 template <class L>
 struct SweepArrays {
   using Number = typename L::Number;
@@ -20,7 +20,7 @@ struct SweepArrays {
   std::array<const Number*, 3> position_m;
   std::array<const Number*, 3> velocity_m_per_s;
   Number* scratch;  ///< of scratch_size
-  /// Of a single lane: bit k of entry v is set where a spring leaves vertex v + k.
+  /// For a single lane: bit k of entry v is set where a spring leaves vertex v + k.
   const std::array<std::vector<std::uint8_t>, kSpringTypes>& leaving;
 };
 
@@ -35,15 +35,15 @@ struct EulerArrays {
   double time_step_s;
 };
 
-/// Forces that arrive from one row above, and twice those from two rows above: one for the row at
-/// hand, one for the next. A vertex before the first takes what an absent spring sends to the left.
+/// Vectors of forces that arrive from one row above, and twice those from two rows above: one for
+/// the row at hand, one for the next. A vertex before the first takes what an absent spring sends
+/// to the left.
 constexpr int kScratchVectors = 3;
 
 /// The vertices of one simulation in the longest vector.
 constexpr std::ptrdiff_t kMostVertices = 8;
 
-/// Of one simulation: pulls of the springs that still have to arrive, and a vector that is a vector
-/// behind.
+/// Returns a ring's length in one simulation: pulls still to arrive, and the vector behind.
 inline std::ptrdiff_t ring_length(const Mesh& mesh, size_t type) {
   const std::ptrdiff_t needed = kSpringReach[type].offset(mesh) + 2 * kMostVertices;
   return (needed + kMostVertices - 1) / kMostVertices * kMostVertices;

@@ -15,7 +15,7 @@
 
 #ifndef CLOTHFIT_MODEL_KERNELS_TANGENT_SWEEP_ONCE
 #define CLOTHFIT_MODEL_KERNELS_TANGENT_SWEEP_ONCE
-// The compiler must not make calls of these: vectors would go through memory.
+// The compiler must inline these: in calls, vectors would go through memory.
 #define CLOTHFIT_INLINE __attribute__((always_inline))
 namespace clothfit {
 namespace {
@@ -87,15 +87,15 @@ HWY_INLINE void for_vectors(std::ptrdiff_t count, const Visit& visit) {
   for (; e < count; ++e) visit(single, e);
 }
 
-/// What the derivatives of springs' forces consist of.
+/// The parts of the derivatives of springs' forces.
 template <class V>
 struct SpringDerivatives {
   Vector3<V> u, w;
   V tension_ratio, elongation, stretching, stiffness;
 };
 
-/// Those of the springs that leave the vertices from `e` on. All zero for one that has no
-/// direction.
+/// Returns the derivatives for the springs that leave the vertices from `e` on. All are zero for a
+/// spring that has no direction.
 template <class D>
 HWY_INLINE SpringDerivatives<hn::Vec<D>> differentiate(D d, const LineariseArrays& from,
                                                        std::ptrdiff_t e) {
@@ -126,7 +126,7 @@ HWY_INLINE SpringDerivatives<hn::Vec<D>> differentiate(D d, const LineariseArray
           .stiffness = stiffness};
 }
 
-/// How the types' constants change the tensions: not at all, each spring's alike, or by factors.
+/// Says how the types' constants change the tensions: not at all, all alike, or by factors.
 enum class Constants { still, change, change_by_factors };
 
 /// The derivative of a vertex's position and velocity.
@@ -266,7 +266,7 @@ void transpose(const LineariseArrays& from, const TransposedArrays& arrays) {
   for_vectors(from.count, [&](auto d, std::ptrdiff_t e) HWY_ATTR {
     using V = hn::Vec<decltype(d)>;
     const auto spring = differentiate(d, from, e);
-    // What the force pulls one end with it pulls the other against; nothing where no spring leaves.
+    // The force pulls its two ends against each other; nothing where no spring leaves.
     const V exists = hn::LoadU(d, arrays.exists + e);
     const Vector3<V> by_force =
         exists * (load(d, arrays.by_force, e) - load(d, arrays.by_force, e + from.offset));
@@ -274,7 +274,7 @@ void transpose(const LineariseArrays& from, const TransposedArrays& arrays) {
     const auto share = [&](const Vector3<V>& by, const MutableVectors& kept,
                            const MutableVectors& to) HWY_ATTR CLOTHFIT_INLINE {
       store(load(d, to, e) - by, d, to, e);
-      // The other end's, unless it is so near that the next vector is the same memory: that waits.
+      // The other end waits where it is so near that the next vector is the same memory.
       if (from.offset >= kNear)
         store(load(d, to, e + from.offset) + by, d, to, e + from.offset);
       else

@@ -10,7 +10,7 @@
 
 namespace clothfit {
 
-/// The derivative of the springs' forces in a state of one simulation: products with it, and with
+/// Gives products with the derivative of the springs' forces in a state of one simulation, and with
 /// its transpose.
 ///
 /// With L and V the relative position and velocity of a spring's ends, l = |L|, u = L / l, and the
@@ -27,7 +27,7 @@ class TangentSweep {
  public:
   explicit TangentSweep(const Mesh& mesh);
 
-  /// Where derivatives are taken. `factors`: null for springs of a type all alike.
+  /// The state at which derivatives are taken. `factors` is null for springs of a type all alike.
   struct State {
     const LaneSprings<SingleLane>& springs;
     const LaneVectors<SingleLane>& position_m;
@@ -35,14 +35,14 @@ class TangentSweep {
     const SpringFactors<SingleLane>* factors = nullptr;
   };
 
-  /// The derivative of ClothSweep::step_euler along a direction in every lane: state and parameters
-  /// change by `position_m`, `velocity_m_per_s`, `springs` (derivatives of the types' constants)
-  /// and `gravity`, the forces of effects by `effect_force_n` (may be null).
+  /// Computes the derivative of ClothSweep::step_euler along a direction in every lane. State and
+  /// parameters change by `position_m`, `velocity_m_per_s`, `springs` (derivatives of the types'
+  /// constants) and `gravity`, the forces of effects by `effect_force_n` (may be null).
   void step_euler(const State& at, const LaneSprings<>& springs, const LaneVector<>& gravity,
                   const Eigen::VectorXd& inverse_mass_per_kg, const LaneVectors<>* effect_force_n,
                   double time_step_s, LaneVectors<>& position_m, LaneVectors<>& velocity_m_per_s);
 
-  /// The derivative of ClothSweep::add_spring_forces, likewise.
+  /// Computes the derivative of ClothSweep::add_spring_forces, likewise.
   void add_spring_forces(const State& at, const LaneSprings<>& springs,
                          const LaneVectors<>& position_m, const LaneVectors<>& velocity_m_per_s,
                          LaneVectors<>& force_n);
@@ -50,23 +50,24 @@ class TangentSweep {
   /// A number for every spring, by type and by the vertex it leaves.
   using PerSpring = std::array<std::vector<double>, kSpringTypes>;
 
-  /// Derivatives of some cost by every single spring's constants.
+  /// A cost's derivatives by every single spring's constants.
   struct SpringGradients {
     PerSpring natural_length_m, stiffness_n_per_m, damping_ns_per_m;
 
     static SpringGradients zero(const Mesh& mesh);
   };
 
-  /// The transpose: from a cost's derivatives by the forces, adds those by the state before to
-  /// `by_position` and `by_velocity`, and those by the springs' own constants to `by_springs`.
+  /// Multiplies by the transpose. From a cost's derivatives by the forces, it adds those by the
+  /// state before to `by_position` and `by_velocity`, and those by the springs' own constants to
+  /// `by_springs`.
   void add_transposed(const State& at, const LaneVectors<SingleLane>& by_force,
                       LaneVectors<SingleLane>& by_position, LaneVectors<SingleLane>& by_velocity,
                       SpringGradients& by_springs);
 
-  /// The transpose of one coordinate of V += h (g + F / m), P += h V. Given a cost's derivatives by
-  /// the new positions and velocities, makes of `by_velocity` those by V before, sets `by_force`,
-  /// and adds to `by_mass` those by the masses, from the acceleration that `driven` velocities
-  /// show.
+  /// Multiplies by the transpose of one coordinate of V += h (g + F / m), P += h V. It starts from
+  /// a cost's derivatives by the new positions and velocities. It turns `by_velocity` into those by
+  /// V before, sets `by_force`, and adds to `by_mass` those by the masses, from the acceleration
+  /// that `driven` velocities show.
   static void take_back_motion(double time_step_s, double gravity_m_per_s2,
                                const Eigen::VectorXd& inverse_mass_per_kg,
                                const LaneArray<SingleLane>& velocity_m_per_s,

@@ -15,7 +15,7 @@ Mesh coarser_mesh(const Mesh& mesh, int least) {
 
 namespace {
 
-/// The cell of `mesh` that the vertex [i, j] of `other` lies in, and where in it.
+/// The cell of `mesh` in which the vertex [i, j] of `other` lies, and its place there.
 struct CellPlace {
   int i, j;
   double down, right;  ///< from 0 to 1
@@ -40,7 +40,7 @@ HangingCloth on_mesh(const HangingCloth& cloth, const Mesh& mesh) {
   HangingCloth result = cloth;
   result.mesh = mesh;
   const std::array<double, kSpringTypes> from = flat_lengths(cloth.mesh), to = flat_lengths(mesh);
-  // A spring that is so much longer, and stands for so much more of the sheet: k l^2 / area stays.
+  // A longer spring stands for so much more of the sheet that k l^2 / area stays.
   const double fewer = cloth.mesh.spacing_s_m() * cloth.mesh.spacing_t_m() /
                        (mesh.spacing_s_m() * mesh.spacing_t_m());
   for (size_t t = 0; t < kSpringTypes; ++t) {

@@ -48,7 +48,7 @@ MinimiseResult minimise_by_conjugate_gradients(HeldEnergy& energy, const StopRul
     add_scaled(-1, gradient, direction);
     here = {.energy_j = found.energy_j, .slope_n = dot(direction, gradient)};
     if (!(here.slope_n < 0)) go_straight_down();
-    // The first change of energy that is tried is that of the step before.
+    // The first trial step aims at the change of energy of the step before.
     step = found.step * std::clamp(slope_before / here.slope_n, 0.1, 10.0);
     result.energy_j = here.energy_j;
     result.gradient_n = std::sqrt(gradient2);

@@ -139,7 +139,7 @@ EquilibriumResult find_equilibrium(const HangingCloth& cloth,
     result.stages.push_back({mesh, work});
     result.position_m = position.vectors();
     shape_mesh = mesh;
-    // A coarse mesh that got nowhere still starts the next one, unless what is left is no start.
+    // A coarse mesh that got nowhere still starts the next one, unless its shape is no start.
     if (!own && (work.reason == MinimiseReason::fell || work.reason == MinimiseReason::not_finite))
       result.position_m = start_position_m, shape_mesh = cloth.mesh;
     if (work.reason == MinimiseReason::cancelled && !own) {

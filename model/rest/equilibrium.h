@@ -10,7 +10,7 @@
 
 namespace clothfit {
 
-/// How the minimum of the energy is looked for. All end by the same rule.
+/// Says how the minimum of the energy is looked for. All methods end by the same rule.
 enum class EquilibriumMethod {
   conjugate_gradient,  ///< on the cloth's own mesh alone: the reference
   cascade,             ///< conjugate gradients from a coarse mesh to ever finer ones [lethanh2007]
@@ -19,15 +19,15 @@ enum class EquilibriumMethod {
 
 struct EquilibriumOptions {
   EquilibriumMethod method = EquilibriumMethod::multigrid_newton;
-  /// Forces that count as balanced: the 2-norm of what is left of them on all vertices, as a share
-  /// of the cloth's weight; > 0. n vertices that each lack the share e of their own weight leave
+  /// Forces that count as balanced; > 0. It is the 2-norm of the residual force on all vertices, as
+  /// a share of the cloth's weight. n vertices that each lack the share e of their own weight give
   /// e / sqrt(n), so larger meshes deserve less.
   double tolerance = 1e-3;
-  /// On meshes that only start the next one.
+  /// Tolerance on meshes that only start the next one.
   double coarse_tolerance = 1e-3;
   int coarsest_vertices = 12;    ///< >= 4: a mesh with a longer side is made coarser
   int most_iterations = 200000;  ///< >= 1; on each mesh
-  /// Called before each iteration with the mesh and the forces left, as a share of the weight;
+  /// Called before each iteration with the mesh and the residual force, as a share of the weight;
   /// `false` cancels.
   std::function<bool(const Mesh& mesh, int iteration, double imbalance)> go_on;
 
@@ -38,7 +38,7 @@ struct EquilibriumResult {
   MinimiseReason reason = MinimiseReason::iterations_used_up;  ///< on the cloth's own mesh
   Eigen::Matrix3Xd position_m;                                 ///< 3 x vertices, world
   double energy_j = 0;
-  double imbalance = 0;  ///< what the rule asks for: forces left, as a share of the weight
+  double imbalance = 0;  ///< measured by the rule: residual force, as a share of the weight
   int iterations = 0;    ///< on the cloth's own mesh, as the next two
   int evaluations = 0;   ///< of energy and gradient
   int products = 0;      ///< of the second derivative with a vector
@@ -52,28 +52,29 @@ struct EquilibriumResult {
   bool usable() const { return reason == MinimiseReason::converged; }
 };
 
-/// One line on how a search for equilibrium ended, for a person.
+/// Says in one line, for a person, how a search for equilibrium ended.
 const char* describe(MinimiseReason reason);
 
-/// A shape in which springs and weight are balanced while held points are where `motion` has them
-/// at `time_s` (those without one where `start_position_m` has them): a local minimum of the energy
-/// near the path from `parameters.start_position_m` downhill. Cloth without bending stiffness has
-/// many. A start of perfect symmetry may end in a saddle of it: a flat vertical sheet stays flat.
+/// Finds a shape in which springs and weight are balanced. Held points are where `motion` has them
+/// at `time_s` (those without one where `start_position_m` has them). The shape is a local minimum
+/// of the energy near the path from `parameters.start_position_m` downhill; cloth without bending
+/// stiffness has many. A start of perfect symmetry may end in a saddle of the energy: a flat
+/// vertical sheet stays flat.
 ///
-/// Dampers play no part; effects and the strain limit are left out. The same bits for any number of
-/// threads. Throws InputError where nothing is held, where no spring has stiffness, and for numbers
-/// that are none; that the cloth falls apart is a reason.
+/// Dampers play no part; effects and the strain limit are left out. The bits are the same for any
+/// number of threads. Throws InputError where nothing is held, where no spring has stiffness, and
+/// for numbers that are none; that the cloth falls apart is a reason.
 EquilibriumResult find_equilibrium(const Cloth& cloth, const ParameterSet& parameters,
                                    const EquilibriumOptions& options = {}, double time_s = 0);
 
-/// The same for any HangingCloth, such as that of equation 8. `held_target_m`: 3 x held.
+/// Finds it for any HangingCloth, such as that of equation 8. `held_target_m`: 3 x held.
 EquilibriumResult find_equilibrium(const HangingCloth& cloth,
                                    const std::vector<HeldVertexWeights>& held,
                                    const Eigen::Matrix3Xd& held_target_m,
                                    const Eigen::Matrix3Xd& start_position_m,
                                    const EquilibriumOptions& options = {});
 
-/// Where the held points belong at `time_s`, the set's shifts added: 3 x held.
+/// Returns where the held points belong at `time_s`, the set's shifts added: 3 x held.
 Eigen::Matrix3Xd held_targets_m(const Cloth& cloth, const ParameterSet& parameters, double time_s);
 
 }  // namespace clothfit

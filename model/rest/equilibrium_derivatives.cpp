@@ -44,7 +44,7 @@ Sparse second_derivative(const HangingCloth& cloth, const SpringNet& net,
   return matrix;
 }
 
-/// How the gradient changes along `direction` while the shape stays.
+/// Returns how the gradient changes along `direction` while the shape stays.
 Eigen::Matrix3Xd gradient_change(const HangingCloth& cloth, const SpringNet& net,
                                  const Eigen::Matrix3Xd& position_m,
                                  const EquilibriumDirection& direction) {
@@ -81,8 +81,8 @@ EquilibriumDerivatives equilibrium_derivatives(const HangingCloth& cloth,
 
   EquilibriumDerivatives result;
   const Eigen::SimplicialLDLT<Sparse> factors(reduced);
-  // A pivot is the stiffness that is left to an unknown once all before it may give way. Next to
-  // the stiffest ones, rounding leaves this much of a motion that costs nothing.
+  // A pivot is the stiffness of an unknown once all before it may give way. If a motion costs
+  // nothing, rounding leaves this share of the stiffest pivots.
   constexpr double kNothing = 1e-11;
   if (factors.info() != Eigen::Success) return result;
   const Eigen::VectorXd pivots = factors.vectorD();

@@ -7,7 +7,7 @@
 
 namespace clothfit {
 
-/// A direction in the space of what an equilibrium depends on: the rate at which each changes.
+/// A direction in the space of an equilibrium's inputs: the rate at which each changes.
 struct EquilibriumDirection {
   std::array<double, kSpringTypes> stiffness_n_per_m{};
   std::array<double, kSpringTypes> natural_length_m{};
@@ -29,14 +29,14 @@ struct EquilibriumDerivatives {
   bool usable() const { return reason == DerivativeReason::found; }
 };
 
-/// How the equilibrium `position_m` moves with the parameters, by the implicit function theorem:
-/// with the gradient g of the energy and the held points A x = c,
+/// Returns how the equilibrium `position_m` moves with the parameters, by the implicit function
+/// theorem. With the gradient g of the energy and the held points A x = c,
 ///
 ///   H dx + A' dl = -(dg/dp) dp,   A dx = dc,
 ///
-/// H being the exact second derivative. Solved on the null space of A by a sparse L D L'
-/// factorisation (three unknowns per vertex: some ten milliseconds for 17 x 17, seconds for 100 x
-/// 100). As good as the equilibrium is: its imbalance should be far below the default, 1e-8 or so.
+/// H being the exact second derivative. A sparse L D L' factorisation solves this on the null space
+/// of A (three unknowns per vertex: some ten milliseconds for 17 x 17, seconds for 100 x 100). The
+/// result is as good as the equilibrium: its imbalance should be far below the default, 1e-8 or so.
 EquilibriumDerivatives equilibrium_derivatives(const HangingCloth& cloth,
                                                const std::vector<HeldVertexWeights>& held,
                                                const Eigen::Matrix3Xd& position_m,

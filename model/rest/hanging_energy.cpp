@@ -21,12 +21,12 @@ namespace {
 using Planes = std::array<const double*, 3>;
 using WritablePlanes = std::array<double*, 3>;
 
-/// Rows of vertices that one task works on. A task computes again what the two rows above its own
-/// send down.
+/// Rows of vertices that one task works on. A task computes again the pulls from the two rows above
+/// its own.
 constexpr int kBlockRows = 24;
 
-/// Rows of pulls, three coordinates each, that are kept while rows are swept: types 0, 2 and 3 of
-/// this row and the one above, type 4 of this and two above, types 1 and 5 of this.
+/// Rows of pulls, three coordinates each, that are kept while rows are swept. They are types 0, 2
+/// and 3 of this row and the one above, type 4 of this and two above, types 1 and 5 of this.
 constexpr int kKeptRows = 11;
 
 /// The rows of `layout` from `first` on up to `last`.
@@ -42,8 +42,8 @@ struct RowBlock {
   }
 };
 
-/// How far a spring's ends are from the vertex that it is indexed by, and how many springs a row of
-/// vertices has.
+/// The distance of a spring's ends from the vertex that indexes it, and the springs in a row of
+/// vertices.
 struct SpringReach {
   std::ptrdiff_t a, b;
   int rows, columns;
@@ -102,8 +102,8 @@ using EightTag = hn::CappedTag<double, 8>;
 using Eight = hn::Vec<EightTag>;
 using Eight3 = Vector3<Eight>;
 
-/// Calls `pull(type, index, reach, j, own)` for every spring that pulls at the block's vertices,
-/// `own` telling whether it starts in the block, and `sink(index, j, force)` for every vertex with
+/// Calls `pull(type, index, reach, j, own)` for every spring that pulls at the block's vertices;
+/// `own` tells whether it starts in the block. Calls `sink(index, j, force)` for every vertex with
 /// the sum of the pulls on it.
 template <class Pull, class Sink>
 HWY_INLINE void sweep_rows(const RowBlock& block, const Pull& pull, const Sink& sink) {
@@ -113,7 +113,7 @@ HWY_INLINE void sweep_rows(const RowBlock& block, const Pull& pull, const Sink& 
   const std::ptrdiff_t stride = layout.stride, width = RowBlock::scratch_row(layout);
   const std::array<SpringReach, kSpringTypes> reach = reaches(layout);
   std::fill_n(block.scratch, RowBlock::scratch_size(layout), 0.0);
-  // Each kept row begins with kLanes zeros: what would come from left of the first column.
+  // Each kept row begins with kLanes zeros: the pulls from left of the first column.
   const auto kept = [&](std::ptrdiff_t n) HWY_ATTR {
     double* const row = block.scratch + 3 * n * width + kLanes;
     return WritablePlanes{row, row + width, row + 2 * width};
@@ -158,7 +158,7 @@ HWY_INLINE void sweep_rows(const RowBlock& block, const Pull& pull, const Sink& 
   }
 }
 
-/// `v` for the springs that exist, zero in the padding.
+/// Returns `v` for the springs that exist, zero in the padding.
 HWY_INLINE Eight3 existing(const Eight3& v, std::ptrdiff_t j, std::ptrdiff_t count) {
   const EightTag d;
   if (j + static_cast<std::ptrdiff_t>(hn::Lanes(d)) <= count) return v;
@@ -270,7 +270,7 @@ void linearise(const RowBlock& block, const LineariseArrays& in) {
         const std::ptrdiff_t at = i * stride + j;
         const Eight3 along = load(EightTag(), in.position_m, at + reach[t].b) -
                              load(EightTag(), in.position_m, at + reach[t].a);
-        // A spring of no length has no direction: it keeps the stiffness of one that is 1e-100 m
+        // A spring of no length has no direction. It keeps the stiffness of one that is 1e-100 m
         // long, whose derivative is finite and useless.
         const Eight inverse = inverse_square_root(hn::Max(dot(along, along), hn::Set(d, 1e-200)));
         const Eight part = hn::Mul(hn::Mul(stiffness, natural), inverse);

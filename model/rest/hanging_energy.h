@@ -8,7 +8,7 @@
 
 namespace clothfit {
 
-/// Springs and weight of a hanging cloth, all that its equilibrium depends on besides held points.
+/// Springs and weight of a hanging cloth: all inputs of its equilibrium besides held points.
 struct HangingCloth {
   Mesh mesh;
   std::array<double, kSpringTypes> natural_length_m{};   ///< > 0
@@ -16,10 +16,10 @@ struct HangingCloth {
   Eigen::VectorXd mass_kg;                               ///< per vertex, > 0
   Eigen::Vector3d gravity_m_per_s2{0, 0, -9.81};
 
-  /// The model's cloth: E = sum k (l - l0)^2 / 2 - sum m g . x.
+  /// Makes the model's cloth: E = sum k (l - l0)^2 / 2 - sum m g . x.
   static HangingCloth of(const Cloth& cloth, const ParameterSet& parameters);
 
-  /// The energy of the second founding paper [lethanh2007, equation 8],
+  /// Makes the cloth with the energy of the second founding paper [lethanh2007, equation 8],
   ///
   ///   E = 1/2 sum k (l / L - 1)^2 + C_g sum m g (z - Z0),
   ///
@@ -34,8 +34,8 @@ struct HangingCloth {
   double weight_n() const { return mass_kg.sum() * gravity_m_per_s2.norm(); }
 };
 
-/// What the second derivative of a spring's energy does with the transverse part k (1 - l0 / l),
-/// which is negative for compressed springs.
+/// Says how a spring's second derivative treats the transverse part k (1 - l0 / l). It is negative
+/// for compressed springs.
 enum class Curvature {
   exact,
   clamped  ///< taken for zero where it is negative: positive semidefinite
@@ -46,8 +46,8 @@ enum class Curvature {
 ///   f_a = -f_b = transverse (v_b - v_a) + longitudinal (d . (v_b - v_a)) d,   d = x_b - x_a
 ///   transverse = k (1 - l0 / l),   longitudinal = k l0 / l^3
 ///
-/// One plane per spring type, indexed by the vertex in whose row and column the spring starts (of
-/// `shear_up`, which starts a row below, the vertex above).
+/// There is one plane per spring type. A spring is indexed by the vertex in whose row and column it
+/// starts; `shear_up`, which starts a row below, by the vertex above.
 struct EnergyTangent {
   MeshField position_m;
   std::array<Eigen::ArrayXd, kSpringTypes> transverse_n_per_m;
@@ -61,16 +61,16 @@ struct MatrixSprings {
   std::array<std::array<Eigen::ArrayXd, 6>, kSpringTypes> stiffness_n_per_m;
 };
 
-/// The springs' product with `direction`; `scratch` is kept from call to call.
+/// Multiplies the springs with `direction`; `scratch` is kept from call to call.
 void multiply(const EnergyTangent& tangent, const MeshField& direction, MeshField& product,
               std::vector<std::vector<double>>& scratch);
 void multiply(const MatrixSprings& springs, const MeshField& direction, MeshField& product,
               std::vector<std::vector<double>>& scratch);
 
-/// Energy, gradient and second derivative over the mesh, a row of vertices at a time in the
-/// processor's vectors, blocks of rows in parallel. Strict IEEE arithmetic in a fixed order: the
-/// same bits for any number of threads and on every instruction set, as the time step has them.
-/// Held points are not known here.
+/// Computes energy, gradient and second derivative over the mesh. A row of vertices at a time is
+/// computed in the processor's vectors, blocks of rows in parallel. The arithmetic is strict IEEE
+/// in a fixed order: the same bits for any number of threads and on every instruction set, as the
+/// time step has them. Held points are not known here.
 ///
 /// Holds scratch memory: one object per caller.
 class HangingEnergy {
@@ -80,12 +80,12 @@ class HangingEnergy {
   const HangingCloth& cloth() const { return cloth_; }
   const FieldLayout& layout() const { return layout_; }
 
-  /// Energy (J); its derivative by the positions (N) goes to `gradient_n`.
+  /// Returns the energy (J); its derivative by the positions (N) goes to `gradient_n`.
   double energy_and_gradient(const MeshField& position_m, MeshField& gradient_n);
 
   void linearise(const MeshField& position_m, Curvature curvature, EnergyTangent& tangent);
 
-  /// The second derivative times `direction`.
+  /// Multiplies the second derivative with `direction`.
   void multiply(const EnergyTangent& tangent, const MeshField& direction, MeshField& product) {
     clothfit::multiply(tangent, direction, product, scratch_);
   }

@@ -27,7 +27,7 @@ HeldProjection::HeldProjection(const Mesh& mesh, const std::vector<HeldVertexWei
   if (held_.empty()) return;
   lift_ = weights_.transpose() * LeastNormFactors(weights_ * weights_.transpose()).pseudo_inverse();
   projection_ = Eigen::MatrixXd::Identity(touched, touched) - lift_ * weights_;
-  // What rounding leaves of a vertex that is held itself.
+  // Rounding residuals at a vertex that is held itself are cleared.
   projection_ = projection_.unaryExpr([](double p) { return std::abs(p) < 1e-14 ? 0.0 : p; });
 }
 

@@ -10,13 +10,13 @@ namespace {
 
 /// Rows and columns up to this many are not made coarser.
 constexpr int kCoarsest = 6;
-/// Steps of the smoother before and after the coarse correction, and the share of the spectrum that
-/// it damps: the eigenvalues from 2 / kSmoothedRange to 2.
+/// Steps of the smoother before and after the coarse correction, and the damped share of the
+/// spectrum: the eigenvalues from 2 / kSmoothedRange to 2.
 constexpr int kSmoothing = 2;
 constexpr double kSmoothedRange = 6;
 constexpr int kRowsPerTask = 32;
 
-/// Which vertices of a row (or column) a coarse one keeps.
+/// The vertices of a row (or column) that a coarse one keeps.
 struct CoarseAxis {
   std::vector<int> fine;  ///< index on the fine axis of every coarse vertex
 
@@ -29,7 +29,7 @@ struct CoarseAxis {
   }
   int count() const { return static_cast<int>(fine.size()); }
   int at(int coarse) const { return fine[static_cast<size_t>(coarse)]; }
-  /// Fine intervals in the one that begins at a coarse vertex: 1 or 2.
+  /// Returns the fine intervals in the one that begins at a coarse vertex: 1 or 2.
   int width(int coarse) const { return at(coarse + 1) - at(coarse); }
   /// Calls `use(fine, weight)` for the fine vertices that take their value from a coarse one.
   template <class Use>
@@ -53,7 +53,7 @@ void for_rows(int rows, const Work& work) {
   });
 }
 
-/// out = sum of the fine plane's values by the transpose of the bilinear interpolation.
+/// Computes out = sum of the fine plane's values by the transpose of the bilinear interpolation.
 void restrict_plane(const FieldLayout& fine, const CoarseAxis& down, const CoarseAxis& across,
                     const double* from, const FieldLayout& coarse, double* to) {
   for_rows(coarse.rows, [&](int i) {
@@ -73,7 +73,7 @@ void restrict_plane(const FieldLayout& fine, const CoarseAxis& down, const Coars
   });
 }
 
-/// to += the bilinear interpolation of the coarse plane.
+/// Computes to += the bilinear interpolation of the coarse plane.
 void add_prolongated_plane(const FieldLayout& coarse, const CoarseAxis& down,
                            const CoarseAxis& across, const double* from, const FieldLayout& fine,
                            double* to) {
@@ -112,7 +112,7 @@ Block inverse(const Block& m) {
           cxz * s, (m.xy * m.xz - m.xx * m.yz) * s};
 }
 
-/// `use(row begin, row length)` for all of a plane, in parallel where it is large.
+/// Calls `use(row begin, row length)` for all of a plane, in parallel where it is large.
 template <class Work>
 void for_segments(const FieldLayout& layout, const Work& work) {
   if (layout.rows <= 2 * kRowsPerTask) {
@@ -136,7 +136,7 @@ struct LatticeMultigrid::Level {
   MatrixSprings springs;
   /// The finest level's springs in their shorter form: a third of the memory to walk through.
   const EnergyTangent* tangent = nullptr;
-  MatrixPlanes ground;            ///< what holds each vertex where it is
+  MatrixPlanes ground;            ///< stiffness of each vertex against its place
   MatrixPlanes inverse_diagonal;  ///< zero where fixed
   MeshField right, solution, product, step;
   std::vector<std::vector<double>> scratch;
@@ -178,7 +178,7 @@ struct LatticeMultigrid::Level {
     });
   }
 
-  /// step = keep * step + gain * D^-1 (right - product);  solution += step.
+  /// Computes step = keep * step + gain * D^-1 (right - product) and solution += step.
   void smooth_step(double keep, double gain) {
     for_segments(layout, [&](std::ptrdiff_t begin, std::ptrdiff_t count) {
       const auto part = [&](const Eigen::ArrayXd& plane) { return plane.data() + begin; };
@@ -205,7 +205,7 @@ struct LatticeMultigrid::Level {
     });
   }
 
-  /// Chebyshev's iteration on the upper part of the spectrum.
+  /// Iterates by Chebyshev's method on the upper part of the spectrum.
   void smooth(bool from_zero) {
     const double upper = 2, lower = 2 / kSmoothedRange;
     const double centre = 0.5 * (upper + lower), half = 0.5 * (upper - lower);
@@ -252,7 +252,7 @@ struct LatticeMultigrid::Level {
     });
     for (const int vertex : fixed)
       for (size_t c = 0; c < 6; ++c) inverse_diagonal[c][layout.at(vertex)] = 0;
-    // For the next level: what keeps it from moving vertices that are fixed between its own.
+    // The next level gets the stiffness that keeps it from moving fixed vertices between its own.
     fixed_diagonal.resize(fixed.size());
     for (size_t n = 0; n < fixed.size(); ++n)
       for (size_t c = 0; c < 6; ++c) fixed_diagonal[n][c] = diagonal[c][layout.at(fixed[n])];
@@ -262,7 +262,7 @@ struct LatticeMultigrid::Level {
 
 namespace {
 
-/// The springs that stand for those of a lattice twice as fine.
+/// Computes the springs that stand for those of a lattice twice as fine.
 void coarsen_springs(const MatrixSprings& fine, const CoarseAxis& down, const CoarseAxis& across,
                      MatrixSprings& coarse) {
   const FieldLayout& f = fine.layout;
@@ -278,8 +278,8 @@ void coarsen_springs(const MatrixSprings& fine, const CoarseAxis& down, const Co
     };
     for (int j = 0; j < to.columns; ++j) {
       const bool below = i + 1 < to.rows, right = j + 1 < to.columns;
-      // A coarse spring's ends are `width` times as far apart as a fine one's, and as many fine
-      // ones lie between them.
+      // A coarse spring's ends are `width` times as far apart as a fine one's. As many fine ones
+      // lie between them.
       if (below) {
         const int width = down.width(i);
         set(structural_t, j, [&](const auto& add) {

@@ -12,15 +12,16 @@ namespace clothfit {
 /// A symmetric 3 x 3 matrix at every vertex: planes xx, yy, zz, xy, xz, yz.
 using MatrixPlanes = std::array<Eigen::ArrayXd, 6>;
 
-/// One V-cycle on a lattice of springs, a preconditioner for (H + shift M) v = r with H the clamped
-/// second derivative of a cloth's energy.
+/// Applies one V-cycle on a lattice of springs. It is a preconditioner for (H + shift M) v = r with
+/// H the clamped second derivative of a cloth's energy.
 ///
 /// Coarse lattices take every second vertex and the last of each row and column. Their springs are
-/// matrices: the mean of the fine ones that they stand for, which a lattice of the same continuum
-/// has at any spacing. Corrections go up bilinearly, residuals down by the transpose. Smoothed by
-/// Chebyshev's polynomials of the matrix, scaled by its 3 x 3 blocks on the diagonal: a network of
-/// semidefinite springs scaled so has no eigenvalue above 2, so no estimate is needed. The coarsest
-/// lattice is solved by Cholesky's factorisation. The cycle is symmetric and positive definite.
+/// matrices: each is the mean of the fine ones that it stands for, which a lattice of the same
+/// continuum has at any spacing. Corrections go up bilinearly, residuals down by the transpose. The
+/// smoother is Chebyshev's polynomials of the matrix, scaled by its 3 x 3 blocks on the diagonal. A
+/// network of semidefinite springs scaled so has no eigenvalue above 2, so no estimate is needed.
+/// The coarsest lattice is solved by Cholesky's factorisation. The cycle is symmetric and positive
+/// definite.
 ///
 /// `fixed` vertices do not move and are not looked at.
 class LatticeMultigrid {
@@ -28,11 +29,11 @@ class LatticeMultigrid {
   LatticeMultigrid(const FieldLayout& layout, const std::vector<int>& fixed);
   ~LatticeMultigrid();
 
-  /// Takes the matrix at hand, which must stay as it is while it is applied; `shift_n_per_m` is a
+  /// Takes the matrix at hand, which must stay as it is while it is applied. `shift_n_per_m` is a
   /// plane of the finest layout, added to the diagonal, > 0 at every vertex.
   void set(const EnergyTangent& clamped, const Eigen::ArrayXd& shift_n_per_m);
 
-  /// approximately v = (H + shift)^-1 r.
+  /// Computes approximately v = (H + shift)^-1 r.
   void apply(const MeshField& r, MeshField& v);
 
  private:

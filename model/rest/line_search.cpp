@@ -27,7 +27,7 @@ LinePlace search_line(HeldEnergy& energy, const MeshField& at, const MeshField& 
     } else {
       low = here;
     }
-    // Where the slope vanishes if it falls evenly, inside the bounds.
+    // The next step is where the slope vanishes if it falls evenly, inside the bounds.
     if (bounded) {
       const double rise = high.slope_n - low.slope_n;
       const double secant = rise > 0 ? low.step - low.slope_n * (high.step - low.step) / rise : NAN;

@@ -26,7 +26,7 @@ void for_chunks(std::ptrdiff_t size, const Work& work) {
 }
 
 double dot_of_chunk(const double* a, const double* b, std::ptrdiff_t count) {
-  // Partial sums that an 8-fold vector unit and plain code both keep in the same order.
+  // An 8-fold vector unit and plain code both keep these partial sums in the same order.
   Eigen::Array<double, kLanes, 1> sums = Eigen::Array<double, kLanes, 1>::Zero();
   using Lanes = Eigen::Map<const Eigen::Array<double, kLanes, 1>>;
   for (std::ptrdiff_t k = 0; k + kLanes <= count; k += kLanes) sums += Lanes(a + k) * Lanes(b + k);

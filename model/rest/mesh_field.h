@@ -9,7 +9,7 @@
 
 namespace clothfit {
 
-/// Where the vertices of a mesh lie in memory: row by row, each row padded with zeros to whole
+/// The places of a mesh's vertices in memory: row by row. Each row is padded with zeros to whole
 /// vectors, so that a spring's far end two columns on may be read past the last vertex.
 struct FieldLayout {
   int columns = 0;
@@ -25,8 +25,8 @@ struct FieldLayout {
   std::ptrdiff_t at(int vertex) const { return at(vertex / columns, vertex % columns); }
 };
 
-/// A vector at every vertex of a mesh: three planes x, y, z behind one another. Padding is zero
-/// always, so that whole planes may be added and multiplied.
+/// A vector at every vertex of a mesh: three planes x, y, z behind one another. Padding is always
+/// zero, so that whole planes may be added and multiplied.
 struct MeshField {
   FieldLayout layout;
   Eigen::ArrayXd values;  ///< 3 planes, and a few zeros to be read past the end
@@ -51,15 +51,15 @@ struct MeshField {
   Eigen::Matrix3Xd vectors() const;  ///< 3 x vertices
 };
 
-/// Sum of a_k b_k in an order that depends on the size alone: the same bits for any number of
-/// threads and on every processor.
+/// Returns the sum of a_k b_k in an order that depends on the size alone. The bits are the same for
+/// any number of threads and on every processor.
 double dot(const MeshField& a, const MeshField& b);
 double norm(const MeshField& a);
 
-/// y += factor * x.
+/// Computes y += factor * x.
 void add_scaled(double factor, const MeshField& x, MeshField& y);
 
-/// y = x + factor * y.
+/// Computes y = x + factor * y.
 void scale_and_add(const MeshField& x, double factor, MeshField& y);
 
 }  // namespace clothfit

@@ -16,7 +16,7 @@ enum class MinimiseReason {
   cancelled
 };
 
-/// When a minimisation ends.
+/// The rule by which a minimisation ends.
 struct StopRule {
   double gradient_n = 0;  ///< 2-norm of the held gradient that counts as equilibrium
   int most_iterations = 0;
@@ -34,7 +34,8 @@ struct MinimiseResult {
   double gradient_n = 0;  ///< 2-norm of the held gradient
 };
 
-/// Whether `result`, at its `iterations`, energy and gradient, ends here; if so, sets its reason.
+/// Says whether `result`, at its `iterations`, energy and gradient, ends here; if so, sets its
+/// reason.
 bool is_over(const StopRule& stop, MinimiseResult& result);
 
 /// The energy as the minimisers see it: held points stay, and evaluations are counted.
@@ -48,7 +49,7 @@ class HeldEnergy {
   HangingEnergy& unheld() { return energy_; }
   int evaluations() const { return evaluations_; }
 
-  /// `gradient_n` is what is left of it where held points stay.
+  /// Returns the energy; `gradient_n` is the residual gradient where held points stay.
   double energy_and_gradient(const MeshField& position_m, MeshField& gradient_n) {
     ++evaluations_;
     const double energy_j = energy_.energy_and_gradient(position_m, gradient_n);

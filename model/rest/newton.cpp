@@ -9,14 +9,14 @@
 namespace clothfit {
 namespace {
 
-/// Root mean square of what vertices lack, as a share of a vertex's weight, below which the exact
-/// second derivative is used.
+/// Root mean square of the vertices' residual forces as a share of a vertex's weight. Below it the
+/// exact second derivative is used.
 constexpr double kNearBalance = 0.1;
 constexpr int kMostInner = 60;
 constexpr double kEnoughSlope = 0.9;  ///< a Newton step needs no exact line search
 
-/// The vertices that the preconditioner holds: of every held point the one that weighs most. The
-/// others of a point between vertices it takes for free, and the projection mends that.
+/// Returns the vertices that the preconditioner holds: of every held point the one that weighs
+/// most. It takes the others of a point between vertices for free; the projection corrects that.
 std::vector<int> leading_vertices(const HeldProjection& held) {
   std::vector<int> leading;
   for (const HeldVertexWeights& point : held.held())
@@ -27,7 +27,7 @@ std::vector<int> leading_vertices(const HeldProjection& held) {
   return leading;
 }
 
-/// The linear system of one step and what solving it needs.
+/// The linear system of one step, and the means to solve it.
 class NewtonSystem {
  public:
   NewtonSystem(HangingEnergy& energy, const HeldProjection& held)
@@ -115,7 +115,8 @@ MinimiseResult minimise_by_newton(HeldEnergy& energy, const StopRule& stop,
   const double weight_n = energy.unheld().cloth().weight_n();
   const double vertices = energy.unheld().cloth().mesh.vertex_count();
   const double slowest_per_s2 = pendulum_shift_per_s2(energy.unheld().cloth());
-  // So small that it does not slow the last steps, and large enough for the arithmetic.
+  // The least shift is small enough not to slow the last steps, and large enough for the
+  // arithmetic.
   const double least_shift = 1e-4 * slowest_per_s2, most_shift = 1e12 * slowest_per_s2;
   NewtonSystem system(energy.unheld(), energy.held());
   MeshField gradient(energy.layout()), new_gradient(energy.layout()), trial(energy.layout());
@@ -125,11 +126,11 @@ MinimiseResult minimise_by_newton(HeldEnergy& energy, const StopRule& stop,
 
   MinimiseResult result{.energy_j = here.energy_j, .gradient_n = norm(gradient)};
   while (!is_over(stop, result)) {
-    // As a share of the vertices' own weight: what 0.1 means does not depend on the mesh.
+    // The force is a share of the vertices' own weight, so that 0.1 means the same on every mesh.
     const double lacking = result.gradient_n * std::sqrt(vertices) / weight_n;
     shift = std::max(shift, least_shift);
     system.set(position_m, lacking < kNearBalance ? Curvature::exact : Curvature::clamped, shift);
-    // Solved ever more closely, so that the last steps converge faster than linearly.
+    // The system is solved ever more closely, so that the last steps converge faster than linearly.
     const double enough = std::clamp(std::sqrt(0.15 * lacking), 1e-3, 0.3);
     result.products += system.solve(gradient, enough * result.gradient_n, direction);
     here.slope_n = dot(direction, gradient);

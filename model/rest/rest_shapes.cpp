@@ -14,7 +14,7 @@ constexpr double kTolerance = 1e-9;
 constexpr int kMostIterations = 1000;
 
 /// Turns a cloth whose held points lie above one another to where it is closest to `start_m`, by
-/// its masses; leaves others as they are.
+/// its masses. Leaves others as they are.
 void turn_towards(const Cloth& cloth, const Eigen::Vector3d& gravity,
                   const Eigen::Matrix3Xd& start_m, const Eigen::Matrix3Xd& held_m,
                   Eigen::Matrix3Xd& position_m) {

@@ -41,20 +41,20 @@ struct Spring {
 using SpringNet = std::array<std::vector<Spring>, kSpringTypes>;
 SpringNet make_springs(const Mesh& mesh);
 
-/// Length of each type's springs in the flat, unstretched cloth (m).
+/// Returns the length of each type's springs in the flat, unstretched cloth (m).
 std::array<double, kSpringTypes> flat_lengths(const Mesh& mesh);
 
-/// The flat, unstretched cloth in its own plane: columns (s, t, 0), 3 x vertices.
+/// Returns the flat, unstretched cloth in its own plane: columns (s, t, 0), 3 x vertices.
 Eigen::Matrix3Xd flat_positions(const Mesh& mesh);
 
-/// How a cloth's mass sits on its vertices. `by_area`: an edge vertex carries half, a corner a
+/// Returns a cloth's mass on its vertices `by_area`. An edge vertex carries half, a corner a
 /// quarter of what an inner one does.
 Eigen::VectorXd masses_by_area(const Mesh& mesh, double mass_kg);
 
-/// `equal`: every vertex of `reference` carries mass / vertices, as in the founding paper. On
-/// another mesh the same distribution over the cloth is used: the inner vertices' m0 / a^2 per
-/// area, and what the reference's border carries beyond that along the edges (m0 / 2 per spacing)
-/// and at the corners (m0 / 4). Sums to `mass_kg` on every mesh.
+/// Returns a cloth's mass on its vertices `equal`, as in the founding paper: every vertex of
+/// `reference` carries mass / vertices. Another mesh has the same distribution over the cloth: the
+/// inner vertices' m0 / a^2 per area, and the surplus of the reference's border along the edges (m0
+/// / 2 per spacing) and at the corners (m0 / 4). The masses sum to `mass_kg` on every mesh.
 Eigen::VectorXd masses_equal(const Mesh& mesh, const Mesh& reference, double mass_kg);
 
 }  // namespace clothfit

@@ -65,8 +65,8 @@ Obstacle::Obstacle(const TriangleMesh& mesh, double reach_m) : reach_m_(reach_m)
       triangle.corner_rim[n] = corner;
       rims_[static_cast<size_t>(edge)].normal += triangle.normal;
       ++faces_at[static_cast<size_t>(edge)];
-      // Weighted by the angle at the corner, the mean normal tells inside from outside wherever the
-      // corner is the nearest point, however its faces are cut into triangles.
+      // The mean normal is weighted by the angle at the corner. It then tells inside from outside
+      // wherever the corner is the nearest point, however its faces are cut into triangles.
       const Eigen::Vector3d to_next = (triangle.corner[next] - triangle.corner[n]).normalized();
       const Eigen::Vector3d to_last = (triangle.corner[last] - triangle.corner[n]).normalized();
       const double angle = std::acos(std::clamp(to_next.dot(to_last), -1.0, 1.0));
@@ -97,7 +97,8 @@ void Obstacle::build_tree(int first, int last) {
   }
   nodes_.push_back(node);
   if (node.count <= kLeafTriangles) return;
-  // In half, along the longest side; stable, so that the tree does not depend on the library.
+  // The split is in half, along the longest side. It is stable, so that the tree does not depend on
+  // the library.
   Eigen::Index axis = 0;
   (node.high - node.low).maxCoeff(&axis);
   const auto begin = triangles_.begin();

@@ -14,13 +14,14 @@ struct TriangleMesh {
   Eigen::Matrix3Xi triangle;  ///< indices of vertices, 0 the first
 };
 
-/// A resting body that cloth cannot pass, with what it takes to find the nearest point of its
-/// surface fast: a tree of boxes, and whether edges and corners are seen from outside.
+/// A resting body that cloth cannot pass. It keeps what finds the nearest point of its surface
+/// fast: a tree of boxes, and whether edges and corners are seen from outside.
 class Obstacle {
  public:
-  /// `reach_m`: how far below the surface a point still belongs to this side of it; more than cloth
-  /// ever sinks in, less than the thickness of what lies behind. Vertices in the same place are the
-  /// same vertex; triangles without area are left out. Indices must be those of vertices.
+  /// `reach_m` says how far below the surface a point still belongs to this side of it. It is more
+  /// than cloth ever sinks in, less than the thickness of the body behind. Vertices in the same
+  /// place are the same vertex; triangles without area are left out. Indices must be those of
+  /// vertices.
   explicit Obstacle(const TriangleMesh& mesh, double reach_m = 0.05);
 
   /// The part of the surface that is nearest to a point below it.
@@ -30,8 +31,8 @@ class Obstacle {
     Eigen::Vector3d place_m;    ///< on it: the nearest point
     Eigen::Vector3d direction;  ///< a face's outward normal, an edge's direction: unit vectors
   };
-  /// Nothing where the point is on the free side, deeper than the reach, or beyond the border of a
-  /// surface that is not closed.
+  /// Returns the nearest part of the surface. Nothing where the point is on the free side, deeper
+  /// than the reach, or beyond the border of a surface that is not closed.
   std::optional<Nearest> beneath(const Eigen::Vector3d& point_m) const;
 
   int triangles() const { return static_cast<int>(triangles_.size()); }

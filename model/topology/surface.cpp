@@ -12,8 +12,8 @@ namespace {
 constexpr double kSmallestRelativeWeight = 1e-12;
 constexpr double kOutsideAllowed_m = 1e-6;
 
-/// Second derivatives at the knots of the natural cubic spline through values at n evenly spaced
-/// knots (spacing 1), as an n x n operator on the values:
+/// Returns second derivatives of the natural cubic spline at the knots, as an n x n operator on the
+/// values. There are n evenly spaced knots (spacing 1):
 ///
 ///   M_{k-1} + 4 M_k + M_{k+1} = 6 (f_{k-1} - 2 f_k + f_{k+1}),  M_0 = M_{n-1} = 0
 ///
@@ -33,9 +33,9 @@ Eigen::MatrixXd natural_second_derivatives(int n) {
   return m;
 }
 
-/// Weights (points x n) of the interpolation at the coordinates `x_m` between `n` knots that are
-/// evenly spaced over [0, length_m], or of its derivative there of that `order` (0 to 2;
-/// 1/m^order).
+/// Returns weights (points x n) of the interpolation at the coordinates `x_m`, or of its derivative
+/// there. The `n` knots are evenly spaced over [0, length_m]; the derivative has that `order` (0 to
+/// 2; 1/m^order).
 Surface::Weights axis_weights(int n, double length_m, const Eigen::VectorXd& x_m,
                               SurfaceInterpolation interpolation, int order) {
   Eigen::MatrixXd second_derivatives;
@@ -73,7 +73,7 @@ Surface::Weights axis_weights(int n, double length_m, const Eigen::VectorXd& x_m
   return weights;
 }
 
-/// Along s and along t.
+/// Returns the orders along s and along t.
 std::pair<int, int> derivative_orders(SurfaceQuantity quantity) {
   switch (quantity) {
     case SurfaceQuantity::place:

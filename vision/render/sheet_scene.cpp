@@ -187,7 +187,7 @@ SheetScene::SheetScene(std::span<const PlacedSheet> sheets, const Rigid3& camera
   traced_->device.reset(rtcNewDevice(nullptr));
   if (!traced_->device) throw std::runtime_error("Embree finds no device on this machine");
   traced_->scene.reset(rtcNewScene(traced_->device.get()));
-  // Robust: no line of sight slips through between two triangles.
+  // Robust tracing lets no line of sight slip through between two triangles.
   rtcSetSceneFlags(traced_->scene.get(), RTC_SCENE_FLAG_ROBUST);
   for (const Sheet& sheet : traced_->sheets) {
     attach(traced_->device.get(), traced_->scene.get(), sheet);

@@ -27,7 +27,7 @@ cv::Mat draw_overlay(const cv::Mat& grey, const std::vector<OverlayPoint>& point
   cv::Mat picture;
   cv::cvtColor(grey, picture, cv::COLOR_GRAY2BGR);
 
-  // Drawn to a sixteenth of a pixel, so that a cross shows where within a pixel the point lies.
+  // Crosses are drawn to a sixteenth of a pixel, to show where within a pixel the point lies.
   constexpr int kFractionBits = 4;
   constexpr double kFraction = 1 << kFractionBits;
   const int arm_px = std::max(3, static_cast<int>(std::lround(0.004 * grey.cols)));
