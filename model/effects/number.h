@@ -7,8 +7,8 @@
 #include "model/cloth/effect.h"
 #include "model/kernels/lanes.h"
 
-/// The numbers over which the laws of effects are written, each law once. They are `double`, a
-/// number in every lane, or a dual number that carries derivatives (ceres::Jet).
+/// The numbers over which effects write their forces, once for all: `double`, a number in every
+/// lane, or a dual number that carries derivatives (ceres::Jet).
 namespace clothfit {
 
 /// A yes or no in every lane.
