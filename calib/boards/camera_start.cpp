@@ -17,7 +17,7 @@ namespace {
 /// orthogonality [zhang2000]; it fails on views that are nearly parallel, so a few that span usual
 /// lenses follow.
 std::vector<Eigen::Vector2d> focal_candidates(const BoardObservations& observations) {
-  // A start has to live with distortion that is not known yet; gross errors are larger.
+  // A start knows no distortion yet, so the tolerance covers it; gross errors are larger.
   const double tolerance_px =
       0.01 * std::hypot(observations.image_width, observations.image_height);
   std::vector<std::vector<cv::Point3f>> boards;

@@ -62,8 +62,8 @@ struct ParameterSet {
   std::vector<std::function<Eigen::Vector3d(double time_s)>> held_shift;
 };
 
-/// Returns where a set wants a held point with a motion of its own at `time_s`. That is `motion_m`,
-/// the motion's place then, plus the set's shift. Without a shift these are the bits of `motion_m`.
+/// Returns the place of a held point with a motion of its own at `time_s`. That is `motion_m`, the
+/// motion's place then, plus the set's shift. Without a shift these are the bits of `motion_m`.
 Eigen::Vector3d shifted(const Eigen::Vector3d& motion_m, const ParameterSet& set, size_t held,
                         double time_s);
 

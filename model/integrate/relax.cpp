@@ -91,7 +91,7 @@ struct HeavyAir {
   }
 
   /// Returns the share of the way after step `n`. Held points glide from their places to their
-  /// targets over the first fifth: a jump would hit the cloth like a hammer. Shifts by effects,
+  /// targets over the first fifth: a jump would set the whole cloth swinging. Shifts by effects,
   /// centimetres at most, act from the first step on.
   double way(int n) const { return std::min(1.0, 5.0 * (n + 1) / steps); }
 };
