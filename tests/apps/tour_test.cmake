@@ -1,6 +1,7 @@
-# Follows SOURCE_DIR/docs/tour.md with PROGRAM in WORK_DIR: runs the commands of its console blocks
-# in order, and compares what each prints with the lines that the page shows. Whether the numbers
-# are right is not asked here: tests/apps/demo_test.cpp and tests/fit/recordings_test.cpp do that.
+# Follows a page of SOURCE_DIR, docs/tour.md unless PAGE names another, with PROGRAM in WORK_DIR:
+# runs the commands of its console blocks in order, and compares what each prints with the lines
+# that the page shows. Whether the numbers are right is not asked here:
+# tests/apps/demo_test.cpp and tests/fit/recordings_test.cpp do that.
 #
 # On the page, a line "..." stands for any number of lines. Blank lines do not count, nor do times
 # such as "12.3 s". Blocks that begin with "```console whole" take half a minute or more together
@@ -72,18 +73,21 @@ function(follow command expected)
   if(NOT missing STREQUAL "")
     readable("${missing}" missing)
     string(REPLACE "\n" "\n  " output "${output}")  # CMake keeps indented lines as they are
-    message(SEND_ERROR "docs/tour.md shows other lines for\n  $ ${command}\n  ${missing}\n"
+    message(SEND_ERROR "${PAGE} shows other lines for\n  $ ${command}\n  ${missing}\n"
       "All of what it printed:\n  ${output}")
   endif()
 endfunction()
 
+if(NOT DEFINED PAGE)
+  set(PAGE docs/tour.md)
+endif()
 file(REMOVE_RECURSE ${WORK_DIR})
 file(MAKE_DIRECTORY ${WORK_DIR})
 file(CREATE_LINK ${SOURCE_DIR}/data ${WORK_DIR}/data SYMBOLIC)
 get_filename_component(program_folder ${PROGRAM} DIRECTORY)
 set(ENV{PATH} "${program_folder}:$ENV{PATH}")
 
-file(READ ${SOURCE_DIR}/docs/tour.md page)
+file(READ ${SOURCE_DIR}/${PAGE} page)
 lines_of("${page}" page)
 set(count 0)
 set(left_out 0)
@@ -119,7 +123,7 @@ foreach(line IN LISTS page)
 endforeach()
 
 if(count EQUAL 0)
-  message(SEND_ERROR "docs/tour.md has no commands in console blocks")
+  message(SEND_ERROR "${PAGE} has no commands in console blocks")
 endif()
 if(left_out GREATER 0)
   message(STATUS "left out: ${left_out} of ${count} commands take half a minute and more; "
