@@ -45,7 +45,7 @@ set(CLOTHFIT_ARROWS
   "fit/refine           -> data/algebra data model/cloth fit/interface fit/problem fit/cost"
   "fit/uncertainty      -> data/algebra data fit/interface fit/jobs fit/problem fit/cost
                            fit/refine"
-  "fit                  -> data model/cloth fit/interface fit/observe fit/problem fit/cost
+  "fit                  -> data model/cloth fit/interface fit/jobs fit/observe fit/problem fit/cost
                            fit/search fit/refine fit/uncertainty"
   "fit/diagnosis        -> data/algebra data calib/camera model/cloth model/effects
                            model/integrate fit/interface fit/jobs fit/observe

@@ -1,7 +1,6 @@
 #include "fit/fit.h"
 
 #include <fmt/format.h>
-#include <tbb/global_control.h>
 
 #include <algorithm>
 #include <chrono>
@@ -10,6 +9,8 @@
 #include "data/input_error.h"
 #include "fit/cost/report_residuals.h"
 #include "fit/identify.h"
+#include "fit/jobs/stop_token.h"
+#include "fit/jobs/thread_limit.h"
 #include "fit/observe/cloud_errors.h"
 #include "fit/observe/marker_offsets.h"
 #include "fit/problem/mesh_ladder.h"
@@ -243,65 +244,67 @@ void run_on(const FitInput& input, const FitProblem& problem, const FitOptions& 
     result.observations_used += static_cast<int>(set.rows.size());
 }
 
+void forecast(const FitInput& input, const FitProblem& problem, const FitOptions& options,
+              FitReport& report) {
+  const Eigen::VectorXd values = problem.space.start();
+  report.stop = FitStop::converged;
+  report.result.time_step_s = own_time_step_s(problem, options, values);
+  report.stages.push_back("forecast: nothing fitted");
+  run_on(input, problem, options, values, {}, options.forecast->marker_offsets, {}, report);
+}
+
+/// From the optimum to the intervals and the error on held-out frames.
+void identify_all(const FitInput& input, const FitProblem& problem, const FitOptions& options,
+                  const ProgressCallback& progress, FitReport& report) {
+  FitResult& result = report.result;
+  const auto fail = [&](const std::string& message) {
+    report = stopped(std::move(report), FitStop::diverged, message);
+  };
+  std::vector<Candidate> candidates;
+  const RefineResult refined = identify(input, problem, options, progress, report, candidates);
+  if (!refined.usable) return fail("no fit worked out: " + refined.message);
+  const Eigen::VectorXd& values = refined.values;
+  result.time_step_s = refined.time_step_s;
+  report.stop = refined.converged ? FitStop::converged : FitStop::reached_limit;
+  report.message = refined.message;
+  const TrajectoryObjective objective(
+      problem, problem.first_held_out,
+      time_steps_of_run(problem.cloth, parameter_set(problem, values), result.time_step_s));
+  const Uncertainty uncertainty = estimate_uncertainty(
+      objective, values,
+      {.loss = options.loss, .bootstrap = options.bootstrap, .seed = options.seed},
+      refined.residual_by_coordinate);
+  if (options.bootstrap > 0 && uncertainty.bootstrap_lower.size() == 0)
+    report.stages.push_back(
+        "no bootstrap: fewer than two blocks, or a coordinate that the residuals say nothing of");
+  if (!uncertainty.usable) return fail("the derivatives at the optimum could not be computed");
+  fill_correlation(problem.space, uncertainty, report);
+  result.basins = basins_of(problem.space, std::move(candidates), values, uncertainty);
+  add_uncertainty(problem, values, uncertainty, report);
+  const FurtherLooks looks =
+      look_further(input, objective, options, values, uncertainty, progress, report);
+  run_on(input, problem, options, values, uncertainty, {}, looks, report);
+}
+
 }  // namespace
 
 FitReport fit(const FitInput& input, const FitOptions& options, const ProgressCallback& progress) {
   options.validate();
   const auto began = std::chrono::steady_clock::now();
-  const tbb::global_control threads(
-      tbb::global_control::max_allowed_parallelism,
-      options.threads > 0
-          ? static_cast<size_t>(options.threads)
-          : tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
-
+  const ThreadLimit threads(options.threads);
   const auto [columns, rows] = mesh_of(input.recording.cloth, options);
   const FitProblem problem = make_problem(input, options, columns, rows);
   FitReport report = report_of(input, problem, options);
-  FitResult& result = report.result;
-  Eigen::VectorXd values = problem.space.start();
-  Uncertainty uncertainty;
-  FurtherLooks looks;
-  if (!options.forecast) {
-    std::vector<Candidate> candidates;
-    const RefineResult refined = identify(input, problem, options, progress, report, candidates);
-    if (refined.cancelled) return stopped(std::move(report), FitStop::cancelled, "cancelled");
-    if (!refined.usable)
-      return stopped(std::move(report), FitStop::diverged, "no fit worked out: " + refined.message);
-    values = refined.values;
-    result.time_step_s = refined.time_step_s;
-    report.stop = refined.converged ? FitStop::converged : FitStop::reached_limit;
-    report.message = refined.message;
-    const TrajectoryObjective objective(
-        problem, problem.first_held_out,
-        time_steps_of_run(problem.cloth, parameter_set(problem, values), result.time_step_s));
-    uncertainty = estimate_uncertainty(
-        objective, values,
-        {.loss = options.loss, .bootstrap = options.bootstrap, .seed = options.seed},
-        refined.residual_by_coordinate);
-    if (options.bootstrap > 0 && uncertainty.bootstrap_lower.size() == 0)
-      report.stages.push_back(
-          "no bootstrap: fewer than two blocks, or a coordinate that the residuals say nothing of");
-    if (!uncertainty.usable)
-      return stopped(std::move(report), FitStop::diverged,
-                     "the derivatives at the optimum could not be computed");
-    fill_correlation(problem.space, uncertainty, report);
-    result.basins = basins_of(problem.space, std::move(candidates), values, uncertainty);
-    add_uncertainty(problem, values, uncertainty, report);
-    bool cancelled = false;
-    const ProgressCallback watched = [&](const Progress& now) {
-      cancelled = cancelled || (progress && !progress(now));
-      return !cancelled;
-    };
-    looks = look_further(input, objective, options, values, uncertainty, watched, report);
-    if (cancelled) return stopped(std::move(report), FitStop::cancelled, "cancelled");
-  } else {
-    result.time_step_s = own_time_step_s(problem, options, values);
-    report.stages.push_back("forecast: nothing fitted");
+  try {
+    if (options.forecast)
+      forecast(input, problem, options, report);
+    else
+      identify_all(input, problem, options, stop_token(progress), report);
+  } catch (const StopRequested&) {
+    return stopped(std::move(report), FitStop::cancelled, "cancelled");
   }
-  run_on(input, problem, options, values, uncertainty,
-         options.forecast ? options.forecast->marker_offsets : std::vector<MarkerOffset>(), looks,
-         report);
-  result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+  report.result.seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
   return report;
 }
 
@@ -329,6 +332,7 @@ FitReport report_at(const FitInput& input, const FitOptions& options,
     uncertainty.upper[p] = std::min(parameter.upper, values[p] + half);
   }
   FitReport report = report_of(input, problem, options);
+  report.stop = FitStop::converged;
   report.stages.push_back("nothing fitted here: the values come from a fit elsewhere");
   report.result.time_step_s = own_time_step_s(problem, options, values);
   run_on(input, problem, options, values, uncertainty, known.marker_offsets, {}, report);

@@ -101,7 +101,7 @@ void print_result(const Diagnosis& diagnosis, const fs::path& folder) {
   if (diagnosis.seen_elsewhere)
     fmt::print("Markers seen elsewhere: {}\n", seen_elsewhere_text(*diagnosis.seen_elsewhere));
   for (size_t n = 0; n < diagnosis.accepted.size(); ++n) {
-    const Term& term = diagnosis.accepted[n].trial.term;
+    const Hypothesis& term = diagnosis.accepted[n].trial.hypothesis;
     fmt::print("{}: {}\n", term.title(), found_text(term, diagnosis.found().result));
     if (!diagnosis.separation_of(n).empty())
       fmt::print("  {}\n", separation_text(term, diagnosis.separation_of(n)));
@@ -218,7 +218,7 @@ void add_diagnose_verb(Verb program) {
   verb.add_option("--work", &options.fit.work,
                   "Times as much work as refinement is allowed before it ends unconverged")
       .shows_default();
-  verb.add_option("--lines", &options.lines, "Lines of search that are followed side by side")
+  verb.add_option("--lines", &options.beam_width, "Lines of search that are followed side by side")
       .shows_default();
   verb.add_option("--refits", &options.refits, "Laws of each line that are fitted in one round")
       .shows_default();

@@ -13,6 +13,7 @@
 #include "data/input_error.h"
 #include "data/output_folder.h"
 #include "data/text_file.h"
+#include "fit/problem/effects_of.h"
 
 namespace clothfit {
 namespace {
@@ -35,12 +36,12 @@ std::vector<HiddenLaw> laws_asked_for(const std::vector<std::string>& asked,
     for (const HiddenLaw& known : library)
       if (known.effect == effect && law.empty()) own.push_back(known);
     std::string names;
-    for (const EffectLaw& known : described.laws) {
+    for (const EffectMode& known : described.modes) {
       names += (names.empty() ? "" : ", ") + known.name;
       if (own.empty() && (law.empty() || known.name == law)) own.push_back({effect, known.name});
       if (own.size() == 1 && !law.empty()) break;
     }
-    if (described.laws.empty() && own.empty() && law.empty()) own.push_back({effect, ""});
+    if (described.modes.empty() && own.empty() && law.empty()) own.push_back({effect, ""});
     if (own.empty())
       throw InputError("--hidden", fmt::format("{} has no law '{}'", effect, law),
                        names.empty() ? "no law: it has but one" : "one of " + names);
@@ -51,7 +52,7 @@ std::vector<HiddenLaw> laws_asked_for(const std::vector<std::string>& asked,
 
 UndeclaredOptions options_of(const UndeclaredFlags& flags, const UndeclaredRun& run) {
   UndeclaredOptions options{.scene = run.scene, .diagnosis = {.fit = run.fit}};
-  options.diagnosis.lines = flags.lines;
+  options.diagnosis.beam_width = flags.lines;
   options.diagnosis.refits = flags.refits;
   options.scene.held_out_from =
       flags.fitted > 0 ? flags.fitted : 1 + 3 * (run.scene.frames - 1) / 4;

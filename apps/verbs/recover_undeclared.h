@@ -19,7 +19,7 @@ struct UndeclaredFlags {
   int fitted = 0;  ///< frames; 0: three quarters
   double least_sigmas = DrawOptions{}.least, most_sigmas = DrawOptions{}.most;
   double most_mimicked = UndeclaredOptions{}.most_mimicked;
-  int lines = DiagnoseOptions{}.lines, refits = DiagnoseOptions{}.refits;
+  int lines = DiagnoseOptions{}.beam_width, refits = DiagnoseOptions{}.refits;
 };
 
 void add_undeclared_options(Verb verb, UndeclaredFlags& flags);

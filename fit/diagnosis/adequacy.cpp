@@ -7,22 +7,12 @@
 #include <utility>
 
 #include "data/algebra/dense_factors.h"
-#include "fit/diagnosis/law_derivatives.h"
+#include "fit/diagnosis/criteria.h"
+#include "fit/diagnosis/hypothesis_derivatives.h"
 #include "fit/diagnosis/projection.h"
 
 namespace clothfit {
 namespace {
-
-/// A structure that is surer than this,
-constexpr double kSure = 5;
-/// and larger than this share of the noise's own square, is one.
-constexpr double kLarge = 0.02;
-/// Chi-square per degree of freedom that may be left beyond 1.
-constexpr double kLeft = 0.2;
-
-/// Directions in which the discretisation errs are estimates. Of the error's own square they may
-/// leave so much: smooth structure of a tenth of its size, and all in all a third.
-constexpr double kErrorSmooth = 0.01, kErrorLeft = 0.1;
 
 /// Mean product of pairs of residuals over their mean square, with its standard score.
 struct Correlation {
@@ -100,9 +90,94 @@ Eigen::MatrixXd smooth_functions(const TrajectoryObjective& objective, int along
   return functions;
 }
 
+/// Sums over pairs of blocks.
+struct Pairs {
+  double products = 0, squares = 0, count = 0;
+
+  void add(const Eigen::Ref<const Eigen::VectorXd>& one,
+           const Eigen::Ref<const Eigen::VectorXd>& other) {
+    products += one.dot(other);
+    squares += 0.5 * (one.squaredNorm() + other.squaredNorm());
+    count += static_cast<double>(one.size());
+  }
+};
+
+/// Adds a recording's pairs: a marker and itself in the next frame, and neighbours in one frame.
+void add_pairs(const TrajectoryObjective& objective,
+               const Eigen::Ref<const Eigen::VectorXd>& residual, Pairs& in_time, Pairs& along) {
+  const FitProblem& problem = objective.problem();
+  const std::vector<std::pair<int, int>> near = neighbours(problem.marker_place_m);
+  const auto of = [&](const Objective::Block* block) {
+    return residual.segment(block->offset, block->dimension);
+  };
+  for (size_t s = 0; s < problem.observations.size(); ++s) {
+    const auto blocks = blocks_of(objective, static_cast<int>(s));
+    for (const auto& [place, block] : blocks) {
+      const auto next = blocks.find({place.first, place.second + 1});
+      if (next != blocks.end()) in_time.add(of(block), of(next->second));
+    }
+    for (int frame = 0; frame < objective.frames(); ++frame) {
+      for (const auto& [one, other] : near) {
+        const auto a = blocks.find({one, frame}), b = blocks.find({other, frame});
+        if (a != blocks.end() && b != blocks.end()) along.add(of(a->second), of(b->second));
+      }
+    }
+  }
+}
+
+/// The square that smooth functions take from the projected residual, and their number.
+struct Taken {
+  double square = 0, rank = 0;
+};
+
+Taken taken_by_smooth(const FittedModel& model, const ModelProjection& projection, int along,
+                      int in_time) {
+  Taken taken;
+  for (size_t n = 0; n < model.parts.size(); ++n) {
+    Columns functions;
+    for (size_t m = 0; m < model.parts.size(); ++m)
+      functions.push_back(smooth_functions(model.objective(m), along, in_time));
+    if (2 * functions[n].cols() > functions[n].rows()) continue;
+    // Each recording has its own.
+    for (size_t m = 0; m < model.parts.size(); ++m)
+      if (m != n) functions[m] = Eigen::MatrixXd::Zero(functions[m].rows(), functions[n].cols());
+    const Eigen::MatrixXd left = projection.columns(functions);
+    const Eigen::MatrixXd information = left.transpose() * left;
+    const LeastNormFactors solver(information);
+    const Eigen::VectorXd pull = left.transpose() * projection.residual();
+    taken.square += pull.dot(solver.solve(pull));
+    taken.rank += static_cast<double>(solver.rank());
+  }
+  return taken;
+}
+
+void add_smooth(const FittedModel& model, const ModelProjection& projection, Adequacy& result) {
+  const double chi_square = projection.residual().squaredNorm();
+  constexpr std::pair<int, int> kSets[] = {{1, 4}, {2, 4}, {2, 8}, {3, 6}};
+  for (const auto& [waves, in_time_waves] : kSets) {
+    const Taken taken = taken_by_smooth(model, projection, waves, in_time_waves);
+    if (taken.rank == 0) continue;
+    const double score = (taken.square - taken.rank) / std::sqrt(2 * taken.rank);
+    if (score <= result.smooth_score) continue;
+    result.smooth_score = score;
+    result.smooth_share = (taken.square - taken.rank) / chi_square;
+  }
+}
+
+bool looks_like_noise(const Adequacy& of) {
+  const double discretisation = of.discretisation_square;
+  const bool structured =
+      of.smooth_score > kCriteria.structure_score &&
+      of.smooth_share * of.chi_square_per_dof >
+          std::max(kCriteria.structure_share, kCriteria.smooth_discretisation * discretisation);
+  return !structured &&
+         of.chi_square_per_dof < 1 + std::max(kCriteria.excess_chi_square,
+                                              kCriteria.left_discretisation * discretisation);
+}
+
 }  // namespace
 
-Adequacy judge_adequacy(const ModelFit& model, Loss loss) {
+Adequacy judge_adequacy(const FittedModel& model, Loss loss) {
   const ModelProjection projection(model, loss);
   const ModelProjection noise_alone(model, loss, false);
   Adequacy result;
@@ -112,79 +187,25 @@ Adequacy judge_adequacy(const ModelFit& model, Loss loss) {
   result.noise_chi_square_per_dof = noise_alone.residual().squaredNorm() /
                                     std::max(1.0, noise_alone.weights() - noise_alone.taken());
 
-  double time_products = 0, time_squares = 0, time_count = 0;
-  double near_products = 0, near_squares = 0, near_count = 0;
+  Pairs time_pairs, near_pairs;
   for (size_t n = 0; n < model.parts.size(); ++n) {
-    const FitProblem& problem = *model.problems[n];
     const TrajectoryObjective objective = model.objective(n);
-    const Eigen::Index first = projection.first_row(n);
-    const std::vector<std::pair<int, int>> near = neighbours(problem.marker_place_m);
-    for (size_t s = 0; s < problem.observations.size(); ++s) {
-      const auto blocks = blocks_of(objective, static_cast<int>(s));
-      const auto add = [&](const Objective::Block& one, const Objective::Block& other,
-                           double& products, double& squares, double& count) {
-        const auto a = residual.segment(first + one.offset, one.dimension);
-        const auto b = residual.segment(first + other.offset, other.dimension);
-        products += a.dot(b);
-        squares += 0.5 * (a.squaredNorm() + b.squaredNorm());
-        count += one.dimension;
-      };
-      for (const auto& [place, block] : blocks) {
-        const auto next = blocks.find({place.first, place.second + 1});
-        if (next != blocks.end())
-          add(*block, *next->second, time_products, time_squares, time_count);
-      }
-      for (int frame = 0; frame < objective.frames(); ++frame) {
-        for (const auto& [one, other] : near) {
-          const auto a = blocks.find({one, frame}), b = blocks.find({other, frame});
-          if (a != blocks.end() && b != blocks.end())
-            add(*a->second, *b->second, near_products, near_squares, near_count);
-        }
-      }
-    }
+    add_pairs(objective, residual.segment(projection.first_row(n), objective.residual_count()),
+              time_pairs, near_pairs);
   }
-  const Correlation in_time = correlation(time_products, time_squares, time_count);
-  const Correlation along = correlation(near_products, near_squares, near_count);
+  const Correlation in_time =
+      correlation(time_pairs.products, time_pairs.squares, time_pairs.count);
+  const Correlation along = correlation(near_pairs.products, near_pairs.squares, near_pairs.count);
   result.time_correlation = in_time.value;
   result.time_score = in_time.score;
   result.neighbour_correlation = along.value;
   result.neighbour_score = along.score;
 
-  const double chi_square = residual.squaredNorm();
-  constexpr std::pair<int, int> kSets[] = {{1, 4}, {2, 4}, {2, 8}, {3, 6}};
-  for (const auto& [waves, in_time_waves] : kSets) {
-    double taken = 0, rank = 0;
-    for (size_t n = 0; n < model.parts.size(); ++n) {
-      Columns functions;
-      for (size_t m = 0; m < model.parts.size(); ++m)
-        functions.push_back(smooth_functions(model.objective(m), waves, in_time_waves));
-      if (2 * functions[n].cols() > functions[n].rows()) continue;
-      // Each recording has its own.
-      for (size_t m = 0; m < model.parts.size(); ++m)
-        if (m != n) functions[m] = Eigen::MatrixXd::Zero(functions[m].rows(), functions[n].cols());
-      const Eigen::MatrixXd left = projection.columns(functions);
-      const Eigen::MatrixXd information = left.transpose() * left;
-      const LeastNormFactors solver(information);
-      const Eigen::VectorXd pull = left.transpose() * residual;
-      taken += pull.dot(solver.solve(pull));
-      rank += static_cast<double>(solver.rank());
-    }
-    if (rank == 0) continue;
-    const double score = (taken - rank) / std::sqrt(2 * rank);
-    if (score > result.smooth_score) {
-      result.smooth_score = score;
-      result.smooth_share = (taken - rank) / chi_square;
-    }
-  }
+  add_smooth(model, projection, result);
   double square = 0;
   for (const PooledPart& part : model.parts) square += part.directions.squaredNorm();
   result.discretisation_square = square / static_cast<double>(model.residual_count());
-  const bool structured = result.smooth_score > kSure &&
-                          result.smooth_share * result.chi_square_per_dof >
-                              std::max(kLarge, kErrorSmooth * result.discretisation_square);
-  result.adequate =
-      !structured &&
-      result.chi_square_per_dof < 1 + std::max(kLeft, kErrorLeft * result.discretisation_square);
+  result.adequate = looks_like_noise(result);
   return result;
 }
 

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "fit/diagnosis/model_fit.h"
+#include "fit/diagnosis/fitted_model.h"
 
 namespace clothfit {
 
@@ -23,6 +23,6 @@ struct Adequacy {
 };
 
 /// Of a linearised model. `loss`: whether large residuals count less (Huber).
-Adequacy judge_adequacy(const ModelFit& model, Loss loss);
+Adequacy judge_adequacy(const FittedModel& model, Loss loss);
 
 }  // namespace clothfit

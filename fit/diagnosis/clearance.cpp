@@ -5,7 +5,9 @@
 
 #include "data/algebra/dense_factors.h"
 #include "data/median.h"
-#include "fit/diagnosis/refit.h"
+#include "fit/diagnosis/criteria.h"
+#include "fit/diagnosis/worth.h"
+#include "fit/problem/effects_of.h"
 #include "fit/refine/pooled_space.h"
 #include "fit/uncertainty/uncertainty.h"
 
@@ -49,7 +51,7 @@ Eigen::MatrixXd covariance(const PooledSpace& space, const std::vector<Quadratic
 }
 
 /// By the residuals' trend where derivatives are rough. Empty where a recording has none.
-std::vector<Quadratic> quadratics_of(const ModelFit& model, double threshold) {
+std::vector<Quadratic> quadratics_of(const FittedModel& model, double threshold) {
   std::vector<Quadratic> quadratics;
   for (size_t n = 0; n < model.parts.size(); ++n) {
     PooledPart part = model.parts[n];
@@ -69,10 +71,10 @@ struct FromNeutral {
 };
 
 /// Of the last term. Nothing where derivatives are missing.
-FromNeutral from_neutral(const ModelFit& model, double threshold) {
+FromNeutral from_neutral(const FittedModel& model, double threshold) {
   const std::vector<const FitProblem*> problems = model.problem_pointers();
   const PooledSpace pooled(problems);
-  const Term& term = model.terms.back();
+  const Hypothesis& term = model.hypotheses.back();
   const EffectDescription effect = describe_effect(term.effect);
   std::vector<Eigen::Index> indices;
   std::vector<double> away;
@@ -104,16 +106,17 @@ FromNeutral from_neutral(const ModelFit& model, double threshold) {
 
 }  // namespace
 
-double clear_of_neutral(const ModelFit& model, const Adequacy& structure, double threshold) {
+double clear_of_neutral(const FittedModel& model, const Adequacy& structure, double threshold) {
   const FromNeutral own = from_neutral(model, threshold);
-  return 5 * std::sqrt(own.square / inflation(structure) / least_fall(own.amplitudes));
+  return kCriteria.clear_of_neutral *
+         std::sqrt(own.square / inflation(structure) / least_decrease(own.amplitudes));
 }
 
-double rise_without_last(const ModelFit& model, double threshold) {
+double rise_without_last(const FittedModel& model, double threshold) {
   return from_neutral(model, threshold).square;
 }
 
-std::vector<NamedValues> sigma_of(const ModelFit& model, const Adequacy& structure,
+std::vector<NamedValues> sigma_of(const FittedModel& model, const Adequacy& structure,
                                   double threshold) {
   const std::vector<const FitProblem*> problems = model.problem_pointers();
   const PooledSpace pooled(problems);
@@ -137,7 +140,7 @@ std::vector<NamedValues> sigma_of(const ModelFit& model, const Adequacy& structu
   return result;
 }
 
-double typical_roughness(const ModelFit& model) {
+double typical_roughness(const FittedModel& model) {
   std::vector<double> all;
   for (size_t n = 0; n < model.parts.size(); ++n) {
     const PooledPart& part = model.parts[n];

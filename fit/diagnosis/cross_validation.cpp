@@ -38,7 +38,7 @@ struct Normal {
 
 class Folds {
  public:
-  Folds(const DiagnosisSetup& setup, const ModelFit& model, int blocks, double threshold,
+  Folds(const DiagnosisSetup& setup, const FittedModel& model, int blocks, double threshold,
         bool whole, FreeForces forces)
       : model_(model),
         problems_(model.problem_pointers()),
@@ -78,10 +78,10 @@ class Folds {
       // Such a step led out of what is stable.
       if (result[n].size() != objectives_[n].residual_count()) result[n] = part.linear.residual;
       if (part.correction.size() > 0) result[n] += part.correction;
-      const Eigen::Index amounts = part.amounts.size();
+      const Eigen::Index amounts = part.amplitudes.size();
       if (amounts > 0)
         result[n] +=
-            part.directions * (part.amounts + ways[n].segment(part.values.size(), amounts));
+            part.directions * (part.amplitudes + ways[n].segment(part.values.size(), amounts));
     }
     return result;
   }
@@ -121,7 +121,7 @@ class Folds {
     normal.information.topLeftCorner(unforced, unforced).setIdentity();
     normal.information.topLeftCorner(fitted, fitted) = prior.information;
     normal.gradient.head(fitted) = prior.gradient;
-    if (unforced > fitted) normal.gradient.segment(fitted, unforced - fitted) = part.amounts;
+    if (unforced > fitted) normal.gradient.segment(fitted, unforced - fitted) = part.amplitudes;
     const int stretches = whole_ ? 1 : blocks_;
     normal.block_information.assign(static_cast<size_t>(stretches),
                                     Eigen::MatrixXd::Zero(all, all));
@@ -260,7 +260,7 @@ class Folds {
     return space.values(next.cwiseMax(space.coordinates(lower)).cwiseMin(space.coordinates(upper)));
   }
 
-  const ModelFit& model_;
+  const FittedModel& model_;
   std::vector<const FitProblem*> problems_;
   PooledSpace space_;
   bool whole_;
@@ -347,7 +347,7 @@ double squares_with_forces(const Folds& folds, double threshold) {
 
 }  // namespace
 
-CrossValidation cross_validate(const DiagnosisSetup& setup, const ModelFit& model, int blocks,
+CrossValidation cross_validate(const DiagnosisSetup& setup, const FittedModel& model, int blocks,
                                double threshold, bool whole, const DiagnosisSetup* forces_mesh) {
   whole = whole && model.parts.size() > 1;
   FreeForces forces;

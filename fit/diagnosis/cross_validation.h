@@ -3,7 +3,7 @@
 #include <limits>
 #include <vector>
 
-#include "fit/diagnosis/model_fit.h"
+#include "fit/diagnosis/fitted_model.h"
 
 namespace clothfit {
 
@@ -36,7 +36,7 @@ struct CrossValidation {
 /// first order, each known to be of one size beforehand: of 0.01, 0.1, 1 and 10 m/s2 the one that
 /// foresees best. Forces are each recording's own, so that of one that is left out whole nothing
 /// can be known of them.
-CrossValidation cross_validate(const DiagnosisSetup& setup, const ModelFit& model, int blocks,
+CrossValidation cross_validate(const DiagnosisSetup& setup, const FittedModel& model, int blocks,
                                double threshold, bool whole = false,
                                const DiagnosisSetup* forces_mesh = nullptr);
 

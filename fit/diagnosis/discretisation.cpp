@@ -4,6 +4,7 @@
 #include <cmath>
 #include <tuple>
 
+#include "fit/diagnosis/criteria.h"
 #include "fit/diagnosis/horizons.h"
 #include "fit/identify.h"
 #include "fit/problem/mesh_ladder.h"
@@ -21,18 +22,19 @@ DiagnosisSetup with_other_mesh(const DiagnosisSetup& setup) {
   return other;
 }
 
-ModelFit lead_to_mesh(const DiagnosisSetup& other, const ModelFit& model, double share,
-                      const ModelFit& shorter, const ProgressCallback& progress, bool own_only) {
-  const ModelFit own = share < 1 ? shortened(model, share) : model;
-  ModelFit fitted =
-      model_at(other, model.terms, shorter.parts.empty() ? model.values() : shorter.values());
+FittedModel lead_to_mesh(const DiagnosisSetup& other, const FittedModel& model, double share,
+                         const FittedModel& shorter, const ProgressCallback& progress,
+                         bool own_only) {
+  const FittedModel own = share < 1 ? shortened(model, share) : model;
+  FittedModel fitted =
+      model_at(other, model.hypotheses, shorter.parts.empty() ? model.values() : shorter.values());
   StageOptions stage;
   stage.rounds = 1;
   stage.own_only = own_only;
-  if (share < 1) stage.least_fall = 0;
+  if (share < 1) stage.least_decrease = 0;
   // Of a start in motion there are hundreds of directions: where parameters stand matters little,
   // for what they change is fitted along, and updated derivatives lead near for some runs.
-  stage.rough = std::ranges::any_of(
+  stage.unrefined = std::ranges::any_of(
       fitted.problems, [](const auto& problem) { return problem->start == StartKind::unknown; });
   for (size_t n = 0; n < fitted.parts.size(); ++n) {
     PooledPart& part = fitted.parts[n];
@@ -44,25 +46,25 @@ ModelFit lead_to_mesh(const DiagnosisSetup& other, const ModelFit& model, double
       part.linear.usable = part.linear.residual.size() == objective.residual_count();
       part.borrowed = true;
     }
-    stage.rough = stage.rough && part.linear.usable;
-    if (share < 1) stage.least_fall += kRough * objective.residual_count();
+    stage.unrefined = stage.unrefined && part.linear.usable;
+    if (share < 1) stage.least_decrease += kRough * objective.residual_count();
   }
   refine_model(fitted, other, stage, progress);
   return fitted;
 }
 
-ModelFit fit_on_mesh(const DiagnosisSetup& other, const ModelFit& model,
-                     const ProgressCallback& progress, bool own_only) {
-  ModelFit fitted;
+FittedModel fit_on_mesh(const DiagnosisSetup& other, const FittedModel& model,
+                        const ProgressCallback& progress, bool own_only) {
+  FittedModel fitted;
   for (const double share : shares_from(kFirstOnMesh)) {
     fitted = lead_to_mesh(other, model, share, fitted, progress, own_only);
-    if (!fitted.usable) break;
+    if (!fitted.usable()) break;
   }
   return fitted;
 }
 
 std::vector<DiscretisationError> discretisation_errors(const DiagnosisSetup& setup,
-                                                       const ModelFit& model) {
+                                                       const FittedModel& model) {
   std::vector<DiscretisationError> errors;
   for (const PooledPart& part : model.parts)
     errors.push_back({.expected = {}, .directions = {part.linear.residual.size(), 0}});
@@ -84,8 +86,8 @@ std::vector<DiscretisationError> discretisation_errors(const DiagnosisSetup& set
   if (setup.options.spring_set == SpringSet::fabric) {
     const DiagnosisSetup other = with_other_mesh(setup);
     const double finer = static_cast<double>(other.columns - 1) / (setup.columns - 1);
-    const ModelFit there = fit_on_mesh(other, model);
-    for (size_t n = 0; there.usable && n < there.parts.size(); ++n) {
+    const FittedModel there = fit_on_mesh(other, model);
+    for (size_t n = 0; there.usable() && n < there.parts.size(); ++n) {
       const Eigen::VectorXd& own = model.parts[n].linear.residual;
       const Eigen::VectorXd& residual = there.parts[n].linear.residual;
       // Of second order in the spacing: a coarser mesh errs four times as much.
@@ -95,38 +97,37 @@ std::vector<DiscretisationError> discretisation_errors(const DiagnosisSetup& set
   return errors;
 }
 
-void refine_with_discretisation(ModelFit& model, const DiagnosisSetup& setup,
+void refine_with_discretisation(FittedModel& model, const DiagnosisSetup& setup,
                                 const ProgressCallback& progress) {
-  constexpr double kBelievable = 3;
-  if (model.usable && model.is_hopeless()) {
+  if (model.usable() && model.misfits_grossly()) {
     for (PooledPart& part : model.parts) {
       part.correction.resize(0);
       part.directions.resize(part.linear.residual.size(), 0);
-      part.amounts.resize(0);
+      part.amplitudes.resize(0);
     }
     refine_model(model, setup, {}, progress);
-    if (!model.usable || model.is_hopeless()) return;
+    if (!model.usable() || model.misfits_grossly()) return;
   }
   std::vector<DiscretisationError> errors = discretisation_errors(setup, model);
   for (size_t n = 0; n < errors.size(); ++n) {
-    model.parts[n].amounts = Eigen::VectorXd::Zero(errors[n].directions.cols());
+    model.parts[n].amplitudes = Eigen::VectorXd::Zero(errors[n].directions.cols());
     model.parts[n].correction = std::move(errors[n].expected);
     model.parts[n].directions = std::move(errors[n].directions);
   }
   for (;;) {
     refine_model(model, setup, {}, progress);
-    if (!model.usable || model.cancelled) return;
+    if (!model.usable()) return;
     bool believable = true;
     for (PooledPart& part : model.parts) {
       std::vector<int> kept;
-      for (int k = 0; k < part.amounts.size(); ++k)
-        if (std::abs(part.amounts[k]) < kBelievable) kept.push_back(k);
-      if (std::ssize(kept) == part.amounts.size()) continue;
+      for (int k = 0; k < part.amplitudes.size(); ++k)
+        if (std::abs(part.amplitudes[k]) < kCriteria.believable_error) kept.push_back(k);
+      if (std::ssize(kept) == part.amplitudes.size()) continue;
       believable = false;
       // The first one is the step's, where an error of it is expected.
       if (kept.empty() || kept.front() > 0) part.correction.resize(0);
       part.directions = Eigen::MatrixXd(part.directions(Eigen::all, kept));
-      part.amounts = Eigen::VectorXd(part.amounts(kept));
+      part.amplitudes = Eigen::VectorXd(part.amplitudes(kept));
     }
     if (believable) return;
   }

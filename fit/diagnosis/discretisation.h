@@ -1,6 +1,6 @@
 #pragma once
 
-#include "fit/diagnosis/model_fit.h"
+#include "fit/diagnosis/fitted_model.h"
 
 namespace clothfit {
 
@@ -16,7 +16,7 @@ struct DiscretisationError {
 /// other mesh is often another cloth); cloth is no limit of meshes, so nothing of it is expected.
 /// Springs whose natural lengths are fitted are those of one mesh, which then has no such error.
 std::vector<DiscretisationError> discretisation_errors(const DiagnosisSetup& setup,
-                                                       const ModelFit& model);
+                                                       const FittedModel& model);
 
 /// The setup with the mesh that directions are taken from.
 DiagnosisSetup with_other_mesh(const DiagnosisSetup& setup);
@@ -28,21 +28,21 @@ inline constexpr double kFirstOnMesh = 0.28;
 /// model's own mesh, where there are any, which serve for most of the way; where recordings begin
 /// in motion all the way, and it ends near the optimum. `own_only`: what is shared by recordings
 /// stays.
-ModelFit fit_on_mesh(const DiagnosisSetup& other, const ModelFit& model,
-                     const ProgressCallback& progress = {}, bool own_only = false);
+FittedModel fit_on_mesh(const DiagnosisSetup& other, const FittedModel& model,
+                        const ProgressCallback& progress = {}, bool own_only = false);
 
 /// One of these horizons: over a share of the model's frames, from where the fit over the shorter
 /// one stands; from where the model stands if that has no parts.
-ModelFit lead_to_mesh(const DiagnosisSetup& other, const ModelFit& model, double share,
-                      const ModelFit& shorter, const ProgressCallback& progress,
-                      bool own_only = false);
+FittedModel lead_to_mesh(const DiagnosisSetup& other, const FittedModel& model, double share,
+                         const FittedModel& shorter, const ProgressCallback& progress,
+                         bool own_only = false);
 
 /// Refines a model together with the amounts by which its discretisation errs, in the directions of
 /// where it stands first. A direction that is asked for by several times what it may be is no error
 /// of that discretisation: something else is missing, by which the two meshes were led to different
 /// optima. It is left out, and what was expected along it. A model that leaves more than thirty
 /// times what noise makes, once refined, has none: they cost most where they say least.
-void refine_with_discretisation(ModelFit& model, const DiagnosisSetup& setup,
+void refine_with_discretisation(FittedModel& model, const DiagnosisSetup& setup,
                                 const ProgressCallback& progress);
 
 }  // namespace clothfit

@@ -114,8 +114,8 @@ std::shared_ptr<const Effect> make_free_force(const Cloth& cloth, int waves_alon
   return std::make_shared<FreeForce>(std::move(force_per_unit_kg), from_s, until_s);
 }
 
-FreeForces free_forces(const DiagnosisSetup& mesh, const ModelFit& model, int stretches) {
-  ModelFit there = model_at(mesh, model.terms, model.values());
+FreeForces free_forces(const DiagnosisSetup& mesh, const FittedModel& model, int stretches) {
+  FittedModel there = model_at(mesh, model.hypotheses, model.values());
   FreeForces forces{.stretches = stretches, .columns = Columns(model.parts.size())};
   tbb::parallel_for(size_t{0}, model.parts.size(), [&](size_t n) {
     forces.columns[n] =

@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "fit/diagnosis/law_derivatives.h"
+#include "fit/diagnosis/hypothesis_derivatives.h"
 #include "model/cloth/effect.h"
 
 namespace clothfit {
@@ -39,6 +39,6 @@ std::shared_ptr<const Effect> make_free_force(const Cloth& cloth, int waves_alon
 
 /// Of the model where it stands, at no force, with the derivatives of a mesh that may be coarser
 /// than its own. Where a stretch begins and ends is known to kEmergingInterval_s.
-FreeForces free_forces(const DiagnosisSetup& mesh, const ModelFit& model, int stretches);
+FreeForces free_forces(const DiagnosisSetup& mesh, const FittedModel& model, int stretches);
 
 }  // namespace clothfit

@@ -68,7 +68,7 @@ Eigen::MatrixXd Projection::columns(const Eigen::MatrixXd& of) const {
   return left;
 }
 
-ModelProjection::ModelProjection(const ModelFit& model, Loss loss, bool with_directions) {
+ModelProjection::ModelProjection(const FittedModel& model, Loss loss, bool with_directions) {
   const std::vector<const FitProblem*> problems = model.problem_pointers();
   const PooledSpace space(problems);
   const double threshold = loss == Loss::huber ? kHuberScales * robust_scale(model.residual())
@@ -132,7 +132,7 @@ double ModelProjection::weights() const {
 Explained explain(const Eigen::VectorXd& residual, const Eigen::MatrixXd& columns,
                   const Eigen::VectorXd& lower, const Eigen::VectorXd& upper) {
   assert(columns.cols() == lower.size() && lower.size() == upper.size());
-  Explained result{.amount = Eigen::VectorXd::Zero(columns.cols()),
+  Explained result{.amplitude = Eigen::VectorXd::Zero(columns.cols()),
                    .information = columns.transpose() * columns};
   const Eigen::VectorXd pull = -columns.transpose() * residual;
   // Coordinate descent ends at the least within the box, for the sum of squares is convex.
@@ -142,14 +142,15 @@ Explained explain(const Eigen::VectorXd& residual, const Eigen::MatrixXd& column
     for (Eigen::Index k = 0; k < columns.cols(); ++k) {
       const double own = result.information(k, k);
       if (own == 0) continue;
-      const double slope = pull[k] - result.information.row(k).dot(result.amount);
-      const double next = std::clamp(result.amount[k] + slope / own, lower[k], upper[k]);
-      most = std::max(most, (next - result.amount[k]) * (next - result.amount[k]) * own);
-      result.amount[k] = next;
+      const double slope = pull[k] - result.information.row(k).dot(result.amplitude);
+      const double next = std::clamp(result.amplitude[k] + slope / own, lower[k], upper[k]);
+      most = std::max(most, (next - result.amplitude[k]) * (next - result.amplitude[k]) * own);
+      result.amplitude[k] = next;
     }
     if (most < 1e-18) break;
   }
-  result.fall = 2 * pull.dot(result.amount) - result.amount.dot(result.information * result.amount);
+  result.decrease =
+      2 * pull.dot(result.amplitude) - result.amplitude.dot(result.information * result.amplitude);
   return result;
 }
 

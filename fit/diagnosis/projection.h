@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "data/algebra/dense_factors.h"
-#include "fit/diagnosis/model_fit.h"
+#include "fit/diagnosis/fitted_model.h"
 
 namespace clothfit {
 
@@ -47,7 +47,7 @@ class Projection {
 class ModelProjection {
  public:
   /// With the directions of the parts, or without any.
-  ModelProjection(const ModelFit& model, Loss loss, bool with_directions = true);
+  ModelProjection(const FittedModel& model, Loss loss, bool with_directions = true);
 
   const Eigen::VectorXd& residual() const { return shared_.front().residual(); }
   /// Of columns that belong to all recordings: residuals x columns of each.
@@ -68,9 +68,9 @@ class ModelProjection {
 
 /// How well columns explain what is left of a residual: of least squares with both projected.
 struct Explained {
-  Eigen::VectorXd amount;       ///< of each column
+  Eigen::VectorXd amplitude;    ///< of each column
   Eigen::MatrixXd information;  ///< of the amounts
-  double fall = 0;              ///< of the sum of squares
+  double decrease = 0;          ///< of the sum of squares
 };
 
 /// Amounts stay within their ends.

@@ -8,8 +8,11 @@
 #include <cmath>
 #include <utility>
 
-#include "data/shared_progress.h"
+#include "fit/diagnosis/catalogue.h"
+#include "fit/diagnosis/criteria.h"
 #include "fit/diagnosis/refit.h"
+#include "fit/diagnosis/worth.h"
+#include "fit/jobs/stop_token.h"
 #include "fit/uncertainty/uncertainty.h"
 #include "model/effects/force_law.h"
 #include "model/effects/tension_law.h"
@@ -20,20 +23,12 @@ namespace {
 /// Horizons at which terms are scored, as shares of the model's frames: from the shortest on at
 /// which something is missing, for over all frames what is missing biases the model.
 constexpr double kShares[] = {0.3, 0.5, 0.75, 1.0};
-constexpr double kVisibleToTerms = 1.2;  ///< chi-square per residual there
 constexpr size_t kHorizons = 2;
 
-/// Terms that are foreseen to explain less than this share of what the best one does are not
-/// fitted.
-constexpr double kWorthAFit = 0.8;
-
-/// Whether frames left out are foretold better: by a tenth of what is above the noise and by two
-/// per cent of the noise itself, below which nothing counts as structure
-/// (fit/diagnosis/adequacy.h), and in most of the blocks of time.
+/// Whether frames left out are predicted better, on the whole and in most of the blocks of time.
 bool predicts_better(const CrossValidation& one, const CrossValidation& other) {
-  constexpr double kLeastGain = 0.1, kLeastOfNoise = 0.02;
-  if (!one.usable ||
-      other.mean - one.mean <= std::max(kLeastOfNoise, kLeastGain * (other.mean - 1)))
+  if (!one.usable || other.mean - one.mean <= std::max(kCriteria.term_gain_of_noise,
+                                                       kCriteria.term_gain * (other.mean - 1)))
     return false;
   size_t blocks = 0;
   for (size_t b = 0; b < one.block.size(); ++b) blocks += one.block[b] < other.block[b] ? 1 : 0;
@@ -78,99 +73,98 @@ std::string formula_of(const std::vector<LawCoefficient>& coefficients) {
 
 class Pursuit {
  public:
-  Pursuit(const DiagnosisSetup& setup, const ModelFit& model, const ProposalOptions& options,
+  Pursuit(const DiagnosisSetup& setup, const FittedModel& model, const ProposalOptions& options,
           const ProgressCallback& progress)
       : setup_(setup),
         options_(options),
-        own_terms_(model.terms.size()),
-        progress_(for_threads(progress)) {
+        own_terms_(model.hypotheses.size()),
+        progress_(stop_token(progress)) {
     law_.model = model;
     law_.before = law_.after = validation_of(model);
   }
 
   ProposedLaw run() {
-    while (!law_.cancelled && terms_of_law() < options_.most_terms && add_term()) {
+    while (terms_of_law() < options_.most_terms && add_term()) {
     }
-    for (size_t k = own_terms_; !law_.cancelled && terms_of_law() > 1;) {
-      if (k == law_.model.terms.size()) break;
+    for (size_t k = own_terms_; terms_of_law() > 1;) {
+      if (k == law_.model.hypotheses.size()) break;
       if (!drop_term(k)) ++k;
     }
-    if (!law_.cancelled) state_coefficients();
+    state_coefficients();
     return std::move(law_);
   }
 
  private:
-  CrossValidation validation_of(const ModelFit& model) const {
+  CrossValidation validation_of(const FittedModel& model) const {
     return cross_validate(setup_, model, options_.blocks, options_.threshold);
   }
-  int terms_of_law() const { return static_cast<int>(law_.model.terms.size() - own_terms_); }
+  int terms_of_law() const { return static_cast<int>(law_.model.hypotheses.size() - own_terms_); }
 
   /// What is foreseen of each term, the most telling first; the shortest horizon where something is
   /// missing, and the model fitted over that.
-  std::vector<LawScore> shortlist(double& first_share, ModelFit& early) {
-    const std::vector<LawShapes> terms = terms_to_test();
-    std::vector<LawScore> list;
+  std::vector<Score> shortlist(double& first_share, FittedModel& early) {
+    const std::vector<ShapeCandidates> terms = terms_to_test();
+    std::vector<Score> list;
     size_t horizons = 0;
     for (const double share : kShares) {
-      ModelFit at = law_.model;
+      FittedModel at = law_.model;
       if (share < 1) {
         at = shortened(law_.model, share);
         refine_model(at, setup_, {.rounds = 1}, progress_);
       }
-      law_.cancelled = law_.cancelled || at.cancelled;
-      if (law_.cancelled) return {};
-      if (!at.usable) continue;
-      const bool visible =
-          at.residual().squaredNorm() > kVisibleToTerms * static_cast<double>(at.residual_count());
+      if (!at.usable()) continue;
+      const bool visible = at.residual().squaredNorm() >
+                           kCriteria.visible * static_cast<double>(at.residual_count());
       if (!visible && list.empty() && share < 1) continue;
       const ModelProjection projection(at, setup_.options.loss);
-      std::vector<LawScore> scores = score_laws(at, projection, terms, progress_);
+      std::vector<Score> scores = score_hypotheses(at, projection, terms, progress_);
       if (list.empty()) {
         first_share = share;
         early = std::move(at);
         list = std::move(scores);
       } else {
-        for (LawScore& score : scores)
-          for (LawScore& known : list)
-            if (known.term.same_law(score.term)) {
+        for (Score& score : scores)
+          for (Score& known : list)
+            if (known.hypothesis.same_mode(score.hypothesis)) {
               known.share = 0.5 * (known.share + score.share);
-              known.fall = std::max(known.fall, score.fall);
+              known.decrease = std::max(known.decrease, score.decrease);
             }
       }
       if (++horizons == kHorizons) break;
     }
-    std::ranges::stable_sort(list, std::greater<>(), &LawScore::share);
+    std::ranges::stable_sort(list, std::greater<>(), &Score::share);
     return list;
   }
 
   /// Those of a shortlist that are worth a fit, with the columns over all frames that it starts
   /// with.
-  std::vector<LawScore> worth_a_fit(const std::vector<LawScore>& list, double first_share) const {
-    std::vector<LawScore> worth;
-    std::vector<LawShapes> terms;
-    for (const LawScore& score : list) {
-      if (std::ssize(worth) == options_.fits || score.share < kWorthAFit * list.front().share)
+  std::vector<Score> worth_a_fit(const std::vector<Score>& list, double first_share) const {
+    std::vector<Score> worth;
+    std::vector<ShapeCandidates> terms;
+    for (const Score& score : list) {
+      if (std::ssize(worth) == options_.fits ||
+          score.share < kCriteria.term_worth_a_fit * list.front().share)
         break;
-      if (score.fall < least_fall(score.amount.size())) continue;
+      if (score.decrease < least_decrease(score.amplitude.size())) continue;
       worth.push_back(score);
-      terms.push_back({score.term});
+      terms.push_back({score.hypothesis});
     }
     if (first_share == 1) return worth;
-    for (LawScore& score : worth) score.columns.clear();
+    for (Score& score : worth) score.columns.clear();
     const ModelProjection projection(law_.model, setup_.options.loss);
-    for (LawScore& whole : score_laws(law_.model, projection, terms, progress_))
-      for (LawScore& score : worth)
-        if (score.term.same_law(whole.term)) score.columns = std::move(whole.columns);
-    std::erase_if(worth, [](const LawScore& score) { return score.columns.empty(); });
+    for (Score& whole : score_hypotheses(law_.model, projection, terms, progress_))
+      for (Score& score : worth)
+        if (score.hypothesis.same_mode(whole.hypothesis)) score.columns = std::move(whole.columns);
+    std::erase_if(worth, [](const Score& score) { return score.columns.empty(); });
     return worth;
   }
 
-  std::vector<LawShapes> terms_to_test() const {
-    std::vector<LawShapes> laws;
-    for (const Term& term : empirical_laws(setup_.inputs.front(), setup_.options)) {
-      const auto is_term = [&](const Term& own) { return own.same_law(term); };
+  std::vector<ShapeCandidates> terms_to_test() const {
+    std::vector<ShapeCandidates> laws;
+    for (const Hypothesis& term : empirical_hypotheses(setup_.inputs.front(), setup_.options)) {
+      const auto is_term = [&](const Hypothesis& own) { return own.same_mode(term); };
       if (std::ranges::find(options_.without, term.effect) == options_.without.end() &&
-          std::ranges::none_of(law_.model.terms, is_term))
+          std::ranges::none_of(law_.model.hypotheses, is_term))
         laws.push_back({term});
     }
     return laws;
@@ -178,34 +172,32 @@ class Pursuit {
 
   bool add_term() {
     double first_share = 1;
-    ModelFit early;
-    const std::vector<LawScore> list = shortlist(first_share, early);
+    FittedModel early;
+    const std::vector<Score> list = shortlist(first_share, early);
     if (law_.trials.empty()) {
       law_.scores = list;
-      for (LawScore& score : law_.scores) score.columns.clear();
+      for (Score& score : law_.scores) score.columns.clear();
     }
-    ModelFit best;
+    FittedModel best;
     CrossValidation best_validated = law_.after;
     size_t best_trial = 0;
-    const std::vector<LawScore> worth = worth_a_fit(list, first_share);
-    std::vector<const LawScore*> to_fit;
-    for (const LawScore& score : worth) to_fit.push_back(&score);
-    std::vector<ModelFit> models = fit_with_laws(setup_, law_.model, early, to_fit, first_share,
-                                                 options_.threshold, progress_);
-    law_.cancelled = law_.cancelled || std::ranges::any_of(models, &ModelFit::cancelled);
-    if (law_.cancelled) return false;
+    const std::vector<Score> worth = worth_a_fit(list, first_share);
+    std::vector<const Score*> to_fit;
+    for (const Score& score : worth) to_fit.push_back(&score);
+    std::vector<FittedModel> models = fit_with_hypotheses(
+        setup_, law_.model, early, to_fit, first_share, options_.threshold, progress_);
     std::vector<CrossValidation> left_out(models.size());
     tbb::parallel_for(size_t{0}, models.size(), [&](size_t k) {
-      if (models[k].usable) left_out[k] = validation_of(models[k]);
+      if (models[k].usable()) left_out[k] = validation_of(models[k]);
     });
     for (size_t k = 0; k < models.size(); ++k) {
-      ModelFit& fitted = models[k];
-      TermTrial trial{.term = worth[k].term,
-                      .foreseen_fall = worth[k].fall,
+      FittedModel& fitted = models[k];
+      TermTrial trial{.hypothesis = worth[k].hypothesis,
+                      .predicted_decrease = worth[k].decrease,
                       .without_it = law_.after.mean,
                       .refused = {}};
       CrossValidation& validated = left_out[k];
-      if (!fitted.usable) {
+      if (!fitted.usable()) {
         trial.refused = "others leave far less over the first frames, or no fit worked out";
       } else {
         trial.cross_validated = validated.mean;
@@ -216,16 +208,15 @@ class Pursuit {
       }
       law_.trials.push_back(trial);
       if (!trial.refused.empty()) continue;
-      if (best.usable) law_.trials[best_trial].refused = "another term predicts them better";
+      if (best.usable()) law_.trials[best_trial].refused = "another term predicts them better";
       best = std::move(fitted);
       best_validated = std::move(validated);
       best_trial = law_.trials.size() - 1;
     }
-    if (!best.usable) return false;
-    if (best.rough) {
+    if (!best.usable()) return false;
+    if (best.is_unrefined()) {
       refine_model(best, setup_, {}, progress_);
-      law_.cancelled = best.cancelled;
-      if (!best.usable) return false;
+      if (!best.usable()) return false;
       best_validated = validation_of(best);
     }
     law_.model = std::move(best);
@@ -234,33 +225,32 @@ class Pursuit {
   }
 
   bool drop_term(size_t k) {
-    std::vector<Term> terms = law_.model.terms;
-    const Term dropped = terms[k];
+    std::vector<Hypothesis> terms = law_.model.hypotheses;
+    const Hypothesis dropped = terms[k];
     terms.erase(terms.begin() + static_cast<std::ptrdiff_t>(k));
-    ModelFit fitted = with_terms(setup_, law_.model, terms, {});
+    FittedModel fitted = with_hypotheses(setup_, law_.model, terms, {});
     refine_model(fitted, setup_, {}, progress_);
-    law_.cancelled = law_.cancelled || fitted.cancelled;
-    if (law_.cancelled || !fitted.usable) return false;
+    if (!fitted.usable()) return false;
     CrossValidation validated = validation_of(fitted);
     if (predicts_better(law_.after, validated)) return false;
     law_.model = std::move(fitted);
     law_.after = std::move(validated);
     for (TermTrial& trial : law_.trials)
-      if (trial.term.same_law(dropped) && trial.refused.empty())
+      if (trial.hypothesis.same_mode(dropped) && trial.refused.empty())
         trial.refused = "the terms after it make it needless";
     return true;
   }
 
   void state_coefficients() {
     if (terms_of_law() == 0) return;
-    const ModelFit& model = law_.model;
+    const FittedModel& model = law_.model;
     const Eigen::VectorXd& values = model.parts.front().values;
     const ParameterSpace& space = model.problems.front()->space;
     // A force is shared; what one recording says of it stands for all.
     const Uncertainty uncertainty =
         estimate_uncertainty(model.objective(0), values, {.loss = setup_.options.loss});
-    for (size_t k = own_terms_; k < model.terms.size(); ++k) {
-      const Term& term = model.terms[k];
+    for (size_t k = own_terms_; k < model.hypotheses.size(); ++k) {
+      const Hypothesis& term = model.hypotheses[k];
       for (const std::string& parameter : term.amplitudes) {
         const int p = space.index(term.effect + "." + parameter);
         const FitParameter& range = space.parameters[static_cast<size_t>(p)];
@@ -288,7 +278,7 @@ class Pursuit {
 
 }  // namespace
 
-ProposedLaw propose_law(const DiagnosisSetup& setup, const ModelFit& model,
+ProposedLaw propose_law(const DiagnosisSetup& setup, const FittedModel& model,
                         const ProposalOptions& options, const ProgressCallback& progress) {
   return Pursuit(setup, model, options, progress).run();
 }

@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "fit/diagnosis/cross_validation.h"
-#include "fit/diagnosis/law_score.h"
-#include "fit/diagnosis/model_fit.h"
+#include "fit/diagnosis/fitted_model.h"
+#include "fit/diagnosis/score.h"
 
 namespace clothfit {
 
@@ -20,8 +20,8 @@ struct ProposalOptions {
 
 /// A term with which a model was fitted again.
 struct TermTrial {
-  Term term;
-  double foreseen_fall = 0;                    ///< of chi-square, by the derivatives
+  Hypothesis hypothesis;
+  double predicted_decrease = 0;               ///< of chi-square, by the derivatives
   double cross_validated = 0, without_it = 0;  ///< chi-square per observation left out
   std::string refused;                         ///< why it is not kept; empty: it is
 };
@@ -43,11 +43,10 @@ struct ProposedLaw {
   std::string formula;  ///< a line for each of force per mass a, pressure p, tension T
   /// The model with the law: its terms stand behind those the model had. Fitted, so that
   /// describe_model() and with_terms() make of it what simulations and fits take.
-  ModelFit model;
+  FittedModel model;
   CrossValidation before, after;
-  std::vector<LawScore> scores;   ///< of each term by itself, in the first round, the best first
+  std::vector<Score> scores;      ///< of each term by itself, in the first round, the best first
   std::vector<TermTrial> trials;  ///< in the order in which they were fitted
-  bool cancelled = false;
   bool found() const { return !coefficients.empty(); }
 };
 
@@ -62,7 +61,7 @@ struct ProposedLaw {
 /// than without it: by a tenth of what is above the noise, two per cent of the noise at least, and
 /// in most of the blocks of time. In the end each term is dropped without which frames left out are
 /// predicted no worse.
-ProposedLaw propose_law(const DiagnosisSetup& setup, const ModelFit& model,
+ProposedLaw propose_law(const DiagnosisSetup& setup, const FittedModel& model,
                         const ProposalOptions& options, const ProgressCallback& progress);
 
 }  // namespace clothfit

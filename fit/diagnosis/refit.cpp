@@ -7,54 +7,51 @@
 #include <limits>
 #include <numeric>
 
+#include "fit/diagnosis/criteria.h"
 #include "fit/diagnosis/discretisation.h"
 #include "fit/diagnosis/horizons.h"
 #include "fit/fit.h"
+#include "fit/jobs/stop_token.h"
+#include "fit/problem/effects_of.h"
 
 namespace clothfit {
 namespace {
 
-/// Of the fall that was foreseen; less than that asks for another way to the optimum,
-constexpr double kKeptPromise = 0.8;
-/// unless hardly more than noise is left: chi-square per residual.
-constexpr double kHardlyMore = 1.1;
-
 /// A share of the frames over which most of what is missing has shown, and little has grown.
 constexpr double kShortHorizon = 0.4;
 
-/// A start at half of what a linear model foresees is on the right side, and not too far.
-constexpr double kCautious = 0.5;
-
-/// The model with a law more at a share of what its score foresees. Not linearised.
-ModelFit cautious_start(const DiagnosisSetup& setup, const ModelFit& model, const LawScore& score) {
-  std::vector<Term> terms = model.terms;
-  terms.push_back(score.term);
+/// The model with a hypothesis at a share of its predicted amplitude, not linearised. A start at
+/// half of it is on the right side, and not too far.
+FittedModel cautious_start(const DiagnosisSetup& setup, const FittedModel& model,
+                           const Score& score) {
+  std::vector<Hypothesis> hypotheses = model.hypotheses;
+  hypotheses.push_back(score.hypothesis);
   std::vector<NamedValues> start = model.values();
-  const EffectDescription effect = describe_effect(score.term.effect);
-  const size_t each = score.term.amplitudes.size();
+  const EffectDescription effect = describe_effect(score.hypothesis.effect);
+  const size_t each = score.hypothesis.amplitudes.size();
   for (size_t n = 0; n < start.size(); ++n) {
     for (size_t k = 0; k < each; ++k) {
-      const std::string& name = score.term.amplitudes[k];
-      const auto own = static_cast<size_t>(score.amount.size()) > each ? n * each + k : k;
-      start[n][score.term.effect + "." + name] =
+      const std::string& name = score.hypothesis.amplitudes[k];
+      const auto own = static_cast<size_t>(score.amplitude.size()) > each ? n * each + k : k;
+      start[n][score.hypothesis.effect + "." + name] =
           std::ranges::find(effect.parameters, name, &EffectParameter::name)->neutral +
-          kCautious * score.amount[static_cast<Eigen::Index>(own)];
+          kCriteria.cautious_start * score.amplitude[static_cast<Eigen::Index>(own)];
     }
   }
-  return model_at(setup, terms, start);
+  return model_at(setup, hypotheses, start);
 }
 
-/// Moves a model, whose frames are all, to its optimum over a share of them; the model over these.
-/// Over all of them its own discretisation may err as `from` does.
-ModelFit refined_over(const DiagnosisSetup& setup, ModelFit& whole, const ModelFit& from,
-                      double share, const ProgressCallback& progress) {
-  ModelFit fitted = share < 1 ? shortened(whole, share) : whole;
+/// Moves a model over all frames to its optimum over a share of them, and returns the model over
+/// that. Over all of them its discretisation may err as that of `from` does.
+FittedModel refined_over(const DiagnosisSetup& setup, FittedModel& whole, const FittedModel& from,
+                         double share, const ProgressCallback& progress) {
+  FittedModel fitted = share < 1 ? shortened(whole, share) : whole;
   StageOptions stage;
   if (share < 1) {
     stage.rounds = 1;
-    stage.least_fall = 0;
+    stage.least_decrease = 0;
     for (size_t n = 0; n < fitted.parts.size(); ++n)
-      stage.least_fall += kRough * fitted.objective(n).residual_count();
+      stage.least_decrease += kRough * fitted.objective(n).residual_count();
   }
   for (size_t n = 0; n < fitted.parts.size(); ++n) {
     PooledPart& part = fitted.parts[n];
@@ -62,34 +59,32 @@ ModelFit refined_over(const DiagnosisSetup& setup, ModelFit& whole, const ModelF
     if (share < 1) continue;
     part.correction = from.parts[n].correction;
     part.directions = from.parts[n].directions;
-    part.amounts = from.parts[n].amounts;
+    part.amplitudes = from.parts[n].amplitudes;
   }
   refine_model(fitted, setup, stage, progress);
-  for (size_t n = 0; fitted.usable && n < whole.parts.size(); ++n)
+  for (size_t n = 0; fitted.usable() && n < whole.parts.size(); ++n)
     whole.parts[n].values = fitted.parts[n].values;
   return fitted;
 }
 
-/// From where the model stands, over all frames.
-ModelFit fit_from_here(const DiagnosisSetup& setup, const ModelFit& model, const LawScore& score,
-                       const StageOptions& stage, const ProgressCallback& progress) {
-  std::vector<Term> terms = model.terms;
-  terms.push_back(score.term);
-  ModelFit fitted = with_terms(setup, model, terms, score.columns);
+/// The fit from where the model stands, over all frames.
+FittedModel fit_from_here(const DiagnosisSetup& setup, const FittedModel& model, const Score& score,
+                          const StageOptions& stage, const ProgressCallback& progress) {
+  std::vector<Hypothesis> hypotheses = model.hypotheses;
+  hypotheses.push_back(score.hypothesis);
+  FittedModel fitted = with_hypotheses(setup, model, hypotheses, score.columns);
   refine_model(fitted, setup, stage, progress);
   return fitted;
 }
 
 /// A model fitted over a share of the frames, after the fit over the shorter one.
-using FitOver = std::function<ModelFit(size_t model, double share, const ModelFit& shorter)>;
+using FitOver = std::function<FittedModel(size_t model, double share, const FittedModel& shorter)>;
 
 /// Models fitted side by side over growing horizons. Those that leave far more than the best one
 /// fall out, and are not usable.
-std::vector<ModelFit> race(size_t models, double first_share, double threshold,
-                           const FitOver& fit_over) {
-  // What is left above the noise: times the best one's, or times a share of the noise.
-  constexpr double kFarMore = 10, kOfNoise = 0.2;
-  std::vector<ModelFit> fitted(models);
+std::vector<FittedModel> race(size_t models, double first_share, double threshold,
+                              const FitOver& fit_over) {
+  std::vector<FittedModel> fitted(models);
   std::vector<size_t> running(models);
   std::iota(running.begin(), running.end(), size_t{0});
   for (const double share : shares_from(first_share)) {
@@ -98,94 +93,92 @@ std::vector<ModelFit> race(size_t models, double first_share, double threshold,
       const size_t k = running[n];
       fitted[k] = fit_over(k, share, fitted[k]);
     });
-    for (const size_t k : running) {
-      if (fitted[k].cancelled) return fitted;
-      if (fitted[k].usable) least = std::min(least, fitted[k].chi_square(threshold));
-    }
+    for (const size_t k : running)
+      if (fitted[k].usable()) least = std::min(least, fitted[k].chi_square(threshold));
     if (share == 1) break;
     std::erase_if(running, [&](size_t k) {
-      if (!fitted[k].usable) return true;
+      if (!fitted[k].usable()) return true;
       const auto count = static_cast<double>(fitted[k].residual_count());
       const double above = fitted[k].chi_square(threshold) - count;
-      fitted[k].usable = above <= kFarMore * std::max(least - count, kOfNoise * count);
-      return !fitted[k].usable;
+      const bool keeps_up = above <= kCriteria.race_far_behind *
+                                         std::max(least - count, kCriteria.race_of_noise * count);
+      if (!keeps_up) fitted[k].state = FitState::failed;
+      return !keeps_up;
     });
   }
   return fitted;
 }
 
-/// Laws beside a model, from where `early` stands.
-std::vector<ModelFit> race_laws(const DiagnosisSetup& setup, const ModelFit& model,
-                                const ModelFit& early, const std::vector<const LawScore*>& scores,
-                                double first_share, double threshold,
-                                const ProgressCallback& progress) {
-  std::vector<ModelFit> whole;
-  for (const LawScore* score : scores) whole.push_back(cautious_start(setup, early, *score));
-  return race(scores.size(), first_share, threshold, [&](size_t k, double share, const ModelFit&) {
-    return refined_over(setup, whole[k], model, share, progress);
-  });
+/// Hypotheses beside a model, from where `early` stands.
+std::vector<FittedModel> race_hypotheses(const DiagnosisSetup& setup, const FittedModel& model,
+                                         const FittedModel& early,
+                                         const std::vector<const Score*>& scores,
+                                         double first_share, double threshold,
+                                         const ProgressCallback& progress) {
+  std::vector<FittedModel> whole;
+  for (const Score* score : scores) whole.push_back(cautious_start(setup, early, *score));
+  return race(scores.size(), first_share, threshold,
+              [&](size_t k, double share, const FittedModel&) {
+                return refined_over(setup, whole[k], model, share, progress);
+              });
 }
 
-/// From where a rough fit stands; where that does not bring what was foreseen, over growing
+/// Refines an unrefined fit. Where that does not gain what was predicted, it is tried over growing
 /// horizons.
-ModelFit fit_from_rough(const DiagnosisSetup& setup, const ModelFit& model, const LawScore& score,
-                        ModelFit near, double threshold, const ProgressCallback& progress) {
+FittedModel fit_from_unrefined(const DiagnosisSetup& setup, const FittedModel& model,
+                               const Score& score, FittedModel near, double threshold,
+                               const ProgressCallback& progress) {
   refine_model(near, setup, {}, progress);
-  if (near.cancelled) return near;
-  if (near.usable) {
+  if (near.usable()) {
     const double left = near.chi_square(threshold);
     const double fall = model.chi_square(threshold) - left;
-    if (fall > kKeptPromise * score.fall ||
-        left < kHardlyMore * static_cast<double>(near.residual_count()))
+    if (fall > kCriteria.kept_promise * score.decrease ||
+        left < kCriteria.hardly_above_noise * static_cast<double>(near.residual_count()))
       return near;
   }
-  ModelFit far =
-      race_laws(setup, model, model, {&score}, kShortHorizon, threshold, progress).front();
-  if (far.cancelled || !near.usable) return far;
-  return far.usable && far.chi_square(threshold) < near.chi_square(threshold) ? far : near;
+  FittedModel far =
+      race_hypotheses(setup, model, model, {&score}, kShortHorizon, threshold, progress).front();
+  if (!near.usable()) return far;
+  return far.usable() && far.chi_square(threshold) < near.chi_square(threshold) ? far : near;
 }
 
-/// All laws roughly, from where the model stands along the derivatives of the score; then, exactly,
-/// those that gain half as much as the best one, or less than was foreseen.
-std::vector<ModelFit> fit_near(const DiagnosisSetup& setup, const ModelFit& model,
-                               const std::vector<const LawScore*>& scores, double threshold,
-                               const ProgressCallback& progress) {
-  constexpr double kOfBest = 0.5;
+/// Fits all hypotheses along the derivatives of the score, unrefined. Those that gain half as much
+/// as the best one, or less than was predicted, are refined then.
+std::vector<FittedModel> fit_near(const DiagnosisSetup& setup, const FittedModel& model,
+                                  const std::vector<const Score*>& scores, double threshold,
+                                  const ProgressCallback& progress) {
   const double without = model.chi_square(threshold);
-  std::vector<ModelFit> fitted(scores.size());
+  std::vector<FittedModel> fitted(scores.size());
   std::vector<double> fall(scores.size(), 0);
   tbb::parallel_for(size_t{0}, scores.size(), [&](size_t k) {
-    fitted[k] = fit_from_here(setup, model, *scores[k], {.rounds = 1, .rough = true}, progress);
-    if (fitted[k].usable) fall[k] = without - fitted[k].chi_square(threshold);
+    fitted[k] = fit_from_here(setup, model, *scores[k], {.rounds = 1, .unrefined = true}, progress);
+    if (fitted[k].usable()) fall[k] = without - fitted[k].chi_square(threshold);
   });
-  if (fitted.empty() || std::ranges::any_of(fitted, &ModelFit::cancelled)) return fitted;
-  const double enough = kOfBest * *std::ranges::max_element(fall);
+  if (fitted.empty()) return fitted;
+  const double enough = kCriteria.exact_fit_of_best * *std::ranges::max_element(fall);
   tbb::parallel_for(size_t{0}, scores.size(), [&](size_t k) {
-    if (fall[k] < enough && fall[k] > kKeptPromise * scores[k]->fall) return;
-    fitted[k] = fit_from_rough(setup, model, *scores[k], std::move(fitted[k]), threshold, progress);
+    if (fall[k] < enough && fall[k] > kCriteria.kept_promise * scores[k]->decrease) return;
+    fitted[k] =
+        fit_from_unrefined(setup, model, *scores[k], std::move(fitted[k]), threshold, progress);
   });
   return fitted;
 }
 
 }  // namespace
 
-double least_fall(Eigen::Index amplitudes) {
-  return 25 + 3.6 * static_cast<double>(amplitudes - 1);
-}
-
-ModelFit with_terms(const DiagnosisSetup& setup, const ModelFit& model,
-                    const std::vector<Term>& terms, const Columns& columns) {
-  ModelFit result = model_at(setup, terms, model.values());
+FittedModel with_hypotheses(const DiagnosisSetup& setup, const FittedModel& model,
+                            const std::vector<Hypothesis>& hypotheses, const Columns& columns) {
+  FittedModel result = model_at(setup, hypotheses, model.values());
   const std::vector<std::string> added =
-      terms.empty() ? std::vector<std::string>() : terms.back().parameters();
+      hypotheses.empty() ? std::vector<std::string>() : hypotheses.back().parameters();
   for (size_t n = 0; n < result.parts.size(); ++n) {
     const PooledPart& from = model.parts[n];
     PooledPart& part = result.parts[n];
     part.frames = from.frames;
     part.correction = from.correction;
     part.directions = from.directions;
-    part.amounts = from.amounts;
-    // Where a term is dropped the run is another one.
+    part.amplitudes = from.amplitudes;
+    // The run is another one where a hypothesis is dropped.
     const std::vector<FitParameter>& before = model.problems[n]->space.parameters;
     const bool kept_all = std::ranges::all_of(before, [&](const FitParameter& parameter) {
       return result.problems[n]->space.index(parameter.name) >= 0;
@@ -224,46 +217,47 @@ ModelFit with_terms(const DiagnosisSetup& setup, const ModelFit& model,
   return result;
 }
 
-std::vector<ModelFit> fit_with_laws(const DiagnosisSetup& setup, const ModelFit& model,
-                                    const ModelFit& early,
-                                    const std::vector<const LawScore*>& scores, double first_share,
-                                    double threshold, const ProgressCallback& progress) {
+std::vector<FittedModel> fit_with_hypotheses(const DiagnosisSetup& setup, const FittedModel& model,
+                                             const FittedModel& early,
+                                             const std::vector<const Score*>& scores,
+                                             double first_share, double threshold,
+                                             const ProgressCallback& progress) {
   if (first_share == 1) return fit_near(setup, model, scores, threshold, progress);
-  std::vector<ModelFit> fitted =
-      race_laws(setup, model, early, scores, first_share, threshold, progress);
-  // Growing horizons can lead astray where no single law brings the model near the cloth.
+  std::vector<FittedModel> fitted =
+      race_hypotheses(setup, model, early, scores, first_share, threshold, progress);
+  // Growing horizons can lead astray where no single hypothesis brings the model near the cloth.
   const double without = model.chi_square(threshold);
   for (size_t k = 0; k < fitted.size(); ++k) {
-    if (fitted[k].cancelled) return fitted;
-    if (!fitted[k].usable || fitted[k].chi_square(threshold) < without) continue;
+    if (!fitted[k].usable() || fitted[k].chi_square(threshold) < without) continue;
     fitted[k] = fit_from_here(setup, model, *scores[k], {}, progress);
   }
   return fitted;
 }
 
-std::vector<ModelFit> race_on_mesh(const DiagnosisSetup& other, const std::vector<ModelFit>& models,
-                                   double threshold, const ProgressCallback& progress) {
+std::vector<FittedModel> race_on_mesh(const DiagnosisSetup& other,
+                                      const std::vector<FittedModel>& models, double threshold,
+                                      const ProgressCallback& progress) {
   return race(models.size(), kFirstOnMesh, threshold,
-              [&](size_t k, double share, const ModelFit& shorter) {
+              [&](size_t k, double share, const FittedModel& shorter) {
                 return lead_to_mesh(other, models[k], share, shorter, progress);
               });
 }
 
-ModelFit fitted_anew(const DiagnosisSetup& setup, const std::vector<Term>& terms,
-                     const ProgressCallback& progress) {
+FittedModel identified_from_scratch(const DiagnosisSetup& setup,
+                                    const std::vector<Hypothesis>& hypotheses,
+                                    const ProgressCallback& progress) {
   // Of a start in motion there are hundreds of numbers more: minutes, where a fit from a known
   // model takes seconds.
   if (std::ranges::any_of(setup.inputs, [](const FitInput& input) {
         return input.recording.start == StartKind::unknown;
       }))
     return {};
-  FitOptions options = options_with(setup, terms, 0);
-  options.mesh_columns = setup.columns;
-  options.mesh_rows = setup.rows;
-  const FitReport first = fit(with_terms(setup.inputs.front(), terms), options, progress);
+  const FitOptions options = options_on_mesh(setup, hypotheses, 0);
+  const FitReport first = fit(setup.inputs.front(), options, progress);
+  if (first.stop == FitStop::cancelled) throw StopRequested();
   if (!first.usable()) return {};
-  ModelFit fitted =
-      model_at(setup, terms, std::vector<NamedValues>(setup.inputs.size(), first.values));
+  FittedModel fitted =
+      model_at(setup, hypotheses, std::vector<NamedValues>(setup.inputs.size(), first.values));
   if (setup.inputs.size() > 1) return fit_on_mesh(setup, fitted, progress);
   linearise_model(fitted);
   return fitted;

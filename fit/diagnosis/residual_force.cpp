@@ -258,7 +258,7 @@ void average(const std::vector<Sample>& samples, int frames, ResidualForce& resu
 
 }  // namespace
 
-ResidualForce residual_force(const ModelFit& model) {
+ResidualForce residual_force(const FittedModel& model) {
   ResidualForce result;
   const FitProblem& problem = *model.problems.front();
   const PooledPart& part = model.parts.front();

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "fit/diagnosis/model_fit.h"
+#include "fit/diagnosis/fitted_model.h"
 
 namespace clothfit {
 
@@ -39,6 +39,6 @@ struct ResidualForce {
 
 /// Of a model's fitted frames, of its first recording. The first and the last two of each marker
 /// are left out: a natural spline is straight there.
-ResidualForce residual_force(const ModelFit& model);
+ResidualForce residual_force(const FittedModel& model);
 
 }  // namespace clothfit

@@ -13,13 +13,14 @@
 #include <set>
 #include <utility>
 
-#include "data/shared_progress.h"
 #include "fit/diagnosis/candidate_recording.h"
 #include "fit/diagnosis/discretisation.h"
 #include "fit/diagnosis/horizons.h"
-#include "fit/diagnosis/law_derivatives.h"
+#include "fit/diagnosis/hypothesis_derivatives.h"
 #include "fit/diagnosis/projection.h"
 #include "fit/diagnosis/refit.h"
+#include "fit/jobs/stop_token.h"
+#include "fit/problem/effects_of.h"
 #include "fit/problem/parameterised_model.h"
 #include "model/cloth/stability.h"
 
@@ -30,20 +31,20 @@ constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 constexpr size_t kKept = 3;  ///< recordings that are named
 
 /// Laws whose amplitudes together are one that a refit may turn to.
-using Refit = std::vector<Term>;
+using Refit = std::vector<Hypothesis>;
 
 /// The law at its shape and beside it; a harmonic at any phase.
-std::vector<Refit> refits_of(const Term& law) {
+std::vector<Refit> refits_of(const Hypothesis& law) {
   constexpr double kPart = 0.5;
-  LawShapes shapes = shapes_around(law, kPart);
+  ShapeCandidates shapes = shapes_around(law, kPart);
   shapes.insert(shapes.begin(), law);
   if (!is_harmonic(law)) {
     std::vector<Refit> refits;
-    for (const Term& shape : shapes) refits.push_back({shape});
+    for (const Hypothesis& shape : shapes) refits.push_back({shape});
     return refits;
   }
   std::map<double, Refit> by_frequency;
-  for (const Term& shape : shapes) {
+  for (const Hypothesis& shape : shapes) {
     Refit& phases = by_frequency[shape.shape.at("frequency")];
     if (!phases.empty()) continue;
     for (const double phase : {0.0, 0.25}) {
@@ -57,7 +58,7 @@ std::vector<Refit> refits_of(const Term& law) {
 }
 
 /// The parameters of a term in a problem's space: amplitudes, and shapes where they are fitted.
-std::vector<int> parameters_of(const Term& term, const ParameterSpace& space) {
+std::vector<int> parameters_of(const Hypothesis& term, const ParameterSpace& space) {
   std::vector<std::string> names = term.parameters();
   if (term.fits_shape)
     for (const auto& [name, value] : term.shape) names.push_back(term.effect + "." + name);
@@ -68,7 +69,7 @@ std::vector<int> parameters_of(const Term& term, const ParameterSpace& space) {
 }
 
 /// The model as if it did not have a law, near where it stands with it.
-ModelFit without(ModelFit model, const Term& law) {
+FittedModel without(FittedModel model, const Hypothesis& law) {
   for (size_t n = 0; n < model.parts.size(); ++n)
     for (const int p : parameters_of(law, model.problems[n]->space))
       model.parts[n].linear.residual_by_coordinate.col(p).setZero();
@@ -76,7 +77,7 @@ ModelFit without(ModelFit model, const Term& law) {
 }
 
 /// What a law's amplitudes do to the residuals, D_a a: a column of each recording.
-Columns change_by(const ModelFit& model, const Term& law) {
+Columns change_by(const FittedModel& model, const Hypothesis& law) {
   const EffectDescription effect = describe_effect(law.effect);
   Columns change;
   for (size_t n = 0; n < model.parts.size(); ++n) {
@@ -99,7 +100,7 @@ Columns change_by(const ModelFit& model, const Term& law) {
 /// A law of the model, and one that may do the same.
 struct Pair {
   size_t accepted = 0;
-  Term law, other;
+  Hypothesis law, other;
   std::vector<Refit> refits;  ///< of the other one
 };
 
@@ -108,12 +109,12 @@ struct Distance {
   Refit nearest;  ///< of the other law; none where it cannot act
 };
 
-/// Of each pair: law_distance().
-std::vector<Distance> distances(const ModelFit& model, const std::vector<Pair>& pairs) {
-  std::vector<Term> laws;
+/// Of each pair: hypothesis_distance().
+std::vector<Distance> distances(const FittedModel& model, const std::vector<Pair>& pairs) {
+  std::vector<Hypothesis> laws;
   for (const Pair& pair : pairs)
     for (const Refit& refit : pair.refits) laws.insert(laws.end(), refit.begin(), refit.end());
-  const std::vector<Columns> columns = law_derivatives(model, laws);
+  const std::vector<Columns> columns = hypothesis_derivatives(model, laws);
   std::vector<Distance> result;
   std::optional<ModelProjection> projection;
   Eigen::VectorXd change;
@@ -151,7 +152,7 @@ std::vector<Pair> narrowed(std::vector<Pair> pairs, const std::vector<Distance>&
 
 /// How a recording errs on another mesh, as discretisation_errors() has it: fitted there to what is
 /// seen here, with updated derivatives. Nothing where that does not run.
-std::optional<Eigen::VectorXd> mesh_direction(FitProblem other, const ModelFit& own) {
+std::optional<Eigen::VectorXd> mesh_direction(FitProblem other, const FittedModel& own) {
   const PooledPart& here = own.parts.front();
   const int cells = own.problems.front()->cloth.mesh.columns - 1;
   const double factor = other.cloth.mesh.columns - 1 < cells ? 1.0 / 3 : 4.0 / 3;
@@ -161,7 +162,7 @@ std::optional<Eigen::VectorXd> mesh_direction(FitProblem other, const ModelFit& 
                   .linear = {},
                   .correction = {},
                   .directions = {},
-                  .amounts = {}};
+                  .amplitudes = {}};
   part.steps = stable_time_steps(other.cloth, parameter_set(other, part.values))
                    .times(1 / PooledOptions().stability_margin);
   const TrajectoryObjective objective(other, part.frames, part.steps);
@@ -174,10 +175,10 @@ std::optional<Eigen::VectorXd> mesh_direction(FitProblem other, const ModelFit& 
   const PooledFit fitted = fit_pooled({&problem, 1}, {part},
                                       {.iterations = 12,
                                        .rounds = 1,
-                                       .least_fall = kRough * objective.residual_count(),
+                                       .least_decrease = kRough * objective.residual_count(),
                                        .kept_within = 0.02,
                                        .updated_within = 0.1,
-                                       .rough = true},
+                                       .unrefined = true},
                                       {});
   if (!fitted.usable) return std::nullopt;
   return factor * fitted.parts.front().linear.residual;
@@ -185,23 +186,20 @@ std::optional<Eigen::VectorXd> mesh_direction(FitProblem other, const ModelFit& 
 
 /// The model found in a candidate recording. Not usable where it does not run. `other`: the first
 /// recording on the other mesh; null where that is not asked.
-ModelFit in_candidate(const CandidateRecording& candidate, const ModelFit& model,
-                      const FitProblem* other) {
+FittedModel in_candidate(const CandidateRecording& candidate, const FittedModel& model,
+                         const FitProblem* other) {
   const PooledPart& found = model.parts.front();
-  ModelFit result{.terms = model.terms, .problems = {}, .parts = {}};
+  FittedModel result{.hypotheses = model.hypotheses, .problems = {}, .parts = {}};
   FitProblem problem = *model.problems.front();
   candidate.change(problem);
   if (!observe(problem, found.values, found.steps)) return result;
-  result.parts.push_back({.values = found.values,
-                          .frames = problem.first_held_out,
-                          .steps = found.steps,
-                          .linear = {},
-                          .correction = {},
-                          .directions = {},
-                          .amounts = {}});
+  PooledPart& at = result.parts.emplace_back();
+  at.values = found.values;
+  at.frames = problem.first_held_out;
+  at.steps = found.steps;
   result.problems.push_back(std::make_shared<const FitProblem>(std::move(problem)));
   linearise_model(result);
-  if (!result.usable) return result;
+  if (!result.usable()) return result;
 
   PooledPart& part = result.parts.front();
   const Eigen::VectorXd& residual = part.linear.residual;
@@ -225,22 +223,22 @@ ModelFit in_candidate(const CandidateRecording& candidate, const ModelFit& model
 }
 
 /// The model where it stands on a mesh of half the cells a side, where that is another one.
-std::optional<ModelFit> on_coarse_mesh(const DiagnosisSetup& setup, const ModelFit& model) {
+std::optional<FittedModel> on_coarse_mesh(const DiagnosisSetup& setup, const FittedModel& model) {
   DiagnosisSetup coarse = with_coarse_mesh(setup);
   coarse.inputs = setup.inputs.first(1);
   if (coarse.columns == setup.columns && coarse.rows == setup.rows) return std::nullopt;
-  return model_at(coarse, model.terms, {model.values().front()});
+  return model_at(coarse, model.hypotheses, {model.values().front()});
 }
 
 /// The first recording on the mesh that the model's directions are taken from; none where it has no
 /// direction of a mesh.
-std::optional<FitProblem> on_other_mesh(const DiagnosisSetup& setup, const ModelFit& model) {
+std::optional<FitProblem> on_other_mesh(const DiagnosisSetup& setup, const FittedModel& model) {
   const PooledPart& first = model.parts.front();
   const Eigen::Index of_step = first.correction.size() > 0 ? 1 : 0;
   if (first.directions.cols() <= of_step) return std::nullopt;
   DiagnosisSetup other = with_other_mesh(setup);
   other.inputs = setup.inputs.first(1);
-  return *problems_of(other, model.terms).front();
+  return *problems_of(other, model.hypotheses).front();
 }
 
 /// Of one candidate, how far the laws of each pair are apart; empty where it does not run.
@@ -266,74 +264,85 @@ std::vector<const Recorded*> best_of(const std::vector<Recorded>& all, size_t pa
   return best;
 }
 
+/// The pairs of an accepted effect and a hypothesis that is alike and not in the model.
+std::vector<Pair> pairs_of(const FittedModel& model, const std::vector<AcceptedEffect>& accepted) {
+  std::vector<Pair> pairs;
+  for (size_t k = 0; k < accepted.size(); ++k)
+    for (const Hypothesis& other : accepted[k].alike)
+      if (std::ranges::none_of(model.hypotheses,
+                               [&](const Hypothesis& own) { return own.same_mode(other); }))
+        pairs.push_back({.accepted = k,
+                         .law = accepted[k].trial.hypothesis,
+                         .other = other,
+                         .refits = refits_of(other)});
+  return pairs;
+}
+
+/// Measures each candidate: how far the hypotheses of each pair are apart in it.
+void record(const FittedModel& model, const FitProblem* other, const std::vector<Pair>& pairs,
+            const ProgressCallback& progress, std::vector<Recorded>& recorded) {
+  std::atomic<size_t> begun = 0;
+  tbb::parallel_for(size_t{0}, recorded.size(), [&](size_t n) {
+    if (progress)
+      progress({.stage = "recordings that would tell laws apart",
+                .done = static_cast<double>(begun++),
+                .total = static_cast<double>(recorded.size()),
+                .unit = "recordings",
+                .note = ""});
+    const FittedModel there = in_candidate(*recorded[n].candidate, model, other);
+    recorded[n].distances = there.usable()
+                                ? distances(there, narrowed(pairs, recorded[n].distances))
+                                : std::vector<Distance>{};
+  });
+}
+
+/// The best candidates of each pair.
+std::vector<Recorded> chosen_of(const std::vector<Recorded>& recorded, size_t pairs) {
+  std::set<const Recorded*> best;
+  for (size_t k = 0; k < pairs; ++k)
+    for (const Recorded* one : best_of(recorded, k)) best.insert(one);
+  std::vector<Recorded> chosen;
+  for (const Recorded& one : recorded)
+    if (best.contains(&one)) chosen.push_back(one);
+  return chosen;
+}
+
 }  // namespace
 
-double law_distance(const ModelFit& model, const Term& law, const Term& other) {
+double hypothesis_distance(const FittedModel& model, const Hypothesis& law,
+                           const Hypothesis& other) {
   return distances(model, {{.law = law, .other = other, .refits = refits_of(other)}})
       .front()
       .sigmas;
 }
 
 std::vector<std::vector<Separation>> separating_recordings(
-    const DiagnosisSetup& setup, const ModelFit& model, const std::vector<AcceptedEffect>& accepted,
-    const ProgressCallback& progress) {
-  std::vector<Pair> pairs;
-  for (size_t k = 0; k < accepted.size(); ++k)
-    for (const Term& other : accepted[k].alike)
-      if (std::ranges::none_of(model.terms, [&](const Term& own) { return own.same_law(other); }))
-        pairs.push_back({.accepted = k,
-                         .law = accepted[k].trial.term,
-                         .other = other,
-                         .refits = refits_of(other)});
+    const DiagnosisSetup& setup, const FittedModel& model,
+    const std::vector<AcceptedEffect>& accepted, const ProgressCallback& progress) {
+  const std::vector<Pair> pairs = pairs_of(model, accepted);
   if (pairs.empty()) return {};
-
   // A coarser mesh chooses which refits and recordings are looked at, for a sixteenth of the work.
-  std::optional<ModelFit> coarse = on_coarse_mesh(setup, model);
+  std::optional<FittedModel> coarse = on_coarse_mesh(setup, model);
   if (coarse) linearise_model(*coarse);
-  if (coarse && !coarse->usable) coarse.reset();
-  ModelFit present = model;
+  if (coarse && !coarse->usable()) coarse.reset();
+  FittedModel present = model;
   linearise_model(present);
-  if (!present.usable) return {};
+  if (!present.usable()) return {};
   const std::vector<Distance> now =
       distances(present, coarse ? narrowed(pairs, distances(*coarse, pairs)) : pairs);
+
   const std::vector<CandidateRecording> candidates = candidate_recordings(*model.problems.front());
   std::vector<Recorded> recorded;
   for (const CandidateRecording& candidate : candidates)
     recorded.push_back({.candidate = &candidate, .distances = {}});
-  const ProgressCallback asked = for_threads(progress);
-  // False when nobody waits for it.
-  const auto record = [&](const ModelFit& from, const FitProblem* other) {
-    std::atomic<size_t> begun = 0;
-    std::atomic<bool> stopped = false;
-    tbb::parallel_for(size_t{0}, recorded.size(), [&](size_t n) {
-      if (asked && !asked({.stage = "recordings that would tell laws apart",
-                           .done = static_cast<double>(begun++),
-                           .total = static_cast<double>(recorded.size()),
-                           .unit = "recordings",
-                           .note = ""})) {
-        stopped = true;
-        return;
-      }
-      const ModelFit there = in_candidate(*recorded[n].candidate, from, other);
-      recorded[n].distances = there.usable
-                                  ? distances(there, narrowed(pairs, recorded[n].distances))
-                                  : std::vector<Distance>{};
-    });
-    return !stopped.load();
-  };
-  // Nor is anything fitted on another mesh before it is chosen.
+  const ProgressCallback reported = stop_token(progress);
+  // Nothing is fitted on another mesh before it is chosen.
   const std::optional<FitProblem> other = on_other_mesh(setup, model);
   if (coarse || other) {
-    if (!record(coarse ? *coarse : model, nullptr)) return {};
-    std::vector<Recorded> chosen;
-    std::set<const Recorded*> best;
-    for (size_t k = 0; k < pairs.size(); ++k)
-      for (const Recorded* one : best_of(recorded, k)) best.insert(one);
-    for (const Recorded& one : recorded)
-      if (best.contains(&one)) chosen.push_back(one);
-    recorded = std::move(chosen);
+    record(coarse ? *coarse : model, nullptr, pairs, reported, recorded);
+    recorded = chosen_of(recorded, pairs.size());
   }
-  if (!record(model, other ? &*other : nullptr)) return {};
+  record(model, other ? &*other : nullptr, pairs, reported, recorded);
 
   std::vector<std::vector<Separation>> result(accepted.size());
   for (size_t k = 0; k < pairs.size(); ++k) {

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "fit/diagnosis/model_fit.h"
+#include "fit/diagnosis/fitted_model.h"
 #include "fit/diagnosis/search.h"
 
 namespace clothfit {
@@ -17,7 +17,7 @@ struct SeparatingRecording {
 
 /// What it takes to tell an accepted law from another one that does the same in these recordings.
 struct Separation {
-  Term from;
+  Hypothesis from;
   double now = 0;  ///< how far apart they are in the recordings there are, sigmas
   std::vector<SeparatingRecording> recordings;  ///< the best of each kind, the best three first
 };
@@ -31,7 +31,8 @@ struct Separation {
 ///
 /// in standard deviations of the noise. The other law may take its shape, or one half of its
 /// grid's spacing beside it, and a harmonic any phase. NaN where it cannot act.
-double law_distance(const ModelFit& model, const Term& law, const Term& other);
+double hypothesis_distance(const FittedModel& model, const Hypothesis& law,
+                           const Hypothesis& other);
 
 /// Of each accepted effect, the recordings that would tell it from each law that is alike and not
 /// in the model itself. A candidate is the first recording as it would be with the model found,
@@ -39,7 +40,7 @@ double law_distance(const ModelFit& model, const Term& law, const Term& other);
 /// says more: squares of distances add up at least.) Candidates that do not run are left out.
 /// Empty where nothing is alike, or when cancelled.
 std::vector<std::vector<Separation>> separating_recordings(
-    const DiagnosisSetup& setup, const ModelFit& model, const std::vector<AcceptedEffect>& accepted,
-    const ProgressCallback& progress);
+    const DiagnosisSetup& setup, const FittedModel& model,
+    const std::vector<AcceptedEffect>& accepted, const ProgressCallback& progress);
 
 }  // namespace clothfit

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "data/fit_result.h"
+#include "fit/interface/hypothesis.h"
 #include "model/fabric/spring_set.h"
 
 namespace clothfit {
@@ -45,6 +46,8 @@ struct FitOptions {
   SpringSet spring_set = SpringSet::fabric;  ///< others come with the paper's strain limit
   /// Effects to fit beside those the recording declares, of motion or of the measurement.
   std::vector<std::string> effects;
+  /// Hypotheses to fit beside these: their amplitudes, at the shapes that they name.
+  std::vector<Hypothesis> hypotheses;
   std::vector<ParameterPrior> priors;
   int mesh_columns = 0;  ///< 0: the recording's suggestion
   int mesh_rows = 0;

@@ -10,14 +10,19 @@
 
 namespace clothfit {
 
-enum class FitStop { converged, reached_limit, cancelled, diverged };
+enum class FitStop { not_run, converged, reached_limit, cancelled, diverged };
+
+/// Whether there is a result.
+inline bool is_usable(FitStop stop) {
+  return stop == FitStop::converged || stop == FitStop::reached_limit;
+}
 
 /// A fit with all that a report shows.
 struct FitReport {
-  FitStop stop = FitStop::converged;
+  FitStop stop = FitStop::not_run;
   std::string message;  ///< one line for a person
   FitResult result;
-  bool usable() const { return stop == FitStop::converged || stop == FitStop::reached_limit; }
+  bool usable() const { return is_usable(stop); }
   ModelDescription model;  ///< what was found, with all that a simulation needs
   /// Every parameter of the fit by name, those of the start and of the drive among them.
   std::map<std::string, double> values;

@@ -38,7 +38,7 @@ EffectDescription describe() {
       .name = "camera_drift",
       .summary = "the measured world drifts rigidly from the first frame on",
       .parameters = std::move(parameters),
-      .laws = {
+      .modes = {
           {.name = "shift", .amplitudes = {"velocity_x", "velocity_y", "velocity_z"}, .shapes = {}},
           {.name = "turn",
            .amplitudes = {"turn_rate_x", "turn_rate_y", "turn_rate_z"},

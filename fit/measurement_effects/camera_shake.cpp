@@ -31,16 +31,16 @@ EffectDescription describe() {
                                           .upper = 0.1,
                                           .typical = 2e-3}),
                     std::back_inserter(parameters));
-  std::vector<EffectLaw> laws;
+  std::vector<EffectMode> modes;
   for (const char* amplitude : {"shift", "turn"}) {
-    laws.push_back(Harmonic::laws(amplitude).front());
-    laws.back().name = amplitude;
+    modes.push_back(Harmonic::modes(amplitude).front());
+    modes.back().name = amplitude;
   }
   return {.name = "camera_shake",
           .summary = "the measured world shakes rigidly, with one harmonic",
           .parameters = std::move(parameters),
           .test = EffectTest::profiled,
-          .laws = std::move(laws)};
+          .modes = std::move(modes)};
 }
 
 std::unique_ptr<MeasurementEffect> make() {

@@ -30,11 +30,11 @@ EffectDescription describe() {
             .typical = 1e-3},
            {.name = "from", .unit = "s", .neutral = 0, .lower = 0, .upper = 3600, .typical = 0.01}},
       .test = EffectTest::profiled,
-      .laws = {{.name = "",
-                .amplitudes = {"lost"},
-                .shapes = {{.parameter = "from",
-                            .values = {0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9},
-                            .of_duration = true}}}}};
+      .modes = {{.name = "",
+                 .amplitudes = {"lost"},
+                 .shapes = {{.parameter = "from",
+                             .values = {0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9},
+                             .of_duration = true}}}}};
 }
 
 std::unique_ptr<MeasurementEffect> make() {

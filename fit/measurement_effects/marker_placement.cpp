@@ -49,9 +49,9 @@ EffectDescription describe() {
                           .lower = -0.2,
                           .upper = 0.2,
                           .typical = 2e-3}},
-          .laws = {{.name = "shift", .amplitudes = {"shift_s", "shift_t"}, .shapes = {}},
-                   {.name = "stretch", .amplitudes = {"stretch_s", "stretch_t"}, .shapes = {}},
-                   {.name = "turn", .amplitudes = {"turn"}, .shapes = {}}}};
+          .modes = {{.name = "shift", .amplitudes = {"shift_s", "shift_t"}, .shapes = {}},
+                    {.name = "stretch", .amplitudes = {"stretch_s", "stretch_t"}, .shapes = {}},
+                    {.name = "turn", .amplitudes = {"turn"}, .shapes = {}}}};
 }
 
 std::unique_ptr<MeasurementEffect> make() {

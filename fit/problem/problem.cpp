@@ -14,6 +14,7 @@
 #include "fit/measurement_effects/registry.h"
 #include "fit/observe/sheet_placement.h"
 #include "fit/problem/cloth_setup.h"
+#include "fit/problem/effects_of.h"
 #include "model/effects/registry.h"
 
 namespace clothfit {
@@ -245,7 +246,7 @@ void add_effects(const Recording& recording, const FitOptions& options, FitProbl
       present.push_back(effect.name);
     }
   }
-  for (const DeclaredEffect& effect : recording.declared) {
+  for (const DeclaredEffect& effect : effects_of(recording, options.hypotheses)) {
     if (!absent(effect.name)) continue;
     const std::string line = effect.line > 0 ? ":" + std::to_string(effect.line) : "";
     add_effect(effect.name, recording_file(recording) + line, effect.parameters, options, problem);

@@ -36,13 +36,13 @@ Eigen::VectorXd amounts_of(const Eigen::MatrixXd& directions, const Eigen::Vecto
 /// Fits the amounts of a part's directions to its residual; its cost then, priors included.
 double settle(const FitProblem& problem, PooledPart& part, double threshold) {
   const TrajectoryObjective objective = objective_of(problem, part);
-  if (part.amounts.size() != part.directions.cols())
-    part.amounts = Eigen::VectorXd::Zero(part.directions.cols());
+  if (part.amplitudes.size() != part.directions.cols())
+    part.amplitudes = Eigen::VectorXd::Zero(part.directions.cols());
   if (part.directions.cols() > 0)
-    part.amounts =
+    part.amplitudes =
         amounts_of(part.directions, huber_weights(objective, residual_of(part), threshold),
                    corrected_residual(part));
-  return huber_cost(objective, residual_of(part), threshold) + 0.5 * part.amounts.squaredNorm() +
+  return huber_cost(objective, residual_of(part), threshold) + 0.5 * part.amplitudes.squaredNorm() +
          prior_cost(problem, part.values).cost;
 }
 
@@ -201,7 +201,7 @@ class Pool {
       const Eigen::VectorXd missed = there[n].linear.residual - parts_[n].linear.residual - change;
       const double off = missed.norm() / std::max(change.norm(), 1e-300);
       if (off <= options_.kept_within) continue;
-      if (off > options_.updated_within && !options_.rough) {
+      if (off > options_.updated_within && !options_.unrefined) {
         there[n].linear.usable = false;
         continue;
       }
@@ -245,8 +245,8 @@ Eigen::VectorXd corrected_residual(const PooledPart& part) {
 }
 
 Eigen::VectorXd residual_of(const PooledPart& part) {
-  if (part.amounts.size() == 0) return corrected_residual(part);
-  return corrected_residual(part) + part.directions * part.amounts;
+  if (part.amplitudes.size() == 0) return corrected_residual(part);
+  return corrected_residual(part) + part.directions * part.amplitudes;
 }
 
 Quadratic quadratic_of(const FitProblem& problem, const PooledPart& part, double threshold) {
@@ -259,7 +259,7 @@ Quadratic quadratic_of(const FitProblem& problem, const PooledPart& part, double
   const Eigen::MatrixXd weighted = weight.asDiagonal() * jacobian;
   const PriorCost prior = prior_cost(problem, part.values);
   result.cost =
-      huber_cost(objective, residual, threshold) + 0.5 * part.amounts.squaredNorm() + prior.cost;
+      huber_cost(objective, residual, threshold) + 0.5 * part.amplitudes.squaredNorm() + prior.cost;
   result.gradient = weighted.transpose() * residual + prior.gradient;
   result.information = weighted.transpose() * jacobian + prior.information;
   if (part.directions.cols() > 0) {
@@ -269,7 +269,7 @@ Quadratic quadratic_of(const FitProblem& problem, const PooledPart& part, double
     const SymmetricFactors solver(own);
     // Zero where the amounts are at their least, but for the weights' last change.
     const Eigen::VectorXd pull =
-        part.directions.transpose() * weight.cwiseProduct(residual) + part.amounts;
+        part.directions.transpose() * weight.cwiseProduct(residual) + part.amplitudes;
     result.gradient -= between * solver.solve(pull);
     result.information -= between * solver.solve(between.transpose());
   }
@@ -336,9 +336,9 @@ PooledFit fit_pooled(std::span<const FitProblem* const> problems, std::vector<Po
       const Eigen::VectorXd step = space.step(here, damping, held);
       const Eigen::VectorXd next = (x + step).cwiseMax(lower).cwiseMin(upper);
       const Eigen::VectorXd way = next - x;
-      const double foreseen = space.foreseen_fall(here, way);
+      const double foreseen = space.predicted_decrease(here, way);
       const double moved = looked_at(way);
-      if (step.allFinite() && foreseen < options.least_fall * pool.scatter()) {
+      if (step.allFinite() && foreseen < options.least_decrease * pool.scatter()) {
         settled = true;
         break;
       }
@@ -347,8 +347,8 @@ PooledFit fit_pooled(std::span<const FitProblem* const> problems, std::vector<Po
         ++refusals;
         // A step this short that rises is the cost's rounding.
         settled = moved < options.least_step;
-        if (options.rough && refusals == kRoughRefusals) break;
-        if (!settled && !pool.is_exact() && !options.rough) {
+        if (options.unrefined && refusals == kRoughRefusals) break;
+        if (!settled && !pool.is_exact() && !options.unrefined) {
           if (!pool.make_exact()) break;
           continue;
         }
@@ -373,8 +373,8 @@ PooledFit fit_pooled(std::span<const FitProblem* const> problems, std::vector<Po
     // A round that hardly moved had the time steps of where it ended.
     constexpr double kStill = 1e-4;
     const bool still = looked_at(x - began) < kStill;
-    result.converged = settled && (still || (options.least_fall > 0 && pool.is_settled()));
-    if (result.converged || options.rough || result.iterations >= options.iterations ||
+    result.converged = settled && (still || (options.least_decrease > 0 && pool.is_settled()));
+    if (result.converged || options.unrefined || result.iterations >= options.iterations ||
         out_of_work())
       break;
   }
@@ -397,7 +397,7 @@ PooledFit fit_pooled(std::span<const FitProblem* const> problems,
                      .linear = {},
                      .correction = {},
                      .directions = {},
-                     .amounts = {}});
+                     .amplitudes = {}});
     for (const auto& [name, value] : start)
       if (const int p = problem->space.index(name); p >= 0) parts.back().values[p] = value;
   }

@@ -25,7 +25,7 @@ struct PooledPart {
   /// Directions, residuals x any, in which it may err beyond that, each by a standard normal
   /// amount: residuals are r + correction + directions * amount, and the amounts are fitted along.
   Eigen::MatrixXd directions;
-  Eigen::VectorXd amounts;  ///< of the directions, as they were fitted
+  Eigen::VectorXd amplitudes;  ///< of the directions, as they were fitted
 };
 
 /// Residuals of a part with what it is expected to err by taken out.
@@ -40,7 +40,7 @@ struct PooledOptions {
   double least_step = 1e-7;  ///< it ends when no shared coordinate moves further,
   /// or the next step promises no more of the cost than this, times chi-square per residual where
   /// that is above one: the more is left, the less sure is any parameter.
-  double least_fall = 0;
+  double least_decrease = 0;
   double stability_margin = 1.5;
   Loss loss = Loss::squared;
   /// Exact derivatives are had anew, updated, or kept, as in a refinement (RefineOptions).
@@ -49,7 +49,7 @@ struct PooledOptions {
   bool own_only = false;  ///< shared parameters stay where they are
   /// Derivatives that a fit begins with are updated and never had anew: near the optimum for the
   /// price of some runs. One round; `updated_within` must be more than 0.
-  bool rough = false;
+  bool unrefined = false;
   /// Springs times time steps of the runs with derivatives: looked at after each iteration.
   double most_spring_steps = 1e18;
 };

@@ -147,7 +147,8 @@ Eigen::VectorXd PooledSpace::step(const Expansion& expansion, double damping,
   return step;
 }
 
-double PooledSpace::foreseen_fall(const Expansion& expansion, const Eigen::VectorXd& way) const {
+double PooledSpace::predicted_decrease(const Expansion& expansion,
+                                       const Eigen::VectorXd& way) const {
   const auto shared_way = way.head(shared());
   double square = shared_way.dot(expansion.shared * shared_way);
   for (size_t n = 0; n < places_.size(); ++n) {

@@ -59,7 +59,7 @@ class PooledSpace {
                        const std::vector<bool>& held) const;
 
   /// By how much the expansion says that the cost falls on the way.
-  double foreseen_fall(const Expansion& expansion, const Eigen::VectorXd& way) const;
+  double predicted_decrease(const Expansion& expansion, const Eigen::VectorXd& way) const;
 
  private:
   struct Place {

@@ -15,7 +15,7 @@ namespace clothfit {
 struct Cloth;
 struct EffectLinearisation;
 
-/// How a fit walks along a parameter.
+/// Says how a fit walks along a parameter.
 enum class ParameterScale { linear, logarithmic };
 
 /// A parameter of an effect. Three named NAME_x, NAME_y, NAME_z are a vector's, which a recording
@@ -30,41 +30,41 @@ struct EffectParameter {
   ParameterScale scale = ParameterScale::linear;
 };
 
-/// How it is tested whether data ask for an effect.
+/// Says how the data are tested for an effect.
 enum class EffectTest {
   smooth,    ///< by the derivative at the neutral value
-  profiled,  ///< some parameters matter only away from neutral: over a grid of their values
+  profiled,  ///< some parameters matter only away from neutral: over a grid of them
   finite     ///< no derivative at neutral: by fits at trial amplitudes
 };
 
-/// Values of a parameter that says how an effect is at work, not how much.
+/// Values of a parameter that sets the shape of an effect, not its amplitude.
 struct ShapeGrid {
   std::string parameter;
-  std::vector<double> values;  ///< in its unit, or as the two below say
+  std::vector<double> values;  ///< in its unit, or as the next two say
   bool per_duration = false;   ///< frequencies, in units of 1 / duration of the observed motion
   bool of_duration = false;    ///< times since its first frame, as fractions of its duration
   bool over_cloth = false;     ///< a place or a length on it
 };
 
-/// One law that an effect may follow: data are asked for each law by itself.
-struct EffectLaw {
-  std::string name;                     ///< such as "hem"; empty where an effect has but one
-  std::vector<std::string> amplitudes;  ///< parameters that say how much: neutral is absent
+/// One mode of an effect; the data are asked for each mode by itself.
+struct EffectMode {
+  std::string name;                     ///< such as "hem"; empty where an effect has one mode only
+  std::vector<std::string> amplitudes;  ///< parameters; at their neutral values the mode is absent
   std::vector<ShapeGrid> shapes;        ///< tried at each combination; all others stay neutral
 };
 
-/// At the neutral values of all its parameters an effect leaves the trajectory bit-equal;
-/// parameters that say how, not how much, have a neutral value too, at which alone nothing need
+/// Describes an effect. At the neutral values of all its parameters it leaves the trajectory
+/// bit-equal. Shape parameters have a neutral value too, but at that value alone nothing need
 /// vanish.
 struct EffectDescription {
   std::string name;
   std::string summary;  ///< one line for a person, with the equation
   std::vector<EffectParameter> parameters;
   EffectTest test = EffectTest::smooth;
-  std::vector<EffectLaw> laws = {};  ///< none: one, of which all parameters are amplitudes
+  std::vector<EffectMode> modes = {};  ///< none: one mode, whose amplitudes are all parameters
 };
 
-/// What an effect may look at: the state at the beginning of a step, in SI units, world.
+/// The state that an effect may look at: at the beginning of a step, in SI units, world.
 template <class L = ExactLanes>
 struct EffectScene {
   const Cloth& cloth;
@@ -80,43 +80,43 @@ struct EffectScene {
 template <class L = ExactLanes>
 using EffectValues = std::vector<LaneValue<L>>;
 
-/// What an effect remembers from step to step: lanes x numbers; zero at the start unless
+/// The memory of an effect from step to step: lanes x numbers. It is zero at the start unless
 /// ParameterSet::start_effect_memory says otherwise.
 template <class L = ExactLanes>
 using EffectMemory = LaneArray<L>;
 
-/// What an effect does to simulations in lanes of kind L. Each does some of three things; what it
-/// does not do, it leaves as it is.
+/// An effect's work on simulations in lanes of kind L. It does some of three things and leaves the
+/// others as they are.
 template <class L>
 class LaneEffect {
  public:
   virtual ~LaneEffect() = default;
 
-  /// Adds the effect's force on every vertex to `force_n` and moves its memory on.
+  /// Adds the effect's force on every vertex to `force_n` and advances its memory.
   virtual void add_force(const EffectScene<L>& /*scene*/, const EffectValues<L>& /*parameters*/,
                          EffectMemory<L>& /*memory*/, LaneVectors<L>& /*force_n*/) const {}
 
-  /// Changes the sum F of all forces but the weight on every vertex, for inertia that is not the
-  /// vertices' mass m: the step accelerates a vertex by g + F / m.
+  /// Changes the sum F of all forces but the weight on every vertex. It serves inertia other than
+  /// the vertices' mass m: the step accelerates a vertex by g + F / m.
   virtual void change_force(const EffectScene<L>& /*scene*/, const EffectValues<L>& /*parameters*/,
                             LaneVectors<L>& /*force_n*/) const {}
 
-  /// Shifts `target_m`, where each held point is placed at the end of the step (world), and moves
-  /// the memory on. `support_force_n`: what the cloth, its weight included, pulls each with.
+  /// Shifts `target_m`, where each held point is placed at the end of the step (world), and
+  /// advances the memory. `support_force_n` is the cloth's pull on each, its weight included.
   virtual void shift_supports(const EffectScene<L>& /*scene*/,
                               const EffectValues<L>& /*parameters*/,
                               const LaneVectors<L>& /*support_force_n*/,
                               EffectMemory<L>& /*memory*/, LaneVectors<L>& /*target_m*/) const {}
 };
 
-/// Bounds that a stable time step follows from.
+/// Bounds from which a stable time step follows.
 struct EffectRates {
   double damping_per_s = 0;       ///< rate at which velocities are damped, at most
   double frequency2_per_s2 = 0;   ///< added to the square of the largest angular frequency
   double acceleration_ratio = 1;  ///< acceleration for a given force over that without the effect
 };
 
-/// What an effect does in lanes of the kinds L.
+/// An effect's work in lanes of the kinds L.
 template <class... L>
 class EffectInLanes : public LaneEffect<L>... {
  public:
@@ -128,19 +128,19 @@ class EffectInLanes : public LaneEffect<L>... {
 /// One physical effect beyond springs, dampers along them, and gravity.
 class Effect : public EffectInLanes<ExactLanes, FastLanes, SingleLane> {
  public:
-  /// Whether `change_force` and `shift_supports` do anything.
+  /// Says whether `change_force` and `shift_supports` do anything.
   virtual bool changes_force() const { return false; }
   virtual bool shifts_supports() const { return false; }
 
-  /// Whether it shifts supports before anything moves, too, by what depends on no memory: cloth
-  /// that starts at rest hangs from where they are then.
+  /// Says whether the effect shifts supports before anything moves, too, independently of any
+  /// memory. Cloth that starts at rest then hangs from the shifted places.
   virtual bool shifts_supports_at_rest() const { return false; }
 
-  /// How many numbers it remembers of one simulation.
+  /// Returns how many numbers it remembers of one simulation.
   virtual int memory_size(const Cloth& /*cloth*/) const { return 0; }
 
-  /// Add the derivatives of `add_force`, `change_force` and `shift_supports` in one simulation, at
-  /// what these are given, to those there are.
+  /// Adds the derivatives of `add_force`, `change_force` and `shift_supports` in one simulation to
+  /// those there are. They are taken at the arguments of these functions.
   virtual void linearise_force(const EffectScene<SingleLane>& /*scene*/,
                                const EffectValues<SingleLane>& /*parameters*/,
                                const EffectMemory<SingleLane>& /*memory*/,
@@ -155,7 +155,7 @@ class Effect : public EffectInLanes<ExactLanes, FastLanes, SingleLane> {
                                   const EffectMemory<SingleLane>& /*memory*/,
                                   EffectLinearisation& /*derivatives*/) const {}
 
-  /// `parameters` in the description's order.
+  /// `parameters` are in the description's order.
   virtual EffectRates rates(const Cloth& cloth, const SpringParameters& springs,
                             const std::vector<double>& parameters) const = 0;
 };

@@ -87,7 +87,7 @@ struct Law {
   }
 };
 
-/// A coefficient and what it multiplies.
+/// A coefficient and its factor.
 struct Entry {
   EffectParameter parameter;
   const char* text;
@@ -134,17 +134,17 @@ EffectDescription describe() {
           "height and time",
       .parameters = {}};
   for (Entry& entry : entries()) effect.parameters.push_back(std::move(entry.parameter));
-  // A vector is one law, any other coefficient one by itself.
+  // A vector is one mode, any other coefficient one by itself.
   for (size_t k = 0; k < coefficients;) {
     const std::string& name = effect.parameters[k].name;
     if (name.ends_with("_x")) {
-      effect.laws.push_back(
+      effect.modes.push_back(
           {.name = name.substr(0, name.size() - 2),
            .amplitudes = {name, effect.parameters[k + 1].name, effect.parameters[k + 2].name},
            .shapes = {}});
       k += 3;
     } else {
-      effect.laws.push_back({.name = name, .amplitudes = {name}, .shapes = {}});
+      effect.modes.push_back({.name = name, .amplitudes = {name}, .shapes = {}});
       ++k;
     }
   }

@@ -33,7 +33,7 @@ EffectDescription describe() {
       .parameters = Harmonic::parameters(
           {.name = "a", .unit = "m/s2", .neutral = 0, .lower = -20, .upper = 20, .typical = 0.1}),
       .test = EffectTest::profiled,
-      .laws = Harmonic::laws("a")};
+      .modes = Harmonic::modes("a")};
 }
 
 std::unique_ptr<Effect> make() {

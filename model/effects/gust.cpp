@@ -20,7 +20,7 @@ struct Law {
     return dot(at.area_m2, pressure_pa) * direction(at.area_m2);
   }
 
-  /// A force that follows the surface's attitude alone adds stiffness of the order of q times a
+  /// The force follows the surface's attitude alone. It adds stiffness of the order of q times a
   /// spacing, nothing beside the springs'.
   static EffectRates rates(const Cloth&, const SpringParameters&, const std::vector<double>&) {
     return {};
@@ -35,7 +35,7 @@ EffectDescription describe() {
           .parameters = Harmonic::parameters(
               {.name = "q", .unit = "Pa", .neutral = 0, .lower = -3, .upper = 3, .typical = 0.05}),
           .test = EffectTest::profiled,
-          .laws = Harmonic::laws("q")};
+          .modes = Harmonic::modes("q")};
 }
 
 std::unique_ptr<Effect> make() {

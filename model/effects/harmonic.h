@@ -12,8 +12,8 @@ namespace clothfit {
 /// A vector that comes and goes with time t (s, the recording's): amplitude sin(2 pi (f t +
 /// phase)).
 ///
-/// Parameters of an effect of it, in this order: the amplitude's x, y, z, neutral at 0; frequency f
-/// (Hz) and phase (turns), which matter only where the amplitude does.
+/// An effect with a harmonic has these parameters, in this order: the amplitude's x, y, z, neutral
+/// at 0; frequency f (Hz) and phase (turns), which matter only where the amplitude does.
 struct Harmonic {
   static constexpr int kParameters = 5;
   template <class Real>
@@ -41,9 +41,10 @@ struct Harmonic {
     return all;
   }
 
-  /// Of an amplitude named `amplitude`. Half a turn more is the other sign. Half a turn over the
-  /// duration lies between neighbouring frequencies: further apart, what lies between is lost.
-  static std::vector<EffectLaw> laws(const std::string& amplitude) {
+  /// Returns the mode of an amplitude named `amplitude`. Half a turn more is the other sign. Half a
+  /// turn over the duration lies between neighbouring frequencies: further apart, frequencies
+  /// between them are lost.
+  static std::vector<EffectMode> modes(const std::string& amplitude) {
     return {{.name = "",
              .amplitudes = {amplitude + "_x", amplitude + "_y", amplitude + "_z"},
              .shapes = {{.parameter = "frequency",
@@ -52,9 +53,9 @@ struct Harmonic {
                         {.parameter = "phase", .values = {0, 0.125, 0.25, 0.375}}}}};
   }
 
-  /// Whether a law's shapes are those of a harmonic. What a small one does at any phase is what it
-  /// does at phase 0 times the phase's cosine, and what it does at a quarter turn times its sine.
-  static bool is_followed_by(const EffectLaw& law) {
+  /// Says whether a mode's shapes are those of a harmonic. A small one at any phase is a sum of
+  /// two: at phase 0 times the phase's cosine, and at a quarter turn times its sine.
+  static bool is_followed_by(const EffectMode& law) {
     return law.shapes.size() == 2 && law.shapes[0].parameter == "frequency" &&
            law.shapes[1].parameter == "phase";
   }

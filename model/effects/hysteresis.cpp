@@ -43,9 +43,9 @@ EffectDescription describe() {
                 .typical = 0.002,
                 .scale = ParameterScale::logarithmic}},
           .test = EffectTest::profiled,
-          .laws = {{.name = "",
-                    .amplitudes = {"ratio"},
-                    .shapes = {{.parameter = "yield", .values = {5e-4, 2e-3, 8e-3, 3e-2}}}}}};
+          .modes = {{.name = "",
+                     .amplitudes = {"ratio"},
+                     .shapes = {{.parameter = "yield", .values = {5e-4, 2e-3, 8e-3, 3e-2}}}}}};
 }
 
 std::unique_ptr<Effect> make() {

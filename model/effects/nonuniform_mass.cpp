@@ -33,9 +33,9 @@ enum Parameter {
 template <class Real>
 using Parameters = std::array<Real, kCount>;
 
-/// Shares of what a side's vertices carry that lie within a band at the side's beginning, at its
-/// end, and at either. A vertex carries its hat function's part of the cloth, so that a band weighs
-/// the same, and its middle lies at the same place, on every mesh.
+/// Shares of a side's vertices that lie within a band at the side's beginning, at its end, and at
+/// either. A vertex carries its hat function's part of the cloth. A band therefore weighs the same,
+/// with its middle at the same place, on every mesh.
 template <class Real>
 struct BandShares {
   Real at_begin, at_end, at_either;
@@ -52,7 +52,7 @@ struct BandShares {
     const Real some = select(u > Real(least), u, Real(least));
     return select(some < Real(most), some, Real(most));
   }
-  /// The part of the hat function of the vertex at `x_m` that lies below `band_m`.
+  /// Returns the part of the hat function of the vertex at `x_m` that lies below `band_m`.
   static Real within(double x_m, double side_m, double spacing_m, const Real& band_m) {
     const bool first = x_m < 0.5 * spacing_m, last = side_m - x_m < 0.5 * spacing_m;
     const Real reach = (band_m - Real(x_m)) / Real(spacing_m);
@@ -63,7 +63,7 @@ struct BandShares {
   }
 };
 
-/// The mass at a vertex over its stated mass.
+/// Returns the mass at a vertex over its stated mass.
 template <class Real>
 Real relative_mass(const Mesh& mesh, int i, int j, const Parameters<Real>& p) {
   const Real one(1.0);
@@ -86,7 +86,7 @@ Real relative_mass(const Mesh& mesh, int i, int j, const Parameters<Real>& p) {
          (one + p[gradient_t] * Real(t - 0.5)) * (one + p[patch] * bump);
 }
 
-/// Stated over relative mass of every vertex.
+/// Returns stated over relative mass of every vertex.
 template <class Real>
 std::vector<Real> inverse_ratios(const Mesh& mesh, const Parameters<Real>& p) {
   std::vector<Real> ratios;
@@ -242,18 +242,18 @@ EffectDescription describe() {
                           .upper = 1,
                           .typical = 0.01}},
           .test = EffectTest::profiled,
-          .laws = {{.name = "hem",
-                    .amplitudes = {"hem"},
-                    .shapes = {over_cloth("hem_width", {0.005, 0.01, 0.02, 0.04})}},
-                   {.name = "edges",
-                    .amplitudes = {"hem_left", "hem_right", "hem_top", "hem_bottom"},
-                    .shapes = {over_cloth("hem_width", {0.005, 0.01, 0.02, 0.04})}},
-                   {.name = "gradient", .amplitudes = {"gradient_s", "gradient_t"}, .shapes = {}},
-                   {.name = "patch",
-                    .amplitudes = {"patch"},
-                    .shapes = {over_cloth("patch_s", {0.2, 0.5, 0.8}),
-                               over_cloth("patch_t", {0.2, 0.5, 0.8}),
-                               over_cloth("patch_radius", {0.05, 0.12})}}}};
+          .modes = {{.name = "hem",
+                     .amplitudes = {"hem"},
+                     .shapes = {over_cloth("hem_width", {0.005, 0.01, 0.02, 0.04})}},
+                    {.name = "edges",
+                     .amplitudes = {"hem_left", "hem_right", "hem_top", "hem_bottom"},
+                     .shapes = {over_cloth("hem_width", {0.005, 0.01, 0.02, 0.04})}},
+                    {.name = "gradient", .amplitudes = {"gradient_s", "gradient_t"}, .shapes = {}},
+                    {.name = "patch",
+                     .amplitudes = {"patch"},
+                     .shapes = {over_cloth("patch_s", {0.2, 0.5, 0.8}),
+                                over_cloth("patch_t", {0.2, 0.5, 0.8}),
+                                over_cloth("patch_radius", {0.05, 0.12})}}}};
 }
 
 std::unique_ptr<Effect> make() {

@@ -25,7 +25,7 @@ Real bump(const Real& square) {
   return rest * rest * rest;
 }
 
-/// What the stiffness of a spring whose middle is at (s, t) is multiplied by.
+/// Returns the factor on the stiffness of a spring whose middle is at (s, t).
 template <class Real>
 Real factor(double s, double t, const std::array<Real, 8>& p) {
   const Real from_s = (Real(s) - p[patch_s]) / p[patch_radius],
@@ -90,7 +90,7 @@ EffectDescription describe() {
                      amplitude("edge", 5), place("edge_width", 0.15, 0.05, 0.5),
                      amplitude("gradient_s", 0.9), amplitude("gradient_t", 0.9)},
       .test = EffectTest::profiled,
-      .laws = {
+      .modes = {
           {.name = "patch",
            .amplitudes = {"patch"},
            .shapes = {{.parameter = "patch_s", .values = {0.2, 0.5, 0.8}, .over_cloth = true},

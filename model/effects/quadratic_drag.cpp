@@ -41,8 +41,8 @@ EffectDescription describe() {
       .parameters =
           {{.name = "c_n", .unit = "kg/m3", .neutral = 0, .lower = 0, .upper = 10, .typical = 0.1},
            {.name = "c_t", .unit = "kg/m3", .neutral = 0, .lower = 0, .upper = 2, .typical = 0.02}},
-      .laws = {{.name = "normal", .amplitudes = {"c_n"}, .shapes = {}},
-               {.name = "tangential", .amplitudes = {"c_t"}, .shapes = {}}}};
+      .modes = {{.name = "normal", .amplitudes = {"c_n"}, .shapes = {}},
+                {.name = "tangential", .amplitudes = {"c_t"}, .shapes = {}}}};
 }
 
 std::unique_ptr<Effect> make() {

@@ -43,9 +43,9 @@ EffectDescription describe() {
                 .typical = 0.05,
                 .scale = ParameterScale::logarithmic}},
           .test = EffectTest::profiled,
-          .laws = {{.name = "",
-                    .amplitudes = {"ratio"},
-                    .shapes = {{.parameter = "time", .values = {0.02, 0.07, 0.25, 1}}}}}};
+          .modes = {{.name = "",
+                     .amplitudes = {"ratio"},
+                     .shapes = {{.parameter = "time", .values = {0.02, 0.07, 0.25, 1}}}}}};
 }
 
 std::unique_ptr<Effect> make() {

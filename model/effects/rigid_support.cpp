@@ -39,9 +39,9 @@ EffectDescription describe() {
             .upper = 0.05,
             .typical = 0.01}},
       .test = EffectTest::profiled,
-      .laws = {{.name = "",
-                .amplitudes = {"share"},
-                .shapes = {{.parameter = "slack", .values = {-0.08, -0.04, -0.02, 0}}}}}};
+      .modes = {{.name = "",
+                 .amplitudes = {"share"},
+                 .shapes = {{.parameter = "slack", .values = {-0.08, -0.04, -0.02, 0}}}}}};
 }
 
 std::unique_ptr<Effect> make() {

@@ -26,7 +26,7 @@ struct Law {
   template <class Vectors, class Visit>
   static void for_contacts(const Cloth& cloth, const Vectors& position_m, double thickness_m,
                            const Visit& visit) {
-    // Memory only: nothing in it is meant to last from one call to the next.
+    // Only its memory is kept: nothing in it is meant to last from one call to the next.
     thread_local NearPairs search;
     const Mesh& mesh = cloth.mesh;
     const auto area_m2 = [&](int k) {
@@ -35,7 +35,7 @@ struct Law {
     search.for_pairs(
         mesh.vertex_count(), [&](int k) { return value_of(position_m(k)); }, thickness_m,
         [&](int a, int b, const Vector3<double>&, double distance_m2) {
-          // Two vertices in the same place know no direction.
+          // Two vertices in the same place have no direction.
           if (distance_m2 > 0 && !neighbours(mesh, a, b, thickness_m))
             visit(a, b, area_m2(a) * area_m2(b));
         });
@@ -46,7 +46,7 @@ struct Law {
                      const std::array<Real, kParameters>& p, const Add& add) {
     using std::sqrt;
     const auto& [stiffness, d] = p;
-    // Nothing to search for; but at neutral there are derivatives.
+    // At neutral there is no force to search for, but there are derivatives.
     if (std::is_same_v<Real, double> && stiffness == Real(0.0)) return;
     for_contacts(cloth, position_m, value_of(d), [&](int a, int b, double areas_m4) {
       const Vector3<Real> connection = position_m(b) - position_m(a);
@@ -62,7 +62,7 @@ struct Law {
                         const std::array<double, kParameters>& p,
                         EffectLinearisation& derivatives) {
     const double stiffness = p[0], d = p[1];
-    // At neutral too: what matters there is the derivative by the stiffness.
+    // Contacts are visited at neutral too, for the derivative by the stiffness.
     for_contacts(cloth, position_m, d, [&](int a, int b, double areas) {
       const Vector3<double> connection = position_m(b) - position_m(a);
       const double r = std::sqrt(dot(connection, connection));
@@ -83,8 +83,9 @@ struct Law {
     });
   }
 
-  /// Twice the stiffness against all vertices that may be near, over the mass: those of two other
-  /// layers within a disc of the thickness, widened by what a lattice may have more.
+  /// Bounds the frequency by twice the stiffness against all vertices that may be near, over the
+  /// mass. They are those of two other layers within a disc of the thickness, widened by the
+  /// surplus that a lattice may have.
   static EffectRates rates(const Cloth& cloth, const SpringParameters&,
                            const std::vector<double>& parameters) {
     constexpr double kLayers = 2;
@@ -115,9 +116,9 @@ EffectDescription describe() {
                           .upper = 0.1,
                           .typical = 0.002}},
           .test = EffectTest::finite,
-          .laws = {{.name = "",
-                    .amplitudes = {"stiffness"},
-                    .shapes = {{.parameter = "thickness", .values = {0.01, 0.03}}}}}};
+          .modes = {{.name = "",
+                     .amplitudes = {"stiffness"},
+                     .shapes = {{.parameter = "thickness", .values = {0.01, 0.03}}}}}};
 }
 
 std::unique_ptr<Effect> make() {

@@ -57,8 +57,8 @@ EffectDescription describe() {
                           .typical = 0.01,
                           .scale = ParameterScale::logarithmic}},
           .test = EffectTest::profiled,
-          .laws = {{.name = "stretched", .amplitudes = {"stretched"}, .shapes = {strains}},
-                   {.name = "compressed", .amplitudes = {"compressed"}, .shapes = {strains}}}};
+          .modes = {{.name = "stretched", .amplitudes = {"stretched"}, .shapes = {strains}},
+                    {.name = "compressed", .amplitudes = {"compressed"}, .shapes = {strains}}}};
 }
 
 std::unique_ptr<Effect> make() {

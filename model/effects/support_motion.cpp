@@ -34,7 +34,7 @@ EffectDescription describe() {
                                           .upper = 0.1,
                                           .typical = 0.002}),
       .test = EffectTest::profiled,
-      .laws = Harmonic::laws("amplitude")};
+      .modes = Harmonic::modes("amplitude")};
 }
 
 std::unique_ptr<Effect> make() {

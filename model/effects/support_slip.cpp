@@ -23,7 +23,7 @@ struct Law {
     return {crept_m[0], crept_m[1], crept_m[2]};
   }
 
-  /// A support that creeps eases the springs that pull it: their pull falls at the rate mobility
+  /// A support that creeps eases the springs that pull it. Their pull falls at the rate mobility
   /// times stiffness.
   static EffectRates rates(const Cloth& cloth, const SpringParameters& springs,
                            const std::vector<double>& parameters) {
@@ -52,9 +52,9 @@ EffectDescription describe() {
                           .upper = 10,
                           .typical = 0.02}},
           .test = EffectTest::finite,
-          .laws = {{.name = "",
-                    .amplitudes = {"mobility"},
-                    .shapes = {{.parameter = "threshold", .values = {0, 0.05, 0.2}}}}}};
+          .modes = {{.name = "",
+                     .amplitudes = {"mobility"},
+                     .shapes = {{.parameter = "threshold", .values = {0, 0.05, 0.2}}}}}};
 }
 
 std::unique_ptr<Effect> make() {

@@ -103,7 +103,7 @@ EffectDescription describe() {
                                    .lower = entry.lower,
                                    .upper = entry.upper,
                                    .typical = entry.typical});
-      effect.laws.push_back({.name = name, .amplitudes = {name}, .shapes = {}});
+      effect.modes.push_back({.name = name, .amplitudes = {name}, .shapes = {}});
     }
   }
   return effect;

@@ -46,8 +46,8 @@ EffectDescription describe() {
                          pressure("q_x"),
                          pressure("q_y"),
                          pressure("q_z")},
-          .laws = {{.name = "pressure", .amplitudes = {"q_x", "q_y", "q_z"}, .shapes = {}},
-                   {.name = "drag", .amplitudes = {"c"}, .shapes = {}}}};
+          .modes = {{.name = "pressure", .amplitudes = {"q_x", "q_y", "q_z"}, .shapes = {}},
+                    {.name = "drag", .amplitudes = {"c"}, .shapes = {}}}};
 }
 
 std::unique_ptr<Effect> make() {

@@ -59,7 +59,7 @@ TEST(DiagnosedRecordings, SwingBreezeLacksItsWind) {
   ASSERT_TRUE(diagnosis.usable()) << diagnosis.message;
   EXPECT_EQ(diagnosis.verdict, DiagnosisVerdict::explained);
   ASSERT_EQ(diagnosis.accepted.size(), 1u);
-  EXPECT_EQ(diagnosis.accepted.front().trial.term.effect, "wind");
+  EXPECT_EQ(diagnosis.accepted.front().trial.hypothesis.effect, "wind");
   const FitResult& result = diagnosis.found().result;
   const Eigen::Vector3d wind(found_value(result, "wind", "q_x"), found_value(result, "wind", "q_y"),
                              found_value(result, "wind", "q_z"));
@@ -75,7 +75,7 @@ TEST(DiagnosedRecordings, SwingHemLacksTheMassOfItsHem) {
 
   ASSERT_TRUE(diagnosis.usable()) << diagnosis.message;
   ASSERT_FALSE(diagnosis.accepted.empty());
-  EXPECT_EQ(diagnosis.accepted.front().trial.term.effect, "nonuniform_mass");
+  EXPECT_EQ(diagnosis.accepted.front().trial.hypothesis.effect, "nonuniform_mass");
   const FitResult& result = diagnosis.found().result;
   EXPECT_NEAR(added_mass_kg(result, 0.0347, 0.4), truth_kg, 0.1 * truth_kg);
   const ObservationErrors& errors = result.errors.front();

@@ -14,33 +14,50 @@ namespace {
 
 using nlohmann::ordered_json;
 
-ordered_json term_json(const Term& term) {
-  ordered_json json{{"effect", term.effect}, {"law", term.law}};
+ordered_json term_json(const Hypothesis& term) {
+  ordered_json json{{"effect", term.effect}, {"law", term.mode}};
   if (!term.shape.empty()) json["shape"] = term.shape;
   return json;
 }
 
-std::vector<std::string> titles(const std::vector<Term>& terms) {
+ordered_json criteria_json(const DiagnosisCriteria& criteria) {
+  ordered_json json = ordered_json::array();
+  for (const CriterionDescription& one : describe(criteria))
+    json.push_back({{"name", one.name},
+                    {"value", one.value},
+                    {"decides", one.decides},
+                    {"raising", one.raising},
+                    {"chosen", one.chosen}});
+  return json;
+}
+
+std::vector<std::string> titles(const std::vector<Hypothesis>& terms) {
   std::vector<std::string> all;
-  for (const Term& term : terms) all.push_back(term.title());
+  for (const Hypothesis& term : terms) all.push_back(term.title());
   return all;
 }
 
-ordered_json trial_json(const LawTrial& trial) {
-  ordered_json json = term_json(trial.term);
-  json["foreseen_fall"] = trial.foreseen_fall;
-  json["fall"] = trial.fall;
+ordered_json trial_json(const Trial& trial) {
+  ordered_json json = term_json(trial.hypothesis);
+  json["foreseen_fall"] = trial.predicted_decrease;
+  json["fall"] = trial.decrease;
   json["cross_validated"] = trial.cross_validated;
   json["cross_validated_before"] = trial.without_it;
   json["cross_validated_trivial"] = trial.best_trivial;
   json["clear_of_neutral"] = trial.clear_of_neutral;
-  json["refused"] = trial.refused;
-  if (trial.with_later_ones) json["with_later_ones"] = true;
+  json["criteria"] = ordered_json::array();
+  for (const Criterion& criterion : trial.criteria)
+    json["criteria"].push_back({{"name", criterion.name},
+                                {"measured", criterion.measured},
+                                {"threshold", criterion.threshold},
+                                {"passed", criterion.passed}});
+  json["refused"] = trial.refusal();
+  if (trial.on_credit) json["with_later_ones"] = true;
   return json;
 }
 
 /// Values that the last fit has for what a term fits.
-ordered_json found_json(const Term& term, const FitReport& found) {
+ordered_json found_json(const Hypothesis& term, const FitReport& found) {
   ordered_json json = ordered_json::array();
   const auto add = [&](const std::string& name) {
     const auto value = found.values.find(term.effect + "." + name);
@@ -104,20 +121,20 @@ void write_diagnosis(const Diagnosis& diagnosis, const std::string& command,
     const AcceptedEffect& accepted = diagnosis.accepted[n];
     ordered_json one = trial_json(accepted.trial);
     one.erase("refused");
-    std::vector<std::string> alike{accepted.trial.term.effect};
-    for (const Term& term : accepted.alike)
+    std::vector<std::string> alike{accepted.trial.hypothesis.effect};
+    for (const Hypothesis& term : accepted.alike)
       if (std::ranges::find(alike, term.effect) == alike.end()) alike.push_back(term.effect);
     one["class"] = alike;
-    one["parameters"] = found_json(accepted.trial.term, diagnosis.found());
+    one["parameters"] = found_json(accepted.trial.hypothesis, diagnosis.found());
     one["instead"] = ordered_json::array();
-    for (const LawTrial& trial : accepted.refused) one["instead"].push_back(trial_json(trial));
+    for (const Trial& trial : accepted.refused) one["instead"].push_back(trial_json(trial));
     one["separation"] = ordered_json::array();
     for (const Separation& separation : diagnosis.separation_of(n))
       one["separation"].push_back(separation_json(separation));
     json["accepted"].push_back(std::move(one));
   }
   json["refused"] = ordered_json::array();
-  for (const LawTrial& trial : diagnosis.refused) json["refused"].push_back(trial_json(trial));
+  for (const Trial& trial : diagnosis.refused) json["refused"].push_back(trial_json(trial));
   json["errors"] = ordered_json::array();
   // What was not held out, or not fitted, has no error.
   const auto known = [](const ErrorSummary& error, double rms) {
@@ -143,21 +160,21 @@ void write_diagnosis(const Diagnosis& diagnosis, const std::string& command,
   json["analysed_mesh"] = {{"columns", diagnosis.columns}, {"rows", diagnosis.rows}};
   json["score_frames"] = diagnosis.score_frames;
   json["candidates"] = ordered_json::array();
-  for (const LawScore& score : diagnosis.scores) {
-    ordered_json one = term_json(score.term);
+  for (const Score& score : diagnosis.scores) {
+    ordered_json one = term_json(score.hypothesis);
     one["share"] = score.share;
-    one["predicted_fall"] = score.fall;
+    one["predicted_fall"] = score.decrease;
     one["parameters"] = ordered_json::array();
-    for (Eigen::Index k = 0; k < score.amount.size(); ++k)
-      one["parameters"].push_back({{"name", score.amount_name(k)},
-                                   {"beyond_neutral", score.amount[k]},
+    for (Eigen::Index k = 0; k < score.amplitude.size(); ++k)
+      one["parameters"].push_back({{"name", score.amplitude_name(k)},
+                                   {"beyond_neutral", score.amplitude[k]},
                                    {"sigma", score.sigma[k]}});
     json["candidates"].push_back(std::move(one));
   }
   json["detection_limits"] = ordered_json::array();
   for (const DetectionLimit& limit : diagnosis.limits)
     for (Eigen::Index k = 0; k < limit.limit.size(); ++k) {
-      ordered_json one = term_json(limit.term);
+      ordered_json one = term_json(limit.hypothesis);
       one["parameter"] = limit.parameter[static_cast<size_t>(k)];
       one["amplitude"] = limit.limit[k];
       one["unit"] = limit.unit[static_cast<size_t>(k)];
@@ -165,7 +182,7 @@ void write_diagnosis(const Diagnosis& diagnosis, const std::string& command,
     }
   json["planted"] = ordered_json::array();
   for (const PlantOutcome& outcome : diagnosis.plants) {
-    ordered_json one = term_json(outcome.plant.term);
+    ordered_json one = term_json(outcome.plant.hypothesis);
     one["parameter"] = outcome.plant.parameter;
     one["beyond_neutral"] = outcome.plant.beyond_neutral;
     one["named"] = outcome.named();
@@ -175,6 +192,7 @@ void write_diagnosis(const Diagnosis& diagnosis, const std::string& command,
   json["reinjected"] = nullptr;
   if (diagnosis.reinjected && diagnosis.reinjected->ran)
     json["reinjected"] = {{"found", titles(diagnosis.reinjected->found)}};
+  json["criteria"] = criteria_json(diagnosis.criteria);
   json["residual_force"] = residual_force_json(diagnosis.residual_force);
   json["proposed_law"] = proposed_law_json(diagnosis);
   write_json(json, file);

@@ -11,6 +11,7 @@
 #include "apps/report/page/html.h"
 #include "apps/report/page/svg.h"
 #include "apps/terminal/number_text.h"
+#include "fit/problem/effects_of.h"
 
 namespace clothfit {
 namespace {
@@ -98,13 +99,13 @@ Table term_table(const ProposedLaw& law) {
   constexpr size_t kShown = 12;
   Table table{{"term", "explains", "fall of chi-square", "coefficients"}, {}};
   for (size_t n = 0; n < std::min(kShown, law.scores.size()); ++n) {
-    const LawScore& score = law.scores[n];
+    const Score& score = law.scores[n];
     std::string amounts;
-    for (Eigen::Index k = 0; k < score.amount.size(); ++k)
-      amounts += (k > 0 ? ", " : "") + value_text(score.amount[k], score.sigma[k]) + " ± " +
+    for (Eigen::Index k = 0; k < score.amplitude.size(); ++k)
+      amounts += (k > 0 ? ", " : "") + value_text(score.amplitude[k], score.sigma[k]) + " ± " +
                  significant(score.sigma[k], 2);
-    table.rows.push_back({score.term.title(), fmt::format("{:.0f} %", 100 * score.share),
-                          significant(score.fall, 3), amounts});
+    table.rows.push_back({score.hypothesis.title(), fmt::format("{:.0f} %", 100 * score.share),
+                          significant(score.decrease, 3), amounts});
   }
   return table;
 }
@@ -112,7 +113,7 @@ Table term_table(const ProposedLaw& law) {
 Table law_trial_table(const ProposedLaw& law) {
   Table table{{"term", "foreseen fall", "left out", "without it", "outcome"}, {}};
   for (const TermTrial& trial : law.trials)
-    table.rows.push_back({trial.term.title(), significant(trial.foreseen_fall, 3),
+    table.rows.push_back({trial.hypothesis.title(), significant(trial.predicted_decrease, 3),
                           significant(trial.cross_validated, 4), significant(trial.without_it, 4),
                           trial.refused.empty() ? "kept" : trial.refused});
   return table;
@@ -238,9 +239,9 @@ ordered_json proposed_law_json(const Diagnosis& diagnosis) {
                                 {"after", after->held_out.rms}});
   json["trials"] = ordered_json::array();
   for (const TermTrial& trial : law.trials)
-    json["trials"].push_back({{"effect", trial.term.effect},
-                              {"law", trial.term.law},
-                              {"foreseen_fall", trial.foreseen_fall},
+    json["trials"].push_back({{"effect", trial.hypothesis.effect},
+                              {"law", trial.hypothesis.mode},
+                              {"foreseen_fall", trial.predicted_decrease},
                               {"cross_validated", trial.cross_validated},
                               {"cross_validated_before", trial.without_it},
                               {"refused", trial.refused}});

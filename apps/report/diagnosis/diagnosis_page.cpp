@@ -11,6 +11,7 @@
 #include "apps/report/page/html.h"
 #include "apps/terminal/number_text.h"
 #include "apps/terminal/version.h"
+#include "fit/problem/effects_of.h"
 
 namespace clothfit {
 namespace {
@@ -27,7 +28,7 @@ std::string effects_text(const Diagnosis& diagnosis) {
   std::string text;
   if (diagnosis.seen_elsewhere) text = "constants by which its markers are seen elsewhere";
   for (const AcceptedEffect& accepted : diagnosis.accepted)
-    text += (text.empty() ? "" : ", then ") + accepted.trial.term.title();
+    text += (text.empty() ? "" : ", then ") + accepted.trial.hypothesis.title();
   return text;
 }
 
@@ -127,31 +128,32 @@ std::string what_was_missing(const Diagnosis& diagnosis) {
   }
   for (size_t n = 0; n < diagnosis.accepted.size(); ++n) {
     const AcceptedEffect& accepted = diagnosis.accepted[n];
-    const LawTrial& trial = accepted.trial;
-    content += fmt::format("<h3>{}</h3>\n", escape_xml(trial.term.title()));
-    content += paragraph(describe_effect(trial.term.effect).summary + ".");
+    const Trial& trial = accepted.trial;
+    content += fmt::format("<h3>{}</h3>\n", escape_xml(trial.hypothesis.title()));
+    content += paragraph(describe_effect(trial.hypothesis.effect).summary + ".");
     content += fmt::format("<p class=\"found\"><strong>{}</strong></p>\n",
-                           escape_xml(found_text(trial.term, diagnosis.found().result)));
+                           escape_xml(found_text(trial.hypothesis, diagnosis.found().result)));
     content += paragraph(fmt::format(
         "Chi-square falls by {}, of {} that the derivatives foresaw. Blocks of time that were left "
         "out in turn are predicted with a chi-square of {} per number, {} without it, {} with the "
         "best correction that needs no physics. Its amplitude stands {:.0f} sigma clear of doing "
         "nothing, with errors that may depend on each other over the cloth.",
-        significant(trial.fall, 3), significant(trial.foreseen_fall, 3),
+        significant(trial.decrease, 3), significant(trial.predicted_decrease, 3),
         significant(trial.cross_validated, 4), significant(trial.without_it, 4),
         significant(trial.best_trivial, 4), trial.clear_of_neutral));
-    if (trial.clear_of_neutral < LawTrial::kClear)
+    if (trial.clear_of_neutral < kCriteria.clear_of_neutral)
       content += paragraph(
           "That is less than five, the usual bar; all else that the model lacks counts as error "
           "here. The effect is accepted because it takes a good part of what is left, and nothing "
           "that was left out is predicted worse with it.");
-    if (trial.with_later_ones)
+    if (trial.on_credit)
       content += paragraph(
           "A constant for each marker, or the last residual held, did as well as this effect "
           "alone, and not as well as it and those below together.");
     if (!accepted.alike.empty()) {
       std::string names;
-      for (const Term& term : accepted.alike) names += (names.empty() ? "" : ", ") + term.title();
+      for (const Hypothesis& term : accepted.alike)
+        names += (names.empty() ? "" : ", ") + term.title();
       content += paragraph("This recording cannot tell it from: " + names + ".");
       content += what_to_record(diagnosis.separation_of(n));
     }

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "apps/terminal/number_text.h"
+#include "fit/problem/effects_of.h"
 
 namespace clothfit {
 namespace {
@@ -13,7 +14,7 @@ namespace {
 /// Laws that a reader is shown of all that were scored.
 constexpr size_t kShown = 12;
 
-std::string shape_text(const Term& term) {
+std::string shape_text(const Hypothesis& term) {
   std::string text;
   for (const auto& [name, value] : term.shape)
     text += (text.empty() ? "" : ", ") + name + " " + significant(value, 3);
@@ -25,11 +26,11 @@ std::string sigmas_text(double sigmas) {
 }
 
 /// "q_x 0.05 ± 0.01, q_y ..." with as many digits as sigma allows.
-std::string amounts_text(const LawScore& score) {
+std::string amounts_text(const Score& score) {
   std::string text;
-  for (Eigen::Index k = 0; k < score.amount.size(); ++k)
-    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", score.amount_name(k),
-                        value_text(score.amount[k], score.sigma[k]));
+  for (Eigen::Index k = 0; k < score.amplitude.size(); ++k)
+    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", score.amplitude_name(k),
+                        value_text(score.amplitude[k], score.sigma[k]));
   return text;
 }
 
@@ -37,20 +38,22 @@ std::string amounts_text(const LawScore& score) {
 
 Table candidate_table(const Diagnosis& diagnosis) {
   Table table{{"effect", "law", "shape", "share", "fall", "parameter", "amount", "sigma"}, {}};
-  for (const LawScore& score : diagnosis.scores)
-    for (Eigen::Index k = 0; k < score.amount.size(); ++k)
-      table.rows.push_back({score.term.effect, score.term.law, shape_text(score.term),
-                            exact_text(score.share), exact_text(score.fall), score.amount_name(k),
-                            exact_text(score.amount[k]), exact_text(score.sigma[k])});
+  for (const Score& score : diagnosis.scores)
+    for (Eigen::Index k = 0; k < score.amplitude.size(); ++k)
+      table.rows.push_back({score.hypothesis.effect, score.hypothesis.mode,
+                            shape_text(score.hypothesis), exact_text(score.share),
+                            exact_text(score.decrease), score.amplitude_name(k),
+                            exact_text(score.amplitude[k]), exact_text(score.sigma[k])});
   return table;
 }
 
 Table short_candidate_table(const Diagnosis& diagnosis) {
   Table table{{"law", "explains", "fall of chi-square", "amplitudes beyond neutral", "at"}, {}};
   for (size_t n = 0; n < std::min(kShown, diagnosis.scores.size()); ++n) {
-    const LawScore& score = diagnosis.scores[n];
-    table.rows.push_back({score.term.title(), fmt::format("{:.0f} %", 100 * score.share),
-                          significant(score.fall, 3), amounts_text(score), shape_text(score.term)});
+    const Score& score = diagnosis.scores[n];
+    table.rows.push_back({score.hypothesis.title(), fmt::format("{:.0f} %", 100 * score.share),
+                          significant(score.decrease, 3), amounts_text(score),
+                          shape_text(score.hypothesis)});
   }
   return table;
 }
@@ -59,23 +62,23 @@ Table trial_table(const Diagnosis& diagnosis) {
   Table table{{"round", "law", "foreseen fall", "fall", "left out", "without it",
                "mended without physics", "clear of neutral", "outcome"},
               {}};
-  const auto add = [&](size_t round, const LawTrial& trial) {
+  const auto add = [&](size_t round, const Trial& trial) {
     table.rows.push_back(
-        {std::to_string(round), trial.term.title(), significant(trial.foreseen_fall, 3),
-         significant(trial.fall, 3), significant(trial.cross_validated, 4),
+        {std::to_string(round), trial.hypothesis.title(), significant(trial.predicted_decrease, 3),
+         significant(trial.decrease, 3), significant(trial.cross_validated, 4),
          significant(trial.without_it, 4), significant(trial.best_trivial, 4),
          std::isfinite(trial.clear_of_neutral) ? fmt::format("{:.1f} sigma", trial.clear_of_neutral)
                                                : "-",
-         trial.refused.empty() ? "could be accepted" : trial.refused});
+         trial.passed() ? "could be accepted" : trial.refusal()});
   };
   size_t round = 1;
   for (const AcceptedEffect& accepted : diagnosis.accepted) {
     add(round, accepted.trial);
     table.rows.back().back() = "accepted";
-    for (const LawTrial& trial : accepted.refused) add(round, trial);
+    for (const Trial& trial : accepted.refused) add(round, trial);
     ++round;
   }
-  for (const LawTrial& trial : diagnosis.refused) add(round, trial);
+  for (const Trial& trial : diagnosis.refused) add(round, trial);
   return table;
 }
 
@@ -84,9 +87,9 @@ Table limit_table(const Diagnosis& diagnosis) {
               {}};
   for (const DetectionLimit& limit : diagnosis.limits)
     for (Eigen::Index k = 0; k < limit.limit.size(); ++k)
-      table.rows.push_back({limit.term.title(), limit.parameter[static_cast<size_t>(k)],
+      table.rows.push_back({limit.hypothesis.title(), limit.parameter[static_cast<size_t>(k)],
                             significant(limit.limit[k], 3), limit.unit[static_cast<size_t>(k)],
-                            significant(limit.found[k], 3), shape_text(limit.term)});
+                            significant(limit.found[k], 3), shape_text(limit.hypothesis)});
   return table;
 }
 
@@ -101,11 +104,12 @@ Table plant_table(const Diagnosis& diagnosis) {
   Table table{{"law", "parameter", "planted, beyond neutral", "unit", "outcome", "at"}, {}};
   for (const PlantOutcome& outcome : diagnosis.plants) {
     const Plant& plant = outcome.plant;
-    const EffectDescription effect = describe_effect(plant.term.effect);
+    const EffectDescription effect = describe_effect(plant.hypothesis.effect);
     const auto parameter =
         std::ranges::find(effect.parameters, plant.parameter, &EffectParameter::name);
-    table.rows.push_back({plant.term.title(), plant.parameter, significant(plant.beyond_neutral, 3),
-                          parameter->unit, outcome_text(outcome), shape_text(plant.term)});
+    table.rows.push_back({plant.hypothesis.title(), plant.parameter,
+                          significant(plant.beyond_neutral, 3), parameter->unit,
+                          outcome_text(outcome), shape_text(plant.hypothesis)});
   }
   return table;
 }
@@ -121,7 +125,7 @@ Table separation_table(std::span<const Separation> separations) {
   return table;
 }
 
-std::string separation_text(const Term& accepted, std::span<const Separation> separations) {
+std::string separation_text(const Hypothesis& accepted, std::span<const Separation> separations) {
   constexpr double kTold = 5;
   std::string text;
   for (const Separation& separation : separations) {
@@ -200,7 +204,7 @@ std::string seen_elsewhere_text(const SeenElsewhere& seen) {
                      significant(1e3 * seen.rms_m, 3));
 }
 
-std::string found_text(const Term& term, const FitResult& result) {
+std::string found_text(const Hypothesis& term, const FitResult& result) {
   std::string text;
   const auto add = [&](const ParameterEstimate& parameter) {
     text +=

@@ -30,7 +30,7 @@ Table separation_table(std::span<const Separation> separations);
 
 /// "gravity_tilt cannot be told from world_tilt (0.0 sigma; 29 sigma with: twice as long)": the
 /// best recording for each law.
-std::string separation_text(const Term& accepted, std::span<const Separation> separations);
+std::string separation_text(const Hypothesis& accepted, std::span<const Separation> separations);
 
 /// Errors of one kind of observation of one recording, with the model as declared and as it was
 /// found.
@@ -49,7 +49,7 @@ Table before_after_table(const Diagnosis& diagnosis);
 Table adequacy_table(const Diagnosis& diagnosis);
 
 /// "q_x 0.05, q_y 0.21 Pa (frequency 2 Hz)": values that a fit found for a term, with sigma.
-std::string found_text(const Term& term, const FitResult& result);
+std::string found_text(const Hypothesis& term, const FitResult& result);
 
 /// "a constant for each, 8.31 mm in the mean (rms of a coordinate)".
 std::string seen_elsewhere_text(const SeenElsewhere& seen);

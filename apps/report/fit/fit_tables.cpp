@@ -37,6 +37,8 @@ std::string interval_text(const std::optional<Interval>& interval, double sigma)
 
 std::string to_string(FitStop stop) {
   switch (stop) {
+    case FitStop::not_run:
+      return "not run";
     case FitStop::converged:
       return "converged";
     case FitStop::reached_limit:

@@ -7,8 +7,9 @@
 
 #include "data/algebra/dense_factors.h"
 #include "data/input_error.h"
-#include "fit/diagnosis/law_derivatives.h"
+#include "fit/diagnosis/hypothesis_derivatives.h"
 #include "fit/jobs/draws.h"
+#include "fit/problem/effects_of.h"
 #include "fit/problem/parameterised_model.h"
 #include "fit/problem/problem.h"
 #include "model/integrate/relax.h"
@@ -22,9 +23,9 @@ constexpr double kStabilityMargin = 1.5;  ///< as fits leave it
 /// Series of draws under a trial's seed.
 enum HiddenLawSeries : int { kShape = 300, kDirection, kSize };
 
-const LawShapes* shapes_of(const RecordingInformation& information, const HiddenLaw& law) {
-  const auto found = std::ranges::find_if(information.laws, [&](const LawShapes& shapes) {
-    return shapes.front().effect == law.effect && shapes.front().law == law.law;
+const ShapeCandidates* shapes_of(const RecordingInformation& information, const HiddenLaw& law) {
+  const auto found = std::ranges::find_if(information.laws, [&](const ShapeCandidates& shapes) {
+    return shapes.front().effect == law.effect && shapes.front().mode == law.law;
   });
   return found == information.laws.end() ? nullptr : &*found;
 }
@@ -100,20 +101,18 @@ RecordingInformation recording_information(const SyntheticScene& scene, const Fi
   const double duration_s =
       problem.frame_time_s[static_cast<size_t>(frames - 1)] - problem.frame_time_s.front();
   const TimeSteps stable = stable_time_steps(problem.cloth, parameter_set(problem, values));
-  ModelFit model{.terms = {},
-                 .problems = {std::make_shared<const FitProblem>(std::move(problem))},
-                 .parts = {{.values = values,
-                            .frames = frames,
-                            .steps = stable.times(1 / kStabilityMargin),
-                            .linear = {},
-                            .correction = {},
-                            .directions = {},
-                            .amounts = {}}}};
+  FittedModel model{.hypotheses = {},
+                    .problems = {std::make_shared<const FitProblem>(std::move(problem))},
+                    .parts = {}};
+  PooledPart& part = model.parts.emplace_back();
+  part.values = values;
+  part.frames = frames;
+  part.steps = stable.times(1 / kStabilityMargin);
   linearise_model(model);
-  if (!model.usable)
+  if (!model.usable())
     throw InputError("recover", "the scene has no derivatives", "a calmer motion",
                      "shorten it with --seconds, or raise the stiffness");
-  std::vector<LawShapes> laws = laws_to_test(recording.input, fit, duration_s);
+  std::vector<ShapeCandidates> laws = hypotheses_to_test(recording.input, fit, duration_s);
   ModelProjection projection(model, Loss::squared);
   return {.recording = std::move(recording),
           .laws = std::move(laws),
@@ -123,13 +122,13 @@ RecordingInformation recording_information(const SyntheticScene& scene, const Fi
 
 DrawnLaw draw_law(const RecordingInformation& information, const HiddenLaw& law,
                   const DrawOptions& options, std::uint64_t seed, const Eigen::MatrixXd& beside) {
-  const LawShapes* shapes = shapes_of(information, law);
+  const ShapeCandidates* shapes = shapes_of(information, law);
   if (shapes == nullptr) return {};
-  DrawnLaw drawn{.term = shapes->front(), .amount = {}, .projected = {}};
+  DrawnLaw drawn{.term = shapes->front(), .amplitude = {}, .projected = {}};
   int place = 0;
   for (auto& [name, value] : drawn.term.shape) {
     double least = value, most = value;
-    for (const Term& term : *shapes) {
+    for (const Hypothesis& term : *shapes) {
       least = std::min(least, term.shape.at(name));
       most = std::max(most, term.shape.at(name));
     }
@@ -147,7 +146,7 @@ DrawnLaw draw_law(const RecordingInformation& information, const HiddenLaw& law,
     if (p.upper <= p.neutral) along = -std::abs(along);
     direction[k] = p.typical * along;
   }
-  const Columns columns = law_derivatives(information.model, {&drawn.term, 1}).front();
+  const Columns columns = hypothesis_derivatives(information.model, {&drawn.term, 1}).front();
   if (columns.empty()) return {};
   Eigen::VectorXd projected = information.projection.columns({columns.front() * direction});
   if (beside.cols() > 0) projected -= beside * PivotedQr(beside).solve(projected);
@@ -163,7 +162,7 @@ DrawnLaw draw_law(const RecordingInformation& information, const HiddenLaw& law,
   const double most = std::min(options.most, reach * information_along);
   if (most < options.least) return {};
   drawn.sigmas = options.least * std::pow(most / options.least, Draws(seed, kSize, 0).uniform());
-  drawn.amount = drawn.sigmas / information_along * direction;
+  drawn.amplitude = drawn.sigmas / information_along * direction;
   drawn.projected = projected / information_along;
   return drawn;
 }
@@ -176,19 +175,19 @@ HiddenEffect hidden_effect(const DrawnLaw& drawn) {
       value = shape->second;
     const auto& amplitudes = drawn.term.amplitudes;
     if (const auto at = std::ranges::find(amplitudes, parameter.name); at != amplitudes.end())
-      value += drawn.amount[at - amplitudes.begin()];
+      value += drawn.amplitude[at - amplitudes.begin()];
     hidden.values.push_back(value);
   }
   return hidden;
 }
 
 std::vector<std::vector<Eigen::MatrixXd>> projected_laws(const RecordingInformation& information) {
-  std::vector<Term> all;
-  for (const LawShapes& law : information.laws) all.insert(all.end(), law.begin(), law.end());
-  const std::vector<Columns> derivatives = law_derivatives(information.model, all);
+  std::vector<Hypothesis> all;
+  for (const ShapeCandidates& law : information.laws) all.insert(all.end(), law.begin(), law.end());
+  const std::vector<Columns> derivatives = hypothesis_derivatives(information.model, all);
   std::vector<std::vector<Eigen::MatrixXd>> result;
   size_t n = 0;
-  for (const LawShapes& law : information.laws) {
+  for (const ShapeCandidates& law : information.laws) {
     std::vector<Eigen::MatrixXd>& shapes = result.emplace_back();
     for (size_t k = 0; k < law.size(); ++k, ++n)
       shapes.push_back(derivatives[n].empty() ? Eigen::MatrixXd()

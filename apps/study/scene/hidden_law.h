@@ -5,7 +5,8 @@
 #include <vector>
 
 #include "apps/study/scene/synthetic_recording.h"
-#include "fit/diagnosis/model_fit.h"
+#include "fit/diagnosis/catalogue.h"
+#include "fit/diagnosis/fitted_model.h"
 #include "fit/diagnosis/projection.h"
 
 namespace clothfit {
@@ -24,9 +25,9 @@ std::vector<HiddenLaw> hidden_laws(ObservationKind observations);
 /// without hidden effects, over the fitted frames, on the truth's mesh (of twice the cells a side
 /// of the fit's at most).
 struct RecordingInformation {
-  SyntheticRecording recording;  ///< without noise, of a cloth on that mesh
-  std::vector<LawShapes> laws;   ///< that a diagnosis tests
-  ModelFit model;
+  SyntheticRecording recording;       ///< without noise, of a cloth on that mesh
+  std::vector<ShapeCandidates> laws;  ///< that a diagnosis tests
+  FittedModel model;
   ModelProjection projection;  ///< everything that the fit has free is taken out
 };
 
@@ -37,8 +38,8 @@ RecordingInformation recording_information(const SyntheticScene& scene, const Fi
 
 /// A hidden law with its numbers.
 struct DrawnLaw {
-  Term term;                  ///< the shape drawn
-  Eigen::VectorXd amount;     ///< of each amplitude beyond neutral, in its unit
+  Hypothesis term;            ///< the shape drawn
+  Eigen::VectorXd amplitude;  ///< of each amplitude beyond neutral, in its unit
   double sigmas = 0;          ///< how many of its standard deviations it amounts to
   Eigen::VectorXd projected;  ///< derivative of the residuals by `sigmas`, projected; length 1
 };

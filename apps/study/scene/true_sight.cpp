@@ -22,7 +22,7 @@ HiddenMeasurement::HiddenMeasurement(const SyntheticScene& scene, const Recordin
   for (const HiddenEffect& hidden : scene.hidden) {
     const MeasurementEffectEntry* entry = measurement_effect_named(hidden.name);
     if (entry == nullptr) continue;
-    Term& term = terms.emplace_back();
+    Hypothesis& term = terms.emplace_back();
     term.effect = entry->make();
     for (const double value : hidden.values) term.parameters.emplace_back(value);
     between_frames =
@@ -51,7 +51,7 @@ Eigen::Matrix2Xd HiddenMeasurement::places_m(int frame) const {
   for (Eigen::Index m = 0; m < place_m.cols(); ++m) {
     const Sighting from = sighting(frame, static_cast<int>(m), nullptr, Eigen::Vector3d::Zero());
     MeasuredPair shift_m(MeasuredNumber(0.0), MeasuredNumber(0.0));
-    for (const Term& term : terms) term.effect->shift_place(from, term.parameters, shift_m);
+    for (const Hypothesis& term : terms) term.effect->shift_place(from, term.parameters, shift_m);
     place_m.col(m) += Eigen::Vector2d(shift_m[0].a, shift_m[1].a);
   }
   return place_m;
@@ -119,7 +119,7 @@ Eigen::Vector3d TrueSight::at(double time_s, int marker, const Surface& surface,
 Eigen::Vector3d TrueSight::look(const Sighting& from, int marker, const Surface& surface,
                                 Instants& known) const {
   MeasuredNumber seen_s(from.time_s), mixed(0.0);
-  for (const HiddenMeasurement::Term& term : hidden_.terms) {
+  for (const HiddenMeasurement::Hypothesis& term : hidden_.terms) {
     term.effect->shift_time(from, term.parameters, seen_s);
     term.effect->mix_neighbours(from, term.parameters, mixed);
   }
@@ -129,7 +129,7 @@ Eigen::Vector3d TrueSight::look(const Sighting& from, int marker, const Surface&
         mixed.a * (at(seen_s.a - from.frame_interval_s, marker, surface, known) - 2 * place_m +
                    at(seen_s.a + from.frame_interval_s, marker, surface, known));
   MeasuredPoint moved = place_m.cast<MeasuredNumber>();
-  for (const HiddenMeasurement::Term& term : hidden_.terms)
+  for (const HiddenMeasurement::Hypothesis& term : hidden_.terms)
     term.effect->move(from, term.parameters, moved);
   for (int c = 0; c < 3; ++c) place_m[c] = moved[c].a;
   return place_m;
@@ -161,7 +161,7 @@ std::vector<std::optional<Eigen::Vector2d>> TrueSight::pixels(
     }
     if (pixel && !hidden_.terms.empty()) {
       MeasuredPair moved(MeasuredNumber(pixel->x()), MeasuredNumber(pixel->y()));
-      for (const HiddenMeasurement::Term& term : hidden_.terms)
+      for (const HiddenMeasurement::Hypothesis& term : hidden_.terms)
         term.effect->move_pixel(from, term.parameters, moved);
       pixel = Eigen::Vector2d(moved[0].a, moved[1].a);
     }

@@ -15,7 +15,7 @@ namespace clothfit {
 
 /// The hidden effects of the measurement, and where they have the markers sit.
 struct HiddenMeasurement {
-  struct Term {
+  struct Hypothesis {
     std::shared_ptr<const MeasurementEffect> effect;
     std::vector<MeasuredNumber> parameters;
   };
@@ -32,7 +32,7 @@ struct HiddenMeasurement {
 
   double size_m = 0, frame_rate_hz = 0;
   int frames = 0;
-  std::vector<Term> terms;
+  std::vector<Hypothesis> terms;
   bool between_frames = false, shifts_place = false;  ///< whether one looks there
   Eigen::Matrix2Xd stated_m;                          ///< 2 x markers
 };

@@ -1,10 +1,9 @@
 #include "apps/study/trials/planted_drag.h"
 
-#include <tbb/global_control.h>
-
 #include <cmath>
 
 #include "fit/jobs/draws.h"
+#include "fit/jobs/thread_limit.h"
 #include "fit/problem/problem.h"
 #include "fit/refine/pooled_fit.h"
 
@@ -22,11 +21,7 @@ SyntheticRecording release(const RecoverOptions& study, int number) {
 
 PseudoTruth pseudo_truth(const RecoverOptions& study, int releases,
                          const ProgressCallback& progress) {
-  const tbb::global_control threads(
-      tbb::global_control::max_allowed_parallelism,
-      study.threads > 0
-          ? static_cast<size_t>(study.threads)
-          : tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
+  const ThreadLimit threads(study.threads);
   RecoverOptions exact = study;
   exact.scene.noisy = false;
   std::vector<FitProblem> problems;

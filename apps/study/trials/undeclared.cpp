@@ -15,9 +15,10 @@
 #include "apps/study/scene/true_sight.h"
 #include "apps/study/trials/undeclared_json.h"
 #include "data/input_error.h"
-#include "fit/diagnosis/law_derivatives.h"
+#include "fit/diagnosis/hypothesis_derivatives.h"
 #include "fit/jobs/draws.h"
 #include "fit/measurement_effects/registry.h"
+#include "fit/problem/effects_of.h"
 
 namespace clothfit {
 namespace {
@@ -78,7 +79,7 @@ std::optional<Setting> draw_setting(const UndeclaredOptions& options,
       seeds.resize(n);
       seeds.push_back(derived_seed(seed, static_cast<int>(n) + 2 * k));
       DrawnLaw drawn = draw_law(information, laws[n], options.draw, seeds.back());
-      if (drawn.amount.size() == 0) return std::nullopt;
+      if (drawn.amplitude.size() == 0) return std::nullopt;
       if (markers_stay_on_cloth(options, information, {&drawn, 1}))
         setting.laws.push_back(std::move(drawn));
     }
@@ -91,7 +92,7 @@ std::optional<Setting> draw_setting(const UndeclaredOptions& options,
     setting.laws[0] = draw_law(information, laws[0], options.draw, seeds[0], second);
     setting.laws[1] = draw_law(information, laws[1], options.draw, seeds[1], first);
     for (DrawnLaw& drawn : setting.laws)
-      if (drawn.amount.size() == 0) return std::nullopt;
+      if (drawn.amplitude.size() == 0) return std::nullopt;
     setting.laws[0].projected = first;
     setting.laws[1].projected = second;
   }
@@ -126,11 +127,11 @@ const ParameterEstimate* estimate_of(const FitResult& result, const std::string&
 void compare_amplitudes(const RecordingInformation& information, const DrawnLaw& drawn,
                         const FitResult& result, HiddenInTrial& hidden) {
   const EffectDescription effect = describe_effect(drawn.term.effect);
-  Term found = drawn.term;
+  Hypothesis found = drawn.term;
   for (auto& [name, value] : found.shape)
     if (const ParameterEstimate* estimate = estimate_of(result, found.effect, name))
       value = estimate->value;
-  Eigen::VectorXd amount = Eigen::VectorXd::Zero(drawn.amount.size());
+  Eigen::VectorXd amount = Eigen::VectorXd::Zero(drawn.amplitude.size());
   for (Eigen::Index k = 0; k < amount.size(); ++k) {
     const std::string& name = drawn.term.amplitudes[static_cast<size_t>(k)];
     const ParameterEstimate* estimate = estimate_of(result, found.effect, name);
@@ -139,17 +140,18 @@ void compare_amplitudes(const RecordingInformation& information, const DrawnLaw&
         std::ranges::find(effect.parameters, name, &EffectParameter::name)->neutral;
     amount[k] = estimate->value - neutral;
     hidden.found.push_back({.name = found.effect + "." + name,
-                            .truth = neutral + drawn.amount[k],
+                            .truth = neutral + drawn.amplitude[k],
                             .estimate = estimate->value,
                             .sigma = estimate->sigma});
   }
-  const std::array<Term, 2> terms{found, drawn.term};
-  const std::vector<Columns> columns = law_derivatives(information.model, terms);
+  const std::array<Hypothesis, 2> terms{found, drawn.term};
+  const std::vector<Columns> columns = hypothesis_derivatives(information.model, terms);
   if (hidden.found.empty() || columns[0].empty() || columns[1].empty()) return;
   const Eigen::VectorXd seen = information.projection.columns({columns[0].front() * amount});
-  const Eigen::VectorXd truth = information.projection.columns({columns[1].front() * drawn.amount});
+  const Eigen::VectorXd truth =
+      information.projection.columns({columns[1].front() * drawn.amplitude});
   hidden.amplitude_ratio = seen.dot(truth) / truth.squaredNorm();
-  if (hidden.amplitude_ratio > 0 && amount.dot(drawn.amount) < 0)
+  if (hidden.amplitude_ratio > 0 && amount.dot(drawn.amplitude) < 0)
     for (FoundAmplitude& one : hidden.found) {
       const std::string name = one.name.substr(found.effect.size() + 1);
       const double neutral =
@@ -176,7 +178,7 @@ double error_with_truth(const FitInput& input, const UndeclaredOptions& options,
   told.start = diagnosis.base().values;
   for (auto& [name, value] : *told.start)
     if (const auto known = truth.find(name); known != truth.end()) value = known->second;
-  std::vector<Term> terms;
+  std::vector<Hypothesis> terms;
   for (const DrawnLaw& drawn : laws) {
     terms.push_back(drawn.term);
     const HiddenEffect hidden = hidden_effect(drawn);
@@ -188,7 +190,8 @@ double error_with_truth(const FitInput& input, const UndeclaredOptions& options,
         (*told.start)[hidden.name + "." + name] = hidden.values[p];
     }
   }
-  const FitReport report = fit(with_terms(input, terms), told, {});
+  told.hypotheses = terms;
+  const FitReport report = fit(input, told, {});
   return report.usable() ? held_out_rms(report) : kNothingHidden;
 }
 
@@ -280,7 +283,7 @@ std::string UndeclaredOptions::key() const {
       scene.cameras, scene.noise_m, scene.noise_px, scene.missing, scene.outliers,
       static_cast<int>(fit.observations), fit.mesh_columns, fit.population, fit.generations,
       fit.refine_best, static_cast<int>(fit.loss), fit.start_nodes, fit.substep_scale, fit.work,
-      diagnosis.lines, diagnosis.refits, diagnosis.most_effects, without);
+      diagnosis.beam_width, diagnosis.refits, diagnosis.most_effects, without);
 }
 
 bool UndeclaredTrial::right_first() const {
@@ -352,8 +355,8 @@ UndeclaredTrial undeclared_once(const UndeclaredOptions& options, int index, std
     trial.accepted_effects.push_back("markers seen elsewhere");
   }
   for (const AcceptedEffect& accepted : diagnosis.accepted) {
-    trial.accepted.push_back(accepted.trial.term.title());
-    trial.accepted_effects.push_back(accepted.trial.term.effect);
+    trial.accepted.push_back(accepted.trial.hypothesis.title());
+    trial.accepted_effects.push_back(accepted.trial.hypothesis.effect);
   }
   name_hidden(trial);
   trial.before = held_out_rms(diagnosis.base());
@@ -363,9 +366,9 @@ UndeclaredTrial undeclared_once(const UndeclaredOptions& options, int index, std
   trial.after_fitted = fitted_rms(diagnosis.found());
   trial.noise = diagnosis.base().result.errors.front().noise;
   for (size_t n = 0; n < laws.size(); ++n) {
-    const bool same_law =
+    const bool same_mode =
         std::ranges::find(trial.accepted, setting->laws[n].term.title()) != trial.accepted.end();
-    if (same_law)
+    if (same_mode)
       compare_amplitudes(releases.at(setting->release)->information(), setting->laws[n],
                          diagnosis.found().result, trial.hidden[n]);
   }

@@ -1,5 +1,5 @@
 // How sure it is that a law is there. Not checked here: what residuals' structure is
-// (law_score_test.cpp, Adequacy).
+// (score_test.cpp, Adequacy).
 #include "fit/diagnosis/clearance.h"
 
 #include <gtest/gtest.h>
@@ -12,6 +12,7 @@
 
 #include "fit/diagnosis/projection.h"
 #include "fit/diagnosis/refit.h"
+#include "fit/diagnosis/worth.h"
 #include "tests/fit/diagnosis/true_model.h"
 #include "tests/fit/synthetic_cloth.h"
 
@@ -23,28 +24,28 @@ const FitOptions kClearanceOptions{.loss = Loss::squared};
 constexpr Adequacy kWhite{.chi_square_per_dof = 1};
 
 /// The true model of a recording with `term` as its last one, linearised.
-ModelFit model_with(const Term& term, const SyntheticCloth& cloth) {
+FittedModel model_with(const Hypothesis& term, const SyntheticCloth& cloth) {
   const FitInput input = synthetic_input(cloth);
   return true_model({.inputs = {&input, 1}, .options = kClearanceOptions, .columns = 9, .rows = 9},
                     cloth, {term});
 }
 
-const ModelFit& of_drag() {
-  static const ModelFit model = model_with(drag_term(), {.drag_rate_per_s = 0.5});
+const FittedModel& of_drag() {
+  static const FittedModel model = model_with(drag_term(), {.drag_rate_per_s = 0.5});
   return model;
 }
 
 /// Where the last term's amplitudes stand in the first recording's space.
-std::vector<int> places_of(const ModelFit& model) {
+std::vector<int> places_of(const FittedModel& model) {
   std::vector<int> places;
-  for (const std::string& name : model.terms.back().parameters())
+  for (const std::string& name : model.hypotheses.back().parameters())
     places.push_back(model.problems.front()->space.index(name));
   return places;
 }
 
 /// Fisher's information of the amplitudes of a model of one recording, all else free, in their
 /// units: the square of their derivatives with all else projected out.
-Eigen::MatrixXd information_of_amplitudes(const ModelFit& model) {
+Eigen::MatrixXd information_of_amplitudes(const FittedModel& model) {
   const std::vector<int> amplitudes = places_of(model);
   const FitProblem& problem = *model.problems.front();
   EXPECT_TRUE(problem.priors.empty());
@@ -66,16 +67,16 @@ Eigen::MatrixXd information_of_amplitudes(const ModelFit& model) {
 }
 
 /// The model as if there were another recording that shows just the same.
-ModelFit twice(const ModelFit& model) {
-  ModelFit both = model;
+FittedModel twice(const FittedModel& model) {
+  FittedModel both = model;
   both.problems.push_back(model.problems.front());
   both.parts.push_back(model.parts.front());
   return both;
 }
 
 TEST(ClearOfNeutral, OfOneAmplitudeInWhiteNoiseIsItsNumberOfSigmas) {
-  const ModelFit& model = of_drag();
-  ASSERT_TRUE(model.usable);
+  const FittedModel& model = of_drag();
+  ASSERT_TRUE(model.usable());
   const double sigma = 1 / std::sqrt(information_of_amplitudes(model)(0, 0));
 
   const double clear = clear_of_neutral(model, kWhite, kNoThreshold);
@@ -85,8 +86,8 @@ TEST(ClearOfNeutral, OfOneAmplitudeInWhiteNoiseIsItsNumberOfSigmas) {
 }
 
 TEST(ClearOfNeutral, IsLessByWhatSumsOfDependentResidualsScatterMore) {
-  const ModelFit& model = of_drag();
-  ASSERT_TRUE(model.usable);
+  const FittedModel& model = of_drag();
+  ASSERT_TRUE(model.usable());
   const double white = clear_of_neutral(model, kWhite, kNoThreshold);
   const auto share = [&](double chi_square, double in_time, double along) {
     return clear_of_neutral(model,
@@ -106,8 +107,8 @@ TEST(ClearOfNeutral, IsLessByWhatSumsOfDependentResidualsScatterMore) {
 }
 
 TEST(ClearOfNeutral, IsNoMoreThanNoiseAllows) {
-  const ModelFit& model = of_drag();
-  ASSERT_TRUE(model.usable);
+  const FittedModel& model = of_drag();
+  ASSERT_TRUE(model.usable());
   const double white = clear_of_neutral(model, kWhite, kNoThreshold);
 
   EXPECT_EQ(
@@ -125,12 +126,12 @@ TEST(ClearOfNeutral, IsNoMoreThanNoiseAllows) {
 }
 
 TEST(ClearOfNeutral, CountsSeveralAmplitudesAsOneNumberThatIsAsUnlikely) {
-  ModelFit model =
-      model_with({.effect = "wind", .law = "pressure", .amplitudes = {"q_x", "q_y", "q_z"}}, {});
-  ASSERT_TRUE(model.usable);
+  FittedModel model =
+      model_with({.effect = "wind", .mode = "pressure", .amplitudes = {"q_x", "q_y", "q_z"}}, {});
+  ASSERT_TRUE(model.usable());
   const Eigen::MatrixXd information = information_of_amplitudes(model);
   Eigen::Vector3d pressure_pa(0.01, -0.02, 0.005);
-  pressure_pa *= std::sqrt(least_fall(3) / pressure_pa.dot(information * pressure_pa));
+  pressure_pa *= std::sqrt(least_decrease(3) / pressure_pa.dot(information * pressure_pa));
   const std::vector<int> places = places_of(model);
   for (int axis = 0; axis < 3; ++axis)
     model.parts.front().values[places[static_cast<size_t>(axis)]] = pressure_pa[axis];
@@ -141,9 +142,9 @@ TEST(ClearOfNeutral, CountsSeveralAmplitudesAsOneNumberThatIsAsUnlikely) {
 // Derivatives of cloth that folds and unfolds are steeper than what the residuals do over any
 // distance.
 TEST(ClearOfNeutral, GoesByTheTrendWhereDerivativesExplode) {
-  const ModelFit& model = of_drag();
-  ASSERT_TRUE(model.usable);
-  ModelFit rough = model;
+  const FittedModel& model = of_drag();
+  ASSERT_TRUE(model.usable());
+  FittedModel rough = model;
   rough.parts.front().linear.residual_by_coordinate *= 1000;
 
   const double smooth = clear_of_neutral(model, kWhite, kNoThreshold);
@@ -161,8 +162,8 @@ TEST(ClearOfNeutral, GoesByTheTrendWhereDerivativesExplode) {
 }
 
 TEST(ClearOfNeutral, GrowsWithTheRecordingsThatShareAnAmplitude) {
-  const ModelFit& model = of_drag();
-  ASSERT_TRUE(model.usable);
+  const FittedModel& model = of_drag();
+  ASSERT_TRUE(model.usable());
 
   const double one = clear_of_neutral(model, kWhite, kNoThreshold);
   EXPECT_NEAR(clear_of_neutral(twice(model), kWhite, kNoThreshold), std::sqrt(2.0) * one,
@@ -171,14 +172,15 @@ TEST(ClearOfNeutral, GrowsWithTheRecordingsThatShareAnAmplitude) {
 
 // Two clocks that are off alike: their squares add, and count as those of two amplitudes.
 TEST(ClearOfNeutral, CountsTheAmplitudesThatEachRecordingHasOfItsOwn) {
-  ModelFit model = model_with({.effect = "clock_offset", .law = "", .amplitudes = {"time"}}, {});
-  ASSERT_TRUE(model.usable);
+  FittedModel model =
+      model_with({.effect = "clock_offset", .mode = "", .amplitudes = {"time"}}, {});
+  ASSERT_TRUE(model.usable());
   model.parts.front().values[places_of(model).front()] = 2e-3;
 
   const double one = clear_of_neutral(model, kWhite, kNoThreshold);
   EXPECT_GT(one, 0);
   EXPECT_NEAR(clear_of_neutral(twice(model), kWhite, kNoThreshold),
-              5 * std::sqrt(2 * one * one / least_fall(2)), 1e-4 * one);
+              5 * std::sqrt(2 * one * one / least_decrease(2)), 1e-4 * one);
 }
 
 /// The chance that the sum of so many squared standard normal numbers exceeds `square`; up to four.
@@ -194,12 +196,12 @@ TEST(RiseWithoutLast, IsThatOfAFitWithout) {
   const FitInput input = synthetic_input(cloth);
   const DiagnosisSetup setup{
       .inputs = {&input, 1}, .options = kClearanceOptions, .columns = 9, .rows = 9};
-  ModelFit with = true_model(setup, cloth, {drag_term()});
+  FittedModel with = true_model(setup, cloth, {drag_term()});
   with.parts.front().linear = {};  // at time steps as those of the other fit
   refine_model(with, setup, {}, {});
-  ModelFit without = with_terms(setup, with, {}, {});
+  FittedModel without = with_hypotheses(setup, with, {}, {});
   refine_model(without, setup, {}, {});
-  ASSERT_TRUE(with.usable && without.usable);
+  ASSERT_TRUE(with.usable() && without.usable());
   const double rise = without.chi_square(kNoThreshold) - with.chi_square(kNoThreshold);
   ASSERT_GT(rise, 25);
 
@@ -211,8 +213,8 @@ TEST(LeastFall, IsAsUnlikelyAsFiveSigmas) {
   for (const int amplitudes : {1, 2, 3, 4}) {
     SCOPED_TRACE(amplitudes);
     // A straight line in the number of amplitudes is near the truth.
-    EXPECT_LT(chance_beyond(amplitudes, least_fall(amplitudes)), 1.1 * five_sigmas);
-    EXPECT_GT(chance_beyond(amplitudes, 0.95 * least_fall(amplitudes)), five_sigmas);
+    EXPECT_LT(chance_beyond(amplitudes, least_decrease(amplitudes)), 1.1 * five_sigmas);
+    EXPECT_GT(chance_beyond(amplitudes, 0.95 * least_decrease(amplitudes)), five_sigmas);
   }
 }
 

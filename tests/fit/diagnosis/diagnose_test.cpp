@@ -26,7 +26,7 @@ std::vector<std::string> without_all_but_competitors() {
   const std::vector<std::string> tested{"viscous_damping", "quadratic_drag", "wind",
                                         "gravity_tilt",    "scale",          "marker_placement"};
   std::vector<std::string> without;
-  for (const LawShapes& law : laws_to_test(synthetic_input(kSmallWithDrag), {}, 0.5))
+  for (const ShapeCandidates& law : hypotheses_to_test(synthetic_input(kSmallWithDrag), {}, 0.5))
     if (std::ranges::find(tested, law.front().effect) == tested.end())
       without.push_back(law.front().effect);
   return without;
@@ -41,7 +41,7 @@ DiagnoseOptions diagnosis_of_small_cloth() {
   options.fit.refine_best = 1;
   options.fit.work = 0.01;
   options.without = without_all_but_competitors();
-  options.lines = 1;
+  options.beam_width = 1;
   options.refits = 3;
   options.separate = false;  // tests/fit/diagnosis/separation_test.cpp
   return options;
@@ -54,7 +54,7 @@ TEST(Diagnose, NamesAHiddenDragAndItsAmount) {
 
   ASSERT_TRUE(diagnosis.usable()) << diagnosis.message;
   ASSERT_EQ(diagnosis.accepted.size(), 1u);
-  EXPECT_EQ(diagnosis.accepted.front().trial.term.effect, "viscous_damping");
+  EXPECT_EQ(diagnosis.accepted.front().trial.hypothesis.effect, "viscous_damping");
   EXPECT_EQ(diagnosis.verdict, DiagnosisVerdict::explained);
   EXPECT_FALSE(diagnosis.seen_elsewhere);
   EXPECT_FALSE(diagnosis.before.adequate);
@@ -79,7 +79,7 @@ TEST(Diagnose, FindsNothingWhereNothingIsHiddenAndSaysWhatItWouldHaveSeen) {
   EXPECT_EQ(diagnosis.verdict, DiagnosisVerdict::adequate);
   EXPECT_GT(diagnosis.limits.size(), 20u);
   for (const DetectionLimit& limit : diagnosis.limits)
-    if (limit.term.effect == "viscous_damping") {
+    if (limit.hypothesis.effect == "viscous_damping") {
       EXPECT_GT(limit.limit[0], 0);
       EXPECT_LT(limit.limit[0], 0.5);  // 1/s: the drag of the other test is far above it
     }
@@ -141,14 +141,14 @@ TEST(Diagnose, NamesCausesThatConstantsMatchOneByOneButNotTogether) {
 
   ASSERT_TRUE(diagnosis.usable()) << diagnosis.message;
   ASSERT_EQ(diagnosis.accepted.size(), 2u);
-  const LawTrial& first = diagnosis.accepted[0].trial;
-  const LawTrial& second = diagnosis.accepted[1].trial;
-  EXPECT_EQ(first.term.effect, "scale");
-  EXPECT_EQ(second.term.title(), "marker_placement (turn)");
+  const Trial& first = diagnosis.accepted[0].trial;
+  const Trial& second = diagnosis.accepted[1].trial;
+  EXPECT_EQ(first.hypothesis.effect, "scale");
+  EXPECT_EQ(second.hypothesis.title(), "marker_placement (turn)");
   EXPECT_GT(first.cross_validated, first.best_trivial);
-  EXPECT_TRUE(first.with_later_ones);
+  EXPECT_TRUE(first.on_credit);
   EXPECT_LT(second.cross_validated, first.best_trivial);
-  EXPECT_FALSE(second.with_later_ones);
+  EXPECT_FALSE(second.on_credit);
   EXPECT_EQ(diagnosis.verdict, DiagnosisVerdict::explained);
   EXPECT_FALSE(diagnosis.seen_elsewhere);
   const std::map<std::string, double>& found = diagnosis.found().values;
@@ -164,7 +164,7 @@ TEST(Diagnose, GivesUpACauseThatConstantsMatchWhereNoOtherMayBeNamedWithIt) {
   ASSERT_TRUE(diagnosis.usable()) << diagnosis.message;
   EXPECT_TRUE(diagnosis.seen_elsewhere);
   for (const AcceptedEffect& accepted : diagnosis.accepted)
-    EXPECT_NE(accepted.trial.term.effect, "scale");
+    EXPECT_NE(accepted.trial.hypothesis.effect, "scale");
 }
 
 TEST(Diagnose, FitsTwoRecordingsTogetherAndJudgesAThird) {
@@ -185,7 +185,7 @@ TEST(Diagnose, FitsTwoRecordingsTogetherAndJudgesAThird) {
 
   ASSERT_TRUE(diagnosis.usable()) << diagnosis.message;
   ASSERT_EQ(diagnosis.accepted.size(), 1u);
-  EXPECT_EQ(diagnosis.accepted.front().trial.term.effect, "viscous_damping");
+  EXPECT_EQ(diagnosis.accepted.front().trial.hypothesis.effect, "viscous_damping");
   ASSERT_EQ(diagnosis.recordings.size(), 3u);
   EXPECT_TRUE(diagnosis.recordings.back().held_out);
   const auto rate = [&](size_t n) {
@@ -218,7 +218,7 @@ TEST(Diagnose, TestsNoEffectThatItIsToldToLeaveOutAndProposesALawForIt) {
   const Diagnosis diagnosis = diagnose(synthetic_input(kSmallWithDrag), options, {});
 
   EXPECT_FALSE(diagnosis.scores.empty());
-  for (const LawScore& score : diagnosis.scores) EXPECT_NE(score.term.effect, "viscous_damping");
+  for (const Score& score : diagnosis.scores) EXPECT_NE(score.hypothesis.effect, "viscous_damping");
   EXPECT_EQ(diagnosis.verdict, DiagnosisVerdict::unexplained);
   EXPECT_TRUE(diagnosis.law.found());
 }
@@ -251,7 +251,7 @@ TEST(Diagnose, RefusesRecordingsOfTwoCloths) {
 
 TEST(Diagnose, RefusesOptionsThatMakeNoSense) {
   DiagnoseOptions options = diagnosis_of_small_cloth();
-  options.lines = 0;
+  options.beam_width = 0;
   EXPECT_THROW(diagnose(synthetic_input({}), options, {}), InputError);
   options = diagnosis_of_small_cloth();
   options.law_terms = 11;

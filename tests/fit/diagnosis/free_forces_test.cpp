@@ -1,5 +1,5 @@
 // Forces without a law: their derivatives, and what they foresee of frames that are left out. Not
-// checked here: the other corrections without physics (law_score_test.cpp).
+// checked here: the other corrections without physics (score_test.cpp).
 #include "fit/diagnosis/free_forces.h"
 
 #include <gtest/gtest.h>
@@ -44,25 +44,25 @@ DeclaredEffect hidden_tilt(double about_x_rad) {
   return tilt;
 }
 
-const Term kTilt{.effect = "gravity_tilt", .law = "", .amplitudes = {"about_x", "about_y"}};
+const Hypothesis kTilt{.effect = "gravity_tilt", .mode = "", .amplitudes = {"about_x", "about_y"}};
 
 /// The model without what is hidden at its own optimum.
-ModelFit fitted(const DiagnosisSetup& setup) {
-  ModelFit model = model_at(
+FittedModel fitted(const DiagnosisSetup& setup) {
+  FittedModel model = model_at(
       setup, {}, std::vector<NamedValues>(setup.inputs.size(), named(SyntheticCloth{}.fabric)));
   refine_model(model, setup, {}, {});
-  EXPECT_TRUE(model.usable);
+  EXPECT_TRUE(model.usable());
   return model;
 }
 
-CrossValidation with_forces(const DiagnosisSetup& setup, const ModelFit& model) {
+CrossValidation with_forces(const DiagnosisSetup& setup, const FittedModel& model) {
   return cross_validate(setup, model, kBlocks, kFreeForcesSquares, false, &setup);
 }
 
 /// Derivative of a model's residuals by a push that is there in its runs, along one of the world's
 /// axes: central differences.
-Eigen::VectorXd by_push(const ModelFit& model, int waves_along_s, int waves_along_t, double from_s,
-                        double until_s, size_t axis) {
+Eigen::VectorXd by_push(const FittedModel& model, int waves_along_s, int waves_along_t,
+                        double from_s, double until_s, size_t axis) {
   const PooledPart& part = model.parts.front();
   FitProblem pushed = *model.problems.front();
   pushed.cloth.effects.push_back(
@@ -90,9 +90,9 @@ TEST(FreeForces, HaveTheDerivativesOfASimulationThatIsPushedLikeThat) {
     FitInput input = synthetic_input({});
     input.recording.start = start;
     const DiagnosisSetup setup = setup_of({&input, 1});
-    ModelFit model = model_at(setup, {}, {named(SyntheticCloth{}.fabric)});
+    FittedModel model = model_at(setup, {}, {named(SyntheticCloth{}.fabric)});
     linearise_model(model);
-    ASSERT_TRUE(model.usable);
+    ASSERT_TRUE(model.usable());
 
     const FreeForces forces = free_forces(setup, model, kStretches);
 
@@ -139,7 +139,7 @@ TEST(FreeForces, HaveTheDerivativesOfASimulationThatIsPushedLikeThat) {
 TEST(FreeForces, ForeseeAForceThatStaysAsItIs) {
   const FitInput input = synthetic_input({});
   const DiagnosisSetup setup = setup_of({&input, 1});
-  ModelFit model = true_model(setup, {});
+  FittedModel model = true_model(setup, {});
   const FreeForces forces = free_forces(setup, model, kStretches);
   ASSERT_TRUE(forces.usable());
   Eigen::VectorXd push_m_per_s2(FreeForces::kInStretch);
@@ -159,7 +159,7 @@ TEST(FreeForces, ForeseeAForceThatStaysAsItIs) {
 TEST(FreeForces, HoldTheLastValueBeforeABlockThroughoutIt) {
   const FitInput input = synthetic_input({});
   const DiagnosisSetup setup = setup_of({&input, 1});
-  ModelFit model = true_model(setup, {});
+  FittedModel model = true_model(setup, {});
   const FreeForces forces = free_forces(setup, model, kStretches);
   ASSERT_TRUE(forces.usable());
   Eigen::VectorXd push_m_per_s2 =
@@ -178,10 +178,10 @@ TEST(FreeForces, HoldTheLastValueBeforeABlockThroughoutIt) {
 TEST(FreeForces, ForeseeAPushThatTheModelLacksAndTheLawForeseesItBetter) {
   const FitInput input = moved_by(hidden_tilt(0.02), synthetic_input({}));
   const DiagnosisSetup setup = setup_of({&input, 1});
-  const ModelFit without = fitted(setup);
-  ModelFit with_law = with_terms(setup, without, {kTilt}, {});
+  const FittedModel without = fitted(setup);
+  FittedModel with_law = with_hypotheses(setup, without, {kTilt}, {});
   refine_model(with_law, setup, {}, {});
-  ASSERT_TRUE(with_law.usable);
+  ASSERT_TRUE(with_law.usable());
 
   const CrossValidation before = with_forces(setup, without), after = with_forces(setup, with_law);
 
@@ -209,7 +209,7 @@ TEST(FreeForces, AreFoundWithTheDerivativesOfACoarserMesh) {
   const SyntheticCloth cloth{.drag_rate_per_s = 0.5, .mesh = 17};
   const FitInput input = synthetic_input(cloth);
   const DiagnosisSetup setup = setup_of({&input, 1}, 17), coarse = setup_of({&input, 1}, 9);
-  const ModelFit model = fitted(setup);
+  const FittedModel model = fitted(setup);
 
   const double fine = with_forces(setup, model).free_forces,
                rough = cross_validate(setup, model, kBlocks, kFreeForcesSquares, false, &coarse)
@@ -223,7 +223,7 @@ TEST(FreeForces, AreEachRecordingsOwn) {
   const std::vector<FitInput> inputs{moved_by(hidden_tilt(0.02), synthetic_input({})),
                                      moved_by(hidden_tilt(-0.02), synthetic_input({}))};
   const DiagnosisSetup setup = setup_of(inputs);
-  const ModelFit model = fitted(setup);
+  const FittedModel model = fitted(setup);
 
   const CrossValidation validated = with_forces(setup, model);
 
@@ -233,7 +233,7 @@ TEST(FreeForces, AreEachRecordingsOwn) {
 TEST(FreeForces, OfARecordingThatIsLeftOutAreNotKnown) {
   const std::vector<FitInput> inputs{synthetic_input({.seed = 1}), synthetic_input({.seed = 2})};
   const DiagnosisSetup setup = setup_of(inputs);
-  const ModelFit model = true_model(setup, {});
+  const FittedModel model = true_model(setup, {});
 
   EXPECT_EQ(cross_validate(setup, model, kBlocks, kFreeForcesSquares, true, &setup).free_forces,
             kFreeForcesSquares);
@@ -247,17 +247,17 @@ TEST(FreeForces, DoNotKeepASearchFromTheFirstOfTwoLaws) {
   const SyntheticCloth cloth{.drag_rate_per_s = 0.15, .mesh = 5, .clock_offset_s = 2e-3};
   const FitInput input = synthetic_input(cloth);
   const DiagnosisSetup setup = setup_of({&input, 1}, 5);
-  const Term clock{.effect = "clock_offset", .law = "", .amplitudes = {"time"}};
-  const SearchOptions options{.laws = {{drag_term()}, {clock}},
-                              .lines = 1,
+  const Hypothesis clock{.effect = "clock_offset", .mode = "", .amplitudes = {"time"}};
+  const SearchOptions options{.hypotheses = {{drag_term()}, {clock}},
+                              .beam_width = 1,
                               .refits = 2,
                               .most_effects = 2,
                               .threshold = kFreeForcesSquares};
 
-  const LawSearch search = search_laws(setup, fitted(setup), options, {});
+  const SearchResult search = search_hypotheses(setup, fitted(setup), options, {});
 
   ASSERT_EQ(search.accepted.size(), 2u);
-  const LawTrial& first = search.accepted.front().trial;
+  const Trial& first = search.accepted.front().trial;
   EXPECT_GT(first.cross_validated, first.best_trivial);
   EXPECT_LT(search.accepted.back().trial.cross_validated, first.best_trivial);
 }

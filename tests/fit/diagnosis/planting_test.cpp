@@ -21,15 +21,15 @@ const SyntheticCloth kTwinCloth{.mesh = 5, .markers = 4, .frames = 26, .held_out
 
 /// A few laws of the air and of gravity.
 SearchOptions few_laws(const FitInput& input) {
-  SearchOptions options{.laws = {},
-                        .lines = 1,
+  SearchOptions options{.hypotheses = {},
+                        .beam_width = 1,
                         .refits = 2,
                         .most_effects = 2,
                         .threshold = std::numeric_limits<double>::infinity()};
-  for (const LawShapes& law : laws_to_test(input, kPlantingOptions, 0.5)) {
+  for (const ShapeCandidates& law : hypotheses_to_test(input, kPlantingOptions, 0.5)) {
     const std::string& effect = law.front().effect;
     if (effect == "viscous_damping" || effect == "gravity_tilt" || effect == "wind")
-      options.laws.push_back(law);
+      options.hypotheses.push_back(law);
   }
   return options;
 }
@@ -39,8 +39,8 @@ TEST(Planting, FindsThePlantedDragOnATwinAndNothingOnATwinWithoutIt) {
   const FitInput input = synthetic_input(cloth);
   const DiagnosisSetup setup{
       .inputs = {&input, 1}, .options = kPlantingOptions, .columns = 5, .rows = 5};
-  const ModelFit model = true_model(setup, cloth);
-  const Plant drag{.term = drag_term(), .parameter = "rate", .beyond_neutral = 0.8};
+  const FittedModel model = true_model(setup, cloth);
+  const Plant drag{.hypothesis = drag_term(), .parameter = "rate", .beyond_neutral = 0.8};
 
   const PlantOutcome planted = search_twins(setup, model, drag, few_laws(input), 5, {});
   ASSERT_TRUE(planted.ran) << planted.why_not;
@@ -58,11 +58,11 @@ TEST(Planting, FindsNothingOnATwinOfWhatTheModelHas) {
   const FitInput input = synthetic_input(cloth);
   const DiagnosisSetup setup{
       .inputs = {&input, 1}, .options = kPlantingOptions, .columns = 5, .rows = 5};
-  const ModelFit model = true_model(setup, cloth, {drag_term()});
+  const FittedModel model = true_model(setup, cloth, {drag_term()});
 
   SearchOptions options = few_laws(input);
-  std::erase_if(options.laws,
-                [](const LawShapes& law) { return law.front().effect == "viscous_damping"; });
+  std::erase_if(options.hypotheses,
+                [](const ShapeCandidates& law) { return law.front().effect == "viscous_damping"; });
   const PlantOutcome outcome = search_twins(setup, model, {}, options, 7, {});
   ASSERT_TRUE(outcome.ran) << outcome.why_not;
   EXPECT_TRUE(outcome.found.empty()) << outcome.found.front().title();

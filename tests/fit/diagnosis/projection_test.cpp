@@ -86,11 +86,11 @@ TEST(Projection, CountsUnitDirectionsAsACovariance) {
   const Eigen::VectorXd expected =
       -(all.transpose() * inverse * all).ldlt().solve(all.transpose() * inverse * residual);
 
-  EXPECT_LT((explained.amount - expected.tail(2)).norm(), 1e-8 * expected.tail(2).norm());
+  EXPECT_LT((explained.amplitude - expected.tail(2)).norm(), 1e-8 * expected.tail(2).norm());
   const double fall = residual.dot(inverse * residual) -
                       (residual + all * expected).dot(inverse * (residual + all * expected)) -
                       (residual.dot(inverse * residual) - projection.residual().squaredNorm());
-  EXPECT_NEAR(explained.fall, fall, 1e-8 * projection.residual().squaredNorm());
+  EXPECT_NEAR(explained.decrease, fall, 1e-8 * projection.residual().squaredNorm());
 }
 
 TEST(Projection, LeavesNothingOfWhatTheModelCanDoItself) {
@@ -104,13 +104,13 @@ TEST(Projection, LeavesNothingOfWhatTheModelCanDoItself) {
 
 /// Two small recordings of one cloth, with random numbers for what runs would have left: the
 /// second one has a vertical that is known by a prior.
-ModelFit model_of_noise(int directions) {
+FittedModel model_of_noise(int directions) {
   const SyntheticCloth tiny{.mesh = 5, .markers = 5, .frames = 20, .held_out_from = 20};
   const FitInput plain = synthetic_input(tiny);
   FitInput uncertain = plain;
   uncertain.cameras[0].camera_from_world->covariance =
       1e-6 * Eigen::Matrix<double, 6, 6>::Identity();
-  ModelFit model;
+  FittedModel model;
   for (const FitInput& input : {plain, uncertain}) {
     model.problems.push_back(std::make_shared<const FitProblem>(
         make_problem(input, {.observations = ObservationKind::tracks2d}, 5, 5)));
@@ -126,17 +126,17 @@ ModelFit model_of_noise(int directions) {
     part.linear.residual_by_coordinate = random_matrix(rows, problem.space.size(), 30 + seed);
     part.linear.usable = true;
     part.directions = 2 * random_matrix(rows, directions, 40 + seed);
-    part.amounts = Eigen::VectorXd::Zero(directions);
+    part.amplitudes = Eigen::VectorXd::Zero(directions);
     // Off the prior's mean by less than its sigma, so that it pulls.
     for (const GaussianPrior& prior : problem.priors)
       for (const int p : prior.indices) part.values[p] += 7e-4;
   }
-  model.usable = true;
+  model.state = FitState::complete;
   return model;
 }
 
 /// The same as one matrix: shared parameters first, then each recording's own.
-Projection projection_at_once(const ModelFit& model, bool with_directions) {
+Projection projection_at_once(const FittedModel& model, bool with_directions) {
   const std::vector<const FitProblem*> problems = model.problem_pointers();
   const PooledSpace space(problems);
   const Eigen::Index rows = model.residual_count(), shared = space.shared();
@@ -177,7 +177,7 @@ Projection projection_at_once(const ModelFit& model, bool with_directions) {
 // What is each recording's own is eliminated before what they share: products of projected vectors
 // are the same.
 TEST(ModelProjection, IsThatOfAllRecordingsAtOnce) {
-  const ModelFit model = model_of_noise(2);
+  const FittedModel model = model_of_noise(2);
   const Eigen::MatrixXd effect = random_matrix(model.residual_count(), 3, 50);
   const Eigen::Index first = model.parts.front().linear.residual.size();
   const std::vector<Eigen::MatrixXd> columns{effect.topRows(first),
@@ -206,7 +206,7 @@ TEST(ModelProjection, IsThatOfAllRecordingsAtOnce) {
 
 // Without priors and directions each parameter takes one number.
 TEST(ModelProjection, TakesANumberForEachParameter) {
-  ModelFit model = model_of_noise(0);
+  FittedModel model = model_of_noise(0);
   model.problems.back() = model.problems.front();
   model.parts.back().values = model.parts.front().values;
   model.parts.back().linear.residual_by_coordinate.conservativeResize(
@@ -222,8 +222,8 @@ TEST(Explain, FindsTheAmountsAndTheFall) {
   const Eigen::VectorXd residual = -columns * amounts;
   const Explained explained = explain(residual, columns, ends(3, -kInfinite), ends(3, kInfinite));
 
-  EXPECT_LT((explained.amount - amounts).norm(), 1e-4);
-  EXPECT_NEAR(explained.fall, residual.squaredNorm(), 1e-8 * residual.squaredNorm());
+  EXPECT_LT((explained.amplitude - amounts).norm(), 1e-4);
+  EXPECT_NEAR(explained.decrease, residual.squaredNorm(), 1e-8 * residual.squaredNorm());
 }
 
 // Drag cannot be negative: what asks for that is explained by nothing, and others do not lean on
@@ -234,9 +234,9 @@ TEST(Explain, KeepsAmountsWithinTheirEnds) {
   const Explained explained = explain(residual, columns, ends(2, 0), ends(2, kInfinite));
 
   const double alone = -columns.col(1).dot(residual) / columns.col(1).squaredNorm();
-  EXPECT_EQ(explained.amount[0], 0);
-  EXPECT_NEAR(explained.amount[1], alone, 1e-9);
-  EXPECT_NEAR(explained.fall, alone * alone * columns.col(1).squaredNorm(), 1e-6);
+  EXPECT_EQ(explained.amplitude[0], 0);
+  EXPECT_NEAR(explained.amplitude[1], alone, 1e-9);
+  EXPECT_NEAR(explained.decrease, alone * alone * columns.col(1).squaredNorm(), 1e-6);
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "fit/diagnosis/discretisation.h"
+#include "fit/problem/effects_of.h"
 #include "fit/problem/parameterised_model.h"
 #include "fit/problem/simulation.h"
 #include "tests/fit/hidden_effect.h"
@@ -40,7 +41,7 @@ struct Proposal {
                        .options = kProposedLawOptions,
                        .columns = input.recording.cloth.mesh_columns,
                        .rows = input.recording.cloth.mesh_rows};
-  ModelFit model;
+  FittedModel model;
   ProposedLaw law;
 
   Proposal(FitInput recorded, int most_terms) : input(std::move(recorded)) {
@@ -49,17 +50,17 @@ struct Proposal {
     for (const double share : {0.4, 1.0}) {
       model = shortened(model_at(setup, {}, start), share);
       refine_model(model, setup, {.iterations = 60}, {});
-      EXPECT_TRUE(model.usable);
+      EXPECT_TRUE(model.usable());
       start = model.values();
     }
     // Beside 9 x 9 vertices the errors of the mesh would take a model of 17 x 17.
     if (setup.columns == kProposalCloth.mesh) refine_with_discretisation(model, setup, {});
-    EXPECT_TRUE(model.usable);
+    EXPECT_TRUE(model.usable());
     law = propose_law(setup, model, {.most_terms = most_terms}, {});
   }
 
   /// Of a model's residuals on the frames that no fit has seen, in sigmas.
-  static double held_out_rms(const ModelFit& model) {
+  static double held_out_rms(const FittedModel& model) {
     const FitProblem& problem = *model.problems.front();
     const PooledPart& part = model.parts.front();
     const TrajectoryObjective all(problem, problem.frames(), part.steps);

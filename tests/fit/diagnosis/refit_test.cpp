@@ -23,12 +23,12 @@ const FitOptions kRefitOptions = [] {
 }();
 
 /// Whether it leaves no more than what a fit with drag from the truth ends at.
-void expect_optimum(const ModelFit& anew, const DiagnosisSetup& setup,
+void expect_optimum(const FittedModel& anew, const DiagnosisSetup& setup,
                     const SyntheticCloth& cloth) {
-  ASSERT_TRUE(anew.usable);
-  ModelFit near = true_model(setup, cloth, {drag_term()});
+  ASSERT_TRUE(anew.usable());
+  FittedModel near = true_model(setup, cloth, {drag_term()});
   refine_model(near, setup, {}, {});
-  ASSERT_TRUE(near.usable);
+  ASSERT_TRUE(near.usable());
   // Time steps are chosen anew, and change chi-square by a little of its scatter.
   const auto count = static_cast<double>(near.residual_count());
   EXPECT_LT(anew.residual().squaredNorm(),
@@ -41,10 +41,10 @@ TEST(FittedAnew, IsTheOptimumWhateverIsKnown) {
   const DiagnosisSetup setup{
       .inputs = {&input, 1}, .options = kRefitOptions, .columns = 9, .rows = 9};
 
-  const ModelFit anew = fitted_anew(setup, {drag_term()}, {});
+  const FittedModel anew = identified_from_scratch(setup, {drag_term()}, {});
 
   ASSERT_NO_FATAL_FAILURE(expect_optimum(anew, setup, cloth));
-  ASSERT_EQ(anew.terms.size(), 1u);
+  ASSERT_EQ(anew.hypotheses.size(), 1u);
   EXPECT_NEAR(anew.values().front().at("viscous_damping.rate"), 1.2, 0.05);
 }
 
@@ -55,7 +55,7 @@ TEST(FittedAnew, IsOfAllRecordings) {
   inputs.push_back(synthetic_input(cloth));
   const DiagnosisSetup setup{.inputs = inputs, .options = kRefitOptions, .columns = 9, .rows = 9};
 
-  const ModelFit anew = fitted_anew(setup, {drag_term()}, {});
+  const FittedModel anew = identified_from_scratch(setup, {drag_term()}, {});
 
   ASSERT_NO_FATAL_FAILURE(expect_optimum(anew, setup, cloth));
   const std::vector<NamedValues> values = anew.values();
@@ -69,7 +69,7 @@ TEST(FittedAnew, IsOfAKnownStart) {
   const DiagnosisSetup setup{
       .inputs = {&input, 1}, .options = kRefitOptions, .columns = 9, .rows = 9};
 
-  EXPECT_FALSE(fitted_anew(setup, {}, {}).usable);
+  EXPECT_FALSE(identified_from_scratch(setup, {}, {}).usable());
 }
 
 TEST(RaceOnMesh, LeavesWhatIsNotFarBehindAndRuns) {
@@ -79,18 +79,18 @@ TEST(RaceOnMesh, LeavesWhatIsNotFarBehindAndRuns) {
       .inputs = {&input, 1}, .options = kRefitOptions, .columns = 9, .rows = 9};
   DiagnosisSetup coarse = setup;
   coarse.columns = coarse.rows = 7;
-  const Term drift{.effect = "support_drift", .law = "", .amplitudes = {"velocity_x"}};
-  const ModelFit with_drag = true_model(coarse, cloth, {drag_term()});
-  const ModelFit with_drift = true_model(coarse, cloth, {drift});
-  ModelFit lost = with_drag;
+  const Hypothesis drift{.effect = "support_drift", .mode = "", .amplitudes = {"velocity_x"}};
+  const FittedModel with_drag = true_model(coarse, cloth, {drag_term()});
+  const FittedModel with_drift = true_model(coarse, cloth, {drift});
+  FittedModel lost = with_drag;
   lost.parts.front().values.setConstant(std::numeric_limits<double>::quiet_NaN());
 
-  const std::vector<ModelFit> fitted = race_on_mesh(setup, {with_drift, lost, with_drag},
-                                                    std::numeric_limits<double>::infinity(), {});
+  const std::vector<FittedModel> fitted = race_on_mesh(setup, {with_drift, lost, with_drag},
+                                                       std::numeric_limits<double>::infinity(), {});
 
-  EXPECT_FALSE(fitted[0].usable);
-  EXPECT_FALSE(fitted[1].usable);
-  ASSERT_TRUE(fitted[2].usable);
+  EXPECT_FALSE(fitted[0].usable());
+  EXPECT_FALSE(fitted[1].usable());
+  ASSERT_TRUE(fitted[2].usable());
   EXPECT_EQ(fitted[2].problems.front()->cloth.mesh.columns, 9);
   ASSERT_NO_FATAL_FAILURE(expect_optimum(fitted[2], setup, cloth));
 }
@@ -100,16 +100,16 @@ TEST(WithTerms, HandsOnWhatTheModelIsExpectedToErrBy) {
   const FitInput input = synthetic_input(cloth);
   const DiagnosisSetup setup{
       .inputs = {&input, 1}, .options = kRefitOptions, .columns = 9, .rows = 9};
-  ModelFit model = true_model(setup, cloth);
+  FittedModel model = true_model(setup, cloth);
   PooledPart& part = model.parts.front();
   part.correction = Eigen::VectorXd::LinSpaced(part.linear.residual.size(), 0, 1);
 
-  const ModelFit with_drag = with_terms(setup, model, {drag_term()}, {});
+  const FittedModel with_drag = with_hypotheses(setup, model, {drag_term()}, {});
   EXPECT_EQ(with_drag.parts.front().correction, part.correction);
   // A neutral law changes nothing.
   EXPECT_LT((with_drag.residual() - model.residual()).norm(), 1e-9 * model.residual().norm());
 
-  const ModelFit early = shortened(model, 0.5);
+  const FittedModel early = shortened(model, 0.5);
   const Eigen::Index rows = early.residual_count();
   ASSERT_LT(rows, model.residual_count());
   EXPECT_EQ(early.residual(), model.residual().head(rows));
@@ -120,16 +120,16 @@ TEST(WithTerms, WithoutTheOnlyLawIsTheModelBeforeIt) {
   const FitInput input = synthetic_input(cloth);
   const DiagnosisSetup setup{
       .inputs = {&input, 1}, .options = kRefitOptions, .columns = 9, .rows = 9};
-  const ModelFit with_drag = true_model(setup, cloth, {drag_term()});
+  const FittedModel with_drag = true_model(setup, cloth, {drag_term()});
 
-  ModelFit without = with_terms(setup, with_drag, {}, {});
-  EXPECT_TRUE(without.terms.empty());
+  FittedModel without = with_hypotheses(setup, with_drag, {}, {});
+  EXPECT_TRUE(without.hypotheses.empty());
   // Its derivatives are of another run.
   EXPECT_FALSE(without.parts.front().linear.usable);
   refine_model(without, setup, {}, {});
-  ModelFit base = true_model(setup, cloth);
+  FittedModel base = true_model(setup, cloth);
   refine_model(base, setup, {}, {});
-  ASSERT_TRUE(without.usable && base.usable);
+  ASSERT_TRUE(without.usable() && base.usable());
   const auto count = static_cast<double>(base.residual_count());
   const double scatter = std::sqrt(2 * count);
   // Time steps are chosen anew.

@@ -19,14 +19,14 @@ struct Truth {
   FitInput input;
   FitOptions options{.loss = Loss::squared};
   DiagnosisSetup setup{.inputs = {&input, 1}, .options = options, .columns = 9, .rows = 9};
-  ModelFit model;
+  FittedModel model;
 
   Truth(FitInput recorded, int frames) : input(std::move(recorded)) {
     model = model_at(setup, {}, {named(SyntheticCloth{}.fabric)});
     model.parts.front().frames = frames;
     model.parts.front().steps = TimeSteps(1.0 / 60 / 200);
     linearise_model(model);
-    EXPECT_TRUE(model.usable);
+    EXPECT_TRUE(model.usable());
   }
 };
 

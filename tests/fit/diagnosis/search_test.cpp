@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "fit/diagnosis/discretisation.h"
+#include "fit/diagnosis/worth.h"
 #include "tests/data/whole_runs.h"
 #include "tests/fit/diagnosis/true_model.h"
 
@@ -18,8 +19,8 @@ namespace {
 constexpr double kSquares = std::numeric_limits<double>::infinity();
 
 /// A model that leaves so much: chi-square per residual.
-ModelFit that_leaves(const DiagnosisSetup& setup, double chi_square_per_residual) {
-  ModelFit model = true_model(setup, {});
+FittedModel that_leaves(const DiagnosisSetup& setup, double chi_square_per_residual) {
+  FittedModel model = true_model(setup, {});
   Eigen::VectorXd& residual = model.parts.front().linear.residual;
   residual.setConstant(std::sqrt(chi_square_per_residual));
   return model;
@@ -52,7 +53,7 @@ TEST(WorthNaming, IsMoreBesideALawThatExplainsMuch) {
   const FitInput input = synthetic_input({});
   const FitOptions options;
   const DiagnosisSetup setup{.inputs = {&input, 1}, .options = options, .columns = 9, .rows = 9};
-  const ModelFit model = that_leaves(setup, 1);
+  const FittedModel model = that_leaves(setup, 1);
   const auto count = static_cast<double>(model.residual_count());
 
   // A form that is known to a per cent leaves a ten-thousandth of what it explains.
@@ -64,7 +65,7 @@ TEST(WorthNaming, CountsLargeResidualsAsTheFitDoes) {
   const FitInput input = synthetic_input({});
   const FitOptions options;
   const DiagnosisSetup setup{.inputs = {&input, 1}, .options = options, .columns = 9, .rows = 9};
-  const ModelFit model = that_leaves(setup, 400);
+  const FittedModel model = that_leaves(setup, 400);
   const double prior = that_leaves(setup, 0).chi_square(kSquares);
 
   // Huber's: 3D residuals of length sqrt(3) 20, linear beyond 2.
@@ -86,19 +87,19 @@ FitOptions short_search() {
 }
 
 /// The model without laws in that basin.
-ModelFit stiffer(const DiagnosisSetup& setup, SyntheticCloth cloth) {
+FittedModel stiffer(const DiagnosisSetup& setup, SyntheticCloth cloth) {
   constexpr double kStiffer = 6;
   for (double* stiffness : {&cloth.fabric.tension_warp_n_per_m, &cloth.fabric.tension_weft_n_per_m,
                             &cloth.fabric.shear_n_per_m})
     *stiffness *= kStiffer;
-  ModelFit model = true_model(setup, cloth);
+  FittedModel model = true_model(setup, cloth);
   refine_model(model, setup, {}, {});
   refine_with_discretisation(model, setup, {});
   return model;
 }
 
-SearchOptions only(const Term& law) {
-  return {.laws = {{law}}, .lines = 1, .most_effects = 1, .threshold = kSquares};
+SearchOptions only(const Hypothesis& law) {
+  return {.hypotheses = {{law}}, .beam_width = 1, .most_effects = 1, .threshold = kSquares};
 }
 
 TEST(SearchLaws, LeavesABasinRatherThanNameALawForIt) {
@@ -106,16 +107,16 @@ TEST(SearchLaws, LeavesABasinRatherThanNameALawForIt) {
   const FitInput input = synthetic_input(kBouncing);
   const FitOptions options = short_search();
   const DiagnosisSetup setup{.inputs = {&input, 1}, .options = options, .columns = 7, .rows = 7};
-  const ModelFit base = stiffer(setup, kBouncing);
-  ASSERT_TRUE(base.usable);
+  const FittedModel base = stiffer(setup, kBouncing);
+  ASSERT_TRUE(base.usable());
   const auto count = static_cast<double>(base.residual_count());
   ASSERT_GT(base.chi_square(kSquares), 20 * count);
 
-  const Term tilt{.effect = "gravity_tilt", .law = "", .amplitudes = {"about_x", "about_y"}};
-  const LawSearch found = search_laws(setup, base, only(tilt), {});
+  const Hypothesis tilt{.effect = "gravity_tilt", .mode = "", .amplitudes = {"about_x", "about_y"}};
+  const SearchResult found = search_hypotheses(setup, base, only(tilt), {});
 
   EXPECT_TRUE(found.accepted.empty());
-  ASSERT_TRUE(found.base.usable);
+  ASSERT_TRUE(found.base.usable());
   EXPECT_LT(found.base.chi_square(kSquares), 1.2 * count);
   EXPECT_LT(found.model.chi_square(kSquares), 1.2 * count);
 }
@@ -129,17 +130,18 @@ SyntheticCloth in_thick_air(int mesh, int markers) {
 /// What a coarser mesh finds that knows nothing of the air.
 std::vector<NamedValues> found_without_air(const DiagnosisSetup& setup,
                                            const SyntheticCloth& cloth) {
-  ModelFit coarse = true_model(with_coarse_mesh(setup), cloth);
+  FittedModel coarse = true_model(with_coarse_mesh(setup), cloth);
   refine_model(coarse, with_coarse_mesh(setup), {}, {});
-  EXPECT_TRUE(coarse.usable);
+  EXPECT_TRUE(coarse.usable());
   return coarse.values();
 }
 
-ModelFit grossly_misfitting(const DiagnosisSetup& setup, const std::vector<NamedValues>& values) {
-  ModelFit model = model_at(setup, {}, values);
+FittedModel grossly_misfitting(const DiagnosisSetup& setup,
+                               const std::vector<NamedValues>& values) {
+  FittedModel model = model_at(setup, {}, values);
   linearise_model(model);
-  model.rough = true;
-  EXPECT_TRUE(model.is_hopeless());
+  model.state = FitState::unrefined;
+  EXPECT_TRUE(model.misfits_grossly());
   return model;
 }
 
@@ -149,17 +151,17 @@ TEST(SearchLaws, ChoosesALawForAGrosslyMisfittingModelOnACoarserMesh) {
   const FitInput input = synthetic_input(cloth);
   const FitOptions options = short_search();
   const DiagnosisSetup setup{.inputs = {&input, 1}, .options = options, .columns = 13, .rows = 13};
-  const ModelFit base = grossly_misfitting(setup, found_without_air(setup, cloth));
+  const FittedModel base = grossly_misfitting(setup, found_without_air(setup, cloth));
 
-  const LawSearch found = search_laws(setup, base, only(drag_term()), {});
+  const SearchResult found = search_hypotheses(setup, base, only(drag_term()), {});
 
   ASSERT_EQ(found.accepted.size(), 1u);
   EXPECT_NEAR(found.model.values().front().at("viscous_damping.rate"), 3, 0.1);
   EXPECT_LT(found.model.chi_square(kSquares),
             1.2 * static_cast<double>(found.model.residual_count()));
   // Held against the model without it as it is reported.
-  const ModelFit& without = found.base.usable ? found.base : base;
-  EXPECT_NEAR(found.accepted.front().trial.fall,
+  const FittedModel& without = found.base.usable() ? found.base : base;
+  EXPECT_NEAR(found.accepted.front().trial.decrease,
               without.chi_square(kSquares) - found.model.chi_square(kSquares),
               0.01 * without.chi_square(kSquares));
 }
@@ -171,12 +173,13 @@ TEST(SearchLaws, RefinesAGrosslyMisfittingModelOnItsOwnMeshWhereNoLawIsFound) {
   const DiagnosisSetup setup{.inputs = {&input, 1}, .options = options, .columns = 11, .rows = 11};
   std::vector<NamedValues> elsewhere = found_without_air(setup, cloth);
   elsewhere.front().at("shear") *= 0.7;
-  const ModelFit off = grossly_misfitting(setup, elsewhere);
+  const FittedModel off = grossly_misfitting(setup, elsewhere);
 
-  const LawSearch refined = search_laws(setup, off, {.lines = 1, .threshold = kSquares}, {});
+  const SearchResult refined =
+      search_hypotheses(setup, off, {.beam_width = 1, .threshold = kSquares}, {});
 
-  ASSERT_TRUE(refined.base.usable);
-  EXPECT_FALSE(refined.base.rough);
+  ASSERT_TRUE(refined.base.usable());
+  EXPECT_FALSE(refined.base.is_unrefined());
   EXPECT_LT(refined.base.chi_square(kSquares), off.chi_square(kSquares));
 }
 
@@ -189,19 +192,19 @@ TEST(SearchLaws, CreditsALawWithWhatItExplainsAndNotWithTheBasin) {
   const FitInput input = synthetic_input(cloth);
   const FitOptions options = short_search();
   const DiagnosisSetup setup{.inputs = {&input, 1}, .options = options, .columns = 7, .rows = 7};
-  const ModelFit base = stiffer(setup, cloth);
-  ASSERT_TRUE(base.usable);
+  const FittedModel base = stiffer(setup, cloth);
+  ASSERT_TRUE(base.usable());
 
-  const LawSearch found = search_laws(setup, base, only(drag_term()), {});
+  const SearchResult found = search_hypotheses(setup, base, only(drag_term()), {});
 
   ASSERT_EQ(found.accepted.size(), 1u);
-  const LawTrial& drag = found.accepted.front().trial;
-  EXPECT_EQ(drag.term.effect, "viscous_damping");
+  const Trial& drag = found.accepted.front().trial;
+  EXPECT_EQ(drag.hypothesis.effect, "viscous_damping");
   EXPECT_NEAR(found.model.values().front().at("viscous_damping.rate"), 1.5, 0.1);
-  ASSERT_TRUE(found.base.usable);
+  ASSERT_TRUE(found.base.usable());
   const double without = found.base.chi_square(kSquares);
   EXPECT_LT(without, 0.5 * base.chi_square(kSquares));
-  EXPECT_NEAR(drag.fall, without - found.model.chi_square(kSquares), 0.05 * without);
+  EXPECT_NEAR(drag.decrease, without - found.model.chi_square(kSquares), 0.05 * without);
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 // How far two laws are apart in a recording, and in others that could be made. Not checked here:
-// the projection it is made of (projection_test.cpp), derivatives of laws (law_score_test.cpp), and
+// the projection it is made of (projection_test.cpp), derivatives of laws (score_test.cpp), and
 // which laws a search says are alike (search_test.cpp).
 #include "fit/diagnosis/separation.h"
 
@@ -44,17 +44,19 @@ DiagnosisSetup setup_of(const FitInput& input, const FitOptions& options) {
   return {.inputs = {&input, 1}, .options = options, .columns = 9, .rows = 9};
 }
 
-const Term kGravityTilt{.effect = "gravity_tilt", .law = "", .amplitudes = {"about_x", "about_y"}};
-const Term kWorldTilt{.effect = "world_tilt", .law = "", .amplitudes = {"about_x", "about_y"}};
-const Term kGravityScale{.effect = "gravity_scale", .law = "", .amplitudes = {"excess"}};
-const Term kFrameRate{.effect = "frame_rate_error", .law = "", .amplitudes = {"excess"}};
-const Term kWind{.effect = "wind", .law = "pressure", .amplitudes = {"q_x", "q_y", "q_z"}};
-const Term kWindDrag{.effect = "wind", .law = "drag", .amplitudes = {"c"}};
-const Term kGust{.effect = "gust",
-                 .law = "",
-                 .amplitudes = {"q_x", "q_y", "q_z"},
-                 .shape = {{"frequency", 1.5}, {"phase", 0}},
-                 .shape_sigma = {{"frequency", 1.2}, {"phase", 0.125}}};
+const Hypothesis kGravityTilt{
+    .effect = "gravity_tilt", .mode = "", .amplitudes = {"about_x", "about_y"}};
+const Hypothesis kWorldTilt{
+    .effect = "world_tilt", .mode = "", .amplitudes = {"about_x", "about_y"}};
+const Hypothesis kGravityScale{.effect = "gravity_scale", .mode = "", .amplitudes = {"excess"}};
+const Hypothesis kFrameRate{.effect = "frame_rate_error", .mode = "", .amplitudes = {"excess"}};
+const Hypothesis kWind{.effect = "wind", .mode = "pressure", .amplitudes = {"q_x", "q_y", "q_z"}};
+const Hypothesis kWindDrag{.effect = "wind", .mode = "drag", .amplitudes = {"c"}};
+const Hypothesis kGust{.effect = "gust",
+                       .mode = "",
+                       .amplitudes = {"q_x", "q_y", "q_z"},
+                       .shape = {{"frequency", 1.5}, {"phase", 0}},
+                       .shape_sigma = {{"frequency", 1.2}, {"phase", 0.125}}};
 
 /// Amplitudes at which each of these is found.
 const NamedValues kFound{{"gravity_tilt.about_x", 0.02},
@@ -65,38 +67,41 @@ const NamedValues kFound{{"gravity_tilt.about_x", 0.02},
                          {"viscous_damping.rate", 0.2}};
 
 /// A model that has a law, with the true fabric; linearised.
-ModelFit model_with(const DiagnosisSetup& setup, const std::vector<Term>& terms) {
+FittedModel model_with(const DiagnosisSetup& setup, const std::vector<Hypothesis>& terms) {
   NamedValues values = named(SyntheticCloth().fabric);
   values.insert(kFound.begin(), kFound.end());
-  ModelFit model = model_at(setup, terms, {values});
+  FittedModel model = model_at(setup, terms, {values});
   linearise_model(model);
-  EXPECT_TRUE(model.usable);
+  EXPECT_TRUE(model.usable());
   return model;
 }
 
 /// The model in a candidate, linearised; not usable where that does not run.
-ModelFit in(const CandidateRecording& candidate, const ModelFit& model) {
+FittedModel in(const CandidateRecording& candidate, const FittedModel& model) {
   FitProblem problem = *model.problems.front();
   candidate.change(problem);
-  ModelFit there = model;
+  FittedModel there = model;
   PooledPart& part = there.parts.front();
-  there.usable = observe(problem, part.values, part.steps);
+  const bool runs = observe(problem, part.values, part.steps);
   part.frames = problem.first_held_out;
   there.problems = {std::make_shared<const FitProblem>(std::move(problem))};
-  if (there.usable) linearise_model(there);
+  if (runs)
+    linearise_model(there);
+  else
+    there.state = FitState::failed;
   return there;
 }
 
 /// How far apart two laws are in each candidate of some kinds.
-std::multimap<CandidateKind, double> distances(const ModelFit& model, const Term& law,
-                                               const Term& other,
+std::multimap<CandidateKind, double> distances(const FittedModel& model, const Hypothesis& law,
+                                               const Hypothesis& other,
                                                const std::set<CandidateKind>& kinds) {
   std::multimap<CandidateKind, double> result;
   for (const CandidateRecording& candidate : candidate_recordings(*model.problems.front())) {
     if (!kinds.contains(candidate.kind)) continue;
-    const ModelFit there = in(candidate, model);
-    EXPECT_TRUE(there.usable) << candidate.what;
-    if (there.usable) result.emplace(candidate.kind, law_distance(there, law, other));
+    const FittedModel there = in(candidate, model);
+    EXPECT_TRUE(there.usable()) << candidate.what;
+    if (there.usable()) result.emplace(candidate.kind, hypothesis_distance(there, law, other));
   }
   return result;
 }
@@ -113,12 +118,12 @@ TEST(LawDistance, IsWhatLeastSquaresLeave) {
   SCOPED_TRACE(kSeed);
   const FitInput input = synthetic_input({});
   const DiagnosisSetup setup = setup_of(input, kInSpace);
-  ModelFit both = model_with(setup, {kWind, drag_term()});
+  FittedModel both = model_with(setup, {kWind, drag_term()});
   PooledPart& part = both.parts.front();
   const ParameterSpace& space = both.problems.front()->space;
   part.values[space.index("viscous_damping.rate")] = 0;
   linearise_model(both);
-  ASSERT_TRUE(both.usable);
+  ASSERT_TRUE(both.usable());
   const Eigen::VectorXd slope = space.value_by_coordinate(part.values);
   Eigen::VectorXd change = Eigen::VectorXd::Zero(part.linear.residual.size());
   Eigen::MatrixXd others(change.size(), 0);
@@ -134,7 +139,7 @@ TEST(LawDistance, IsWhatLeastSquaresLeave) {
   const Eigen::VectorXd amount = others.colPivHouseholderQr().solve(change);
   const double expected = (change - others * amount).norm();
 
-  const double found = law_distance(model_with(setup, {kWind}), kWind, drag_term());
+  const double found = hypothesis_distance(model_with(setup, {kWind}), kWind, drag_term());
 
   EXPECT_GT(expected, 1);
   // Time steps are those of either model's own stability, and a law's derivative is a difference.
@@ -144,9 +149,9 @@ TEST(LawDistance, IsWhatLeastSquaresLeave) {
 TEST(LawDistance, IsNoneAlongWhatTheDiscretisationMayErrBy) {
   SCOPED_TRACE(kSeed);
   const FitInput input = synthetic_input({});
-  ModelFit model = model_with(setup_of(input, kInSpace), {kWind});
+  FittedModel model = model_with(setup_of(input, kInSpace), {kWind});
   PooledPart& part = model.parts.front();
-  EXPECT_GT(law_distance(model, kWind, drag_term()), 2);
+  EXPECT_GT(hypothesis_distance(model, kWind, drag_term()), 2);
 
   const ParameterSpace& space = model.problems.front()->space;
   const Eigen::VectorXd slope = space.value_by_coordinate(part.values);
@@ -157,16 +162,16 @@ TEST(LawDistance, IsNoneAlongWhatTheDiscretisationMayErrBy) {
   }
 
   // Of a length v along a direction of standard deviation v are left v / sqrt(1 + v^2).
-  EXPECT_LT(law_distance(model, kWind, drag_term()), 1);
+  EXPECT_LT(hypothesis_distance(model, kWind, drag_term()), 1);
 }
 
 TEST(LawDistance, IsOfNoLawThatCannotAct) {
   SCOPED_TRACE(kSeed);
   const FitInput input = synthetic_input({});
-  const Term focal{.effect = "focal_error", .law = "", .amplitudes = {"excess"}};
-  const ModelFit model = model_with(setup_of(input, kInSpace), {kWind});
+  const Hypothesis focal{.effect = "focal_error", .mode = "", .amplitudes = {"excess"}};
+  const FittedModel model = model_with(setup_of(input, kInSpace), {kWind});
 
-  EXPECT_TRUE(std::isnan(law_distance(model, kWind, focal)));
+  EXPECT_TRUE(std::isnan(hypothesis_distance(model, kWind, focal)));
 }
 
 // A turn of gravity is one of all that is measured, and a wrong frame rate another gravity, where
@@ -175,15 +180,15 @@ TEST(Candidates, TellWhatIsTheSameByConstructionOnlyWhereSupportsMove) {
   SCOPED_TRACE(kSeed);
   const FitInput input = synthetic_input({});
   struct Case {
-    Term law, other;
+    Hypothesis law, other;
     double same;  ///< sigmas: the scheme's own error of first order is another one
   };
   for (const Case& of :
        {Case{kGravityTilt, kWorldTilt, 1e-3}, Case{kGravityScale, kFrameRate, 1}}) {
     SCOPED_TRACE(of.law.title());
-    const ModelFit model = model_with(setup_of(input, kInSpace), {of.law});
-    EXPECT_GT(law_distance(model, of.law, drag_term()), 5);
-    EXPECT_LT(law_distance(model, of.law, of.other), of.same);
+    const FittedModel model = model_with(setup_of(input, kInSpace), {of.law});
+    EXPECT_GT(hypothesis_distance(model, of.law, drag_term()), 5);
+    EXPECT_LT(hypothesis_distance(model, of.law, of.other), of.same);
 
     const std::set<CandidateKind> still{CandidateKind::duration, CandidateKind::frame_rate,
                                         CandidateKind::attitude, CandidateKind::turned};
@@ -208,8 +213,8 @@ TEST(Candidates, OfMoreFramesOrCamerasTellNoWorse) {
     for (const auto& [law, other] : {std::pair(kWind, kGust), std::pair(kWind, kWindDrag),
                                      std::pair(drag_term(), kWindDrag)}) {
       SCOPED_TRACE(law.title() + " and " + other.title() + (in_pixels ? ", pixels" : ""));
-      const ModelFit model = model_with(setup_of(input, *options), {law});
-      const double now = law_distance(model, law, other);
+      const FittedModel model = model_with(setup_of(input, *options), {law});
+      const double now = hypothesis_distance(model, law, other);
 
       const std::multimap<CandidateKind, double> then =
           distances(model, law, other,
@@ -230,12 +235,12 @@ TEST(Candidates, OfMoreFramesOrCamerasTellNoWorse) {
 TEST(Candidates, AreSeenWhereTheModelHasThem) {
   SCOPED_TRACE(kSeed);
   const FitInput input = synthetic_input({});
-  const ModelFit model = model_with(setup_of(input, kInPixels), {kWind});
-  const auto rows = [](const ModelFit& of) { return of.parts.front().linear.residual.size(); };
+  const FittedModel model = model_with(setup_of(input, kInPixels), {kWind});
+  const auto rows = [](const FittedModel& of) { return of.parts.front().linear.residual.size(); };
   for (const CandidateRecording& candidate : candidate_recordings(*model.problems.front())) {
     SCOPED_TRACE(candidate.what);
-    const ModelFit there = in(candidate, model);
-    ASSERT_TRUE(there.usable);
+    const FittedModel there = in(candidate, model);
+    ASSERT_TRUE(there.usable());
     // Sums of a simulation with derivatives have other roundings than those of one without.
     EXPECT_LT(there.parts.front().linear.residual.lpNorm<Eigen::Infinity>(), 1e-6);
     const int frames = there.parts.front().frames, now = model.parts.front().frames;
@@ -260,7 +265,7 @@ TEST(Candidates, AreSeenWhereTheModelHasThem) {
 TEST(Candidates, HoldTheClothWhereItWasHeld) {
   SCOPED_TRACE(kSeed);
   const FitInput input = synthetic_input({});
-  const ModelFit model = model_with(setup_of(input, kInSpace), {});
+  const FittedModel model = model_with(setup_of(input, kInSpace), {});
   const FitProblem& now = *model.problems.front();
   const auto held_at = [](const FitProblem& problem, size_t h) {
     Eigen::Vector3d place = Eigen::Vector3d::Zero();
@@ -326,10 +331,10 @@ TEST(SeparatingRecordings, AreTheBestOfEachKindBesideTheNumberOfThePresentOne) {
   SCOPED_TRACE(kSeed);
   const FitInput input = synthetic_input({});
   const DiagnosisSetup setup = setup_of(input, kInSpace);
-  const ModelFit model = model_with(setup, {kGravityScale, drag_term()});
+  const FittedModel model = model_with(setup, {kGravityScale, drag_term()});
   const std::vector<AcceptedEffect> accepted{
-      {.trial = {.term = drag_term()}, .alike = {kWindDrag}},
-      {.trial = {.term = kGravityScale}, .alike = {kFrameRate, drag_term()}}};
+      {.trial = {.hypothesis = drag_term()}, .alike = {kWindDrag}},
+      {.trial = {.hypothesis = kGravityScale}, .alike = {kFrameRate, drag_term()}}};
 
   const std::vector<std::vector<Separation>> found =
       separating_recordings(setup, model, accepted, {});
@@ -339,8 +344,8 @@ TEST(SeparatingRecordings, AreTheBestOfEachKindBesideTheNumberOfThePresentOne) {
     // Drag is in the model: nothing is to be told from it.
     ASSERT_EQ(found[n].size(), 1u);
     const Separation& one = found[n].front();
-    EXPECT_TRUE(one.from.same_law(accepted[n].alike.front()));
-    EXPECT_EQ(one.now, law_distance(model, accepted[n].trial.term, one.from));
+    EXPECT_TRUE(one.from.same_mode(accepted[n].alike.front()));
+    EXPECT_EQ(one.now, hypothesis_distance(model, accepted[n].trial.hypothesis, one.from));
     ASSERT_EQ(one.recordings.size(), 3u);
     for (size_t k = 1; k < 3; ++k)
       EXPECT_LE(one.recordings[k].sigmas, one.recordings[k - 1].sigmas);
@@ -349,7 +354,7 @@ TEST(SeparatingRecordings, AreTheBestOfEachKindBesideTheNumberOfThePresentOne) {
   EXPECT_TRUE(found[1].front().recordings.front().what.starts_with("held points shaken"));
 
   EXPECT_TRUE(
-      separating_recordings(setup, model, {{.trial = {.term = kGravityScale}}}, {}).empty());
+      separating_recordings(setup, model, {{.trial = {.hypothesis = kGravityScale}}}, {}).empty());
   int calls = 0;
   EXPECT_TRUE(separating_recordings(setup, model, accepted, [&](const Progress&) {
                 return ++calls < 3;
@@ -363,12 +368,12 @@ TEST(SeparatingRecordings, ErrAsTheModelDoes) {
   DiagnosisSetup setup = setup_of(input, kInSpace);
   setup.columns = setup.rows = kSmallCloth.mesh;
   const std::vector<AcceptedEffect> accepted{
-      {.trial = {.term = kGravityScale}, .alike = {kFrameRate}}};
-  const ModelFit exact = model_with(setup, {kGravityScale});
-  ModelFit errs = that_may_err(setup, exact);
+      {.trial = {.hypothesis = kGravityScale}, .alike = {kFrameRate}}};
+  const FittedModel exact = model_with(setup, {kGravityScale});
+  FittedModel errs = that_may_err(setup, exact);
   errs.parts.front().correction = Eigen::VectorXd::Zero(exact.residual_count());
 
-  const auto best_of = [&](const ModelFit& model) {
+  const auto best_of = [&](const FittedModel& model) {
     return separating_recordings(setup, model, accepted, {})[0][0].recordings[0].sigmas;
   };
   const double with = best_of(errs), without = best_of(exact);
@@ -402,7 +407,8 @@ TEST(SeparatingRecordings, AreNamedByADiagnosis) {
   ASSERT_EQ(diagnosis.accepted.size(), 1u);
   ASSERT_FALSE(diagnosis.separation_of(0).empty());
   const Separation& one = diagnosis.separation_of(0).front();
-  const std::set<std::string> names{diagnosis.accepted.front().trial.term.effect, one.from.effect};
+  const std::set<std::string> names{diagnosis.accepted.front().trial.hypothesis.effect,
+                                    one.from.effect};
   EXPECT_EQ(names, (std::set<std::string>{"gravity_tilt", "world_tilt"}));
   EXPECT_LT(one.now, 0.1);
   ASSERT_FALSE(one.recordings.empty());

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "fit/diagnosis/discretisation.h"
-#include "fit/diagnosis/model_fit.h"
+#include "fit/diagnosis/fitted_model.h"
 #include "fit/problem/parameterised_model.h"
 #include "fit/problem/simulation.h"
 #include "tests/fit/synthetic_cloth.h"
@@ -13,34 +13,34 @@
 namespace clothfit {
 
 /// The air's drag, which a synthetic cloth may have and its recording does not declare.
-inline Term drag_term() {
-  return {.effect = "viscous_damping", .law = "", .amplitudes = {"rate"}};
+inline Hypothesis drag_term() {
+  return {.effect = "viscous_damping", .mode = "", .amplitudes = {"rate"}};
 }
 
 /// The model of synthetic recordings of a cloth where the truth is, linearised over their fitted
 /// frames. What it knows of drag, `terms` say; what else they name is neutral.
-inline ModelFit true_model(const DiagnosisSetup& setup, const SyntheticCloth& cloth,
-                           const std::vector<Term>& terms = {}) {
+inline FittedModel true_model(const DiagnosisSetup& setup, const SyntheticCloth& cloth,
+                              const std::vector<Hypothesis>& terms = {}) {
   constexpr double kTimeStep_s = 1.0 / 60 / 150;
   NamedValues truth = named(cloth.fabric);
   truth["viscous_damping.rate"] = cloth.drag_rate_per_s;
-  ModelFit model = model_at(setup, terms, std::vector<NamedValues>(setup.inputs.size(), truth));
+  FittedModel model = model_at(setup, terms, std::vector<NamedValues>(setup.inputs.size(), truth));
   for (size_t n = 0; n < model.parts.size(); ++n) {
     const FitProblem& problem = *model.problems[n];
     PooledPart& part = model.parts[n];
     part.steps = time_steps_of_run(problem.cloth, parameter_set(problem, part.values), kTimeStep_s);
   }
   linearise_model(model);
-  EXPECT_TRUE(model.usable);
+  EXPECT_TRUE(model.usable());
   return model;
 }
 
 /// The same model where it stands, that may err as its discretisation does; the truth has the same
 /// steps, so that nothing is expected.
-inline ModelFit that_may_err(const DiagnosisSetup& setup, ModelFit model) {
+inline FittedModel that_may_err(const DiagnosisSetup& setup, FittedModel model) {
   std::vector<DiscretisationError> errors = discretisation_errors(setup, model);
   for (size_t n = 0; n < model.parts.size(); ++n) {
-    model.parts[n].amounts = Eigen::VectorXd::Zero(errors[n].directions.cols());
+    model.parts[n].amplitudes = Eigen::VectorXd::Zero(errors[n].directions.cols());
     model.parts[n].directions = std::move(errors[n].directions);
   }
   return model;

@@ -35,7 +35,7 @@ TEST(MeasurementEffectRegistry, MakesEveryLawOfItsEffectsParametersWithinTheirRa
     std::set<std::string> in_no_law;
     for (const EffectParameter& parameter : effect.parameters) in_no_law.insert(parameter.name);
     bool has_shapes = false;
-    for (const EffectLaw& law : effect.laws) {
+    for (const EffectMode& law : effect.modes) {
       SCOPED_TRACE(effect.name + " " + law.name);
       EXPECT_FALSE(law.amplitudes.empty());
       for (const std::string& amplitude : law.amplitudes)
@@ -52,9 +52,9 @@ TEST(MeasurementEffectRegistry, MakesEveryLawOfItsEffectsParametersWithinTheirRa
         }
       }
     }
-    for (const EffectLaw& law : effect.laws)
+    for (const EffectMode& law : effect.modes)
       for (const ShapeGrid& shape : law.shapes) in_no_law.erase(shape.parameter);
-    EXPECT_TRUE(effect.laws.empty() || in_no_law.empty()) << effect.name;
+    EXPECT_TRUE(effect.modes.empty() || in_no_law.empty()) << effect.name;
     EXPECT_EQ(effect.test == EffectTest::profiled, has_shapes) << effect.name;
   }
 }

@@ -104,7 +104,7 @@ struct TwoRecordings {
       part.steps = 1e-3;
       part.linear = objective(n).linearise(values[n]);
       part.directions = directions[n];
-      part.amounts = best_amounts(part.directions, part.linear.residual);
+      part.amplitudes = best_amounts(part.directions, part.linear.residual);
       quadratics.push_back(quadratic_of(*problems[n], part, kInfinite));
     }
     return space.gather(quadratics);
@@ -181,7 +181,7 @@ TEST(Quadratic, CountsDirectionsAsACovariance) {
   part.linear.residual_by_coordinate = jacobian;
   part.linear.usable = true;
   part.directions = errs;
-  part.amounts = TwoRecordings::best_amounts(errs, residual);
+  part.amplitudes = TwoRecordings::best_amounts(errs, residual);
 
   const Quadratic quadratic = quadratic_of(problem, part, kInfinite);
 
@@ -194,7 +194,7 @@ TEST(Quadratic, CountsDirectionsAsACovariance) {
   const Eigen::MatrixXd information = jacobian.transpose() * inverse * jacobian;
   EXPECT_LT((quadratic.information - information).norm(), 1e-9 * information.norm());
   // Amounts that are not at their least give the same way down.
-  part.amounts.setZero();
+  part.amplitudes.setZero();
   EXPECT_LT((quadratic_of(problem, part, kInfinite).gradient - gradient).norm(),
             1e-9 * gradient.norm());
 }
@@ -231,7 +231,7 @@ TEST(PooledSpace, StepsAsTheWholeSystemOfEquationsSays) {
     whole.block(0, 7 + 6 * n, 7, 6) = e.between[static_cast<size_t>(n)].transpose();
   }
   const double fall = -e.gradient.dot(step) - 0.5 * step.dot(whole * step);
-  EXPECT_NEAR(space.foreseen_fall(e, step), fall, 1e-9 * fall);
+  EXPECT_NEAR(space.predicted_decrease(e, step), fall, 1e-9 * fall);
   EXPECT_GT(fall, 0);
   whole.diagonal() *= 1.1;
   std::vector<int> free;
@@ -316,7 +316,8 @@ TEST(PooledFit, GoesRoughlyTheWholeWayWithTheDerivativesThatItBeginsWith) {
   part.borrowed = true;
   const double start = 0.5 * part.linear.residual.squaredNorm();
 
-  const PooledFit found = fit_pooled(problems, {part}, {.updated_within = 0.1, .rough = true}, {});
+  const PooledFit found =
+      fit_pooled(problems, {part}, {.updated_within = 0.1, .unrefined = true}, {});
 
   ASSERT_TRUE(found.usable);
   EXPECT_LT(found.cost, 1e-3 * start);

@@ -147,14 +147,14 @@ TEST(ForceLaw, NamesWhatEachCoefficientMultiplies) {
 TEST(ForceLaw, AsksForEachCoefficientOnceAVectorAsOne) {
   const EffectDescription effect = force_law::describe();
   std::vector<std::string> asked;
-  for (const EffectLaw& law : effect.laws)
+  for (const EffectMode& law : effect.modes)
     asked.insert(asked.end(), law.amplitudes.begin(), law.amplitudes.end());
 
   std::vector<std::string> names;
   for (const EffectParameter& parameter : effect.parameters) names.push_back(parameter.name);
   EXPECT_EQ(asked, names);
-  EXPECT_EQ(std::ranges::count_if(effect.laws,
-                                  [](const EffectLaw& law) { return law.amplitudes.size() == 3; }),
+  EXPECT_EQ(std::ranges::count_if(effect.modes,
+                                  [](const EffectMode& law) { return law.amplitudes.size() == 3; }),
             4);
 }
 

@@ -37,7 +37,7 @@ TEST(EffectRegistry, EveryLawIsMadeOfItsEffectsParametersWithinTheirRanges) {
     const auto parameter = [&](const std::string& name) {
       return std::ranges::find(effect.parameters, name, &EffectParameter::name);
     };
-    for (const EffectLaw& law : effect.laws) {
+    for (const EffectMode& law : effect.modes) {
       SCOPED_TRACE(effect.name + " " + law.name);
       EXPECT_FALSE(law.amplitudes.empty());
       for (const std::string& amplitude : law.amplitudes)

@@ -12,7 +12,7 @@
 #include "apps/study/trials/recover.h"
 #include "apps/study/trials/undeclared_summary.h"
 #include "data/input_error.h"
-#include "fit/diagnosis/law_derivatives.h"
+#include "fit/diagnosis/hypothesis_derivatives.h"
 #include "fit/measurement_effects/registry.h"
 #include "model/effects/registry.h"
 #include "tests/apps/scratch_folder.h"
@@ -55,7 +55,7 @@ UndeclaredOptions small_undeclared_study() {
   options.diagnosis.fit.generations = 10;
   options.diagnosis.fit.refine_best = 1;
   options.diagnosis.without = all_but({"viscous_damping", "gravity_scale", "scale"});
-  options.diagnosis.lines = 1;
+  options.diagnosis.beam_width = 1;
   options.diagnosis.refits = 3;
   options.laws = {{"viscous_damping", ""}};
   options.trials = 1;
@@ -189,10 +189,10 @@ TEST(HiddenLaw, AmountsToAsManySigmasAsItSays) {
   FitOptions with_drag = small_fit();
   with_drag.effects = {"viscous_damping"};
   const double sigma = bound_sigmas(information.recording, with_drag).at("viscous_damping.rate");
-  ASSERT_EQ(drawn.amount.size(), 1);
+  ASSERT_EQ(drawn.amplitude.size(), 1);
   EXPECT_GE(drawn.sigmas, 8);
   EXPECT_LE(drawn.sigmas, 50);
-  EXPECT_NEAR(drawn.amount[0] / sigma, drawn.sigmas, 1e-3 * drawn.sigmas);
+  EXPECT_NEAR(drawn.amplitude[0] / sigma, drawn.sigmas, 1e-3 * drawn.sigmas);
   EXPECT_NEAR(drawn.projected.norm(), 1, 1e-9);
 }
 
@@ -200,7 +200,7 @@ TEST(HiddenLaw, IsRefusedWhereItsBoundsKeepItFromBeingSeen) {
   const RecordingInformation information = recording_information(small_scene(), small_fit(), 7);
   const DrawnLaw drawn =
       draw_law(information, {"viscous_damping", ""}, {.least = 1e7, .most = 1e8}, 7);
-  EXPECT_EQ(drawn.amount.size(), 0);
+  EXPECT_EQ(drawn.amplitude.size(), 0);
 }
 
 TEST(HiddenLaw, SharesItsClassWithItsTwin) {
@@ -311,7 +311,7 @@ TEST(Undeclared, FindsAPlaceThatACoarserMeshDoesNotShow) {
 
   ASSERT_TRUE(diagnosis.usable()) << diagnosis.message;
   ASSERT_EQ(diagnosis.accepted.size(), 1u);
-  const Term& found = diagnosis.accepted.front().trial.term;
+  const Hypothesis& found = diagnosis.accepted.front().trial.hypothesis;
   EXPECT_EQ(found.title(), "nonuniform_stiffness (patch)");
   EXPECT_NEAR(found.shape.at("patch_s"), 0.433, 0.1);
   EXPECT_NEAR(found.shape.at("patch_t"), 0.202, 0.1);

@@ -1,10 +1,11 @@
-#include "fit/diagnosis/law_score.h"
+#include "fit/diagnosis/score.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "data/algebra/dense_factors.h"
+#include "fit/problem/effects_of.h"
 
 namespace clothfit {
 namespace {
@@ -14,7 +15,7 @@ constexpr double kInfinite = std::numeric_limits<double>::infinity();
 /// Laws that are differentiated at once: as many as keep all cores at work.
 constexpr size_t kAtOnce = 64;
 
-LawScore judge(const Term& term, const ModelProjection& projection, Columns columns) {
+Score judge(const Hypothesis& term, const ModelProjection& projection, Columns columns) {
   const EffectDescription effect = describe_effect(term.effect);
   const Eigen::Index count = columns.front().cols();
   const auto each = static_cast<Eigen::Index>(term.amplitudes.size());
@@ -26,11 +27,11 @@ LawScore judge(const Term& term, const ModelProjection& projection, Columns colu
     up[k] = parameter->upper - parameter->neutral;
   }
   const Explained explained = explain(projection.residual(), projection.columns(columns), down, up);
-  LawScore result{.term = term,
-                  .amount = explained.amount,
-                  .sigma = Eigen::VectorXd::Constant(count, kInfinite),
-                  .fall = explained.fall,
-                  .columns = std::move(columns)};
+  Score result{.hypothesis = term,
+               .amplitude = explained.amplitude,
+               .sigma = Eigen::VectorXd::Constant(count, kInfinite),
+               .decrease = explained.decrease,
+               .columns = std::move(columns)};
   // Amplitudes come in units of their own.
   const Eigen::VectorXd size = explained.information.diagonal().cwiseSqrt();
   if (size.minCoeff() > 0) {
@@ -48,19 +49,20 @@ LawScore judge(const Term& term, const ModelProjection& projection, Columns colu
 
 }  // namespace
 
-std::string LawScore::amount_name(Eigen::Index k) const {
-  const auto each = static_cast<Eigen::Index>(term.amplitudes.size());
-  const std::string& name = term.amplitudes[static_cast<size_t>(k % each)];
-  return amount.size() > each ? name + " (recording " + std::to_string(k / each + 1) + ")" : name;
+std::string Score::amplitude_name(Eigen::Index k) const {
+  const auto each = static_cast<Eigen::Index>(hypothesis.amplitudes.size());
+  const std::string& name = hypothesis.amplitudes[static_cast<size_t>(k % each)];
+  return amplitude.size() > each ? name + " (recording " + std::to_string(k / each + 1) + ")"
+                                 : name;
 }
 
-std::vector<LawScore> score_laws(const ModelFit& model, const ModelProjection& projection,
-                                 const std::vector<LawShapes>& laws,
-                                 const ProgressCallback& progress) {
-  std::vector<Term> tests;
+std::vector<Score> score_hypotheses(const FittedModel& model, const ModelProjection& projection,
+                                    const std::vector<ShapeCandidates>& laws,
+                                    const ProgressCallback& progress) {
+  std::vector<Hypothesis> tests;
   std::vector<size_t> law_of_test;
   for (size_t law = 0; law < laws.size(); ++law) {
-    for (const Term& term : laws[law]) {
+    for (const Hypothesis& term : laws[law]) {
       tests.push_back(term);
       law_of_test.push_back(law);
     }
@@ -68,7 +70,7 @@ std::vector<LawScore> score_laws(const ModelFit& model, const ModelProjection& p
   const double free = std::max(1.0, projection.weights() - projection.taken());
   // Less than chi-square's own standard deviation is not known to be there.
   const double above = std::max(projection.residual().squaredNorm() - free, std::sqrt(2 * free));
-  std::vector<LawScore> best;
+  std::vector<Score> best;
   size_t law_of_best = 0;
   for (size_t first = 0; first < tests.size(); first += kAtOnce) {
     if (progress && !progress({.stage = "scoring laws",
@@ -77,17 +79,17 @@ std::vector<LawScore> score_laws(const ModelFit& model, const ModelProjection& p
                                .unit = "laws",
                                .note = ""}))
       return {};
-    const std::span<const Term> some =
+    const std::span<const Hypothesis> some =
         std::span(tests).subspan(first, std::min(kAtOnce, tests.size() - first));
-    std::vector<Columns> columns = law_derivatives(model, some);
+    std::vector<Columns> columns = hypothesis_derivatives(model, some);
     for (size_t k = 0; k < some.size(); ++k) {
       if (columns[k].empty()) continue;
-      LawScore score = judge(some[k], projection, std::move(columns[k]));
-      score.share = score.fall / above;
+      Score score = judge(some[k], projection, std::move(columns[k]));
+      score.share = score.decrease / above;
       const size_t law = law_of_test[first + k];
       if (best.empty() || law_of_best != law)
         best.push_back(std::move(score));
-      else if (score.fall > best.back().fall)
+      else if (score.decrease > best.back().decrease)
         best.back() = std::move(score);
       law_of_best = law;
     }

@@ -1,7 +1,7 @@
 // The score test of laws on simulated recordings, the derivatives it is made of, and the judgement
 // of what a fit leaves. Not checked here: derivatives of runs along effects that a cloth does not
 // have, one by one (tests/model/integrate/tangents_test.cpp).
-#include "fit/diagnosis/law_score.h"
+#include "fit/diagnosis/score.h"
 
 #include <gtest/gtest.h>
 
@@ -33,63 +33,63 @@ DiagnosisSetup setup_of(std::span<const FitInput> inputs) {
 /// A cloth that is simulated soon.
 const SyntheticCloth kFewVertices{.mesh = 5};
 
-TEST(LawScore, ForeseesASmallDragAndItsSigma) {
+TEST(Score, ForeseesASmallDragAndItsSigma) {
   const SyntheticCloth cloth{.drag_rate_per_s = 0.05, .noise_m = 1e-4};
   const FitInput input = synthetic_input(cloth);
   const DiagnosisSetup setup = setup_of({&input, 1});
-  const ModelFit model = true_model(setup, cloth);
-  ASSERT_TRUE(model.usable);
+  const FittedModel model = true_model(setup, cloth);
+  ASSERT_TRUE(model.usable());
   const ModelProjection projection(model, kScoreOptions.loss);
 
-  const std::vector<LawScore> scores = score_laws(model, projection, {{drag_term()}}, {});
+  const std::vector<Score> scores = score_hypotheses(model, projection, {{drag_term()}}, {});
 
   ASSERT_EQ(scores.size(), 1u);
-  EXPECT_NEAR(scores[0].amount[0], 0.05, 4 * scores[0].sigma[0]);
+  EXPECT_NEAR(scores[0].amplitude[0], 0.05, 4 * scores[0].sigma[0]);
   EXPECT_LT(scores[0].sigma[0], 0.01);
   // What a normal estimate so far from neutral takes from chi-square.
-  const double z = scores[0].amount[0] / scores[0].sigma[0];
-  EXPECT_NEAR(scores[0].fall, z * z, 1e-6 * z * z);
+  const double z = scores[0].amplitude[0] / scores[0].sigma[0];
+  EXPECT_NEAR(scores[0].decrease, z * z, 1e-6 * z * z);
 }
 
-TEST(LawScore, IsThatOfNoiseWhereNothingIsHidden) {
+TEST(Score, IsThatOfNoiseWhereNothingIsHidden) {
   const SyntheticCloth cloth = kFewVertices;
   const FitInput input = synthetic_input(cloth);
   const DiagnosisSetup setup = setup_of({&input, 1});
-  const ModelFit model = that_may_err(setup, true_model(setup, cloth));
-  ASSERT_TRUE(model.usable);
-  std::vector<LawShapes> laws = laws_to_test(input, kScoreOptions, 0.4);
-  std::erase_if(laws, [](const LawShapes& law) { return law.size() > 1; });
+  const FittedModel model = that_may_err(setup, true_model(setup, cloth));
+  ASSERT_TRUE(model.usable());
+  std::vector<ShapeCandidates> laws = hypotheses_to_test(input, kScoreOptions, 0.4);
+  std::erase_if(laws, [](const ShapeCandidates& law) { return law.size() > 1; });
 
-  const std::vector<LawScore> scores =
-      score_laws(model, ModelProjection(model, kScoreOptions.loss), laws, {});
+  const std::vector<Score> scores =
+      score_hypotheses(model, ModelProjection(model, kScoreOptions.loss), laws, {});
 
   EXPECT_GT(scores.size(), 5u);
-  for (const LawScore& score : scores)
+  for (const Score& score : scores)
     // Beyond 20 one law in 100 000 has its chi-square with one degree of freedom.
-    EXPECT_LT(score.fall, 20 + 4 * static_cast<double>(score.amount.size() - 1))
-        << score.term.title();
+    EXPECT_LT(score.decrease, 20 + 4 * static_cast<double>(score.amplitude.size() - 1))
+        << score.hypothesis.title();
 }
 
 // Two recordings of one motion have the same derivatives, but for where noise has put the sheet: of
 // what is the cloth's they say twice as much as one.
-TEST(LawScore, SharesThePhysicsOfTwoRecordingsAndNotTheirClocks) {
+TEST(Score, SharesThePhysicsOfTwoRecordingsAndNotTheirClocks) {
   const std::vector<FitInput> inputs{synthetic_input({.noise_m = 1e-4, .seed = 1}),
                                      synthetic_input({.noise_m = 1e-4, .seed = 2})};
   const SyntheticCloth cloth{.noise_m = 1e-4};
-  const Term clock{.effect = "clock_offset", .law = "", .amplitudes = {"time"}};
+  const Hypothesis clock{.effect = "clock_offset", .mode = "", .amplitudes = {"time"}};
   const auto scores_of = [&](std::span<const FitInput> some) {
-    const ModelFit model = true_model(setup_of(some), cloth);
-    return score_laws(model, ModelProjection(model, kScoreOptions.loss), {{drag_term()}, {clock}},
-                      {});
+    const FittedModel model = true_model(setup_of(some), cloth);
+    return score_hypotheses(model, ModelProjection(model, kScoreOptions.loss),
+                            {{drag_term()}, {clock}}, {});
   };
 
-  const std::vector<LawScore> one = scores_of({inputs.data(), 1}), two = scores_of(inputs);
+  const std::vector<Score> one = scores_of({inputs.data(), 1}), two = scores_of(inputs);
 
   ASSERT_EQ(one.size(), 2u);
   ASSERT_EQ(two.size(), 2u);
-  ASSERT_EQ(two[0].amount.size(), 1);
+  ASSERT_EQ(two[0].amplitude.size(), 1);
   EXPECT_NEAR(two[0].sigma[0], one[0].sigma[0] / std::sqrt(2.0), 0.02 * one[0].sigma[0]);
-  ASSERT_EQ(two[1].amount.size(), 2);
+  ASSERT_EQ(two[1].amplitude.size(), 2);
   // What both clocks do alike is known as one of them alone is; what they do in opposite ways no
   // parameter of the cloth can do, so that it is known better.
   for (const double sigma_s : two[1].sigma) {
@@ -104,34 +104,35 @@ TEST(LawDerivatives, AreThoseOfAModelThatHasTheLawAtItsNeutralValue) {
   const SyntheticCloth cloth;
   const FitInput input = synthetic_input(cloth);
   const DiagnosisSetup setup = setup_of({&input, 1});
-  std::vector<Term> laws{drag_term(),
-                         {.effect = "wind", .law = "pressure", .amplitudes = {"q_x", "q_y", "q_z"}},
-                         {.effect = "nonuniform_mass",
-                          .law = "edges",
-                          .amplitudes = {"hem_left", "hem_right", "hem_top", "hem_bottom"},
-                          .shape = {{"hem_width", 0.02}},
-                          .shape_sigma = {{"hem_width", 0.01}}},
-                         {.effect = "scale", .law = "", .amplitudes = {"factor"}}};
+  std::vector<Hypothesis> laws{
+      drag_term(),
+      {.effect = "wind", .mode = "pressure", .amplitudes = {"q_x", "q_y", "q_z"}},
+      {.effect = "nonuniform_mass",
+       .mode = "edges",
+       .amplitudes = {"hem_left", "hem_right", "hem_top", "hem_bottom"},
+       .shape = {{"hem_width", 0.02}},
+       .shape_sigma = {{"hem_width", 0.01}}},
+      {.effect = "scale", .mode = "", .amplitudes = {"factor"}}};
   // Several phases of one frequency, which need not be differentiated one by one.
   for (const double phase : {-0.2, 0.05, 0.3}) {
     const std::map<std::string, double> shape{{"frequency", 3}, {"phase", phase}};
-    laws.push_back({.effect = "gust", .law = "", .amplitudes = {"q_x", "q_y", "q_z"}});
+    laws.push_back({.effect = "gust", .mode = "", .amplitudes = {"q_x", "q_y", "q_z"}});
     laws.push_back({.effect = "support_motion",
-                    .law = "",
+                    .mode = "",
                     .amplitudes = {"amplitude_x", "amplitude_y", "amplitude_z"}});
     laws.push_back({.effect = "camera_shake",
-                    .law = "shift",
+                    .mode = "shift",
                     .amplitudes = {"shift_x", "shift_y", "shift_z"}});
     for (size_t k = laws.size() - 3; k < laws.size(); ++k) laws[k].shape = shape;
   }
 
-  const std::vector<Columns> columns = law_derivatives(true_model(setup, cloth), laws);
+  const std::vector<Columns> columns = hypothesis_derivatives(true_model(setup, cloth), laws);
 
   ASSERT_EQ(columns.size(), laws.size());
   for (size_t k = 0; k < laws.size(); ++k) {
     SCOPED_TRACE(laws[k].title());
     ASSERT_EQ(columns[k].size(), 1u);  // recordings
-    const ModelFit with = true_model(setup, cloth, {laws[k]});
+    const FittedModel with = true_model(setup, cloth, {laws[k]});
     const PooledPart& part = with.parts.front();
     const ParameterSpace& space = with.problems.front()->space;
     const Eigen::VectorXd slope = space.value_by_coordinate(part.values);
@@ -156,8 +157,8 @@ TEST(Adequacy, HoldsForATrueModelAndNotForOneThatLacksDrag) {
     cloth.drag_rate_per_s = drag;
     const FitInput input = synthetic_input(cloth);
     const DiagnosisSetup setup = setup_of({&input, 1});
-    const ModelFit model = that_may_err(setup, true_model(setup, cloth));
-    ASSERT_TRUE(model.usable);
+    const FittedModel model = that_may_err(setup, true_model(setup, cloth));
+    ASSERT_TRUE(model.usable());
 
     const Adequacy adequacy = judge_adequacy(model, kScoreOptions.loss);
 
@@ -179,15 +180,15 @@ TEST(Adequacy, TakesLittleBesideTheDiscretisationsErrorForNoStructure) {
   const SyntheticCloth cloth{.drag_rate_per_s = 0.06};
   const FitInput input = synthetic_input(cloth);
   const DiagnosisSetup setup = setup_of({&input, 1});
-  ModelFit model = true_model(setup, cloth);
-  ASSERT_TRUE(model.usable);
+  FittedModel model = true_model(setup, cloth);
+  ASSERT_TRUE(model.usable());
   ASSERT_FALSE(judge_adequacy(model, kScoreOptions.loss).adequate);
 
   // A direction that looks like nothing else: of mean square 40, its sign alternating.
   Eigen::MatrixXd& directions = model.parts.front().directions;
   directions = Eigen::MatrixXd::Constant(model.residual_count(), 1, std::sqrt(40.0));
   for (Eigen::Index n = 0; n < directions.rows(); n += 2) directions(n, 0) *= -1;
-  model.parts.front().amounts = Eigen::VectorXd::Zero(1);
+  model.parts.front().amplitudes = Eigen::VectorXd::Zero(1);
 
   const Adequacy adequacy = judge_adequacy(model, kScoreOptions.loss);
   EXPECT_NEAR(adequacy.discretisation_square, 40, 1e-9);
@@ -200,8 +201,8 @@ TEST(CrossValidation, OfATrueModelIsTheNoiseAndBeatsCorrectionsWithoutPhysics) {
   const SyntheticCloth cloth = kFewVertices;
   const FitInput input = synthetic_input(cloth);
   const DiagnosisSetup setup = setup_of({&input, 1});
-  const ModelFit model = true_model(setup, cloth);
-  ASSERT_TRUE(model.usable);
+  const FittedModel model = true_model(setup, cloth);
+  ASSERT_TRUE(model.usable());
 
   const CrossValidation validated = cross_validate(setup, model, 5, 1e300);
 
@@ -218,8 +219,8 @@ TEST(CrossValidation, OfATrueModelForeseesAnotherRecordingToTheNoise) {
   const SyntheticCloth cloth = kFewVertices;
   const std::vector<FitInput> inputs{synthetic_input({.seed = 1}), synthetic_input({.seed = 2})};
   const DiagnosisSetup setup = setup_of(inputs);
-  const ModelFit model = true_model(setup, cloth);
-  ASSERT_TRUE(model.usable);
+  const FittedModel model = true_model(setup, cloth);
+  ASSERT_TRUE(model.usable());
 
   const CrossValidation validated = cross_validate(setup, model, 5, 1e300, true);
 
@@ -237,9 +238,9 @@ TEST(CrossValidation, KeepsTheFramesThatShowAStartInMotion) {
   FitOptions options = kScoreOptions;
   options.start_nodes = 3;
   const DiagnosisSetup setup{.inputs = {&input, 1}, .options = options, .columns = 9, .rows = 9};
-  ModelFit model = model_at(setup, {}, {named(SyntheticCloth().fabric)});
+  FittedModel model = model_at(setup, {}, {named(SyntheticCloth().fabric)});
   refine_model(model, setup, {}, {});
-  ASSERT_TRUE(model.usable);
+  ASSERT_TRUE(model.usable());
   linearise_model(model);
 
   const CrossValidation validated = cross_validate(setup, model, 5, 1e300);
@@ -254,7 +255,7 @@ TEST(Discretisation, ShowsWhatTheStepAndTheMeshAreWorth) {
   const SyntheticCloth cloth = kFewVertices;
   const FitInput input = synthetic_input(cloth);
   const DiagnosisSetup setup = setup_of({&input, 1});
-  const ModelFit model = true_model(setup, cloth);
+  const FittedModel model = true_model(setup, cloth);
 
   const std::vector<DiscretisationError> errors = discretisation_errors(setup, model);
 
@@ -276,7 +277,7 @@ TEST(Discretisation, ExpectsOfTheStepWhatAFinerOneShows) {
   const SyntheticCloth cloth = kFewVertices;
   const FitInput input = synthetic_input(cloth);
   const DiagnosisSetup setup = setup_of({&input, 1});
-  const ModelFit model = true_model(setup, cloth);
+  const FittedModel model = true_model(setup, cloth);
   const PooledPart& part = model.parts.front();
 
   const DiscretisationError error = discretisation_errors(setup, model).front();
@@ -297,19 +298,19 @@ TEST(Discretisation, OfAStartInMotionStopsShortOnlyAlongTheParameters) {
   FitOptions options = kScoreOptions;
   options.start_nodes = 4;
   const DiagnosisSetup setup{.inputs = {&input, 1}, .options = options, .columns = 13, .rows = 13};
-  ModelFit model = model_at(setup, {}, {named(SyntheticCloth().fabric)});
+  FittedModel model = model_at(setup, {}, {named(SyntheticCloth().fabric)});
   refine_model(model, setup, {}, {});
-  ASSERT_TRUE(model.usable);
+  ASSERT_TRUE(model.usable());
   const DiagnosisSetup other = with_other_mesh(setup);
   ASSERT_EQ(other.columns, 7);
 
-  const ModelFit there = fit_on_mesh(other, model);
+  const FittedModel there = fit_on_mesh(other, model);
 
-  ASSERT_TRUE(there.usable);
-  ModelFit optimum = there;
+  ASSERT_TRUE(there.usable());
+  FittedModel optimum = there;
   optimum.parts.front().linear = {};
   refine_model(optimum, other, {}, {});
-  ASSERT_TRUE(optimum.usable);
+  ASSERT_TRUE(optimum.usable());
   linearise_model(optimum);
   const Eigen::VectorXd direction = there.residual() - model.residual();
   const Eigen::VectorXd short_of = there.residual() - optimum.residual();
@@ -325,15 +326,15 @@ TEST(Discretisation, OfATrueModelIsBelieved) {
   const SyntheticCloth cloth = kFewVertices;
   const FitInput input = synthetic_input(cloth);
   const DiagnosisSetup setup = setup_of({&input, 1});
-  ModelFit model = true_model(setup, cloth);
+  FittedModel model = true_model(setup, cloth);
 
   refine_with_discretisation(model, setup, {});
 
-  ASSERT_TRUE(model.usable);
+  ASSERT_TRUE(model.usable());
   const PooledPart& part = model.parts.front();
   ASSERT_EQ(part.directions.cols(), 2);
-  ASSERT_EQ(part.amounts.size(), 2);
-  EXPECT_LT(part.amounts.cwiseAbs().maxCoeff(), 3);
+  ASSERT_EQ(part.amplitudes.size(), 2);
+  EXPECT_LT(part.amplitudes.cwiseAbs().maxCoeff(), 3);
 }
 
 TEST(Discretisation, IsNotWhatAModelLacksThatIsFarOff) {
@@ -342,12 +343,12 @@ TEST(Discretisation, IsNotWhatAModelLacksThatIsFarOff) {
   cloth.noise_m = 1e-4;
   const FitInput input = synthetic_input(cloth);
   const DiagnosisSetup setup = setup_of({&input, 1});
-  ModelFit model = true_model(setup, cloth);
+  FittedModel model = true_model(setup, cloth);
   ASSERT_GT(model.residual().squaredNorm(), 30 * static_cast<double>(model.residual_count()));
 
   refine_with_discretisation(model, setup, {});
 
-  ASSERT_TRUE(model.usable);
+  ASSERT_TRUE(model.usable());
   EXPECT_EQ(model.parts.front().directions.cols(), 0);
 }
 

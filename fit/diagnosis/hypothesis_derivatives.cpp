@@ -1,4 +1,4 @@
-#include "fit/diagnosis/law_derivatives.h"
+#include "fit/diagnosis/hypothesis_derivatives.h"
 
 #include <tbb/parallel_for.h>
 
@@ -10,8 +10,10 @@
 #include <tuple>
 
 #include "data/algebra/dense_factors.h"
+#include "fit/diagnosis/catalogue.h"
 #include "fit/measurement_effects/applicability.h"
 #include "fit/measurement_effects/registry.h"
+#include "fit/problem/effects_of.h"
 #include "model/effects/registry.h"
 
 namespace clothfit {
@@ -33,7 +35,7 @@ struct Batch {
 /// enough that rounding does not count.
 constexpr double kSmall = 1e-5;
 
-void add(Batch& batch, size_t index, const Term& law) {
+void add(Batch& batch, size_t index, const Hypothesis& law) {
   const EffectDescription effect = describe_effect(law.effect);
   const MeasurementEffectEntry* entry = measurement_effect_named(law.effect);
   Batch::Law added{.index = index, .coordinates = {}};
@@ -87,21 +89,21 @@ constexpr int kMotionAmplitudes = 8 * kLanes;
 
 /// Of one recording.
 std::vector<Eigen::MatrixXd> derivatives_in(const FitProblem& problem, const PooledPart& part,
-                                            std::span<const Term> laws) {
+                                            std::span<const Hypothesis> laws) {
   int measured = 0;
   for (const FitProblem::MeasurementTerm& term : problem.measurement)
     for (const Binding& binding : term.parameters) measured += binding.parameter >= 0 ? 1 : 0;
   std::vector<Batch> batches;
   // Effects that only add forces cost least, those of the measurement no derivatives of runs.
   enum class Kind { adds_forces, changes_runs, measures };
-  const auto kind_of = [](const Term& law) {
+  const auto kind_of = [](const Hypothesis& law) {
     if (measurement_effect_named(law.effect) != nullptr) return Kind::measures;
     const std::unique_ptr<Effect> effect = find_effect(law.effect, law.effect).make();
     return effect->changes_force() || effect->shifts_supports() ? Kind::changes_runs
                                                                 : Kind::adds_forces;
   };
   std::vector<Kind> kinds;
-  for (const Term& law : laws) kinds.push_back(kind_of(law));
+  for (const Hypothesis& law : laws) kinds.push_back(kind_of(law));
   for (const Kind kind : {Kind::adds_forces, Kind::changes_runs, Kind::measures}) {
     const int most = kind == Kind::measures ? kMeasurementParameters - measured : kMotionAmplitudes;
     bool begun = false;
@@ -140,7 +142,8 @@ std::vector<Eigen::MatrixXd> derivatives_in(const FitProblem& problem, const Poo
 }
 
 /// Of each law by itself.
-std::vector<Columns> derivatives_of_each(const ModelFit& model, std::span<const Term> laws) {
+std::vector<Columns> derivatives_of_each(const FittedModel& model,
+                                         std::span<const Hypothesis> laws) {
   const size_t recordings = model.parts.size();
   std::vector<std::vector<Eigen::MatrixXd>> of_recording(recordings);
   tbb::parallel_for(size_t{0}, recordings, [&](size_t n) {
@@ -168,17 +171,18 @@ std::vector<Columns> derivatives_of_each(const ModelFit& model, std::span<const 
 
 }  // namespace
 
-std::vector<Columns> law_derivatives(const ModelFit& model, std::span<const Term> laws) {
+std::vector<Columns> hypothesis_derivatives(const FittedModel& model,
+                                            std::span<const Hypothesis> laws) {
   // A harmonic's at any phase are combinations of those at two.
   constexpr size_t kPhases = 2;
   std::map<std::tuple<std::string, std::string, double>, std::vector<size_t>> harmonics;
   for (size_t k = 0; k < laws.size(); ++k)
     if (is_harmonic(laws[k]))
-      harmonics[{laws[k].effect, laws[k].law, laws[k].shape.at("frequency")}].push_back(k);
+      harmonics[{laws[k].effect, laws[k].mode, laws[k].shape.at("frequency")}].push_back(k);
   std::erase_if(harmonics, [](const auto& known) { return known.second.size() <= kPhases; });
 
   std::vector<bool> combined(laws.size(), false);
-  std::vector<Term> each;
+  std::vector<Hypothesis> each;
   for (const auto& [key, phases] : harmonics) {
     for (const size_t k : phases) combined[k] = true;
     for (const double phase : {0.0, 0.25}) {

@@ -1,4 +1,4 @@
-#include "fit/diagnosis/model_fit.h"
+#include "fit/diagnosis/fitted_model.h"
 
 #include <tbb/parallel_for.h>
 
@@ -7,6 +7,7 @@
 #include <set>
 #include <tuple>
 
+#include "fit/diagnosis/criteria.h"
 #include "fit/identify.h"
 #include "fit/measurement_effects/measurement_effect.h"
 #include "fit/measurement_effects/registry.h"
@@ -19,7 +20,7 @@ namespace {
 
 constexpr int kFewestFrames = 8;
 
-/// Derivatives serve on as long as they foretell the residuals' change this well.
+/// Derivatives are kept, or updated, as long as they predict the residuals' change this well.
 constexpr double kKeptWithin = 0.02;
 constexpr double kUpdatedWithin = 0.1;
 
@@ -52,17 +53,17 @@ Eigen::VectorXd values_of(const FitProblem& problem, const NamedValues& known) {
   return values;
 }
 
-std::vector<const FitProblem*> ModelFit::problem_pointers() const {
+std::vector<const FitProblem*> FittedModel::problem_pointers() const {
   std::vector<const FitProblem*> pointers;
   for (const auto& problem : problems) pointers.push_back(problem.get());
   return pointers;
 }
 
-TrajectoryObjective ModelFit::objective(size_t recording) const {
+TrajectoryObjective FittedModel::objective(size_t recording) const {
   return {*problems[recording], parts[recording].frames, parts[recording].steps};
 }
 
-std::vector<NamedValues> ModelFit::values() const {
+std::vector<NamedValues> FittedModel::values() const {
   std::vector<NamedValues> named(problems.size());
   for (size_t n = 0; n < problems.size(); ++n) {
     const ParameterSpace& space = problems[n]->space;
@@ -72,13 +73,22 @@ std::vector<NamedValues> ModelFit::values() const {
   return named;
 }
 
-Eigen::Index ModelFit::residual_count() const {
+ModelFit FittedModel::fit() const {
+  ModelFit plain{.hypotheses = hypotheses, .recordings = {}};
+  const std::vector<NamedValues> named = values();
+  for (size_t n = 0; n < parts.size(); ++n)
+    plain.recordings.push_back(
+        {.values = named[n], .frames = parts[n].frames, .steps = parts[n].steps});
+  return plain;
+}
+
+Eigen::Index FittedModel::residual_count() const {
   Eigen::Index count = 0;
   for (const PooledPart& part : parts) count += part.linear.residual.size();
   return count;
 }
 
-Eigen::VectorXd ModelFit::residual() const {
+Eigen::VectorXd FittedModel::residual() const {
   Eigen::VectorXd all(residual_count());
   Eigen::Index first = 0;
   for (const PooledPart& part : parts) {
@@ -88,15 +98,20 @@ Eigen::VectorXd ModelFit::residual() const {
   return all;
 }
 
-bool ModelFit::is_hopeless() const {
-  return residual().squaredNorm() > kHopeless * static_cast<double>(residual_count());
+double FittedModel::misfit() const {
+  return residual().squaredNorm() / static_cast<double>(residual_count());
 }
 
-double ModelFit::chi_square(double threshold) const {
+bool FittedModel::misfits_grossly() const {
+  return residual().squaredNorm() >
+         kCriteria.grossly_misfitting * static_cast<double>(residual_count());
+}
+
+double FittedModel::chi_square(double threshold) const {
   double sum = 0;
   for (size_t n = 0; n < parts.size(); ++n) {
     const Eigen::VectorXd residual = residual_of(parts[n]);
-    sum += parts[n].amounts.squaredNorm() + 2 * prior_cost(*problems[n], parts[n].values).cost;
+    sum += parts[n].amplitudes.squaredNorm() + 2 * prior_cost(*problems[n], parts[n].values).cost;
     const TrajectoryObjective of = objective(n);
     for (const Objective::Block& block : of.blocks()) {
       const double length = residual.segment(block.offset, block.dimension).norm();
@@ -106,17 +121,18 @@ double ModelFit::chi_square(double threshold) const {
   return sum;
 }
 
-FitOptions options_with(const DiagnosisSetup& setup, const std::vector<Term>& terms,
+FitOptions options_with(const DiagnosisSetup& setup, const std::vector<Hypothesis>& hypotheses,
                         size_t recording) {
   FitOptions options = setup.options;
+  options.hypotheses = hypotheses;
   std::set<std::string> fitted;
-  for (const Term& term : terms) {
-    if (!term.fits_shape) continue;
-    for (const auto& [parameter, value] : term.shape) {
-      const std::string name = term.effect + "." + parameter;
+  for (const Hypothesis& hypothesis : hypotheses) {
+    if (!hypothesis.fits_shape) continue;
+    for (const auto& [parameter, value] : hypothesis.shape) {
+      const std::string name = hypothesis.effect + "." + parameter;
       if (fitted.insert(name).second)
         options.priors.push_back(
-            {.name = name, .mean = value, .sigma = term.shape_sigma.at(parameter)});
+            {.name = name, .mean = value, .sigma = hypothesis.shape_sigma.at(parameter)});
     }
   }
   if (recording > 0)
@@ -125,34 +141,49 @@ FitOptions options_with(const DiagnosisSetup& setup, const std::vector<Term>& te
   return options;
 }
 
-std::vector<std::shared_ptr<const FitProblem>> problems_of(const DiagnosisSetup& setup,
-                                                           const std::vector<Term>& terms) {
+FitOptions options_on_mesh(const DiagnosisSetup& setup, const std::vector<Hypothesis>& hypotheses,
+                           size_t recording) {
+  FitOptions options = options_with(setup, hypotheses, recording);
+  options.mesh_columns = setup.columns;
+  options.mesh_rows = setup.rows;
+  return options;
+}
+
+std::vector<std::shared_ptr<const FitProblem>> problems_of(
+    const DiagnosisSetup& setup, const std::vector<Hypothesis>& hypotheses) {
   std::vector<std::shared_ptr<const FitProblem>> problems;
   for (size_t n = 0; n < setup.inputs.size(); ++n)
-    problems.push_back(std::make_shared<const FitProblem>(
-        make_problem(with_terms(setup.inputs[n], terms), options_with(setup, terms, n),
-                     setup.columns, setup.rows)));
+    problems.push_back(std::make_shared<const FitProblem>(make_problem(
+        setup.inputs[n], options_with(setup, hypotheses, n), setup.columns, setup.rows)));
   return problems;
 }
 
-ModelFit model_at(const DiagnosisSetup& setup, const std::vector<Term>& terms,
-                  const std::vector<NamedValues>& values) {
-  ModelFit model{.terms = terms, .problems = problems_of(setup, terms), .parts = {}};
+FittedModel model_at(const DiagnosisSetup& setup, const std::vector<Hypothesis>& hypotheses,
+                     const std::vector<NamedValues>& values) {
+  FittedModel model{
+      .hypotheses = hypotheses, .problems = problems_of(setup, hypotheses), .parts = {}};
   for (size_t n = 0; n < model.problems.size(); ++n) {
     NamedValues known = values[n];
-    for (const Term& term : terms)
-      for (const auto& [parameter, value] : term.shape)
-        known.try_emplace(term.effect + "." + parameter, value);
+    for (const Hypothesis& hypothesis : hypotheses)
+      for (const auto& [parameter, value] : hypothesis.shape)
+        known.try_emplace(hypothesis.effect + "." + parameter, value);
     const FitProblem& problem = *model.problems[n];
-    model.parts.push_back({.values = values_of(problem, known),
-                           .frames = problem.first_held_out,
-                           .linear = {},
-                           .correction = {},
-                           .directions = {},
-                           .amounts = {}});
-    model.parts.back().steps =
-        stable_time_steps(problem.cloth, parameter_set(problem, model.parts.back().values))
-            .times(1 / PooledOptions().stability_margin);
+    PooledPart& part = model.parts.emplace_back();
+    part.values = values_of(problem, known);
+    part.frames = problem.first_held_out;
+    part.steps = stable_time_steps(problem.cloth, parameter_set(problem, part.values))
+                     .times(1 / PooledOptions().stability_margin);
+  }
+  return model;
+}
+
+FittedModel restored(const DiagnosisSetup& setup, const ModelFit& fit) {
+  std::vector<NamedValues> values;
+  for (const ModelFit::OfRecording& recording : fit.recordings) values.push_back(recording.values);
+  FittedModel model = model_at(setup, fit.hypotheses, values);
+  for (size_t n = 0; n < model.parts.size(); ++n) {
+    model.parts[n].frames = fit.recordings[n].frames;
+    model.parts[n].steps = fit.recordings[n].steps;
   }
   return model;
 }
@@ -162,8 +193,8 @@ int frames_of_share(const FitProblem& problem, double share) {
   return std::clamp(static_cast<int>(std::lround(share * all)), std::min(kFewestFrames, all), all);
 }
 
-ModelFit shortened(const ModelFit& model, double share) {
-  ModelFit result = model;
+FittedModel shortened(const FittedModel& model, double share) {
+  FittedModel result = model;
   for (size_t n = 0; n < model.parts.size(); ++n) {
     const PooledPart& whole = model.parts[n];
     PooledPart& part = result.parts[n];
@@ -186,36 +217,40 @@ ModelFit shortened(const ModelFit& model, double share) {
   return result;
 }
 
-void refine_model(ModelFit& model, const DiagnosisSetup& setup, const StageOptions& options,
+void refine_model(FittedModel& model, const DiagnosisSetup& setup, const StageOptions& options,
                   const ProgressCallback& progress) {
-  // Where a model cannot follow the cloth a fit is led on and on, at ever shorter time steps.
+  // A fit that cannot follow the cloth goes on and on, at ever shorter time steps.
   double most_spring_steps = 0;
   for (const auto& problem : model.problems)
     most_spring_steps += final_refinement(*problem, setup.options).most_spring_steps;
   const PooledOptions pooled{.iterations = options.iterations,
                              .rounds = options.rounds,
-                             .least_fall = options.least_fall,
+                             .least_decrease = options.least_decrease,
                              .loss = setup.options.loss,
                              .kept_within = kKeptWithin,
                              .updated_within = kUpdatedWithin,
                              .own_only = options.own_only,
-                             .rough = options.rough,
+                             .unrefined = options.unrefined,
                              .most_spring_steps = most_spring_steps};
   const std::vector<const FitProblem*> problems = model.problem_pointers();
   PooledFit fitted = fit_pooled(problems, model.parts, pooled, progress);
-  model.cancelled = fitted.cancelled;
-  model.usable = fitted.usable;
-  model.rough = options.rough;
+  model.state = !fitted.usable      ? FitState::failed
+                : options.unrefined ? FitState::unrefined
+                                    : FitState::complete;
   if (fitted.usable) model.parts = std::move(fitted.parts);
 }
 
-void linearise_model(ModelFit& model) {
-  model.usable = true;
+void linearise_model(FittedModel& model) {
+  bool usable = true;
   for (size_t n = 0; n < model.parts.size(); ++n) {
     PooledPart& part = model.parts[n];
     part.linear = model.objective(n).linearise(part.values);
-    model.usable = model.usable && part.linear.usable;
+    usable = usable && part.linear.usable;
   }
+  if (!usable)
+    model.state = FitState::failed;
+  else if (!model.is_unrefined())
+    model.state = FitState::complete;
 }
 
 DiagnosisSetup with_coarse_mesh(const DiagnosisSetup& setup) {
@@ -232,18 +267,19 @@ bool is_coarser(const DiagnosisSetup& mesh, const DiagnosisSetup& than) {
   return mesh.columns < than.columns || mesh.rows < than.rows;
 }
 
-ModelFit with_derivatives_of(const DiagnosisSetup& other_mesh, const ModelFit& model) {
-  ModelFit result = model_at(other_mesh, model.terms, model.values());
+FittedModel with_derivatives_of(const DiagnosisSetup& other_mesh, const FittedModel& model) {
+  FittedModel result = model_at(other_mesh, model.hypotheses, model.values());
   for (size_t n = 0; n < result.parts.size(); ++n) {
     result.parts[n].frames = model.parts[n].frames;
     result.parts[n].correction = model.parts[n].correction;
     result.parts[n].directions = model.parts[n].directions;
-    result.parts[n].amounts = model.parts[n].amounts;
+    result.parts[n].amplitudes = model.parts[n].amplitudes;
   }
   linearise_model(result);
-  for (size_t n = 0; result.usable && n < result.parts.size(); ++n) {
-    result.usable = result.parts[n].linear.residual.size() == model.parts[n].linear.residual.size();
-    result.parts[n].linear.residual = model.parts[n].linear.residual;
+  for (size_t n = 0; result.usable() && n < result.parts.size(); ++n) {
+    Eigen::VectorXd& residual = result.parts[n].linear.residual;
+    if (residual.size() != model.parts[n].linear.residual.size()) result.state = FitState::failed;
+    residual = model.parts[n].linear.residual;
   }
   return result;
 }

@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "fit/diagnosis/model_fit.h"
+#include "fit/diagnosis/fitted_model.h"
 
 namespace clothfit {
 
@@ -16,7 +16,8 @@ using Columns = std::vector<Eigen::MatrixXd>;
 /// own: one after the other, zero in the others' residuals. Without columns for a law whose effect
 /// cannot act in this model, that a predictor has no room for beside the model's own effects of the
 /// measurement, or where they could not be computed.
-std::vector<Columns> law_derivatives(const ModelFit& model, std::span<const Term> laws);
+std::vector<Columns> hypothesis_derivatives(const FittedModel& model,
+                                            std::span<const Hypothesis> laws);
 
 /// The share of a vector's square that columns explain: their squared multiple correlation, of
 /// whatever both were projected to. 0 for none.

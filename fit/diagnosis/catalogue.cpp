@@ -1,11 +1,11 @@
-#include "fit/diagnosis/term.h"
+#include "fit/diagnosis/catalogue.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "data/input_error.h"
 #include "fit/measurement_effects/registry.h"
 #include "fit/observe/held_tracks.h"
+#include "fit/problem/effects_of.h"
 #include "model/effects/harmonic.h"
 #include "model/effects/registry.h"
 
@@ -24,21 +24,22 @@ double spacing(const std::vector<double>& values, double at) {
 }
 
 /// All combinations of the values that a law's shapes are tried at.
-LawShapes shapes_of(const EffectDescription& effect, const EffectLaw& law, double duration_s) {
-  Term term{.effect = effect.name,
-            .law = law.name,
-            .amplitudes = law.amplitudes,
-            .shape = {},
-            .shape_sigma = {}};
-  LawShapes result{term};
+ShapeCandidates shapes_of(const EffectDescription& effect, const EffectMode& law,
+                          double duration_s) {
+  Hypothesis term{.effect = effect.name,
+                  .mode = law.name,
+                  .amplitudes = law.amplitudes,
+                  .shape = {},
+                  .shape_sigma = {}};
+  ShapeCandidates result{term};
   for (const ShapeGrid& grid : law.shapes) {
     const auto parameter =
         std::ranges::find(effect.parameters, grid.parameter, &EffectParameter::name);
     const double in_unit_per_value = grid.per_duration  ? 1 / duration_s
                                      : grid.of_duration ? duration_s
                                                         : 1;
-    LawShapes wider;
-    for (const Term& narrow : result) {
+    ShapeCandidates wider;
+    for (const Hypothesis& narrow : result) {
       for (const double value : grid.values) {
         const double in_unit = value * in_unit_per_value;
         if (in_unit < parameter->lower || in_unit > parameter->upper) continue;
@@ -52,9 +53,9 @@ LawShapes shapes_of(const EffectDescription& effect, const EffectLaw& law, doubl
   return result;
 }
 
-std::vector<EffectLaw> laws_of(const EffectDescription& effect) {
-  if (!effect.laws.empty()) return effect.laws;
-  EffectLaw all{.name = "", .amplitudes = {}, .shapes = {}};
+std::vector<EffectMode> laws_of(const EffectDescription& effect) {
+  if (!effect.modes.empty()) return effect.modes;
+  EffectMode all{.name = "", .amplitudes = {}, .shapes = {}};
   for (const EffectParameter& parameter : effect.parameters)
     all.amplitudes.push_back(parameter.name);
   return {all};
@@ -78,65 +79,12 @@ std::vector<std::string> present_effects(const FitInput& input, const FitOptions
 
 }  // namespace
 
-std::string Term::title() const {
-  return law.empty() ? effect : effect + " (" + law + ")";
-}
-
-std::vector<std::string> Term::parameters() const {
-  std::vector<std::string> names;
-  for (const std::string& amplitude : amplitudes) names.push_back(effect + "." + amplitude);
-  return names;
-}
-
-std::string title(const std::vector<Term>& terms) {
-  std::string text;
-  for (const Term& term : terms) text += (text.empty() ? "" : " + ") + term.title();
-  return text.empty() ? "base" : text;
-}
-
-EffectDescription describe_effect(const std::string& name) {
-  require_effect(name, name);
-  if (const MeasurementEffectEntry* entry = measurement_effect_named(name))
-    return entry->describe();
-  return std::ranges::find_if(effect_registry(),
-                              [&](const EffectEntry& entry) { return name == entry.name; })
-      ->describe();
-}
-
-FitInput with_terms(FitInput input, const std::vector<Term>& terms) {
-  for (const Term& term : terms) {
-    std::vector<DeclaredEffect>& declared = input.recording.declared;
-    auto effect = std::ranges::find(declared, term.effect, &DeclaredEffect::name);
-    if (effect == declared.end()) {
-      DeclaredEffect neutral{.name = term.effect, .parameters = {}};
-      for (const EffectParameter& parameter : describe_effect(term.effect).parameters)
-        neutral.parameters[parameter.name] = {parameter.neutral};
-      declared.push_back(std::move(neutral));
-      effect = std::prev(declared.end());
-    }
-    for (const auto& [parameter, value] : term.shape) effect->parameters[parameter] = {value};
-  }
-  for (const Term& term : terms) {
-    DeclaredEffect& effect =
-        *std::ranges::find(input.recording.declared, term.effect, &DeclaredEffect::name);
-    for (const std::string& amplitude : term.amplitudes) effect.parameters.erase(amplitude);
-    if (!term.fits_shape) continue;
-    for (const auto& [parameter, value] : term.shape) effect.parameters.erase(parameter);
-  }
-  return input;
-}
-
-bool share_shape(const Term& one, const Term& other) {
-  return one.effect == other.effect && std::ranges::any_of(one.shape, [&](const auto& number) {
-           return other.shape.contains(number.first);
-         });
-}
-
-LawShapes at_shapes_of(const std::vector<Term>& terms, const std::map<std::string, double>& values,
-                       const LawShapes& law) {
-  LawShapes result;
-  for (Term one : law) {
-    for (const Term& own : terms) {
+ShapeCandidates at_shapes_of(const std::vector<Hypothesis>& terms,
+                             const std::map<std::string, double>& values,
+                             const ShapeCandidates& law) {
+  ShapeCandidates result;
+  for (Hypothesis one : law) {
+    for (const Hypothesis& own : terms) {
       if (own.effect != one.effect) continue;
       for (const auto& [parameter, value] : own.shape) {
         if (!one.shape.contains(parameter)) continue;
@@ -144,27 +92,27 @@ LawShapes at_shapes_of(const std::vector<Term>& terms, const std::map<std::strin
         one.shape[parameter] = fitted == values.end() ? value : fitted->second;
       }
     }
-    if (std::ranges::find(result, one.shape, &Term::shape) == result.end())
+    if (std::ranges::find(result, one.shape, &Hypothesis::shape) == result.end())
       result.push_back(std::move(one));
   }
   return result;
 }
 
-bool is_harmonic(const Term& law) {
+bool is_harmonic(const Hypothesis& law) {
   const EffectDescription effect = describe_effect(law.effect);
-  const auto own = std::ranges::find(effect.laws, law.law, &EffectLaw::name);
-  return own != effect.laws.end() && Harmonic::is_followed_by(*own);
+  const auto own = std::ranges::find(effect.modes, law.mode, &EffectMode::name);
+  return own != effect.modes.end() && Harmonic::is_followed_by(*own);
 }
 
-bool is_over_cloth(const Term& law) {
+bool is_over_cloth(const Hypothesis& law) {
   const EffectDescription effect = describe_effect(law.effect);
-  const auto own = std::ranges::find(effect.laws, law.law, &EffectLaw::name);
-  return own != effect.laws.end() && std::ranges::any_of(own->shapes, &ShapeGrid::over_cloth);
+  const auto own = std::ranges::find(effect.modes, law.mode, &EffectMode::name);
+  return own != effect.modes.end() && std::ranges::any_of(own->shapes, &ShapeGrid::over_cloth);
 }
 
-LawShapes shapes_around(const Term& term, double part) {
+ShapeCandidates shapes_around(const Hypothesis& term, double part) {
   const EffectDescription effect = describe_effect(term.effect);
-  LawShapes around;
+  ShapeCandidates around;
   for (const auto& [name, value] : term.shape) {
     const EffectParameter& parameter =
         *std::ranges::find(effect.parameters, name, &EffectParameter::name);
@@ -182,16 +130,16 @@ bool is_empirical(const std::string& effect) {
   return effect == "force_law" || effect == "tension_law";
 }
 
-std::vector<Term> empirical_laws(const FitInput& input, const FitOptions& options) {
+std::vector<Hypothesis> empirical_hypotheses(const FitInput& input, const FitOptions& options) {
   const std::vector<std::string> present = present_effects(input, options);
-  std::vector<Term> result;
+  std::vector<Hypothesis> result;
   for (const EffectEntry& entry : effect_registry()) {
     if (!is_empirical(entry.name) || std::ranges::find(present, entry.name) != present.end())
       continue;
     const EffectDescription effect = entry.describe();
-    for (const EffectLaw& law : laws_of(effect))
+    for (const EffectMode& law : laws_of(effect))
       result.push_back({.effect = effect.name,
-                        .law = law.name,
+                        .mode = law.name,
                         .amplitudes = law.amplitudes,
                         .shape = {},
                         .shape_sigma = {}});
@@ -199,8 +147,8 @@ std::vector<Term> empirical_laws(const FitInput& input, const FitOptions& option
   return result;
 }
 
-std::vector<LawShapes> laws_to_test(const FitInput& input, const FitOptions& options,
-                                    double duration_s) {
+std::vector<ShapeCandidates> hypotheses_to_test(const FitInput& input, const FitOptions& options,
+                                                double duration_s) {
   const std::vector<std::string> present = present_effects(input, options);
   std::vector<std::string> names;
   for (const EffectEntry& entry : effect_registry())
@@ -210,13 +158,13 @@ std::vector<LawShapes> laws_to_test(const FitInput& input, const FitOptions& opt
     for (const MeasurementEffectEntry& entry : measurement_effect_registry())
       names.emplace_back(entry.name);
 
-  std::vector<LawShapes> result;
+  std::vector<ShapeCandidates> result;
   for (const std::string& name : names) {
     if (std::ranges::find(present, name) != present.end()) continue;
     const EffectDescription effect = describe_effect(name);
-    if (effect.test == EffectTest::finite && effect.laws.empty()) continue;
-    for (const EffectLaw& law : laws_of(effect)) {
-      LawShapes shapes = shapes_of(effect, law, duration_s);
+    if (effect.test == EffectTest::finite && effect.modes.empty()) continue;
+    for (const EffectMode& law : laws_of(effect)) {
+      ShapeCandidates shapes = shapes_of(effect, law, duration_s);
       if (!shapes.empty()) result.push_back(std::move(shapes));
     }
   }

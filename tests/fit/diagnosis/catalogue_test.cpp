@@ -1,6 +1,6 @@
 // Effects by one of their laws, as additions to a recording. Not checked here: that every law names
 // parameters of its effect (tests/model/effects/registry_test.cpp).
-#include "fit/diagnosis/term.h"
+#include "fit/diagnosis/catalogue.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,7 +8,8 @@
 #include <algorithm>
 
 #include "data/input_error.h"
-#include "fit/diagnosis/model_fit.h"
+#include "fit/diagnosis/fitted_model.h"
+#include "fit/problem/effects_of.h"
 #include "fit/problem/problem.h"
 #include "tests/fit/synthetic_cloth.h"
 
@@ -19,56 +20,60 @@ using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::Not;
 
-const Term kDrag{.effect = "wind", .law = "drag", .amplitudes = {"c"}};
-const Term kPressure{.effect = "wind", .law = "pressure", .amplitudes = {"q_x", "q_y", "q_z"}};
-const Term kHem{.effect = "nonuniform_mass",
-                .law = "hem",
-                .amplitudes = {"hem"},
-                .shape = {{"hem_width", 0.02}},
-                .shape_sigma = {{"hem_width", 0.01}}};
+const Hypothesis kDrag{.effect = "wind", .mode = "drag", .amplitudes = {"c"}};
+const Hypothesis kPressure{
+    .effect = "wind", .mode = "pressure", .amplitudes = {"q_x", "q_y", "q_z"}};
+const Hypothesis kHem{.effect = "nonuniform_mass",
+                      .mode = "hem",
+                      .amplitudes = {"hem"},
+                      .shape = {{"hem_width", 0.02}},
+                      .shape_sigma = {{"hem_width", 0.01}}};
 
-std::vector<std::string> fitted_names(const FitInput& input) {
+std::vector<std::string> fitted_names(const FitInput& input,
+                                      const std::vector<Hypothesis>& hypotheses) {
+  FitOptions options;
+  options.hypotheses = hypotheses;
   std::vector<std::string> names;
-  for (const FitParameter& parameter : make_problem(input, {}, 9, 9).space.parameters)
+  for (const FitParameter& parameter : make_problem(input, options, 9, 9).space.parameters)
     names.push_back(parameter.name);
   return names;
 }
 
 std::vector<std::string> tested(const FitInput& input, const FitOptions& options = {}) {
   std::vector<std::string> titles;
-  for (const LawShapes& law : laws_to_test(input, options, 0.5))
+  for (const ShapeCandidates& law : hypotheses_to_test(input, options, 0.5))
     titles.push_back(law.front().title());
   return titles;
 }
 
-TEST(Term, FreesItsAmplitudesAndHoldsTheRestOfItsEffect) {
+TEST(Hypothesis, FreesItsAmplitudesAndHoldsTheRestOfItsEffect) {
   const FitInput input = synthetic_input({});
-  const std::vector<std::string> names = fitted_names(with_terms(input, {kDrag}));
+  const std::vector<std::string> names = fitted_names(input, {kDrag});
 
   EXPECT_THAT(names, Contains("wind.c"));
   EXPECT_THAT(names, Not(Contains("wind.q_x")));
 }
 
-TEST(Term, OfTheSameEffectJoinsTheOther) {
-  const FitInput input = with_terms(synthetic_input({}), {kDrag, kPressure});
+TEST(Hypothesis, OfTheSameEffectJoinsTheOther) {
+  const FitInput input = synthetic_input({});
+  const std::vector<Hypothesis> both{kDrag, kPressure};
 
-  EXPECT_EQ(std::ranges::count(input.recording.declared, "wind", &DeclaredEffect::name), 1);
+  EXPECT_EQ(std::ranges::count(effects_of(input.recording, both), "wind", &DeclaredEffect::name),
+            1);
   for (const char* name : {"wind.c", "wind.q_x", "wind.q_y", "wind.q_z"})
-    EXPECT_THAT(fitted_names(input), Contains(name));
+    EXPECT_THAT(fitted_names(input, both), Contains(name));
 }
 
-TEST(Term, FitsItsShapeOnlyWhereItSaysSo) {
-  Term hem = kHem;
-  EXPECT_THAT(fitted_names(with_terms(synthetic_input({}), {hem})),
-              Not(Contains("nonuniform_mass.hem_width")));
+TEST(Hypothesis, FitsItsShapeOnlyWhereItSaysSo) {
+  Hypothesis hem = kHem;
+  EXPECT_THAT(fitted_names(synthetic_input({}), {hem}), Not(Contains("nonuniform_mass.hem_width")));
   hem.fits_shape = true;
-  EXPECT_THAT(fitted_names(with_terms(synthetic_input({}), {hem})),
-              Contains("nonuniform_mass.hem_width"));
+  EXPECT_THAT(fitted_names(synthetic_input({}), {hem}), Contains("nonuniform_mass.hem_width"));
 }
 
-TEST(Term, FitsAShapeThatItsEffectsOtherLawFits) {
-  Term edges = kHem, hem = kHem;
-  edges.law = "edges";
+TEST(Hypothesis, FitsAShapeThatItsEffectsOtherLawFits) {
+  Hypothesis edges = kHem, hem = kHem;
+  edges.mode = "edges";
   edges.amplitudes = {"hem_left", "hem_right", "hem_top", "hem_bottom"};
   edges.fits_shape = true;
   const FitInput input = synthetic_input({});
@@ -77,7 +82,8 @@ TEST(Term, FitsAShapeThatItsEffectsOtherLawFits) {
   const DiagnosisSetup setup{.inputs = inputs, .options = options, .columns = 9, .rows = 9};
   for (const bool both : {false, true}) {
     hem.fits_shape = both;
-    for (const std::vector<Term>& terms : {std::vector{edges, hem}, std::vector{hem, edges}}) {
+    for (const std::vector<Hypothesis>& terms :
+         {std::vector{edges, hem}, std::vector{hem, edges}}) {
       const auto problems = problems_of(setup, terms);
 
       EXPECT_GE(problems.front()->space.index("nonuniform_mass.hem_width"), 0);
@@ -87,14 +93,14 @@ TEST(Term, FitsAShapeThatItsEffectsOtherLawFits) {
 }
 
 TEST(AtShapesOf, AreThoseOfTheEffectsOtherLaw) {
-  LawShapes hem(3, kHem);
+  ShapeCandidates hem(3, kHem);
   for (size_t k = 0; k < hem.size(); ++k) hem[k].shape["hem_width"] = 0.01 * static_cast<double>(k);
-  Term edges = kHem;
-  edges.law = "edges";
-  const auto widths = [&](const std::vector<Term>& terms,
+  Hypothesis edges = kHem;
+  edges.mode = "edges";
+  const auto widths = [&](const std::vector<Hypothesis>& terms,
                           const std::map<std::string, double>& values) {
     std::vector<double> result;
-    for (const Term& shape : at_shapes_of(terms, values, hem))
+    for (const Hypothesis& shape : at_shapes_of(terms, values, hem))
       result.push_back(shape.shape.at("hem_width"));
     return result;
   };
@@ -119,12 +125,12 @@ TEST(LawsToTest, AreThoseOfEffectsThatAreNotThereAlready) {
 
 TEST(LawsToTest, AreNoneOfThoseThatNameNoCause) {
   FitInput input = synthetic_input({});
-  for (const LawShapes& law : laws_to_test(input, {}, 0.5))
+  for (const ShapeCandidates& law : hypotheses_to_test(input, {}, 0.5))
     EXPECT_FALSE(is_empirical(law.front().effect)) << law.front().title();
 
   const auto proposed = [&] {
     std::vector<std::string> titles;
-    for (const Term& term : empirical_laws(input, {})) titles.push_back(term.title());
+    for (const Hypothesis& term : empirical_hypotheses(input, {})) titles.push_back(term.title());
     return titles;
   };
   EXPECT_THAT(proposed(), Contains("force_law (drag)"));
@@ -135,11 +141,11 @@ TEST(LawsToTest, AreNoneOfThoseThatNameNoCause) {
 }
 
 TEST(LawsToTest, TryEachCombinationOfShapesWithFrequenciesInTheDuration) {
-  for (const LawShapes& law : laws_to_test(synthetic_input({}), {}, 0.5)) {
-    if (law.front().effect == "nonuniform_mass" && law.front().law == "patch") {
+  for (const ShapeCandidates& law : hypotheses_to_test(synthetic_input({}), {}, 0.5)) {
+    if (law.front().effect == "nonuniform_mass" && law.front().mode == "patch") {
       EXPECT_EQ(law.size(), 18u);
     }
-    if (law.front().effect == "nonuniform_mass" && law.front().law == "edges") {
+    if (law.front().effect == "nonuniform_mass" && law.front().mode == "edges") {
       EXPECT_EQ(law.size(), 4u);  // widths of the hem, of all four edges at once
       EXPECT_EQ(law.front().amplitudes.size(), 4u);
     }

@@ -1,0 +1,93 @@
+#include "fit/diagnosis/basin.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "fit/diagnosis/beam.h"
+#include "fit/diagnosis/clearance.h"
+#include "fit/diagnosis/criteria.h"
+#include "fit/diagnosis/discretisation.h"
+#include "fit/diagnosis/refit.h"
+#include "fit/diagnosis/search_context.h"
+#include "fit/diagnosis/worth.h"
+
+namespace clothfit {
+namespace {
+
+/// The model with these hypotheses identified from scratch, refined with the errors of its mesh.
+FittedModel from_scratch(const SearchContext& search, const std::vector<Hypothesis>& hypotheses) {
+  FittedModel model = identified_from_scratch(search.setup, hypotheses, search.progress);
+  if (model.usable()) refine_with_discretisation(model, search.setup, search.progress);
+  return model;
+}
+
+}  // namespace
+
+const Extended& best_of(const SearchContext& search, const std::vector<Extended>& extended) {
+  return *std::ranges::min_element(
+      extended, {}, [&](const Extended& child) { return search.left_by(child.model); });
+}
+
+bool leaves_good_part(const SearchContext& search, const Extended& extended,
+                      const FittedModel& without) {
+  return search.left_by(extended.model) >= kCriteria.good_part * search.left_by(without);
+}
+
+void converge(SearchContext& search, BeamEntry& entry) {
+  if (!entry.model.is_unrefined() || !entry.accepted.empty()) return;
+  FittedModel converged = entry.model;
+  refine_with_discretisation(converged, search.setup, search.progress);
+  entry.model.state = FitState::complete;
+  if (converged.usable()) search.stand_at(entry, std::move(converged));
+}
+
+void look_for_better_basin(const SearchContext& search, FittedModel& model) {
+  if (!model.usable() || sure_excess(model, search.threshold) == 0) return;
+  if (model.parts.size() > 1 && !search.is_far_off(model)) return;
+  FittedModel other = identified_from_scratch(search.setup, model.hypotheses, search.progress);
+  if (!other.usable() || other.chi_square(search.threshold) >= model.chi_square(search.threshold))
+    return;
+  refine_with_discretisation(other, search.setup, search.progress);
+  if (other.usable()) model = std::move(other);
+}
+
+void look_in_other_basins(const SearchContext& search, std::vector<Extended>& extended,
+                          const FittedModel& without) {
+  if (extended.empty()) return;
+  const Extended& best = best_of(search, extended);
+  if (!best.model.usable() || !search.is_far_off(best.model) ||
+      !leaves_good_part(search, best, without))
+    return;
+  double predicted = 0;
+  for (const Extended& child : extended) predicted = std::max(predicted, child.score->decrease);
+  for (Extended& child : extended) {
+    if (!child.model.usable() || child.score->decrease < kCriteria.from_scratch_of_best * predicted)
+      continue;
+    FittedModel other = from_scratch(search, child.model.hypotheses);
+    if (search.left_by(other) >= search.left_by(child.model)) continue;
+    child.model = std::move(other);
+    child.from_scratch = true;
+  }
+}
+
+FittedModel in_basin_of(const SearchContext& search, const Extended& best,
+                        const FittedModel& without) {
+  if (!best.model.usable() || !search.is_far_off(without)) return {};
+  const double taken = search.left_by(without) - search.left_by(best.model);
+  if (taken <= 0 || (!best.from_scratch && rise_without_last(best.model, search.threshold) > taken))
+    return {};
+  FittedModel there = with_hypotheses(search.setup, best.model, without.hypotheses, {});
+  refine_model(there, search.setup, {}, search.progress);
+  if (there.usable()) refine_with_discretisation(there, search.setup, search.progress);
+  // A fit that begins from scratch in the same basin gains a little, which is none of the
+  // hypothesis' doing.
+  const double enough = search.left_by(without) - kCriteria.other_basin * taken;
+  if (best.from_scratch || (search.left_by(there) < enough && search.is_far_off(there))) {
+    FittedModel other = from_scratch(search, without.hypotheses);
+    if (search.left_by(other) < search.left_by(there)) there = std::move(other);
+  }
+  if (search.left_by(there) >= enough) return {};
+  return there;
+}
+
+}  // namespace clothfit

@@ -1,0 +1,67 @@
+#include "fit/diagnosis/search_context.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "fit/cost/huber.h"
+#include "fit/diagnosis/beam.h"
+#include "fit/diagnosis/criteria.h"
+#include "fit/diagnosis/worth.h"
+#include "fit/jobs/stop_token.h"
+#include "fit/uncertainty/uncertainty.h"
+
+namespace clothfit {
+
+SearchContext::SearchContext(const DiagnosisSetup& analysed, const SearchOptions& asked,
+                             const ProgressCallback& reported)
+    : setup(analysed),
+      coarse(with_coarse_mesh(analysed)),
+      options(asked),
+      progress(stop_token(reported)),
+      threshold(asked.threshold) {}
+
+double SearchContext::left_by(const FittedModel& model) const {
+  return model.usable() ? model.chi_square(threshold) : std::numeric_limits<double>::infinity();
+}
+
+double SearchContext::cost(const FittedModel& model) const {
+  return model.chi_square(threshold) + price_of_amplitudes(model);
+}
+
+double SearchContext::worth(const FittedModel& model) const {
+  return worth_naming(model, threshold, base_chi_square - model.chi_square(threshold));
+}
+
+bool SearchContext::is_far_off(const FittedModel& model) const {
+  return left_by(model) > kCriteria.far_off * static_cast<double>(model.residual_count());
+}
+
+std::vector<ShapeCandidates> SearchContext::untested(const FittedModel& model) const {
+  const NamedValues values = model.values().front();
+  std::vector<ShapeCandidates> result;
+  for (const ShapeCandidates& shapes : options.hypotheses)
+    if (std::ranges::none_of(model.hypotheses,
+                             [&](const Hypothesis& own) { return own.same_mode(shapes.front()); }))
+      result.push_back(at_shapes_of(model.hypotheses, values, shapes));
+  return result;
+}
+
+void SearchContext::begin_at(BeamEntry& entry) {
+  base_chi_square = entry.model.chi_square(threshold);
+  base_cost = entry.cost = cost(entry.model);
+}
+
+void SearchContext::stand_at(BeamEntry& entry, FittedModel there) {
+  entry.model = std::move(there);
+  entry.last.clear();
+  if (entry.accepted.empty()) {
+    base = entry.model;
+    if (std::isfinite(threshold)) threshold = kHuberScales * robust_scale(entry.model.residual());
+    begin_at(entry);
+  }
+  entry.cost = cost(entry.model);
+}
+
+}  // namespace clothfit

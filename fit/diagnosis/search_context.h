@@ -1,0 +1,57 @@
+#pragma once
+
+#include <vector>
+
+#include "fit/diagnosis/catalogue.h"
+#include "fit/diagnosis/fitted_model.h"
+
+namespace clothfit {
+
+struct BeamEntry;
+
+struct SearchOptions {
+  std::vector<ShapeCandidates> hypotheses;  ///< to test
+  int beam_width = 3;                       ///< entries that are followed side by side
+  int refits = 6;                           ///< hypotheses of each entry that are fitted at a time
+  size_t most_effects = 4;
+  /// Residuals beyond it count less (Huber), in sigmas; infinite for squares.
+  double threshold = 1e300;
+};
+
+/// What the steps of one search share.
+struct SearchContext {
+  SearchContext(const DiagnosisSetup& analysed, const SearchOptions& asked,
+                const ProgressCallback& reported);
+  SearchContext(const SearchContext&) = delete;
+  SearchContext& operator=(const SearchContext&) = delete;
+
+  const DiagnosisSetup& setup;
+  const DiagnosisSetup coarse;  ///< a mesh of half the cells a side, where there is one
+  const SearchOptions& options;
+  const ProgressCallback progress;
+  double threshold;  ///< SearchOptions::threshold, in the basin where the base stands
+  /// Chi-square and cost of the model that has found nothing.
+  double base_chi_square = 0, base_cost = 0;
+  /// That model, where it was refined or changed its basin; else not run.
+  FittedModel base;
+
+  /// Chi-square; infinite of a model that is not usable.
+  double left_by(const FittedModel& model) const;
+  /// Chi-square and the price of a model's amplitudes.
+  double cost(const FittedModel& model) const;
+  /// The decrease from which a hypothesis more is worth a name beside a model.
+  double worth(const FittedModel& model) const;
+  /// Whether it leaves so much that its basin may be the wrong one, and that sigmas are those of
+  /// all it lacks.
+  bool is_far_off(const FittedModel& model) const;
+  /// Hypotheses that a model does not have, at the shapes that it has for their effects.
+  std::vector<ShapeCandidates> untested(const FittedModel& model) const;
+
+  /// Takes an entry that has found nothing for the base of all others.
+  void begin_at(BeamEntry& entry);
+  /// Moves an entry to another model of the same hypotheses. What was scored where it stood says
+  /// nothing of it there.
+  void stand_at(BeamEntry& entry, FittedModel there);
+};
+
+}  // namespace clothfit

@@ -1,0 +1,151 @@
+#include "fit/diagnosis/trial.h"
+
+#include <algorithm>
+#include <functional>
+
+#include "fit/diagnosis/adequacy.h"
+#include "fit/diagnosis/clearance.h"
+#include "fit/diagnosis/criteria.h"
+#include "fit/diagnosis/search_context.h"
+#include "fit/diagnosis/worth.h"
+
+namespace clothfit {
+namespace {
+
+class Asked {
+ public:
+  Asked(const SearchContext& search, const Compared& models) : search_(search), models_(models) {
+    trial_.hypothesis = models.score.hypothesis;
+    trial_.predicted_decrease = models.score.decrease;
+  }
+
+  Trial run() {
+    if (!ask({"fitted", Trial::kNotAsked, Trial::kNotAsked, models_.with.usable(),
+              "others leave far less, or no fit worked out"}))
+      return trial_;
+    trial_.hypothesis = models_.with.hypotheses.back();
+    trial_.decrease =
+        models_.without.chi_square(search_.threshold) - models_.with.chi_square(search_.threshold);
+    if (!ask(keeps_its_promise()) || !ask(is_worth_a_name())) return trial_;
+
+    measure_left_out();
+    if (!ask(predicts_better()) || !ask(is_clear_of_neutral()) || !ask(beats_free_forces()))
+      return trial_;
+    if (!ask(beats_corrections())) trial_.on_credit = takes_good_part();
+    return trial_;
+  }
+
+ private:
+  bool ask(Criterion criterion) {
+    trial_.criteria.push_back(std::move(criterion));
+    return trial_.criteria.back().passed;
+  }
+
+  Criterion keeps_its_promise() const {
+    const double least =
+        std::max(least_decrease(models_.score.amplitude.size()),
+                 models_.scored_elsewhere ? 0 : kCriteria.predicted_share * models_.score.decrease);
+    return {"decrease", trial_.decrease, least, !(trial_.decrease < least),
+            "the fit gains less than half of what was foreseen"};
+  }
+
+  Criterion is_worth_a_name() const {
+    const double worth = search_.worth(models_.without);
+    return {"worth_naming", trial_.decrease, worth, !(trial_.decrease < worth),
+            "it takes too little of what is above the noise"};
+  }
+
+  void measure_left_out() {
+    left_out_ = left_out_of(search_, models_.with);
+    trial_.cross_validated = left_out_.mean;
+    trial_.without_it = models_.without_left_out.mean;
+    trial_.best_trivial =
+        std::min(without_physics(models_.without_left_out), models_.without_left_out.free_forces);
+    trial_.clear_of_neutral = clear_of_neutral(
+        models_.with, judge_adequacy(models_.with, search_.setup.options.loss), search_.threshold);
+  }
+
+  Criterion predicts_better() const {
+    return {"left_out", left_out_.mean, models_.without_left_out.mean,
+            left_out_.usable && left_out_.mean < models_.without_left_out.mean,
+            "frames that were left out are predicted no better"};
+  }
+
+  Criterion is_clear_of_neutral() const {
+    const double clear = trial_.clear_of_neutral;
+    return {"clear_of_neutral", clear, kCriteria.clear_of_neutral,
+            !(clear < kCriteria.clear_of_neutral) ||
+                (clear > 0 && takes_good_part() && is_sure_by_blocks()),
+            "not clear of its neutral value"};
+  }
+
+  Criterion beats_free_forces() const {
+    const double forces = models_.without_left_out.free_forces;
+    return {"free_forces", left_out_.mean, forces, left_out_.mean < forces || helps_free_forces(),
+            "free forces do as well, and no better beside it"};
+  }
+
+  Criterion beats_corrections() const {
+    const double trivial = without_physics(models_.without_left_out);
+    return {"corrections", left_out_.mean, trivial, left_out_.mean < trivial,
+            "a correction without physics does as well"};
+  }
+
+  /// Whether it takes much of what the model leaves of blocks left out, above the noise.
+  bool takes_good_part() const {
+    const double without = models_.without_left_out.mean;
+    return without - left_out_.mean > kCriteria.good_part * (without - 1);
+  }
+
+  /// Sigmas say little where a model is far off, for they are those of all that it lacks. A
+  /// hypothesis that predicts no block left out worse is sure without them.
+  bool is_sure_by_blocks() const {
+    const auto count = static_cast<double>(models_.without.residual_count());
+    return models_.without.chi_square(search_.threshold) > kCriteria.far_off * count &&
+           models_.without_left_out.mean > kCriteria.far_off &&
+           left_out_.block.size() >= static_cast<size_t>(kCriteria.time_blocks) &&
+           std::ranges::equal(left_out_.block, models_.without_left_out.block, std::less_equal<>());
+  }
+
+  /// Whether it takes something from what free forces leave. These take much of all that is
+  /// missing, and each of several causes alone leaves more than they do.
+  bool helps_free_forces() const {
+    const double without = models_.without_left_out.free_forces;
+    const double gain = without - left_out_of(search_, models_.with, &search_.coarse).free_forces;
+    return gain > kCriteria.free_forces_gain * std::max(0.0, without - 1);
+  }
+
+  const SearchContext& search_;
+  const Compared& models_;
+  Trial trial_;
+  CrossValidation left_out_;
+};
+
+}  // namespace
+
+bool Trial::passed() const {
+  return std::ranges::all_of(criteria, &Criterion::passed);
+}
+
+std::string Trial::refusal() const {
+  const auto failed = std::ranges::find(criteria, false, &Criterion::passed);
+  return failed == criteria.end() ? "" : failed->refusal;
+}
+
+Trial try_hypothesis(const SearchContext& search, const Compared& models) {
+  return Asked(search, models).run();
+}
+
+CrossValidation left_out_of(const SearchContext& search, const FittedModel& model,
+                            const DiagnosisSetup* forces_mesh) {
+  // A recording left out says most where there are enough others.
+  const bool whole = static_cast<double>(model.parts.size()) >= kCriteria.whole_recordings;
+  return cross_validate(search.setup, model, static_cast<int>(kCriteria.time_blocks),
+                        search.threshold, whole, forces_mesh);
+}
+
+double without_physics(const CrossValidation& of) {
+  return std::min(of.constant_offset, of.last_residual);
+}
+
+}  // namespace clothfit

@@ -1,0 +1,69 @@
+#pragma once
+
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "fit/diagnosis/cross_validation.h"
+#include "fit/diagnosis/fitted_model.h"
+#include "fit/diagnosis/score.h"
+
+namespace clothfit {
+
+struct SearchContext;
+
+/// One thing that was asked of a hypothesis.
+struct Criterion {
+  std::string name;
+  double measured = 0, threshold = 0;  ///< NaN where it is no number
+  bool passed = false;
+  std::string refusal;  ///< what is said where it did not pass
+};
+
+/// What is said of a hypothesis with which a model was fitted again; NaN where it was refused
+/// before that was asked.
+struct Trial {
+  static constexpr double kNotAsked = std::numeric_limits<double>::quiet_NaN();
+  Hypothesis hypothesis;
+  double predicted_decrease = 0;                               ///< of chi-square, by the score
+  double decrease = kNotAsked;                                 ///< by the fit
+  double cross_validated = kNotAsked, without_it = kNotAsked;  ///< chi-square per one left out
+  double best_trivial = kNotAsked;      ///< the same of the model without it, corrected
+  double clear_of_neutral = kNotAsked;  ///< standard deviations, clustered
+  std::vector<Criterion> criteria;      ///< in the order in which they were asked
+  /// Corrections without physics did as well as it alone. It is followed all the same, for what it
+  /// does together with hypotheses accepted after it, with which it must beat them.
+  bool on_credit = false;
+
+  bool passed() const;          ///< every criterion
+  std::string refusal() const;  ///< of the criterion that it did not pass; else empty
+};
+
+/// One effect that was accepted, with what speaks for it.
+struct AcceptedEffect {
+  Trial trial;
+  std::vector<Hypothesis> alike;  ///< hypotheses that these recordings cannot tell from it
+  std::vector<Trial> refused;     ///< others that were fitted in its place
+};
+
+/// A model without a hypothesis, and with it.
+struct Compared {
+  const FittedModel& without;
+  const CrossValidation& without_left_out;  ///< with free forces
+  const Score& score;
+  const FittedModel& with;
+  /// The score is that of another basin or mesh than the one where the model without it stands.
+  bool scored_elsewhere = false;
+};
+
+/// Asks one criterion after the other, the cheap ones first, until one is not passed.
+Trial try_hypothesis(const SearchContext& search, const Compared& models);
+
+/// Blocks left out of a model. `forces_mesh`: of free forces, where these are asked for.
+CrossValidation left_out_of(const SearchContext& search, const FittedModel& model,
+                            const DiagnosisSetup* forces_mesh = nullptr);
+
+/// Chi-square per number left out of a model that is corrected without physics.
+double without_physics(const CrossValidation& of);
+
+}  // namespace clothfit

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+namespace clothfit {
+
+/// An effect that a model has beyond what its recording declares, by one of its modes.
+struct Hypothesis {
+  std::string effect;
+  std::string mode;                     ///< empty where the effect has but one
+  std::vector<std::string> amplitudes;  ///< parameters that are fitted
+  std::map<std::string, double> shape;  ///< parameters that say how; others are neutral
+  /// Standard deviations of the shape's prior, from the spacing of its grid.
+  std::map<std::string, double> shape_sigma;
+  bool fits_shape = false;  ///< whether the shape is fitted too
+
+  std::string title() const;  ///< "nonuniform_mass (hem)"
+  /// Names of the amplitudes in the space of a fit, EFFECT.PARAMETER.
+  std::vector<std::string> parameters() const;
+  bool same_mode(const Hypothesis& other) const {
+    return effect == other.effect && mode == other.mode;
+  }
+};
+
+/// "wind (pressure) + gravity_tilt"; "base" for none.
+std::string title(const std::vector<Hypothesis>& hypotheses);
+
+/// Whether two hypotheses are of one effect and share a number of their shapes.
+bool share_shape(const Hypothesis& one, const Hypothesis& other);
+
+}  // namespace clothfit
