@@ -5,8 +5,8 @@
 
 namespace clothfit {
 
-/// Symmetric equations of a chain of blocks, each coupled to the next and all to a border: the
-/// normal equations of shooting, whose windows are the chain and whose parameters the border.
+/// Symmetric equations of a chain of blocks, each coupled to the next and all to a border. They are
+/// the normal equations of shooting, whose windows are the chain and whose parameters the border.
 ///
 ///   [ D0  N0           E0 ] [ x0 ]   [ b0 ]
 ///   [ N0' D1  N1       E1 ] [ x1 ]   [ b1 ]
@@ -28,9 +28,9 @@ struct BorderedChainSolution {
   Eigen::VectorXd border;               ///< y
 };
 
-/// Eliminates block after block, then solves the reduced equations of the border: the work grows
-/// with the number of blocks, not with its cube. The matrix must be positive definite; where it is
-/// not, the solution is not to be used (it may not be finite).
+/// Eliminates block after block, then solves the reduced equations of the border. The work grows
+/// with the number of blocks, not with its cube. The matrix must be positive definite. Where it is
+/// not, the solution may not be finite and is not to be used.
 BorderedChainSolution solve(BorderedChain chain);
 
 }  // namespace clothfit

@@ -9,14 +9,14 @@ namespace clothfit {
 /// Huber's threshold in units of the residuals' robust scale.
 inline constexpr double kHuberScales = 3;
 
-/// 1.4826 times the median absolute value, at least 1: the size of whitened residuals.
+/// Returns the size of whitened residuals: 1.4826 times the median absolute value, at least 1.
 double robust_scale(const Eigen::VectorXd& residual);
 
-/// Huber's weights of residuals beyond `threshold`, by the length of their observation's.
+/// Returns Huber's weights of residuals beyond `threshold`, by their observation's length.
 Eigen::VectorXd huber_weights(const Objective& objective, const Eigen::VectorXd& residual,
                               double threshold);
 
-/// Half of Huber's sum of squares, observation by observation.
+/// Returns half of Huber's sum of squares, observation by observation.
 double huber_cost(const Objective& objective, const Eigen::VectorXd& residual, double threshold);
 
 }  // namespace clothfit

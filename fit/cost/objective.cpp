@@ -43,7 +43,7 @@ Linearisation Objective::linearise(const Eigen::VectorXd& values, Derivatives de
     add_point(p, step);
     if (central) add_point(p, -step);
   }
-  // One whose time step would not be stable spoils all; the others need not run then.
+  // One run whose time step would not be stable spoils all; the others need not run then.
   for (const Eigen::VectorXd& point : points)
     if (!is_stable(point)) return result;
   std::vector<Eigen::VectorXd> residuals_of = residuals(points);
@@ -160,7 +160,7 @@ Linearisation TrajectoryObjective::linearise_by(const Eigen::VectorXd& values,
   if (!is_stable(values)) return result;
   const FitProblem& of = problem();
   ParameterSet set = parameter_set(of, values);
-  // How the cloth is looked at changes no run.
+  // The view of the cloth changes no run.
   std::vector<int> simulated;
   for (const int p : coordinates)
     if (of.space.parameters[static_cast<size_t>(p)].role != ParameterRole::measurement)

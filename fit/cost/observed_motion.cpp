@@ -7,7 +7,7 @@ namespace clothfit {
 double observed_motion(const Objective& objective) {
   double sum = 0;
   int count = 0;
-  std::map<std::pair<int, int>, Eigen::Vector3d> first;  // of each set's markers
+  std::map<std::pair<int, int>, Eigen::Vector3d> first;  // for each set and marker
   for (const Objective::Block& block : objective.blocks()) {
     if (block.set < 0) continue;
     const Observation& row = objective.problem()

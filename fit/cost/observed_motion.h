@@ -4,13 +4,14 @@
 
 namespace clothfit {
 
-/// Mean distance, in sigmas, of the objective's observations from the first of their marker in
-/// their set: what a cloth that stands still would leave, about. 0 for blocks that are no
-/// observations.
+/// Returns the mean distance, in sigmas, of the observations from the first of their marker in
+/// their set. About as much is the residual of a cloth that stands still. Blocks that are no
+/// observations are left out; without others the result is 0.
 double observed_motion(const Objective& objective);
 
-/// An Objective::mean_length below which a model follows the cloth: a twentieth of the observed
-/// motion. Whatever local refinement needs from a search is there then: the right basin.
+/// Returns an Objective::mean_length below which a model follows the cloth. It is a twentieth of
+/// the observed motion. Such a model is in the right basin, which is all that local refinement
+/// needs from a search.
 double cost_of_following(const Objective& objective);
 
 }  // namespace clothfit

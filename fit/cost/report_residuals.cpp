@@ -8,7 +8,7 @@
 namespace clothfit {
 namespace {
 
-/// Root mean squares of residuals as they come.
+/// Accumulates root mean squares of residuals.
 struct Accumulator {
   double sum = 0;
   int points = 0;
@@ -26,8 +26,8 @@ struct Accumulator {
   }
 };
 
-/// Where the observer of a set sees the held points in every frame: as they are driven, or, when
-/// they do not move, where the placed sheet has them.
+/// Returns where the observer of a set sees the held points in every frame. Points that move are
+/// seen as driven, others where the placed sheet has them.
 std::vector<Eigen::MatrixXd> held_tracks(const FitProblem& problem, const ObservationSet& set) {
   std::vector<Eigen::MatrixXd> tracks;
   for (const HeldVertexWeights& held : problem.cloth.held) {
@@ -49,7 +49,7 @@ std::vector<Eigen::MatrixXd> held_tracks(const FitProblem& problem, const Observ
   return tracks;
 }
 
-/// A cloth that nothing holds does not move rigidly with anything: it stays.
+/// Returns the mean displacement of the held points; a cloth that nothing holds stays.
 Eigen::MatrixXd held_displacement(const FitProblem& problem, const ObservationSet& set) {
   if (problem.cloth.held.empty()) return Eigen::MatrixXd::Zero(set.dimension, problem.frames());
   return mean_displacement(held_tracks(problem, set));
@@ -87,7 +87,7 @@ void fill_residuals(const FitProblem& problem, const Predictor& predictor, const
     std::vector<Accumulator> by_frame(frames);
     for (const Observation& row : set.rows) {
       const auto predicted = predictor.predict(static_cast<int>(s), row, run);
-      if (!predicted) continue;  // the model moved it behind the camera: no pixel to compare
+      if (!predicted) continue;  // the point is behind the camera: no pixel to compare
       const bool is_held_out = row.frame >= problem.first_held_out;
       const Eigen::VectorXd difference = (*predicted - row.observed).head(set.dimension);
       (is_held_out ? held_out : fitted).add(difference);

@@ -5,8 +5,8 @@
 
 namespace clothfit {
 
-/// What the model leaves of the observations, beside what the trivial predictors leave: fills
-/// `report.residuals` and `report.result.errors`. `run` is the free run over all frames.
+/// Fills `report.residuals` and `report.result.errors` with the errors of the model and of the
+/// trivial predictors. `run` is the free run over all frames.
 void fill_residuals(const FitProblem& problem, const Predictor& predictor, const MarkerRun& run,
                     FitReport& report);
 

@@ -19,7 +19,7 @@
 namespace clothfit {
 namespace {
 
-/// Held points x vertices.
+/// Returns the held points' weights: held points x vertices.
 Eigen::MatrixXd held_weights(const Cloth& cloth) {
   Eigen::MatrixXd weights = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(cloth.held.size()),
                                                   cloth.mesh.vertex_count());
@@ -29,7 +29,7 @@ Eigen::MatrixXd held_weights(const Cloth& cloth) {
   return weights;
 }
 
-/// Vertices x held points: as HeldPlacement moves them.
+/// Returns the vertices' moves as HeldPlacement makes them: vertices x held points.
 Eigen::MatrixXd held_move(const Cloth& cloth, const Eigen::MatrixXd& weights) {
   const HeldPlacement<SingleLane> placement(cloth);
   Eigen::MatrixXd move = Eigen::MatrixXd::Zero(weights.cols(), weights.rows());
@@ -44,14 +44,14 @@ Eigen::MatrixXd held_move(const Cloth& cloth, const Eigen::MatrixXd& weights) {
 struct ShootingObjective::Model {
   ParameterSet set;
   std::vector<Direction> along;  ///< empty where no derivatives were asked for
-  /// Of windows but the first: fixed points are held where the recording begins, not where the
-  /// window does.
+  /// The cloth of all windows but the first. Fixed points are held where the recording begins, not
+  /// where the window does.
   Cloth cloth_of_later;
-  Eigen::Matrix3Xd fixed_place_m;                     ///< 3 x held points; of moving ones unused
+  Eigen::Matrix3Xd fixed_place_m;                     ///< 3 x held points; unused for moving ones
   std::vector<Eigen::Matrix3Xd> fixed_place_along_m;  ///< [direction]
 };
 
-/// What a run over one window gives.
+/// The result of a run over one window.
 struct ShootingObjective::Window {
   Eigen::VectorXd residual;      ///< observations, then the gap to the next window
   Eigen::MatrixXd by_parameter;  ///< residuals x coordinates of the space
@@ -461,7 +461,7 @@ ShootingObjective::Equations ShootingObjective::equations(const Eigen::VectorXd&
     chain.diagonal.push_back(by_state.transpose() * by_state);
     chain.to_border.push_back(by_state.transpose() * by_parameter);
     chain.right.push_back(-by_state.transpose() * window.residual);
-    if (w > 0) {  // the gap of the window before falls with this one's state
+    if (w > 0) {  // the gap of the window before depends on this one's state too
       const Window& before = *windows[w - 1];
       const Eigen::Index size = state_size();
       chain.diagonal[w].diagonal() += weights.cwiseAbs2();

@@ -10,43 +10,43 @@
 
 namespace clothfit {
 
-/// The windows that the fitted frames are cut into, with a first guess of the state that each
-/// begins with. The first window begins as the recording does, so that its guess is empty. Shapes:
-/// 3 x vertices, world (m, m/s).
+/// The windows of the fitted frames, with a first guess of the state at the start of each. The
+/// first window begins as the recording does, so its guess is empty. Shapes: 3 x vertices, world
+/// (m, m/s).
 struct ShootingWindows {
-  std::vector<int> first_frame;  ///< of each window, rising from 0
+  std::vector<int> first_frame;  ///< one for each window, rising from 0
   std::vector<Eigen::Matrix3Xd> position_m, velocity_m_per_s;
-  int nodes =
-      4;  ///< per side of the cloth, of the corrections of a state; 2 to the mesh's vertices
+  int nodes = 4;  ///< a side of the cloth, for the corrections of a state; 2 to the mesh's vertices
   int count() const { return static_cast<int>(first_frame.size()); }
 };
 
-/// How closely a window must begin where the one before it ends: standard deviations at a node.
+/// Standard deviations, at a node, of the gap between a window's end and the next one's beginning.
 struct Continuity {
   double position_m = 0;        ///< > 0
   double velocity_m_per_s = 0;  ///< > 0
 };
 
-/// The shooting cost: what free runs over short windows leave of the observations in the first
-/// `frames` frames, each coordinate divided by its sigma, and the gaps between the end of a window
-/// and the beginning of the next. Every window but the first begins with a state of its own,
+/// The shooting cost: residuals of free runs over short windows, and the gaps between windows. The
+/// residuals are those of the first `frames` frames, each coordinate divided by its sigma. A gap
+/// lies between the end of a window and the beginning of the next. Every window but the first
+/// begins with a state of its own,
 ///
 ///   P(v) = guess + sum_k B(v, k) p_k,   V(v) = guess + sum_k B(v, k) w_k,
 ///
 /// B the smooth fields of fit/observe/node_weights.h, held points put where they belong. A gap is
-/// what of (end - guess) lies in those fields less (p, w): finer differences are not seen, and it
-/// is for the guess to have them. With as many nodes as vertices nothing is finer, and the cost
-/// tends to the trajectory's as the continuity's sigma goes to 0; with one window it is that.
+/// the part of (end - guess) in those fields less (p, w). Finer differences are not seen; the guess
+/// has to contain them. With as many nodes as vertices nothing is finer, and the cost tends to the
+/// trajectory's as the continuity's sigma goes to 0. With one window it is the trajectory's.
 ///
-/// Short windows cannot lose the cloth however wrong the parameters are, so that the cost has wide
-/// basins: what makes multiple shooting converge from afar [bock1983].
+/// Short windows cannot lose the cloth however wrong the parameters are. The cost therefore has
+/// wide basins, and multiple shooting converges from afar [bock1983].
 ///
-/// As an Objective its window states are those of `corrections`, and derivatives are by the
-/// parameters alone; `equations` has both. Constant offsets of markers are not taken out. Windows
-/// but the first begin with effects that remember nothing, and with supports that no effect shifts.
+/// As an Objective it takes the window states of `corrections`, and derivatives are by the
+/// parameters alone; `equations` has both. Constant offsets of markers are not removed. Windows but
+/// the first begin with effects that remember nothing, and with supports that no effect shifts.
 class ShootingObjective final : public Objective {
  public:
-  /// Of each window but the first, 6 numbers for each node k and axis c: p at 3 k + c (m), then w
+  /// For each window but the first, 6 numbers for each node k and axis c: p at 3 k + c (m), then w
   /// at 3 nodes^2 + 3 k + c (m/s). The first window's are empty.
   using Corrections = std::vector<Eigen::VectorXd>;
 
@@ -66,28 +66,30 @@ class ShootingObjective final : public Objective {
   using Objective::linearise;
   Linearisation linearise(const Eigen::VectorXd& values) const override;
 
-  /// Residuals for one parameter vector and other window states; empty as those above.
+  /// Returns residuals for one parameter vector and other window states; empty as those above.
   Eigen::VectorXd residual(const Eigen::VectorXd& values, const Corrections& corrections) const;
 
-  /// Half the sum of squares of the residuals, observations under Huber's loss beyond
-  /// `huber_threshold` (infinite: none), without priors. Infinite for no residuals.
+  /// Returns half the sum of squares of the residuals, without priors. Observations beyond
+  /// `huber_threshold` (infinite: none) are under Huber's loss. The cost is infinite for no
+  /// residuals.
   double cost(const Eigen::VectorXd& residual, double huber_threshold) const;
 
-  /// The cost to second order, as Gauss and Newton have it, by the space's coordinates (the border)
-  /// and the windows' corrections (the chain; the first block is empty). `right` is the negative
-  /// gradient. One linearisation for each window, side by side. Priors of the problem are in it.
+  /// The cost to second order (Gauss and Newton). Its unknowns are the space's coordinates (the
+  /// border) and the windows' corrections (the chain, whose first block is empty). `right` is the
+  /// negative gradient. There is one linearisation for each window, side by side. Priors of the
+  /// problem are in it.
   struct Equations {
     bool usable = false;
-    int runs = 0;  ///< of the length of all windows together
+    int runs = 0;  ///< each as long as all windows together
     double cost = 0;
     Eigen::VectorXd residual;
     BorderedChain chain;
   };
   Equations equations(const Eigen::VectorXd& values, double huber_threshold) const;
 
-  /// The same windows with the guesses of the corrected states, and what of these is finer than the
-  /// nodes taken from the ends of the windows before; corrections that keep what the nodes see.
-  /// None where the windows cannot be run.
+  /// Returns the same windows with the corrected states as guesses. Detail finer than the nodes is
+  /// taken from the ends of the windows before; corrections keep the part that the nodes see.
+  /// Returns nothing where the windows cannot be run.
   std::optional<ShootingWindows> recentred(const Eigen::VectorXd& values) const;
 
  private:
@@ -95,7 +97,7 @@ class ShootingObjective final : public Objective {
   struct Window;
   Model model_at(const Eigen::VectorXd& values, bool derivatives) const;
   Schedule schedule_of(int window) const;
-  /// The model with the state that the window begins with. \return Derivatives by the state's own
+  /// Adds the state at the start of the window to the model. \return Derivatives by the state's own
   /// coordinates where the model has those by the parameters.
   std::vector<Direction> begin(int window, const Eigen::VectorXd& correction, Model& model) const;
   std::optional<Window> run(int window, Model model, const Corrections& corrections) const;
@@ -106,14 +108,14 @@ class ShootingObjective final : public Objective {
                                                    bool by_states) const;
   Eigen::VectorXd seen_by_nodes(const Eigen::Matrix3Xd& position_m,
                                 const Eigen::Matrix3Xd& velocity_m_per_s) const;
-  /// What lies at each coordinate of a state, over the continuity's sigma.
+  /// Returns the weight of each coordinate of a state: one over the continuity's sigma.
   Eigen::VectorXd continuity_weights() const;
   int rows(int window) const {
     const auto w = static_cast<size_t>(window);
     return first_row_[w + 1] - first_row_[w];
   }
   bool is_last(int window) const { return window + 1 == windows_.count(); }
-  /// Of a window, where its gap to the next begins in its residuals.
+  /// Returns where a window's gap to the next begins in its residuals.
   int gap_row(int window) const { return rows(window) - (is_last(window) ? 0 : state_size()); }
 
   int frames_;

@@ -11,7 +11,7 @@
 namespace clothfit {
 namespace {
 
-constexpr int kStateNumbers = 6;  ///< of a vertex: position, velocity
+constexpr int kStateNumbers = 6;  ///< for a vertex: position, velocity
 
 Schedule schedule_of(const RecordedStates& states, int transition, double time_step_s) {
   const auto n = static_cast<size_t>(transition);
@@ -20,7 +20,7 @@ Schedule schedule_of(const RecordedStates& states, int transition, double time_s
           .velocities = true};
 }
 
-/// Column v: position and dt times velocity of vertex v, in units.
+/// Column v holds position and dt times velocity of vertex v, in units.
 Eigen::Matrix<double, kStateNumbers, Eigen::Dynamic> stacked(const Eigen::Matrix3Xd& position_m,
                                                              const Eigen::Matrix3Xd& velocity,
                                                              double dt_s, double unit_m) {
@@ -82,7 +82,7 @@ double StateObjective::spring_steps_per_run() const {
 
 ParameterSet StateObjective::between_states(const Eigen::VectorXd& values) const {
   ParameterSet set = parameter_set(problem(), values);
-  // The recorded states have held points where the tracks drive them.
+  // The recorded states have held points at their driven places.
   set.held_shift.clear();
   return set;
 }

@@ -7,31 +7,30 @@
 
 namespace clothfit {
 
-/// What a cloth did, known whole: positions and velocities of every vertex at successive times, 3 x
-/// vertices each (world, m, m/s).
+/// Positions and velocities of every vertex at successive times, 3 x vertices each (world, m, m/s).
 struct RecordedStates {
   std::vector<double> time_s;
   std::vector<Eigen::Matrix3Xd> position_m, velocity_m_per_s;
   int last() const { return static_cast<int>(time_s.size()) - 1; }
 };
 
-/// Every state of a run, `duration_s` long, with a state at each of its equal time steps.
+/// Returns every state of a run of `duration_s`, with a state at each of its equal time steps.
 RecordedStates simulate_states(const Cloth& cloth, const ParameterSet& parameters,
                                double time_step_s, double duration_s);
 
-/// The transitions of the founding paper's cost functions [louchet1995, section 3.2]: state n is
-/// predicted from state n - 1.
+/// Return the transitions of the founding paper's cost functions [louchet1995, section 3.2]. State
+/// n is predicted from state n - 1.
 std::vector<int> full_cost_transitions(const RecordedStates& states);   ///< 1, 2, ... last
 std::vector<int> small_cost_transitions(const RecordedStates& states);  ///< the last alone
 
-/// The founding paper's cost [louchet1995, section 3.2]: what the model predicts from each recorded
-/// state for the next, so that prediction and record cannot drift apart,
+/// The founding paper's cost [louchet1995, section 3.2]. The model predicts each state from the
+/// recorded one before, so that prediction and record cannot drift apart:
 ///
 ///   sum over transitions and vertices of |p_p - p_r|^2 + dt^2 |v_p - v_r|^2
 ///
-/// with the interval between the two states for dt, which the paper leaves open ("of the same order
-/// of magnitude as the time step"). Residuals are those six differences of each vertex, in
-/// `unit_m`. Intervals are cut into equal time steps of at most `time_step_s`.
+/// dt is the interval between the two states. The paper leaves it open ("of the same order of
+/// magnitude as the time step"). Residuals are those six differences of each vertex, in `unit_m`.
+/// Intervals are cut into equal time steps of at most `time_step_s`.
 class StateObjective final : public Objective {
  public:
   /// `problem` gives parameters, mesh, gravity, effects and held points; its observations and its

@@ -19,7 +19,7 @@ struct FollowedPoint {
   Eigen::Matrix3Xd position_m, velocity_m_per_s;  ///< 3 x frames, where known
 };
 
-/// Of a track, where it is known well: between the ends of the spline and across short gaps.
+/// Says where a track is known well: between the ends of the spline and across short gaps.
 std::vector<bool> known_frames(const std::vector<int>& seen, int frames,
                                const TrackStatesOptions& options) {
   std::vector<bool> known(static_cast<size_t>(frames), false);
@@ -32,7 +32,7 @@ std::vector<bool> known_frames(const std::vector<int>& seen, int frames,
   return known;
 }
 
-/// The driven points, as long as their cloth has them.
+/// Returns the driven points, as long as their cloth has them.
 std::vector<FollowedPoint> driven_points(const FitProblem& problem, int frames) {
   constexpr double kDifference = 1e-4;  // s; a drive bends over frames
   const Eigen::Matrix2Xd vertex_m = flat_positions(problem.cloth.mesh).topRows<2>();
@@ -56,8 +56,9 @@ std::vector<FollowedPoint> driven_points(const FitProblem& problem, int frames) 
   return points;
 }
 
-/// A track without noise has no scale by which to tell an outlier, and motion itself stands out:
-/// samples that a smooth path through all of them follows as closely as the rest are none.
+/// Fits a smoothing spline, robustly where samples are outliers. A track without noise has no scale
+/// by which to tell an outlier, and motion itself stands out. Samples that a smooth path through
+/// all of them follows as closely as the rest are no outliers.
 SmoothingSpline smooth_path(const std::vector<double>& time_s, const Eigen::MatrixXd& samples) {
   constexpr double kAsClosely = 9;  // times the noise: sharp turns, sampled 60 times a second
   SmoothingSpline path = fit_smoothing_spline(time_s, samples);
@@ -71,11 +72,11 @@ SmoothingSpline smooth_path(const std::vector<double>& time_s, const Eigen::Matr
   return through_all;
 }
 
-/// The markers, smoothed. Adds the squares of the splines' sigma to `squared_sigma`.
+/// Returns the smoothed markers. Adds the squares of the splines' sigma to `squared_sigma`.
 std::vector<FollowedPoint> smoothed_markers(const FitProblem& problem, int frames,
                                             const TrackStatesOptions& options,
                                             std::vector<double>& squared_sigma) {
-  constexpr size_t kFewest = 8;  // samples that a spline can look for outliers among
+  constexpr size_t kFewest = 8;  // samples among which a spline can find outliers
   const auto marker_count = static_cast<int>(problem.marker_place_m.cols());
   const std::vector<Eigen::MatrixXd> tracks =
       marker_tracks(problem.observations.front(), marker_count, problem.frames());
@@ -108,7 +109,7 @@ std::vector<FollowedPoint> smoothed_markers(const FitProblem& problem, int frame
   return points;
 }
 
-/// Second differences of nodes x nodes values along both ways of the cloth.
+/// Returns second differences of nodes x nodes values along both ways of the cloth.
 Eigen::MatrixXd bends(int nodes) {
   std::vector<Eigen::RowVectorXd> rows;
   const auto add = [&](int at, int stride) {
@@ -127,9 +128,9 @@ Eigen::MatrixXd bends(int nodes) {
   return result;
 }
 
-/// Vertices x points: the values at the vertices of the smooth field through values at points.
+/// Maps values at points to the smooth field's values at the vertices: vertices x points.
 Eigen::MatrixXd field_through(const Mesh& mesh, const Eigen::Matrix2Xd& place_m, int nodes) {
-  // So little that it only speaks where no marker does: a thousandth of the noise.
+  // A thousandth of the noise, so little that it matters only where no marker is.
   constexpr double kStiffness = 1e-6;
   const Eigen::MatrixXd at_points = node_weights(mesh, nodes, place_m);
   const Eigen::MatrixXd bending = bends(nodes);
@@ -206,7 +207,7 @@ std::unique_ptr<StateObjective> state_objective_of_tracks(const FitProblem& prob
                                                           const TrackStates& tracks, bool full,
                                                           const TimeSteps& steps) {
   constexpr double kFewestSteps = 10;
-  constexpr double kLeastSigmaM = 1e-6;  // of tracks without noise
+  constexpr double kLeastSigmaM = 1e-6;  // for tracks without noise
   double interval_s = problem.frame_time_s.back() - problem.frame_time_s.front();
   for (size_t f = 1; f < problem.frame_time_s.size(); ++f)
     interval_s = std::min(interval_s, problem.frame_time_s[f] - problem.frame_time_s[f - 1]);
