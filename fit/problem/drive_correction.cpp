@@ -15,15 +15,15 @@ namespace {
 using Basis = DriveCorrection::Basis;
 
 constexpr int kTail = 3;               ///< knots behind the last that carries a value
-constexpr double kLeastNoiseM = 1e-6;  ///< that path_covariance() adds
+constexpr double kLeastNoiseM = 1e-6;  ///< added by path_covariance()
 constexpr double kWidest = 20;         ///< standard deviations: the prior holds it, not the range
-/// Times closer than these shares of the mean spacing are one: to a covariance, which changes with
-/// the time itself, and to a path, whose bends would lie elsewhere.
+/// Times closer than these shares of the mean spacing are one. A covariance changes with the time
+/// itself; a path would bend elsewhere.
 constexpr double kSameSample = 1e-3, kSameKnot = 1e-5;
 constexpr const char* kAxes[] = {"x", "y", "z"};
 
-/// What knots' values v make of c: its values and second derivatives there are affine in v, and
-/// in between a cubic of those at both ends.
+/// The form of c between knots: cubics of the values and second derivatives at both ends. At the
+/// knots these are affine in the knots' values v.
 template <int D>
 struct Correction {
   std::shared_ptr<const Basis> basis;
@@ -50,7 +50,7 @@ struct Correction {
   }
 };
 
-/// 3 x K.
+/// Returns the values at the knots, 3 x K.
 Eigen::Matrix3Xd at_knots(const DriveCorrection::Point& point, const Eigen::VectorXd& values) {
   Eigen::Matrix3Xd at(3, static_cast<Eigen::Index>(point.values.size() / 3));
   for (size_t n = 0; n < point.values.size(); ++n) at.data()[n] = point.values[n].value(values);
@@ -62,7 +62,7 @@ std::shared_ptr<const Basis> make_basis(double first_s, double last_s, int knots
   const double spacing_s = (last_s - first_s) / (knots - 1);
   auto basis = std::make_shared<Basis>();
   for (int k = 0; k < knots; ++k) basis->time_s.push_back(first_s + k * spacing_s);
-  // The spline through given values is the smoothing spline that smooths nothing.
+  // A smoothing spline that smooths nothing goes through all given values.
   const SmoothingSpline each =
       fit_smoothing_spline(basis->time_s, Eigen::MatrixXd::Identity(knots, knots), {},
                            {.smoothing = 1e-30, .robust = false});
@@ -70,8 +70,8 @@ std::shared_ptr<const Basis> make_basis(double first_s, double last_s, int knots
   basis->second_derivative = Eigen::MatrixXd::Zero(knots + kTail, knots);
   basis->second_derivative.topRows(knots) = each.second_derivative.transpose();
 
-  // With steps h and c, slope c', c'' = 0 at the last knot, continuity to the second derivative at
-  // both knots between, and 0, 0, 0 at the end:
+  // The tail follows from steps h and c, slope c', c'' = 0 at the last knot, continuity to the
+  // second derivative at both knots between, and 0, 0, 0 at the end:
   //   c_2 = (c + h c') / 6,  c_1 = (5 c + 4 h c') / 6,
   //   c''_1 = 6 (c_1 - 6 c_2) / h^2,  c''_2 = 6 c_2 / h^2.
   const double h = spacing_s / kTail;
@@ -86,7 +86,7 @@ std::shared_ptr<const Basis> make_basis(double first_s, double last_s, int knots
   return basis;
 }
 
-/// The index of the sample at a time, to a share of the mean spacing; -1 where there is none.
+/// Returns the index of the sample at a time, to a share of the mean spacing; -1 for none.
 Eigen::Index sample_at(const std::vector<double>& sample_s, double time_s, double share) {
   const double same_s =
       share * (sample_s.back() - sample_s.front()) / static_cast<double>(sample_s.size());
@@ -127,7 +127,7 @@ Eigen::MatrixXd path_covariance(const TrackedPoint& point, const std::vector<dou
     for (Eigen::Index j = 0; j < count; ++j)
       covariance(j, k) = factor * smoothed.position(time_s[static_cast<size_t>(j)])(0);
   }
-  // Both triangles are the same but for rounding.
+  // Both triangles are the same except for rounding.
   covariance = 0.5 * path.noise_sigma * path.noise_sigma *
                (covariance + Eigen::MatrixXd(covariance.transpose()));
   covariance.diagonal().array() += kLeastNoiseM * kLeastNoiseM;

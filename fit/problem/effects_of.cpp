@@ -31,7 +31,7 @@ std::vector<DeclaredEffect> effects_of(const Recording& recording,
     }
     for (const auto& [parameter, value] : hypothesis.shape) effect->parameters[parameter] = {value};
   }
-  // What any hypothesis fits has no given value.
+  // A parameter that any hypothesis fits has no given value.
   for (const Hypothesis& hypothesis : hypotheses) {
     DeclaredEffect& effect = *std::ranges::find(effects, hypothesis.effect, &DeclaredEffect::name);
     for (const std::string& amplitude : hypothesis.amplitudes) effect.parameters.erase(amplitude);

@@ -9,13 +9,13 @@
 
 namespace clothfit {
 
-/// The description of an effect of motion or of the measurement. Throws InputError for an unknown
-/// name.
+/// Returns the description of an effect of motion or of the measurement. Throws InputError for an
+/// unknown name.
 EffectDescription describe_effect(const std::string& name);
 
-/// The effects of a recording with hypotheses beside them. Two modes of one effect are that effect
-/// with the parameters of both. A shape that they share is the last one's, and is fitted if either
-/// fits it.
+/// Returns the effects of a recording with hypotheses beside them. Two modes of one effect are that
+/// effect with the parameters of both. A shape that they share is the last one's, and is fitted if
+/// either fits it.
 std::vector<DeclaredEffect> effects_of(const Recording& recording,
                                        const std::vector<Hypothesis>& hypotheses);
 

@@ -9,17 +9,17 @@
 
 namespace clothfit {
 
-/// What a parameter is of: the fabric's springs, an effect, how the scene was placed, an effect of
-/// the measurement, where the cloth was when the recording began, or what the measured motion of
-/// its held points was off by.
+/// The part of the model to which a parameter belongs. It is the fabric's springs, an effect, the
+/// placement of the scene, an effect of the measurement, the cloth's state when the recording
+/// began, or the error of its held points' measured motion.
 enum class ParameterRole { springs, effect, placement, measurement, start, drive };
 
-/// Whether it says something of the cloth's physics, which is what searches look for.
+/// Says whether a parameter is one of the cloth's physics, which searches look for.
 inline bool is_physical(ParameterRole role) {
   return role == ParameterRole::springs || role == ParameterRole::effect;
 }
 
-/// Whether reports list it: of a start or of a drive there may be hundreds.
+/// Says whether reports list a parameter; a start or a drive may have hundreds.
 inline bool is_listed(ParameterRole role) {
   return role != ParameterRole::start && role != ParameterRole::drive;
 }
@@ -32,7 +32,7 @@ struct FitParameter {
   ParameterScale scale = ParameterScale::linear;
   double lower = 0;    ///< widest bounds, in `unit`
   double upper = 0;    ///< > lower
-  double start = 0;    ///< where a fit begins unless a search finds better
+  double start = 0;    ///< a fit begins here unless a search finds better
   double typical = 1;  ///< for linear parameters: the size of a change that matters
 };
 
@@ -47,11 +47,11 @@ struct ParameterSpace {
 
   Eigen::VectorXd coordinates(const Eigen::VectorXd& values) const;
   Eigen::VectorXd values(const Eigen::VectorXd& coordinates) const;
-  /// d value / d coordinate of each parameter at `values`.
+  /// Returns d value / d coordinate of each parameter at `values`.
   Eigen::VectorXd value_by_coordinate(const Eigen::VectorXd& values) const;
 };
 
-/// Where a number of the model comes from: a parameter of the fit, or a constant.
+/// The source of a number of the model: a parameter of the fit, or a constant.
 struct Binding {
   int parameter = -1;  ///< index into the space, or -1
   double constant = 0;
@@ -60,9 +60,9 @@ struct Binding {
   }
 };
 
-/// Gaussian knowledge about some parameters that comes from elsewhere, such as the direction of
-/// gravity in the camera's axes from world placement:  sqrt_information * (values[indices] - mean)
-/// is standard normal.
+/// Gaussian knowledge about some parameters that comes from elsewhere. An example is the direction
+/// of gravity in the camera's axes from world placement. sqrt_information * (values[indices] -
+/// mean) is standard normal.
 struct GaussianPrior {
   std::vector<int> indices;
   Eigen::VectorXd mean;

@@ -19,7 +19,7 @@ Eigen::VectorXd spring_numbers(const FitProblem& problem, const Eigen::VectorXd&
   return numbers;
 }
 
-/// 3 x nodes.
+/// Returns the corrections, 3 x nodes.
 Eigen::Matrix3Xd corrections(const std::vector<Binding>& bindings, const Eigen::VectorXd& values) {
   Eigen::Matrix3Xd at_nodes(3, static_cast<Eigen::Index>(bindings.size() / 3));
   for (size_t n = 0; n < bindings.size(); ++n) at_nodes.data()[n] = bindings[n].value(values);
@@ -40,7 +40,7 @@ Eigen::Vector3d sheet_shift(const FitProblem& problem, const Eigen::VectorXd& va
   return three(problem.sheet_motion, 3, values);
 }
 
-/// The rotation vector by which gravity is turned.
+/// Returns the rotation vector by which gravity is turned.
 Eigen::Vector3d gravity_turn(const FitProblem& problem, const Eigen::VectorXd& values) {
   return problem.level_axes *
          Eigen::Vector2d(problem.tilt[0].value(values), problem.tilt[1].value(values));
@@ -51,7 +51,7 @@ struct Turned {
   Eigen::Matrix3d by_turn;
 };
 
-/// A vector turned by a rotation vector, with its derivative by the latter.
+/// Returns a vector turned by a rotation vector, with its derivative by the latter.
 Turned turned(const Eigen::Vector3d& turn, const Eigen::Vector3d& vector) {
   using Jet = ceres::Jet<double, 3>;
   const Jet angle_axis[3] = {{turn.x(), 0}, {turn.y(), 1}, {turn.z(), 2}};

@@ -5,14 +5,14 @@
 #include <cassert>
 
 namespace clothfit {
-/// A time as weights on the frames of a run:
+/// Weights on the frames of a run that express a time:
 /// x(t) = sum over k of  position[k] x(frame + k) + velocity[k] v(frame + k).
 struct Predictor::Instant {
   struct Weights {
     std::array<double, 2> position{}, velocity{};
   };
   size_t frame = 0;
-  Weights place, rate;  ///< of x and of dx/dt
+  Weights place, rate;  ///< for x and for dx/dt
 
   Eigen::Vector3d of(const Weights& weights, const MarkerRun& run, int marker) const {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
@@ -25,7 +25,7 @@ struct Predictor::Instant {
     return sum;
   }
 
-  /// x at the time `at_s`, whose derivatives it takes over.
+  /// Returns x at the time `at_s`, whose derivatives it takes over.
   MeasuredPoint moving(const MarkerRun& run, int marker, const MeasuredNumber& at_s) const {
     const Eigen::Vector3d x = of(place, run, marker), by_time = of(rate, run, marker);
     MeasuredPoint result;
@@ -37,7 +37,7 @@ struct Predictor::Instant {
   }
 };
 
-/// What a sight of a marker is made of: looks at some instants with weights, beside the marker.
+/// The parts of one sight of a marker: looks at some instants with weights, beside the marker.
 struct Predictor::Looks {
   struct Look {
     Instant instant;
@@ -45,10 +45,10 @@ struct Predictor::Looks {
   };
   std::array<Look, 3> look;
   size_t count = 1;
-  /// How far beside the marker, as factors of the surface's derivatives there.
+  /// Distance beside the marker, as factors of the surface's derivatives there.
   std::array<double, kSurfaceDerivatives.size()> beside{};
 
-  /// The same of a derivative of the run.
+  /// Returns the same for a derivative of the run.
   Eigen::Vector3d of(const MarkerRun& tangent, int marker) const {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     for (size_t k = 0; k < count; ++k) {
@@ -61,7 +61,7 @@ struct Predictor::Looks {
   }
 };
 
-/// What the observer sees of a marker, with derivatives by where the looks find it and by the
+/// A marker as the observer sees it, with derivatives by the places of the looks and by the
 /// parameters.
 struct Predictor::Appearance {
   Looks looks;
@@ -220,7 +220,7 @@ MeasuredPoint Predictor::look(const Sighting& sighting, const Observation& row,
   return point;
 }
 
-/// Whether the observer sees it at all.
+/// Says whether the observer sees the marker at all.
 bool Predictor::appears(const ObservationSet& set, const Observation& row, const MarkerRun& run,
                         bool derivatives, Appearance& result) const {
   Instant& at_frame = result.looks.look[0].instant;

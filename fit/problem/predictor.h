@@ -12,51 +12,51 @@
 
 namespace clothfit {
 
-/// How the markers of a run of the model moved: 3 x markers in each of its frames (m, world);
-/// velocities where they were asked for.
+/// The motion of the markers in a run of the model: 3 x markers in each of its frames (m, world).
+/// Velocities are there where they were asked for.
 struct MarkerRun {
   std::vector<Eigen::Matrix3Xd> position_m, velocity_m_per_s;
-  /// The same of the surface's derivatives there, x_s, x_t (1, 1/s), x_ss, x_st, x_tt (1/m,
-  /// 1/(m s)); or none.
+  /// The same for the surface's derivatives there, x_s, x_t (1, 1/s), x_ss, x_st, x_tt (1/m, 1/(m
+  /// s)); or none.
   std::vector<MarkerRun> derivatives;
 };
 
-/// From the motion of the vertices, or from a derivative of it.
+/// Returns the markers' motion from that of the vertices, or from a derivative of it.
 MarkerRun marker_run(const FitProblem& problem, const std::vector<Eigen::Matrix3Xd>& position_m,
                      const std::vector<Eigen::Matrix3Xd>& velocity_m_per_s);
 
 MarkerRun marker_run(const FitProblem& problem, const SimulateResult& run);
 
-/// What the observations of a problem should be, for values of its parameters, given how the
-/// markers of the model moved: seen when and where the effects of the measurement say
-/// (fit/measurement_effects), by the observer of their set.
+/// Predicts the observations of a problem, for values of its parameters, from the motion of the
+/// model's markers. Time and place are those that the effects of the measurement state
+/// (fit/measurement_effects). The view is that of the set's observer.
 ///
 /// Between frames markers follow the cubic through the places and velocities at both (Hermite;
-/// error O(interval^4)), after the last one they go straight on. Before the first one cloth is
-/// where it starts, or, where it starts in motion, has come straight. Beside its markers the cloth
-/// goes on as its derivatives there say, to second order.
+/// error O(interval^4)). After the last frame they go straight on. Before the first one the cloth
+/// is at its start or, where it starts in motion, has come straight. Beside its markers the cloth
+/// continues as its derivatives there say, to second order.
 class Predictor {
  public:
-  /// `problem` must outlive it.
+  /// `problem` must outlive the predictor.
   Predictor(const FitProblem& problem, const Eigen::VectorXd& values);
 
-  /// Constants by which markers are seen beside where they would be (fit/observe/marker_offsets.h),
-  /// 3 x markers, world. Without derivatives: fits take them out of the cost instead.
+  /// Sets constants by which markers are seen beside their place (fit/observe/marker_offsets.h), 3
+  /// x markers, world. They have no derivatives: fits remove them from the cost instead.
   void offset_markers(Eigen::Matrix3Xd offset_m) { marker_offset_m_ = std::move(offset_m); }
 
-  /// Whether it looks between frames and so asks for the markers' velocities.
+  /// Says whether it looks between frames, for which it needs the markers' velocities.
   bool needs_velocities() const { return needs_velocities_; }
 
-  /// How many frames a run must have for the observations before frame `frames`.
+  /// Returns how many frames a run must have for the observations before frame `frames`.
   int frames_to_run(int frames) const;
 
-  /// Nothing behind a camera. A pixel's third number is 0.
+  /// Returns nothing for a point behind a camera. A pixel's third number is 0.
   std::optional<Eigen::Vector3d> predict(int set, const Observation& row,
                                          const MarkerRun& run) const;
 
-  /// The same with its derivatives by the space's coordinates, 3 x coordinates, from those of the
-  /// markers' motion; one without frames stands for a motion that does not change. Velocities of
-  /// `tangents` are looked at where those of `run` are.
+  /// Predicts with derivatives by the space's coordinates, 3 x coordinates, from those of the
+  /// markers' motion. A derivative without frames stands for a motion that does not change.
+  /// Velocities of `tangents` are looked at where those of `run` are.
   std::optional<Eigen::Vector3d> predict(int set, const Observation& row, const MarkerRun& run,
                                          std::span<const MarkerRun> tangents,
                                          Eigen::Ref<Eigen::Matrix3Xd> by_coordinate) const;
@@ -82,7 +82,7 @@ class Predictor {
   double frame_interval_s_ = 0;                          ///< median
   Eigen::Matrix3Xd marker_offset_m_;                     ///< 3 x markers, or none
   std::vector<std::vector<MeasuredNumber>> parameters_;  ///< [effect][parameter]
-  /// Which parameters of the fit are the measurement's, and d value / d coordinate of these.
+  /// Indices of the measurement's fitted parameters, with d value / d coordinate of these.
   std::vector<int> fitted_;
   Eigen::VectorXd slope_;
 };

@@ -20,18 +20,19 @@
 namespace clothfit {
 namespace {
 
-/// Stands in for the mass of a cloth that was not weighed: a light woven fabric.
+/// The assumed density, that of a light woven fabric, serves for a cloth that was not weighed.
 constexpr double kAssumedDensityKgPerM2 = 0.1;
 
-/// Frames pooled to place the sheet of a cloth at rest: single ones are often bad detections.
+/// Sheets of cloth at rest are placed by this many pooled frames: single ones are often bad
+/// detections.
 constexpr int kRestFrames = 5;
 
 std::string recording_file(const Recording& recording) {
   return (recording.folder / "recording.yaml").string();
 }
 
-/// Frames up to the last observed one. A slip of the keyboard in a frame number must not ask for a
-/// simulation of years.
+/// Returns the number of frames up to the last observed one. It is limited, for a slip of the
+/// keyboard in a frame number must not ask for a simulation of years.
 int frame_count(const FitInput& input) {
   constexpr int kMostFrames = 1'000'000;
   int last = -1;
@@ -100,9 +101,9 @@ struct Range {
   double lower = 0, upper = 0;
 };
 
-/// From what the cloth must carry: a spring beside a held corner bears about half the weight F.
-/// Tension stiffness lies between F / a (twice as long) and 100 F / a (1 % longer), for the
-/// recording's own spacing a; shear and flexion reach far below, and so do all where a strain limit
+/// Derives the range from the cloth's load: a spring beside a held corner bears about half the
+/// weight F. Tension stiffness lies between F / a (twice as long) and 100 F / a (1 % longer), for
+/// the recording's own spacing a. Shear and flexion reach far below. So do all where a strain limit
 /// carries the rest.
 Range range_of(const SpringNumber& number, SpringSet set, double unit_n_per_m, double flat_m) {
   switch (number.quantity) {
@@ -157,7 +158,7 @@ void add_springs(const Recording& recording, const FitOptions& options, FitProbl
   }
 }
 
-/// Adds an effect of the measurement and binds its parameters: to `given` values, else to the fit.
+/// Adds an effect of the measurement. Its parameters are bound to `given` values, else to the fit.
 void add_measurement_effect(const MeasurementEffectEntry& entry, const std::string& where,
                             const std::map<std::string, std::vector<double>>& given,
                             const FitOptions& options, FitProblem& problem) {
@@ -169,7 +170,7 @@ void add_measurement_effect(const MeasurementEffectEntry& entry, const std::stri
   for (const EffectParameter& parameter : term.description.parameters) {
     const auto value = values.find(parameter.name);
     if (value != values.end() || options.forecast) {
-      // How another recording was measured says nothing of this one.
+      // The measurement of another recording says nothing of this one.
       const double known = value != values.end() ? value->second : parameter.neutral;
       term.parameters.push_back({.parameter = -1, .constant = known});
       continue;
@@ -193,7 +194,7 @@ void add_measurement_effect(const MeasurementEffectEntry& entry, const std::stri
                      "declare values of some, or leave effects out");
 }
 
-/// Adds an effect to the cloth and binds its parameters: to `given` values, else to the fit.
+/// Adds an effect to the cloth. Its parameters are bound to `given` values, else to the fit.
 void add_effect(const std::string& name, const std::string& where,
                 const std::map<std::string, std::vector<double>>& given, const FitOptions& options,
                 FitProblem& problem) {
@@ -260,9 +261,9 @@ void add_effects(const Recording& recording, const FitOptions& options, FitProbl
   add_derivative_weights(problem);
 }
 
-/// Two level directions, and when a camera's pose was estimated, gravity's direction as an unknown
-/// with the prior that this estimate amounts to. Only gravity's direction in the camera's axes
-/// matters to a cloth that is placed by what the camera sees; all else of the pose moves the scene
+/// Adds two level directions and, where a camera's pose was estimated, gravity's direction as an
+/// unknown. Its prior follows from that estimate. Only gravity's direction in the camera's axes
+/// matters to a cloth that is placed by what the camera sees. All else of the pose moves the scene
 /// as a whole. With true camera_from_world = exp(w) * estimate, gravity seen through the estimate
 /// is turned by R' w in the world (R the estimated rotation).
 void add_gravity_direction(FitProblem& problem) {
@@ -297,9 +298,9 @@ void add_gravity_direction(FitProblem& problem) {
   problem.priors.push_back(std::move(prior));
 }
 
-/// The placed sheet is as uncertain as the first frame's markers are noisy, and its error would
-/// pass for physics: a small turn about its middle and a shift are fitted along. The first frame's
-/// own residuals hold them.
+/// Fits a small turn of the placed sheet about its middle and a shift along. The sheet is as
+/// uncertain as the first frame's markers are noisy, and its error would pass for physics. The
+/// first frame's own residuals determine them.
 void add_sheet_motion(FitProblem& problem) {
   if (problem.start != StartKind::released_flat) return;
   const auto add = [&](const char* name, const char* unit, double range) {
@@ -317,7 +318,7 @@ void add_sheet_motion(FitProblem& problem) {
   for (const char* name : {"sheet_shift_x", "sheet_shift_y", "sheet_shift_z"}) add(name, "m", 0.05);
 }
 
-/// What is known of parameters from elsewhere.
+/// Adds knowledge of parameters from elsewhere.
 void add_given_priors(const FitOptions& options, FitProblem& problem) {
   std::vector<std::string> known;
   for (const FitParameter& parameter : problem.space.parameters)
@@ -336,7 +337,7 @@ void add_given_priors(const FitOptions& options, FitProblem& problem) {
     if (std::ranges::find(told, prior.name) != told.end())
       throw InputError(where, "is given twice", "one mean and standard deviation a parameter");
     told.push_back(prior.name);
-    // Not searched for, and a neutral value may be where no derivative leads away.
+    // The search leaves it out, and from a neutral value no derivative may lead away.
     if (parameter.role == ParameterRole::measurement) parameter.start = prior.mean;
     problem.priors.push_back(
         {.indices = {p},

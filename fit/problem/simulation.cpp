@@ -50,7 +50,7 @@ SpringParameters springs_of(const ModelSprings& springs) {
           .critical_elongation = springs.critical_elongation.value_or(SpringParameters::kNoLimit)};
 }
 
-/// The pose of a flat sheet from three of its corners.
+/// Returns the pose of a flat sheet from three of its corners.
 SheetPose pose_of(const Mesh& mesh, const Eigen::Matrix3Xd& position_m) {
   const Eigen::Vector3d corner = position_m.col(mesh.vertex(0, 0));
   const Eigen::Vector3d along_s =
@@ -62,9 +62,9 @@ SheetPose pose_of(const Mesh& mesh, const Eigen::Matrix3Xd& position_m) {
   return {.position_m = corner, .orientation = Eigen::Quaterniond(axes).normalized()};
 }
 
-/// A held point's motion, its correction included, at the frames and at the correction's knots. A
-/// natural cubic spline, such as the smoothing spline of a tracked point and a correction are
-/// together, is found again by the one through its values at its knots.
+/// Samples a held point's motion with its correction, at the frames and at the correction's knots.
+/// The smoothing spline of a tracked point and a correction are together a natural cubic spline.
+/// The spline through its values at its knots restores it.
 HeldPath sample(const FitProblem& problem, const ParameterSet& set, size_t held) {
   HeldPath path{.time_s = corrected_times(problem.drive_correction, problem.frame_time_s),
                 .position_m = {}};
@@ -73,8 +73,8 @@ HeldPath sample(const FitProblem& problem, const ParameterSet& set, size_t held)
   return path;
 }
 
-/// A parameter that fits look for on one side of its neutral value has no meaning on the other: a
-/// drag below 0 would drive the cloth.
+/// Throws for a parameter on the side of its neutral value where fits do not look. It has no
+/// meaning there: a drag below 0 would drive the cloth.
 void require_possible(const std::string& effect, const EffectParameter& parameter, double value,
                       const std::string& where) {
   if (parameter.lower < parameter.neutral || value >= parameter.neutral) return;

@@ -9,15 +9,15 @@
 
 namespace clothfit {
 
-/// How many springs sat on their strain limit, counted by type over frames.
+/// Counts of springs on their strain limit, by type, over frames.
 struct SpringsOnLimit {
   std::array<long, kSpringTypes>
       on{};  ///< at their critical elongation, within kOnLimit, or beyond
   std::array<long, kSpringTypes> all{};  ///< springs times frames
 };
 
-/// One sweep a step leaves a spring that a later one of the sweep moved a little short of its
-/// limit: it counts from this share of its critical elongation on.
+/// A spring counts from this share of its critical elongation on. In one sweep a step, a later
+/// spring of the sweep moves an earlier one a little short of its limit.
 inline constexpr double kOnLimit = 0.95;
 
 /// Counts over all frames of `position_m` (3 x vertices each) but the first, which is the start. No

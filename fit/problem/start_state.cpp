@@ -20,13 +20,13 @@ Eigen::Matrix2Xd vertex_places(const Mesh& mesh) {
 
 /// The markers' places and velocities at the first frame, from smoothed tracks.
 struct MarkerStates {
-  Eigen::Matrix2Xd place_m;  ///< (s, t) of those that have one
+  Eigen::Matrix2Xd place_m;  ///< (s, t) of the markers that have a state
   Eigen::Matrix3Xd position_m, velocity_m_per_s;
 };
 
 MarkerStates smoothed_states(const ObservationSet& set, const Eigen::Matrix2Xd& marker_m,
                              const std::vector<double>& frame_time_s, int first_held_out) {
-  constexpr size_t kFewest = 5;   // samples that a spline is worth fitting to
+  constexpr size_t kFewest = 5;   // samples that are worth fitting a spline to
   constexpr int kLateFrames = 3;  // a marker that is first seen later is extrapolated too far
   const std::vector<Eigen::MatrixXd> tracks =
       marker_tracks(set, static_cast<int>(marker_m.cols()), static_cast<int>(frame_time_s.size()));
@@ -63,11 +63,11 @@ MarkerStates smoothed_states(const ObservationSet& set, const Eigen::Matrix2Xd& 
   return states;
 }
 
-/// The smooth field over the mesh that comes closest to values at the markers.
+/// Returns the smooth field over the mesh that comes closest to values at the markers.
 Eigen::Matrix3Xd smooth_field(const Mesh& mesh, const Eigen::Matrix2Xd& places,
                               const Eigen::Matrix3Xd& values, int nodes) {
   const Eigen::MatrixXd at_markers = node_weights(mesh, nodes, places);
-  // The least that keeps nodes without a marker near from running away.
+  // This is the least ridge that keeps nodes without a marker near from running away.
   const double ridge = 1e-6 * at_markers.squaredNorm() / static_cast<double>(at_markers.cols());
   const Eigen::Vector3d mean = values.rowwise().mean();
   Eigen::MatrixXd normal = at_markers.transpose() * at_markers;
@@ -93,7 +93,7 @@ std::optional<Guess> guess_from_tracks(const ObservationSet& set, const Eigen::M
                smooth_field(mesh, states.place_m, states.velocity_m_per_s, nodes)};
 }
 
-/// Shapes of the first frames, a parabola in time through each vertex's places.
+/// Guesses from shapes of the first frames, with a parabola in time through each vertex's places.
 std::optional<Guess> guess_from_pixels(const std::vector<ObservationSet>& sets,
                                        const Eigen::Matrix2Xd& marker_m,
                                        const std::vector<double>& frame_time_s, int first_held_out,
@@ -163,7 +163,7 @@ StartState make_start_state(const std::vector<ObservationSet>& sets,
   double position_sigma_m = options.position_sigma_m;
   double velocity_sigma_m_per_s = options.velocity_sigma_m_per_s;
   if (!guess) {
-    // As far from flat, and as fast, as a cloth of this size gets.
+    // Sigmas are as far from flat, and as fast, as a cloth of this size gets.
     const double size_m = std::max(mesh.width_m, mesh.height_m);
     position_sigma_m = std::max(position_sigma_m, 0.2 * size_m);
     velocity_sigma_m_per_s = std::max(velocity_sigma_m_per_s, 2 * std::sqrt(9.81 * size_m));

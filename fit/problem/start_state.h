@@ -10,9 +10,9 @@
 
 namespace clothfit {
 
-/// The state of a cloth that was already moving when its recording began: a first guess, and
-/// corrections of positions and velocities that are smooth over the cloth, each a parameter of the
-/// fit:
+/// The state of a cloth that was already moving when its recording began. It is a first guess with
+/// corrections of positions and velocities. These are smooth over the cloth, and each is a
+/// parameter of the fit:
 ///
 ///   P(v) = guess + sum_k B(v, k) p_k,   V(v) = guess + sum_k B(v, k) w_k
 ///
@@ -21,22 +21,23 @@ namespace clothfit {
 struct StartState {
   Eigen::Matrix3Xd position_m, velocity_m_per_s;  ///< the guess
   Eigen::MatrixXd basis;                          ///< vertices x nodes; 0 nodes: nothing to correct
-  /// Of node k and axis c at 3 k + c.
+  /// Numbers of node k and axis c at 3 k + c.
   std::vector<Binding> position, velocity;
 
   int nodes() const { return static_cast<int>(basis.cols()); }
 };
 
 struct StartStateOptions {
-  int nodes = 8;                      ///< per side of the cloth, >= 2; more follow finer folds
-  double position_sigma_m = 0.03;     ///< of the correction at a node, for what is guessed well
+  int nodes = 8;                      ///< a side of the cloth, >= 2; more follow finer folds
+  double position_sigma_m = 0.03;     ///< for the correction at a node where the guess is good
   double velocity_sigma_m_per_s = 1;  ///< the same
 };
 
-/// Guesses from the tracks and adds the corrections to `space`, with priors as wide as the guess
-/// may be wrong. In space the guess is the smoothed markers at the first frame, their velocities
-/// included; from pixels the shapes of the first frames (fit/observe/shape_from_pixels.h). Where
-/// neither works out it is the flat sheet, at rest, with priors as wide as a cloth can be away from
+/// Guesses the state from the tracks and adds the corrections to `space`, with priors as wide as
+/// the guess's error. In space the guess is the smoothed markers at the first frame with their
+/// velocities. From pixels it is the shapes of the first frames (fit/observe/shape_from_pixels.h).
+/// Where neither works out it is the flat sheet, at rest, with priors as wide as a cloth can be
+/// away from that.
 /// that.
 StartState make_start_state(const std::vector<ObservationSet>& sets,
                             const Eigen::Matrix2Xd& marker_m,
