@@ -32,7 +32,7 @@ double mean_square_to_nearest(const std::vector<Point>& from, const Tree& to) {
   return sum / static_cast<double>(from.size());
 }
 
-/// The mean over frames; 0 of none.
+/// The mean over frames; 0 for none.
 struct Mean {
   double sum = 0;
   int count = 0;

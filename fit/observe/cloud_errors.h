@@ -9,14 +9,14 @@
 
 namespace clothfit {
 
-/// Chamfer distance (m²) of two sets of points, 3 x n, neither empty: the mean squared distance
-/// from each point to the nearest of the other set, there and back, added. It is what
-/// reconstructions of cloth from one camera are judged by [kairanda2022].
+/// Returns the Chamfer distance (m²) of two sets of points, 3 x n, neither empty. It adds the mean
+/// squared distances from each point to the nearest of the other set, there and back.
+/// Reconstructions of cloth from one camera are judged by it [kairanda2022].
 double chamfer_distance_m2(const Eigen::Matrix3Xd& a, const Eigen::Matrix3Xd& b);
 
-/// How far the model's surface is from measured clouds (world, m): each frame's is compared with as
-/// many points of the bicubic surface, drawn evenly over the flat cloth. `position_m`: 3 x vertices
-/// of `mesh`, of each frame. Clouds of other frames say nothing.
+/// Compares the model's surface with measured clouds (world, m). Each frame's cloud is compared
+/// with as many points of the bicubic surface, drawn evenly over the flat cloth. `position_m`: 3 x
+/// vertices of `mesh`, for each frame. Clouds of other frames are left out.
 CloudErrors cloud_errors(const PointClouds& clouds, const Mesh& mesh,
                          std::span<const Eigen::Matrix3Xd> position_m, int first_held_out);
 

@@ -34,7 +34,7 @@ int marker_at(const Recording& recording, const Eigen::Vector2d& at_m) {
                    "use motion: fixed or path, or name a place that carries a marker");
 }
 
-/// What each camera sees of all markers.
+/// Returns the observations of each camera, of all markers.
 std::vector<ObservationSet> pixel_sets(const FitInput& input) {
   std::vector<ObservationSet> sets;
   std::map<std::string, int> rejected;
@@ -51,11 +51,12 @@ std::vector<ObservationSet> pixel_sets(const FitInput& input) {
   return sets;
 }
 
-/// The point nearest to the rays through the pixels of a marker in a frame; along what these leave
-/// open, nearest to `guess_m`. Nothing where no camera sees it.
+/// Returns the point nearest to the rays through the pixels of a marker in a frame. Along
+/// directions that these leave open, it is nearest to `guess_m`. Returns nothing where no camera
+/// sees the marker.
 std::optional<Eigen::Vector3d> on_rays(const std::vector<ObservationSet>& sets, int frame,
                                        int marker, const Eigen::Vector3d& guess_m) {
-  constexpr double kGuess = 1e-4;  // of what a ray weighs
+  constexpr double kGuess = 1e-4;  // as a share of a ray's weight
   Eigen::Matrix3d across = kGuess * Eigen::Matrix3d::Identity();
   Eigen::Vector3d right = kGuess * guess_m;
   bool seen = false;

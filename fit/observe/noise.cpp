@@ -10,12 +10,12 @@
 namespace clothfit {
 namespace {
 
-/// From the median absolute third difference of white normal noise to the
-/// standard deviation of one value.
+/// Factor from the median absolute third difference of white normal noise to the standard deviation
+/// of one value.
 const double kMedianToSigma = kMadToSigma / std::sqrt(20.0);
 constexpr double kBeyond = 5;
 
-/// Whether the three intervals between frames f ... f + 3 are nearly equal.
+/// Says whether the three intervals between frames f ... f + 3 are nearly equal.
 bool evenly_spaced(const std::vector<double>& time_s, std::size_t f, double tolerance) {
   const double mean = (time_s[f + 3] - time_s[f]) / 3;
   for (std::size_t k = f; k < f + 3; ++k) {
@@ -24,14 +24,15 @@ bool evenly_spaced(const std::vector<double>& time_s, std::size_t f, double tole
   return true;
 }
 
-/// Median of the first `count` of rising values.
+/// Returns the median of the first `count` of rising values.
 double median(const std::vector<double>& sorted, std::size_t count) {
   return (sorted[(count - 1) / 2] + sorted[count / 2]) / 2;
 }
 
-/// Standard deviation that the sorted absolute differences speak of. Spoilt differences raise the
-/// median (a fifth of them by 30 %), so those beyond `kBeyond` standard deviations are left out and
-/// the median taken again until nothing changes; of normal noise, next to none lies there.
+/// Returns the standard deviation that the sorted absolute differences imply. Spoilt differences
+/// raise the median (a fifth of them by 30 %). Those beyond `kBeyond` standard deviations are
+/// therefore left out and the median taken again until nothing changes; of normal noise, next to
+/// none lies there.
 double robust_sigma(const std::vector<double>& sorted) {
   std::size_t count = sorted.size();
   while (true) {

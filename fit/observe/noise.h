@@ -9,8 +9,8 @@ namespace clothfit {
 struct NoiseEstimate {
   /// Standard deviation of one coordinate; NaN when `differences` is 0.
   double sigma = 0;
-  /// Differences that it rests on. Neighbouring ones share samples, so the estimate is about as
-  /// sure as one from a third as many independent numbers.
+  /// Differences behind the estimate. Neighbouring ones share samples, so it is about as sure as
+  /// one from a third as many independent numbers.
   int differences = 0;
 };
 
@@ -19,16 +19,18 @@ struct NoiseOptions {
   double interval_tolerance = 0.05;
 };
 
-/// Noise per coordinate of `tracks`, a matrix per marker (coordinates x frames, column f is frame
-/// f, NaN where it was not observed) over common `time_s` (one per frame, rising).
+/// Estimates the noise per coordinate of `tracks` over common `time_s` (one per frame, rising).
+/// `tracks` is a matrix per marker: coordinates x frames, column f is frame f, NaN where it was not
+/// observed.
 ///
-/// Third differences in time over four consecutive frames at nearly equal intervals,
+/// The estimate uses third differences in time over four consecutive frames at nearly equal
+/// intervals,
 ///
 ///   d = x_0 - 3 x_1 + 3 x_2 - x_3,   variance 20 sigma^2   (1 + 9 + 9 + 1),
 ///
-/// take away any motion that is a parabola over four frames; what a smooth motion leaves is its
+/// They remove any motion that is a parabola over four frames. Of a smooth motion they keep the
 /// jerk times the interval cubed. Their median absolute value is 0.6745 sqrt(20) sigma for normal
-/// noise; differences beyond five standard deviations (an outlier spoils four) are left out of it.
+/// noise; differences beyond five standard deviations are left out of it (an outlier spoils four).
 /// Noise that is correlated in time (a smoothed track) is underestimated: no difference in time can
 /// see it.
 NoiseEstimate estimate_noise(const std::vector<double>& time_s,

@@ -11,8 +11,8 @@
 namespace clothfit {
 namespace {
 
-/// Gives rows without a sigma the noise that the tracks themselves show. Cameras keep their rate,
-/// trackers that answer when they are done do not: where no run of frames is even enough, uneven
+/// Gives rows without a sigma the noise that the tracks themselves show. Cameras keep their rate;
+/// trackers that answer when they are done do not. Where no run of frames is even enough, uneven
 /// ones have to do.
 void estimate_missing_sigma(ObservationSet& set, const ObservedFrames& frames, int marker_count) {
   if (std::ranges::all_of(set.rows, [](const Observation& row) { return row.sigma > 0; })) return;
@@ -118,7 +118,7 @@ std::vector<Eigen::MatrixXd> marker_tracks(const ObservationSet& set, int marker
 
 std::vector<Eigen::Matrix3Xd> marker_positions(
     const Surface::Weights& vertex_weights, const std::vector<Eigen::Matrix3Xd>& mesh_positions) {
-  // All frames in one product: vertices x 3 F, a frame's x, y, z in neighbouring columns.
+  // All frames go into one product: vertices x 3 F, a frame's x, y, z in neighbouring columns.
   using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   const auto frames = static_cast<Eigen::Index>(mesh_positions.size());
   RowMajor vertices(vertex_weights.cols(), 3 * frames);

@@ -25,26 +25,25 @@ struct ObservationSet {
   std::string kind;  ///< "tracks3d" or the camera's name
   std::string unit;  ///< "m" or "px"
   int dimension = 3;
-  std::optional<CameraParameters> camera;  ///< with a pose; for pixels
+  std::optional<CameraParameters> camera;  ///< has a pose; for pixels
   std::vector<Observation> rows;
   double noise = 0;  ///< root mean square of the rows' sigma
 
-  /// Where the set's observer sees a point of the world; nothing behind a camera. `by_position`,
-  /// where given, is set to the derivative (for pixels, its third row is 0).
+  /// Returns where the set's observer sees a point of the world; nothing behind a camera.
+  /// `by_position`, where given, is set to the derivative (for pixels, its third row is 0).
   std::optional<Eigen::Vector3d> predict(const Eigen::Vector3d& position_m,
                                          Eigen::Matrix3d* by_position = nullptr) const;
 };
 
-/// The frames of a recording: their times, and the first one that is held out (= their number when
-/// none is).
+/// The times of a recording's frames, and the first one held out (their number when none is).
 struct ObservedFrames {
   std::vector<double> time_s;
   int first_held_out = 0;
 };
 
-/// The usable rows of measured tracks. A row without a sigma gets the one estimated from the fitted
-/// frames (fit/observe/noise.h). Rejected rows and those of `excluded` markers (they drive held
-/// points) are left out and counted in `rejected` by reason.
+/// Returns the usable rows of measured tracks. A row without a sigma gets the one estimated from
+/// the fitted frames (fit/observe/noise.h). Rejected rows and those of `excluded` markers (they
+/// drive held points) are left out and counted in `rejected` by reason.
 ObservationSet observations_3d(const Tracks3d& tracks, const ObservedFrames& frames,
                                int marker_count, const std::vector<int>& excluded,
                                std::map<std::string, int>& rejected);
@@ -53,13 +52,14 @@ ObservationSet observations_2d(const Tracks2d& tracks, const CameraParameters& c
                                const std::vector<int>& excluded,
                                std::map<std::string, int>& rejected);
 
-/// (s, t) of every marker, 2 x markers, m.
+/// Returns (s, t) of every marker, 2 x markers, m.
 Eigen::Matrix2Xd marker_places(const MarkerSet& markers);
 
-/// The set as a matrix per marker, coordinates x frames, NaN where it was not observed.
+/// Returns the set as a matrix per marker, coordinates x frames, NaN where it was not observed.
 std::vector<Eigen::MatrixXd> marker_tracks(const ObservationSet& set, int marker_count, int frames);
 
-/// Positions of the markers in every frame, from those of the mesh: one 3 x markers matrix a frame.
+/// Returns positions of the markers in every frame, from the mesh's: one 3 x markers matrix a
+/// frame.
 std::vector<Eigen::Matrix3Xd> marker_positions(const Surface::Weights& vertex_weights,
                                                const std::vector<Eigen::Matrix3Xd>& mesh_positions);
 

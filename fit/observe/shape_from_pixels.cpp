@@ -11,11 +11,11 @@
 namespace clothfit {
 namespace {
 
-constexpr double kStretchSigma = 0.01;  ///< of warp and weft, as a share of the length
+constexpr double kStretchSigma = 0.01;  ///< for warp and weft, as a share of the length
 constexpr double kShearSigma = 0.1;
 constexpr double kLeastSigmaPx = 1;
 
-/// What one frame shows, in front of a sheet whose shape is given by its nodes.
+/// The observations of one frame, to be compared with a sheet whose shape is given by its nodes.
 struct Frame {
   const std::vector<ObservationSet>& sets;
   std::vector<std::pair<size_t, size_t>> rows;  ///< set, row

@@ -10,7 +10,7 @@
 namespace clothfit {
 namespace {
 
-/// What the first frames show of one set.
+/// One set as the first frames show it.
 struct SheetView {
   const ObservationSet* set = nullptr;
   std::vector<const Observation*> rows;
@@ -31,7 +31,7 @@ Eigen::Vector3d flat_place(const Eigen::Matrix2Xd& marker_m, int marker) {
   return {marker_m(0, marker), marker_m(1, marker), 0.0};
 }
 
-/// Whether the markers of a view span the plane.
+/// Says whether the markers of a view span the plane.
 bool spans_plane(const SheetView& view, const Eigen::Matrix2Xd& marker_m) {
   Eigen::Matrix2Xd places(2, static_cast<Eigen::Index>(view.rows.size()));
   for (size_t n = 0; n < view.rows.size(); ++n)
@@ -52,8 +52,9 @@ Rigid3 start_from_3d(const SheetView& view, const Eigen::Matrix2Xd& marker_m) {
   return fit_rigid(flat, seen);
 }
 
-/// A plane's pose from its image: the homography from (s, t, 1) to the ray's (x/z, y/z, 1) has the
-/// first two axes and the origin of the sheet as columns, up to a common factor [zhang2000].
+/// Computes a plane's pose from its image. The homography from (s, t, 1) to the ray's (x/z, y/z, 1)
+/// has the first two axes and the origin of the sheet as columns, up to a common factor
+/// [zhang2000].
 std::optional<Rigid3> start_from_pixels(const SheetView& view, const Eigen::Matrix2Xd& marker_m) {
   const CameraParameters& camera = *view.set->camera;
   Eigen::MatrixXd equations(2 * static_cast<Eigen::Index>(view.rows.size()), 9);

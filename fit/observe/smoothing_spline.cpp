@@ -17,20 +17,21 @@ namespace {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kHuber = 1.345;  ///< 95 % efficient for normal noise
-/// Price of a degree of freedom in the cross-validation score. 1 is the plain score; 1.2 to 1.4
-/// hold it back from following the noise and cost next to nothing elsewhere [kim2004].
+/// Price of a degree of freedom in the cross-validation score. 1 is the plain score. 1.2 to 1.4
+/// keep the score from following the noise and cost next to nothing elsewhere [kim2004].
 constexpr double kCaution = 1.4;
 constexpr int kMostIterations = 50;
 constexpr Eigen::Index kFewestForOutliers = 8;
-constexpr Eigen::Index kNeighbours = 6;  ///< to either side, that a sample is held against
-/// What a moving coordinate leaves of the way from sample to sample, at most. Noise leaves 0.7.
+constexpr Eigen::Index kNeighbours = 6;  ///< to either side, with which a sample is compared
+/// Largest distance of a moving coordinate from its path, as a share of its step from sample to
+/// sample. For noise it is 0.7.
 constexpr double kShareOfStep = 1.0 / 3;
 
 /// Symmetric matrix with two bands above its diagonal: band(k, i) is entry [i, i + k].
 using Band = Eigen::Matrix3Xd;
 
-/// The parts of Reinsch's system that depend on times and weights alone. With h_i = t_{i+1} - t_i
-/// and column i belonging to the inner knot i + 1,
+/// The parts of Reinsch's system that depend on times and weights alone. Column i belongs to the
+/// inner knot i + 1. With h_i = t_{i+1} - t_i,
 ///   Q' f  = second divided differences, rows (1/h_i, -1/h_i - 1/h_{i+1}, 1/h_{i+1}),
 ///   R     = overlaps of the hat functions, and
 ///   (R + lambda Q' W^-1 Q) gamma = Q' y,  f = y - lambda W^-1 Q gamma,  gamma = f'' inside.
@@ -67,7 +68,7 @@ System make_system(const std::vector<double>& time_s, const Eigen::VectorXd& var
   return system;
 }
 
-/// L D L' of a positive definite band matrix: d in row 0, L[i + k, i] in row k.
+/// Factorises a positive definite band matrix as L D L': d in row 0, L[i + k, i] in row k.
 Band factorise(const Band& a) {
   const Eigen::Index m = a.cols();
   Band f = Band::Zero(3, m);
@@ -100,7 +101,7 @@ Eigen::MatrixXd solve(const Band& f, Eigen::MatrixXd right) {
   return right;
 }
 
-/// The same bands of the inverse [hutchinson1985].
+/// Returns the same bands of the inverse [hutchinson1985].
 Band inverse_band(const Band& f) {
   const Eigen::Index m = f.cols();
   Band s = Band::Zero(3, m);
@@ -115,20 +116,22 @@ Band inverse_band(const Band& f) {
   return s;
 }
 
-/// Q' applied to each row of `y` (d x n).
+/// Applies Q' to each row of `y` (d x n).
 Eigen::MatrixXd second_differences(const System& system, const Eigen::MatrixXd& y) {
   Eigen::MatrixXd z(y.rows(), system.q.cols());
   for (Eigen::Index i = 0; i < z.cols(); ++i) z.col(i) = y.middleCols<3>(i) * system.q.col(i);
   return z;
 }
 
-/// Degrees of freedom of the path, given the bands of (R + lambda Q' W^-1 Q)^-1: two for the
-/// straight lines, which are never penalised, and the trace of that inverse times R.
+/// Returns the degrees of freedom of the path, given the bands of (R + lambda Q' W^-1 Q)^-1. Two
+/// are for the straight lines, which are never penalised; the others are the trace of that inverse
+/// times R.
 double degrees_of_freedom(const System& system, const Band& inverse) {
   return 2 + inverse.row(0).dot(system.r.row(0)) + 2 * inverse.row(1).dot(system.r.row(1));
 }
 
-/// Logarithm of the cross-validation score |W^1/2 (y - f)|^2 / (n - kCaution * freedom)^2.
+/// Returns the logarithm of the cross-validation score |W^1/2 (y - f)|^2 / (n - kCaution *
+/// freedom)^2.
 double score(const System& system, const Eigen::MatrixXd& z, double lambda) {
   const Band factors = factorise(system.r + lambda * system.qwq);
   const double n = static_cast<double>(system.variance.size());
@@ -148,13 +151,13 @@ double score(const System& system, const Eigen::MatrixXd& z, double lambda) {
   return std::log(square) - 2 * std::log(left_over);
 }
 
-/// The lambda of the least score: a scan by decades from the smoothest to nearly
-/// none, then golden sections. Ties go to the smoother path.
+/// Returns the lambda of the least score. A scan by decades from the smoothest to nearly none comes
+/// first, then golden sections. Ties go to the smoother path.
 double choose_smoothing(const System& system, const Eigen::MatrixXd& z) {
   const double unit = system.r.row(0).sum() / system.qwq.row(0).sum();
   const auto at = [&](double decade) { return score(system, z, unit * std::pow(10.0, decade)); };
-  // From 10^-5, where every sample is followed, to the smoothest that rounding lets through: the
-  // slowest wave over n samples is damped by half at about (n / 5)^4.
+  // The scan reaches from 10^-5, where every sample is followed, to the smoothest that rounding
+  // lets through. The slowest wave over n samples is damped by half at about (n / 5)^4.
   const double smoothest = 4 * std::log10(static_cast<double>(z.cols()) + 2) + 1;
   double best = smoothest, least = at(smoothest);
   for (double decade = smoothest - 1; decade > -5; decade -= 1) {
@@ -193,7 +196,7 @@ struct Weighted {
   Eigen::VectorXd freedom;  ///< 1 - A_ii
 };
 
-/// The straight line through at most two samples.
+/// Returns the straight line through at most two samples.
 Weighted line_through(const std::vector<double>& time_s, const Eigen::MatrixXd& y) {
   Weighted fit;
   fit.spline.time_s = time_s;
@@ -251,7 +254,7 @@ Weighted fit_weighted(const std::vector<double>& time_s, const Eigen::MatrixXd& 
   return fit;
 }
 
-/// Times and indices of the samples that are not left out.
+/// Returns times and indices of the samples that are not left out.
 std::pair<std::vector<double>, std::vector<Eigen::Index>> used_samples(
     const std::vector<double>& time_s, const std::vector<bool>& outlier) {
   std::pair<std::vector<double>, std::vector<Eigen::Index>> used;
@@ -263,7 +266,7 @@ std::pair<std::vector<double>, std::vector<Eigen::Index>> used_samples(
   return used;
 }
 
-/// The samples around one, it left out.
+/// Returns the samples around one, without it.
 std::vector<Eigen::Index> around(Eigen::Index sample, Eigen::Index count) {
   std::vector<Eigen::Index> result;
   for (Eigen::Index k = std::max<Eigen::Index>(0, sample - kNeighbours);
@@ -272,15 +275,15 @@ std::vector<Eigen::Index> around(Eigen::Index sample, Eigen::Index count) {
   return result;
 }
 
-/// Largest coordinate of each sample's distance from the path, in robust standard deviations.
-/// `freedom` is 1 - leverage of each sample: a sample that the path follows closely has a small
-/// residual for that reason alone.
+/// Returns the largest coordinate of each sample's distance from the path, in robust standard
+/// deviations. `freedom` is 1 - leverage of each sample: a sample that the path follows closely has
+/// a small residual for that reason alone.
 ///
-/// The standard deviation is that of all samples and coordinates; where a coordinate moves, that of
-/// the samples around, if more. A track that was still and begins to move fast leaves the path by
-/// what lies between samples that are far apart, or stamped late: by much more than the noise at
-/// rest, but by little of the way from sample to sample. Rows of outliers leave it by as much as
-/// lies between them.
+/// The standard deviation is that of all samples and coordinates. Where a coordinate moves, it is
+/// that of the samples around, if this is larger. Consider a track that was still and begins to
+/// move fast. Between samples that are far apart, or stamped late, it leaves the path by much more
+/// than the noise at rest, but by little of its step from sample to sample. Rows of outliers leave
+/// the path by as much as their step.
 Eigen::VectorXd robust_distances(const SmoothingSpline& spline, const Eigen::VectorXd& freedom,
                                  const std::vector<double>& time_s, const Eigen::MatrixXd& samples,
                                  const Eigen::VectorXd& variance) {
@@ -293,7 +296,7 @@ Eigen::VectorXd robust_distances(const SmoothingSpline& spline, const Eigen::Vec
         (sigma[i] * std::sqrt(std::max(freedom(i), 1e-6)));
     if (i > 0) step.col(i) = (samples.col(i) - samples.col(i - 1)).cwiseAbs() / sigma[i];
   }
-  // Samples on a line to the last digit have no noise to measure outliers by; their rounding is.
+  // Samples on a line to the last digit have no noise to measure outliers by; rounding serves.
   const double rounding =
       8 * std::numeric_limits<double>::epsilon() * samples.cwiseAbs().maxCoeff() / sigma.minCoeff();
   const double of_all =
@@ -316,8 +319,8 @@ Eigen::VectorXd robust_distances(const SmoothingSpline& spline, const Eigen::Vec
   return result;
 }
 
-/// The lambda whose path has half a degree of freedom per sample: it bends within a sample or two,
-/// so that a curved end or a kink of the motion is not taken for an outlier.
+/// Returns the lambda whose path has half a degree of freedom per sample. The path bends within a
+/// sample or two, so that a curved end or a kink of the motion is not taken for an outlier.
 double local_smoothing(const std::vector<double>& time_s, const Eigen::VectorXd& variance) {
   const System system = make_system(time_s, variance);
   const double unit = system.r.row(0).sum() / system.qwq.row(0).sum();
@@ -332,10 +335,10 @@ double local_smoothing(const std::vector<double>& time_s, const Eigen::VectorXd&
   return unit * std::pow(10.0, (low + high) / 2);
 }
 
-/// Which samples lie off the path that their neighbours agree on. With lambda fixed, Huber's cost
-/// is convex, and an outlier pulls its path by a bounded amount however far off it is. Samples
-/// that it pulled the path away from are taken back once it is left out; none are left out
-/// afterwards, so that one mistake does not lead to the next.
+/// Finds the samples that lie off the path on which their neighbours agree. With lambda fixed,
+/// Huber's cost is convex, and an outlier pulls its path by a bounded amount however far off it is.
+/// It may pull the path away from other samples; these are taken back once it is left out. No
+/// samples are left out afterwards, so that one mistake does not lead to the next.
 std::vector<bool> find_outliers(const std::vector<double>& time_s, const Eigen::MatrixXd& samples,
                                 const Eigen::VectorXd& variance, double reject_beyond) {
   const Eigen::Index n = samples.cols();
@@ -375,7 +378,7 @@ std::vector<bool> find_outliers(const std::vector<double>& time_s, const Eigen::
   return outlier;
 }
 
-/// Value, slope and second derivative at a time.
+/// Returns value, slope and second derivative at a time.
 std::array<Eigen::VectorXd, 3> evaluate(const SmoothingSpline& spline, double time) {
   assert(!spline.time_s.empty());
   const Eigen::Index d = spline.value.rows(), n = spline.value.cols();

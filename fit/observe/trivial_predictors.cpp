@@ -17,7 +17,7 @@ bool observed(const Eigen::MatrixXd& track, Eigen::Index frame) {
   return track.col(frame).allFinite();
 }
 
-/// First frame in [from, to) that shows the marker.
+/// Returns the first frame in [from, to) that shows the marker.
 std::optional<Eigen::Index> first_observed(const Eigen::MatrixXd& track, Eigen::Index from,
                                            Eigen::Index to) {
   for (Eigen::Index frame = from; frame < to; ++frame) {
@@ -34,7 +34,7 @@ std::optional<Eigen::Index> last_observed(const Eigen::MatrixXd& track, Eigen::I
   return std::nullopt;
 }
 
-/// Number of frames before the held-out ones.
+/// Returns the number of frames before the held-out ones.
 Eigen::Index fitted_frames(const Eigen::MatrixXd& track, int held_out_from) {
   assert(held_out_from >= 1);
   return std::min<Eigen::Index>(held_out_from, track.cols());
