@@ -5,8 +5,8 @@
 #include "fit/measurement_effects/measurement_effect.h"
 #include "model/cloth/effect.h"
 
-/// The clock of what looks at the cloth is late against the one of what drives it: an observation
-/// of time t shows the cloth at t + time. Parameter: time (s), neutral at 0. Ours.
+/// Makes the camera's clock late against that of the drive. An observation of time t shows the
+/// cloth at t + time. Parameter: time (s), neutral at 0. Ours.
 namespace clothfit::clock_offset {
 
 EffectDescription describe();

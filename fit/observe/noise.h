@@ -24,9 +24,9 @@ struct NoiseOptions {
 /// observed.
 ///
 /// The estimate uses third differences in time over four consecutive frames at nearly equal
-/// intervals,
+/// intervals:
 ///
-///   d = x_0 - 3 x_1 + 3 x_2 - x_3,   variance 20 sigma^2   (1 + 9 + 9 + 1),
+///   d = x_0 - 3 x_1 + 3 x_2 - x_3,   variance 20 sigma^2   (1 + 9 + 9 + 1).
 ///
 /// They remove any motion that is a parabola over four frames. Of a smooth motion they keep the
 /// jerk times the interval cubed. Their median absolute value is 0.6745 sqrt(20) sigma for normal
