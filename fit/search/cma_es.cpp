@@ -19,10 +19,10 @@ constexpr double kNotFinite = std::numeric_limits<double>::infinity();
 /// The strategy's constants for n parameters and a population, named as there [hansen2016].
 struct Constants {
   Eigen::VectorXd weights;  ///< by rank, the worse half negative
-  Eigen::Index mu = 0;      ///< positive ones
+  Eigen::Index mu = 0;      ///< number of positive ones
   double mu_eff = 0;
   double c_sigma = 0, d_sigma = 0, c_c = 0, c_1 = 0, c_mu = 0;
-  double expected_norm = 0;  ///< of a standard normal vector
+  double expected_norm = 0;  ///< norm of a standard normal vector
 
   Constants(int parameters, int population) {
     const double n = parameters;
@@ -48,7 +48,7 @@ struct Constants {
   }
 };
 
-/// C = B D^2 B'.
+/// The factors of C = B D^2 B'.
 struct Axes {
   Eigen::MatrixXd directions;  ///< B
   Eigen::VectorXd lengths;     ///< D
@@ -58,7 +58,7 @@ struct Axes {
     directions = eigen.vectors;
     lengths = eigen.values.cwiseMax(0).cwiseSqrt();
   }
-  /// C^-1/2 y.
+  /// Returns C^-1/2 y.
   Eigen::VectorXd whitened(const Eigen::VectorXd& y) const {
     return directions * (directions.transpose() * y).cwiseQuotient(lengths);
   }
@@ -77,7 +77,7 @@ void begin_run(const Eigen::VectorXd& mean, int population, const CmaOptions& op
   state.so_far = {};
 }
 
-/// Generations whose best costs are compared.
+/// Returns how many generations' best costs are compared.
 size_t compared_generations(const CmaState& state) {
   return static_cast<size_t>(
       10 + std::ceil(30.0 * static_cast<double>(state.mean.size()) / state.population));
@@ -106,7 +106,7 @@ std::optional<CmaEnd> end_of_run(const CmaOptions& options, const CmaState& stat
   return std::nullopt;
 }
 
-/// Ranks of costs, best first; equal ones in the order of their places.
+/// Returns ranks of costs, best first; equal ones in the order of their places.
 std::vector<Eigen::Index> ranked(const Eigen::VectorXd& costs) {
   std::vector<Eigen::Index> order(static_cast<size_t>(costs.size()));
   std::iota(order.begin(), order.end(), 0);
@@ -114,8 +114,8 @@ std::vector<Eigen::Index> ranked(const Eigen::VectorXd& costs) {
   return order;
 }
 
-/// The update of mean, step and covariance by a generation's steps y (n x population, in units of
-/// sigma), by rank.
+/// Updates mean, step and covariance by a generation's steps y, by rank. y is n x population, in
+/// units of sigma.
 void adapt(const Axes& axes, const Eigen::MatrixXd& y, const Constants& k, CmaState& state) {
   const double n = static_cast<double>(state.mean.size());
   const Eigen::VectorXd towards = y.leftCols(k.mu) * k.weights.head(k.mu);

@@ -16,7 +16,7 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// Six significant digits, whatever the size.
+/// Writes six significant digits, whatever the size.
 std::string number(double value) {
   std::ostringstream text;
   text << value;
@@ -85,7 +85,7 @@ Individual crossed_individual(int parameter_count, const EvolutionOptions& optio
   return individual;
 }
 
-/// Asks for the costs of the individuals from `first_new` on, ranks all and notes the best.
+/// Computes the costs of the individuals from `first_new` on, ranks all and notes the best.
 void evaluate_and_rank(const GenerationCost& cost, std::size_t first_new, EvolutionState& state) {
   const std::size_t count = state.population.size() - first_new;
   if (count > 0) {
@@ -107,7 +107,7 @@ void evaluate_and_rank(const GenerationCost& cost, std::size_t first_new, Evolut
   state.best_cost.push_back(state.population.front().cost);
 }
 
-/// Share of itself by which the best cost fell over the last `window` generations.
+/// Returns the share of itself by which the best cost fell over the last `window` generations.
 double relative_gain(const std::vector<double>& best_cost, int window) {
   const double now = best_cost.back();
   const double before = best_cost[best_cost.size() - 1 - static_cast<std::size_t>(window)];

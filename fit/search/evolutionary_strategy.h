@@ -11,8 +11,9 @@
 
 namespace clothfit {
 
-/// The evolutionary strategy of the founding paper [louchet1995, section 3.3], to the letter. Each
-/// generation is ranked by cost (the ranks guide selection, never the values), then
+/// The evolutionary strategy of the founding paper [louchet1995, section 3.3], to the letter. Ranks
+/// by cost guide selection, never the values. Each generation is ranked, and the next one consists
+/// of
 ///
 ///   50 %  the best, kept unchanged; their cost is known and not evaluated again;
 ///   20 %  new by mutation: a parent among the 80 % best of the preceding generation, one of its
@@ -20,12 +21,15 @@ namespace clothfit {
 ///   30 %  new by uniform crossover: as many parents as there are parameters, among the 50 % best
 ///         of the preceding generation.
 ///
-/// What the paper leaves open, and our choice: parents are drawn uniformly and independently (one
-/// can be drawn twice); the mutated parameter is drawn uniformly and redrawn over its whole range
-/// (`MutationLaw`); a crossed individual takes each parameter from a uniformly drawn one of its
-/// parents; equal costs rank older individuals first; the first generation is uniform over the
-/// ranges. The stopping rules beyond the number of generations follow the paper's own conclusion
-/// that its runs should have been stopped on the cost.
+/// Our choices where the paper leaves things open:
+/// - Parents are drawn uniformly and independently (one can be drawn twice).
+/// - The mutated parameter is drawn uniformly and redrawn over its whole range (`MutationLaw`).
+/// - A crossed individual takes each parameter from a uniformly drawn one of its parents.
+/// - Equal costs rank older individuals first.
+/// - The first generation is uniform over the ranges.
+///
+/// The stopping rules beyond the number of generations follow the paper's own conclusion that its
+/// runs should have been stopped on the cost.
 
 enum class MutationLaw {
   redraw,   ///< uniform over the parameter's range
@@ -39,12 +43,13 @@ struct EvolutionOptions {
   double mutated = 0.2;           ///< share replaced by mutation; crossover gives the rest
   double mutation_parents = 0.8;  ///< share of the best that may be mutated
   MutationLaw mutation = MutationLaw::redraw;
-  double mutation_step = 0.1;  ///< of the range (in the logarithm on a log scale); `gaussian` only
-  /// Stops once the best cost is at or below this.
+  double mutation_step =
+      0.1;  ///< share of the range (in the logarithm on a log scale); `gaussian` only
+  /// The search stops once the best cost is at or below this.
   double cost_below = -std::numeric_limits<double>::infinity();
-  /// Stops when over the last `gain_window` generations the best cost fell by less than the share
-  /// `least_gain` of itself. 0 never stops. A longer window costs generations after convergence, a
-  /// shorter one mistakes a pause for the end.
+  /// The search stops when the best cost fell too little over the last `gain_window` generations:
+  /// by less than the share `least_gain` of itself. 0 never stops. A longer window costs
+  /// generations after convergence, a shorter one mistakes a pause for the end.
   int gain_window = 20;
   double least_gain = 1e-3;
   unsigned long long seed = 1;
@@ -56,21 +61,22 @@ struct EvolutionOptions {
   void validate() const;  ///< throws InputError
 };
 
-/// How an individual came into its generation.
+/// The origin of an individual in its generation.
 enum class Origin { random, given, kept, mutated, crossed };
 
 struct Individual {
   Eigen::VectorXd values;  ///< one per parameter, in the parameter's unit
   double cost = std::numeric_limits<double>::infinity();  ///< +infinity when it was not finite
   Origin origin = Origin::random;
-  /// Ranks in the preceding generation: its own when kept, its parent's when mutated, when crossed
-  /// those of all parents drawn (as many as parameters). Empty in the first generation.
+  /// Ranks in the preceding generation. They are its own when kept, its parent's when mutated, and
+  /// those of all parents drawn (as many as parameters) when crossed. Empty in the first
+  /// generation.
   std::vector<int> parent_ranks;
 };
 
-/// All that the search knows between two generations: plain data, to be saved, resumed, compared.
-/// The randomness of a new individual depends on (seed, generation, place in it) alone, so a
-/// resumed search goes on as if it had never stopped.
+/// The whole state of the search between two generations: plain data, to be saved, resumed,
+/// compared. The randomness of a new individual depends on (seed, generation, place in it) alone. A
+/// resumed search therefore goes on as if it had never stopped.
 struct EvolutionState {
   std::vector<Individual> population;  ///< by rank, best first; empty before the first generation
   std::vector<double> best_cost;       ///< after each generation
@@ -78,18 +84,18 @@ struct EvolutionState {
   int generations() const { return static_cast<int>(best_cost.size()); }
 };
 
-/// How far the individuals still differ: the standard deviation over the population of a
-/// parameter's place in its range, as a share of the range, averaged over the parameters. 0.29 for
-/// a uniform draw, 0 for copies of one individual.
+/// Returns how far the individuals still differ. It is the standard deviation over the population
+/// of a parameter's place in its range, as a share of the range, averaged over the parameters. 0.29
+/// for a uniform draw, 0 for copies of one individual.
 double diversity(const std::vector<SearchParameter>& parameters, const EvolutionState& state);
 
-/// The random first generation. The first individuals are `given` ones, moved into the ranges where
-/// they lie outside; at most as many as the population.
+/// Makes the random first generation. The first individuals are `given` ones, moved into the ranges
+/// where they lie outside; at most as many as the population.
 EvolutionState first_generation(const std::vector<SearchParameter>& parameters,
                                 const EvolutionOptions& options, const GenerationCost& cost,
                                 const std::vector<Eigen::VectorXd>& given = {});
 
-/// The generation after `state`.
+/// Makes the generation after `state`.
 EvolutionState next_generation(const std::vector<SearchParameter>& parameters,
                                const EvolutionOptions& options, const GenerationCost& cost,
                                const EvolutionState& state);
@@ -109,12 +115,12 @@ struct EvolutionResult {
   const Individual& best() const { return state.population.front(); }
 };
 
-/// Sees the state after a generation, to save it, say.
+/// Receives the state after a generation, for example to save it.
 using EvolutionWatcher = std::function<void(const EvolutionState&)>;
 
-/// Generations until a stopping rule holds. After each generation `after_generation`, when given,
-/// sees the state, then `progress`, when given, is told. Throws InputError for options or ranges
-/// that make no sense.
+/// Makes generations until a stopping rule holds. After each generation `after_generation`, when
+/// given, receives the state, then `progress`, when given, is told. Throws InputError for options
+/// or ranges that make no sense.
 EvolutionResult evolve(const std::vector<SearchParameter>& parameters,
                        const EvolutionOptions& options, const GenerationCost& cost,
                        const ProgressCallback& progress = {},

@@ -49,7 +49,7 @@ std::string_view word_of(Enum value, const Words<Enum, count>& words) {
   return found->first;
 }
 
-/// What a line ends with: the checksum of all lines up to it.
+/// Returns the end of a line: the checksum of all lines up to it.
 std::string line_end(std::uint64_t sum) {
   return fmt::format(" {:016x}", sum);
 }
@@ -60,7 +60,7 @@ std::uint64_t line_sum(std::string_view line, std::uint64_t before) {
 
 class LineWriter {
  public:
-  /// One line: the words, separated by spaces.
+  /// Writes one line: the words, separated by spaces.
   template <class... Parts>
   void line(const Parts&... parts) {
     std::string line;
@@ -106,7 +106,7 @@ class LineReader {
     }
   }
 
-  /// The next line whole, without its checksum.
+  /// Returns the whole next line, without its checksum.
   std::string_view line() {
     ++number_;
     const std::size_t end = rest_.find('\n');
@@ -197,7 +197,7 @@ class LineReader {
   std::string file_;
   std::string text_;
   std::string_view rest_;   ///< lines to come
-  std::string_view words_;  ///< of the line at hand, to come
+  std::string_view words_;  ///< of the line at hand, still to come
   std::uint64_t sum_ = kEmptyChecksum;
   int number_ = 0;
 };
@@ -209,7 +209,7 @@ std::string option_line(const char* name, const Value& value) {
   return fmt::format("option {} {}", name, value);
 }
 
-/// What must be the same for a search to go on; the stopping rules need not.
+/// Returns the properties that must be the same for a search to go on; the stopping rules need not.
 Lines lines_of(const EvolutionOptions& options) {
   return {"method evolutionary_strategy",
           option_line("population", options.population),

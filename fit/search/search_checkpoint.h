@@ -9,20 +9,22 @@
 
 namespace clothfit {
 
-/// A search on disk, between two generations: it goes on from there to the same bits as if it had
-/// not stopped. Save from the search's `after_generation`, at each generation or every so many.
+/// Saves a search between two generations, so that it goes on to the same bits as if it had not
+/// stopped. Save from the search's `after_generation`, at each generation or every so many.
 ///
-/// The file holds what must be the same when it is read: the method, `problem` (one line, the
-/// caller's, that names all that determines the costs), the options that determine the generations,
-/// and names and ranges of the parameters. Rules that end the whole search (generations, restarts,
-/// evaluations, a cost that is low enough, no gain) may change, so that a search can be prolonged;
-/// populations that CMA-ES made smaller to stay within the evaluations are then not made larger.
+/// The file holds the properties that must be the same when it is read. These are the method,
+/// `problem`, the options that determine the generations, and names and ranges of the parameters.
+/// `problem` is one line of the caller's that names all that determines the costs. Rules that end
+/// the whole search (generations, restarts, evaluations, a cost that is low enough, no gain) may
+/// change, so that a search can be prolonged. Populations that CMA-ES made smaller to stay within
+/// the evaluations are then not made larger.
 ///
-/// Text, one thing a line; every line ends with the checksum of the file up to there. Numbers are
-/// written as the shortest decimals that read back as the same bits, infinities included.
+/// The file is text, one thing a line; every line ends with the checksum of the file up to there.
+/// Numbers are written as the shortest decimals that read back as the same bits, infinities
+/// included.
 ///
 /// Saving replaces the file in one step and throws InputError when it cannot be written. Loading
-/// throws InputError, with the line, for any damage and for anything that is not the same.
+/// throws InputError, with the line, for any damage and for any property that differs.
 void save_checkpoint(const std::filesystem::path& file, const std::string& problem,
                      const std::vector<SearchParameter>& parameters,
                      const EvolutionOptions& options, const EvolutionState& state);
@@ -30,12 +32,12 @@ void save_checkpoint(const std::filesystem::path& file, const std::string& probl
                      const std::vector<SearchParameter>& parameters, const CmaOptions& options,
                      const CmaState& state);
 
-/// For `resume_evolution`.
+/// Loads a state for `resume_evolution`.
 EvolutionState load_evolution_checkpoint(const std::filesystem::path& file,
                                          const std::string& problem,
                                          const std::vector<SearchParameter>& parameters,
                                          const EvolutionOptions& options);
-/// For `search_by_cma`.
+/// Loads a state for `search_by_cma`.
 CmaState load_cma_checkpoint(const std::filesystem::path& file, const std::string& problem,
                              const std::vector<SearchParameter>& parameters,
                              const CmaOptions& options);
