@@ -11,13 +11,14 @@
 
 namespace clothfit {
 
-/// Everything a fit looks at, read in.
+/// All input of a fit, read in.
 struct FitInput {
   Recording recording;
   Tracks3d tracks3d;                         ///< empty when there are none
   std::map<std::string, Tracks2d> tracks2d;  ///< camera name -> its tracks
   std::vector<CameraParameters> cameras;     ///< those of tracks2d, with poses
-  /// Of markers that held points follow, where there are no 3D tracks (fit/observe/held_tracks.h).
+  /// Tracks of the markers that drive held points, where there are no 3D tracks
+  /// (fit/observe/held_tracks.h).
   Tracks3d held_tracks;
   PointClouds clouds;  ///< world; errors are judged by them, nothing is fitted
 };

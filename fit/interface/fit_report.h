@@ -12,7 +12,7 @@ namespace clothfit {
 
 enum class FitStop { not_run, converged, reached_limit, cancelled, diverged };
 
-/// Whether there is a result.
+/// Says whether there is a result.
 inline bool is_usable(FitStop stop) {
   return stop == FitStop::converged || stop == FitStop::reached_limit;
 }
@@ -23,11 +23,11 @@ struct FitReport {
   std::string message;  ///< one line for a person
   FitResult result;
   bool usable() const { return is_usable(stop); }
-  ModelDescription model;  ///< what was found, with all that a simulation needs
+  ModelDescription model;  ///< the found model, with all that a simulation needs
   /// Every parameter of the fit by name, those of the start and of the drive among them.
   std::map<std::string, double> values;
 
-  /// What the sigma of each parameter of the physics is made of (fit/uncertainty/uncertainty.h).
+  /// The parts of each physical parameter's sigma (fit/uncertainty/uncertainty.h).
   struct SigmaParts {
     std::string name;
     double value = 0;
@@ -54,8 +54,8 @@ struct FitReport {
       bool held_out = false;
     };
     std::vector<Row> rows;
-    /// rms over coordinates in each frame, of the model and of the trivial predictors
-    /// (the latter only where defined; NaN elsewhere). Index = frame.
+    /// rms over coordinates in each frame, of the model and of the trivial predictors. The latter
+    /// are NaN where not defined. Index = frame.
     std::vector<double> rms_by_frame;
     std::vector<double> first_frame_by_frame;
     std::vector<double> last_velocity_by_frame;
@@ -65,7 +65,7 @@ struct FitReport {
 
   /// Best cost after each generation of the evolutionary search.
   std::vector<double> search_cost;
-  /// One line per stage: what was done, with how many frames, substeps, evaluations, final cost.
+  /// One line per stage: its work, frames, substeps, evaluations and final cost.
   std::vector<std::string> stages;
 };
 

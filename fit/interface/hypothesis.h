@@ -6,12 +6,12 @@
 
 namespace clothfit {
 
-/// An effect that a model has beyond what its recording declares, by one of its modes.
+/// An effect, by one of its modes, that a model has beside those its recording declares.
 struct Hypothesis {
   std::string effect;
-  std::string mode;                     ///< empty where the effect has but one
+  std::string mode;                     ///< empty where the effect has only one
   std::vector<std::string> amplitudes;  ///< parameters that are fitted
-  std::map<std::string, double> shape;  ///< parameters that say how; others are neutral
+  std::map<std::string, double> shape;  ///< parameters beside the amplitudes; others are neutral
   /// Standard deviations of the shape's prior, from the spacing of its grid.
   std::map<std::string, double> shape_sigma;
   bool fits_shape = false;  ///< whether the shape is fitted too
@@ -24,10 +24,10 @@ struct Hypothesis {
   }
 };
 
-/// "wind (pressure) + gravity_tilt"; "base" for none.
+/// Returns "wind (pressure) + gravity_tilt"; "base" for none.
 std::string title(const std::vector<Hypothesis>& hypotheses);
 
-/// Whether two hypotheses are of one effect and share a number of their shapes.
+/// Says whether two hypotheses are of one effect and share a number of their shapes.
 bool share_shape(const Hypothesis& one, const Hypothesis& other);
 
 }  // namespace clothfit

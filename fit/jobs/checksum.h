@@ -7,9 +7,9 @@ namespace clothfit {
 
 constexpr std::uint64_t kEmptyChecksum = 0xcbf29ce484222325u;
 
-/// FNV-1a over 64 bits, of `bytes` after those that gave `before`. Tells damage, not forgery. Every
-/// step is a bijection of the sum so far, so that one changed byte always changes the result;
-/// wider damage passes with a probability of 2^-64.
+/// Returns FNV-1a over 64 bits, of `bytes` after those that gave `before`. It tells damage, not
+/// forgery. Every step is a bijection of the sum so far, so that one changed byte always changes
+/// the result. Wider damage passes with a probability of 2^-64.
 constexpr std::uint64_t checksum(std::string_view bytes, std::uint64_t before = kEmptyChecksum) {
   for (const char byte : bytes) {
     before = (before ^ static_cast<unsigned char>(byte)) * 0x100000001b3u;

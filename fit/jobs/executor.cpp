@@ -19,7 +19,7 @@
 namespace clothfit {
 namespace {
 
-/// What the threads of one call share.
+/// The data that the threads of one call share.
 class Run {
  public:
   Run(int count, const Work& work, const ExecuteOptions& options, Journal* journal,
@@ -43,9 +43,9 @@ class Run {
     while (!stops_) {
       const std::size_t turn = next_++;
       if (turn >= left_.size()) return;
-      // A piece that was handed out is done whatever stops the others: the promise about the
-      // lowest index rests on it. In isolation, a thread that waits inside a piece finds no tasks
-      // but the piece's own.
+      // A piece that was handed out is done whatever stops the others: the promise about the lowest
+      // index rests on it. In isolation, a thread that waits inside a piece finds only the piece's
+      // own tasks.
       tbb::this_task_arena::isolate([&] { do_piece(left_[turn]); });
     }
   }
@@ -109,7 +109,7 @@ class Run {
   std::atomic<std::size_t> next_ = 0;
   std::atomic<bool> stops_ = false;
 
-  std::mutex mutex_;                   ///< of all below, of the journal and of progress
+  std::mutex mutex_;                   ///< guards all below, the journal and progress
   std::vector<std::string> payloads_;  ///< each written by the one thread that does the piece
   int performed_ = 0;
   int failed_;  ///< lowest index that failed
@@ -141,8 +141,8 @@ ExecuteResult execute(int count, const Work& work, const ExecuteOptions& options
   Run run(count, work, options, journal, progress);
   tbb::task_arena arena(threads);
   arena.execute([&] {
-    // As many loops as threads, not a task for each piece: those would be split into ranges and
-    // not begun in order.
+    // There are as many loops as threads, not a task for each piece. Tasks would be split into
+    // ranges and not begun in order.
     tbb::parallel_for(
         0, std::min(threads, run.left()), [&](int) { run.do_pieces(); }, tbb::simple_partitioner());
   });

@@ -72,7 +72,7 @@ std::string read_all(const std::filesystem::path& file, int descriptor) {
   }
 }
 
-/// The first line of a record that begins at byte `begin`.
+/// Returns the first line of a record that begins at byte `begin`.
 std::string record_head(std::size_t begin, int index, std::string_view payload) {
   const std::string what = fmt::format("{}{} {}", kRecord, index, payload.size());
   const std::uint64_t sum = checksum(payload, checksum(fmt::format("{} at {}\n", what, begin)));
@@ -82,10 +82,10 @@ std::string record_head(std::size_t begin, int index, std::string_view payload) 
 struct Record {
   int index = 0;
   std::string_view payload;
-  std::size_t end = 0;  ///< the byte after it
+  std::size_t end = 0;  ///< the byte behind the record
 };
 
-/// The record that begins at byte `begin`, where there is an intact one.
+/// Returns the record that begins at byte `begin`, where there is an intact one.
 std::optional<Record> record_at(std::string_view bytes, std::size_t begin) {
   std::string_view rest = bytes.substr(begin);
   if (!rest.starts_with(kRecord)) return std::nullopt;
@@ -103,7 +103,7 @@ std::optional<Record> record_at(std::string_view bytes, std::size_t begin) {
   return Record{.index = index, .payload = payload, .end = begin + head + length + 1};
 }
 
-/// Says why a file whose first bytes are not the header of this run cannot be gone on with.
+/// Says why a run cannot go on with a file whose first bytes are not its header.
 [[noreturn]] void refuse_header(const std::filesystem::path& file, std::string_view bytes,
                                 const std::string& key) {
   const std::string remedy = "name another file, or remove this one";
@@ -139,7 +139,7 @@ Journal::Journal(const std::filesystem::path& file, const std::string& key, Jour
     read_records(bytes, header.size());
     return;
   }
-  // What is no more than a part of the header was killed before it did anything.
+  // A file that holds only a part of the header was killed before it did anything.
   if (!header.starts_with(bytes)) refuse_header(file_, bytes, key);
   write_at_end(header);
   sync();
@@ -150,7 +150,7 @@ Journal::Journal(const std::filesystem::path& file, const std::string& key, Jour
 }
 
 Journal::~Journal() {
-  // Who asks for certainty has it from the checksums of the next run.
+  // A caller that asks for certainty has it from the checksums of the next run.
   static_cast<void>(fdatasync(descriptor_));
   close(descriptor_);
 }

@@ -14,42 +14,42 @@ enum class JournalStart {
   resume  ///< goes on with the file that is there; begins one where none is
 };
 
-/// The finished pieces of a long run in an append-only file, so that a run that was killed loses at
-/// most the pieces at work. Layout: a line with the version, a line with the key, then for each
-/// piece, in the order in which they were finished,
+/// The finished pieces of a long run in an append-only file. A run that was killed loses at most
+/// the pieces at work. Layout: a line with the version, a line with the key, then for each piece,
+/// in the order in which they were finished,
 ///
 ///   record INDEX LENGTH CHECKSUM\n PAYLOAD \n
 ///
 /// Payloads hold any bytes. The checksum covers the record's place in the file too, so that nothing
 /// inside a payload passes for a record.
 ///
-/// A record counts where its checksum holds. What follows the last such record was torn while it
-/// was written, and the file is cut there. A record damaged before that is left out and its piece
-/// is to be done again: each record proves itself, so one spoiled sector need not cost the days in
-/// the others. A damaged header is refused, for it says what the records belong to.
+/// A record counts where its checksum holds. Bytes behind the last such record were torn while they
+/// were written, and the file is cut there. A record damaged before that is left out, and its piece
+/// has to be done again. Each record proves itself, so one spoiled sector need not cost the days in
+/// the others. A damaged header is refused, because it says to which run the records belong.
 ///
-/// A record is with the system when `append` returns (it survives the end of the program) and on
-/// disk at most a second later, or with the record after that (it survives a power cut). A journal
-/// belongs to one process at a time, and there to one thread at a time.
+/// A record is with the system when `append` returns: it survives the end of the program. It is on
+/// disk at most a second later, or with the record after that: it then survives a power cut. A
+/// journal belongs to one process at a time, and there to one thread at a time.
 class Journal {
  public:
-  /// `key` is one line that names all that determines the payloads, such as options and seed; the
-  /// number of pieces need not be among it, so that a run can be prolonged. Throws InputError:
-  /// the file exists and `start` is anew, it belongs to another key, is no journal, is written by
-  /// another process, or cannot be read and written.
+  /// Opens the file. `key` is one line that names all that determines the payloads, such as options
+  /// and seed. The number of pieces need not be in it, so that a run can be prolonged. Throws
+  /// InputError where the file exists and `start` is `anew`, belongs to another key, is no journal,
+  /// is written by another process, or cannot be read and written.
   Journal(const std::filesystem::path& file, const std::string& key, JournalStart start);
   ~Journal();
   Journal(const Journal&) = delete;
   Journal& operator=(const Journal&) = delete;
 
   const std::filesystem::path& file() const { return file_; }
-  /// Payloads by index: those found and those appended.
+  /// Returns payloads by index: those found and those appended.
   const std::map<int, std::string>& finished() const { return finished_; }
-  /// Places where records before the last intact one are damaged.
+  /// Returns at how many places records before the last intact one are damaged.
   int damaged_places() const { return damaged_places_; }
 
   /// Notes the payload of a piece that is not among the finished ones. Throws InputError when it
-  /// cannot be written; the journal then holds what it held before.
+  /// cannot be written; the journal's content is then as before.
   void append(int index, std::string_view payload);
 
  private:

@@ -8,8 +8,8 @@
 
 namespace clothfit {
 
-/// What an error message shows of `text` where it is not `other`: all of it when it is short, else
-/// from the word on in which they first differ.
+/// Returns the part of `text` that an error message shows where it is not `other`. A short text is
+/// shown whole, a long one from the word in which they first differ.
 inline std::string shown_difference(std::string_view text, std::string_view other) {
   constexpr std::size_t kShort = 60;
   if (text.size() <= kShort) return shown_text(text);
