@@ -13,7 +13,7 @@
 
 namespace {
 
-/// Parses the command line, runs the verb, turns what it throws into messages and exit codes.
+/// Parses the command line, runs the verb, and turns exceptions into messages and exit codes.
 int run(int argc, char** argv) {
   clothfit::CommandLine line(
       "Measures a moving cloth and identifies the simulator that moves the same way.", "clothfit",
@@ -56,7 +56,7 @@ int main(int argc, char** argv) {
   try {
     return run(argc, argv);
   } catch (const std::exception& error) {
-    // Not the user's mistake: a full disk, no memory, or ours.
+    // This is not the user's mistake: a full disk, no memory, or ours.
     spdlog::critical("{}", error.what());
     return 1;
   }

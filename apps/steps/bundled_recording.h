@@ -5,9 +5,9 @@
 
 namespace clothfit {
 
-/// Folder of a recording that comes with the program: beside the installed program (in
-/// ../share/clothfit/recordings) or in the source tree it was built from. Throws InputError when
-/// it is at neither place.
+/// Returns the folder of a recording that comes with the program. It is beside the installed
+/// program (in ../share/clothfit/recordings) or in the source tree it was built from. Throws
+/// InputError when it is at neither place.
 std::filesystem::path bundled_recording(const std::string& name);
 
 }  // namespace clothfit

@@ -18,8 +18,8 @@ struct StillsCalibration {
   CalibrateResult result;                    ///< usable
 };
 
-/// Finds the board in every still and calibrates. Throws InputError where the stills cannot be
-/// read or none shows the board, NoResult where the numbers do not work out, Cancelled.
+/// Finds the board in every still and calibrates. Throws InputError where the stills cannot be read
+/// or none shows the board, NoResult where the numbers do not work out, Cancelled.
 StillsCalibration calibrate_from_stills(const std::string& camera, const CalibrationStills& stills,
                                         const CalibrateOptions& options,
                                         const ProgressCallback& progress);
@@ -33,11 +33,12 @@ struct CalibrateStepResult {
   std::vector<StillsCalibration> calibrations;
 };
 
-/// Cameras that have stills of a board; without `again`, only those that lack a camera file.
+/// Returns cameras that have stills of a board; without `again`, only those that lack a camera
+/// file.
 std::vector<std::string> cameras_to_calibrate(const Recording& recording, bool again);
 
-/// Calibrates the named cameras and writes a complete recording into `folder`, which exists.
-/// Refuses stills of another size than the camera's pictures.
+/// Calibrates the named cameras and writes a complete recording into `folder`, which exists. Throws
+/// InputError for stills of another size than the camera's pictures.
 CalibrateStepResult calibrate_step(const Recording& recording,
                                    const std::vector<std::string>& cameras,
                                    const CalibrateOptions& options,

@@ -11,10 +11,11 @@ struct PictureSize {
   bool operator==(const PictureSize&) const = default;
 };
 
-/// Size of the first picture of a folder or video. Throws InputError where there is none.
+/// Returns the size of the first picture of a folder or video. Throws InputError where there is
+/// none.
 PictureSize picture_size(const std::filesystem::path& images);
 
-/// "960 x 720 px"
+/// Returns "960 x 720 px".
 std::string to_string(const PictureSize& size);
 
 }  // namespace clothfit

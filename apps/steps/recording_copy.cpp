@@ -22,7 +22,7 @@ fs::path place_copy(const fs::path& file, const fs::path& target) {
   return target;
 }
 
-/// Copies one file to the place it has in the recording, or, when it lies elsewhere, to
+/// Copies one file to the place it has in the recording. When it lies elsewhere, it goes to
 /// `folder`/`subfolder`. A name already taken by another file gets a number in front.
 fs::path copy_file_into(const fs::path& folder, const fs::path& recording_folder,
                         const fs::path& file, const fs::path& subfolder) {
@@ -54,7 +54,7 @@ Recording copy_recording(const Recording& recording, const std::filesystem::path
   for (auto& [camera, file] : copy.tracks2d) move_in(file, "tracks2d");
   for (CameraEntry& camera : copy.cameras) {
     if (!camera.file) continue;
-    // Cameras may share a file of intrinsics; each needs its own for its place in the world.
+    // Cameras may share a file of intrinsics, but each needs its own for its place in the world.
     const char* ending = camera.file->extension() == ".gz" ? ".yaml.gz" : ".yaml";
     camera.file = place_copy(*camera.file, folder / "cameras" / (camera.name + ending));
   }

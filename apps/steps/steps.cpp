@@ -19,8 +19,8 @@ std::string yaml_of(const Recording& recording) {
   return (recording.folder / "recording.yaml").string();
 }
 
-/// A pose comes from the camera's file or from reference points; without either, hours of tracking
-/// would end in nothing.
+/// Throws InputError for a camera that cannot be placed. A pose comes from the camera's file or
+/// from reference points. Without either, hours of tracking would end in nothing.
 void check_cameras_can_be_placed(const Recording& recording) {
   for (const CameraEntry& camera : recording.cameras) {
     if (!camera.images && !recording.tracks2d.contains(camera.name)) continue;
@@ -74,7 +74,7 @@ Recording complete_recording(const Recording& recording, ObservationKind kind,
 
 namespace {
 
-/// Turned from the axes of the camera that saw them into the world's.
+/// Reads clouds and turns them from the axes of the camera that saw them into the world's.
 PointClouds read_clouds_in_world(const Recording& recording, const Clouds& clouds) {
   const CameraEntry* camera = recording.find_camera(clouds.camera);
   if (camera == nullptr || !camera->file) return {};

@@ -17,18 +17,19 @@ struct StepOptions {
   TrackOptions track;
 };
 
-/// What a fit of `kind` will look at: 3D tracks where there are any, unless told otherwise.
+/// Returns the kind that a fit of `kind` will look at: 3D tracks where there are any, unless told
+/// otherwise.
 ObservationKind resolve_observations(const Recording& recording, ObservationKind kind);
 
-/// Runs the steps that a recording still lacks for a fit of `kind`, each into a complete recording
-/// of its own: `steps`/calibrated, `steps`/tracked. Returns the recording to go on with, which is
-/// the given one when nothing was lacking. Throws InputError, NoResult, Cancelled.
+/// Runs the steps that a recording still lacks for a fit of `kind`. Each goes into a complete
+/// recording of its own: `steps`/calibrated, `steps`/tracked. Returns the recording to go on with,
+/// which is the given one when nothing was lacking. Throws InputError, NoResult, Cancelled.
 Recording complete_recording(const Recording& recording, ObservationKind kind,
                              const StepOptions& options, const std::filesystem::path& steps,
                              const ProgressCallback& progress);
 
-/// Reads what a fit of `kind` looks at. Throws InputError, also where there is nothing to look at
-/// or a camera has no pose.
+/// Reads the input of a fit of `kind`. Throws InputError, also where there is nothing to look at or
+/// a camera has no pose.
 FitInput read_fit_input(const Recording& recording, ObservationKind kind);
 
 }  // namespace clothfit

@@ -36,7 +36,7 @@ void check_size(const CameraEntry& camera) {
   }
 }
 
-/// Reference points with their mean pixels. Corners of one tag lie on one plate.
+/// Returns reference points with their mean pixels. Corners of one tag lie on one plate.
 std::vector<PlacedPixel> reference_pixels(const Recording& recording,
                                           const std::vector<ReferencePixel>& seen) {
   std::vector<PlacedPixel> placed;
@@ -50,7 +50,7 @@ std::vector<PlacedPixel> reference_pixels(const Recording& recording,
   return placed;
 }
 
-/// The flat sheet as the first frame shows it; nothing where the start is not a flat sheet.
+/// Returns the flat sheet as the first frame shows it; nothing where the start is not a flat sheet.
 std::vector<PlacedPixel> first_sheet(const Recording& recording, const Tracks2d& tracks) {
   std::vector<PlacedPixel> sheet;
   if (recording.start != StartKind::released_flat) return sheet;
@@ -65,7 +65,7 @@ std::vector<PlacedPixel> first_sheet(const Recording& recording, const Tracks2d&
   return sheet;
 }
 
-/// Gives the camera its pose in the world, or says in `not_placed` what that would take.
+/// Gives the camera its pose in the world, or says in `not_placed` what is missing for it.
 void place_camera(const Recording& recording, const CameraEntry& camera, CameraTracks& tracks) {
   if (!camera.file) {
     tracks.not_placed = "it is not calibrated: give it a file, or stills of a board";
@@ -142,7 +142,7 @@ TrackStepResult track_step(const Recording& recording, const std::vector<std::st
 
   for (const CameraEntry& camera : step.recording.cameras) {
     if (std::find(cameras.begin(), cameras.end(), camera.name) == cameras.end()) continue;
-    // What is refused is named where the user has it, not where its copy lies.
+    // A refusal names the file where the user has it, not its copy.
     const CameraEntry& given = *recording.find_camera(camera.name);
     if (given.file) check_size(given);
 

@@ -25,13 +25,14 @@ struct TrackStepResult {
   std::vector<CameraTracks> cameras;
 };
 
-/// Cameras whose pictures wait to be tracked: those without tracks, and those whose pose can only
-/// come from reference points that tracking sees. With `again`, every camera with pictures.
+/// Returns cameras whose pictures wait to be tracked. These are cameras without tracks, and those
+/// whose pose can only come from reference points that tracking sees. With `again`, every camera
+/// with pictures.
 std::vector<std::string> cameras_to_track(const Recording& recording, bool again);
 
-/// Tracks the named cameras and writes a complete recording into `folder`, which exists:
-/// tracks2d/CAMERA.csv, cameras/CAMERA.yaml with the pose, overlay_CAMERA.png, tracks.json. Refuses
-/// a camera file of another size than the pictures.
+/// Tracks the named cameras and writes a complete recording into `folder`, which exists. It holds
+/// tracks2d/CAMERA.csv, cameras/CAMERA.yaml with the pose, overlay_CAMERA.png, tracks.json. Throws
+/// InputError for a camera file of another size than the pictures.
 TrackStepResult track_step(const Recording& recording, const std::vector<std::string>& cameras,
                            const TrackOptions& options, const std::filesystem::path& folder,
                            const ProgressCallback& progress);

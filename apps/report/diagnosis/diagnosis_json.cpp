@@ -56,7 +56,7 @@ ordered_json trial_json(const Trial& trial) {
   return json;
 }
 
-/// Values that the last fit has for what a term fits.
+/// Lists the values that the last fit has for a term's parameters.
 ordered_json found_json(const Hypothesis& term, const FitReport& found) {
   ordered_json json = ordered_json::array();
   const auto add = [&](const std::string& name) {
@@ -136,7 +136,7 @@ void write_diagnosis(const Diagnosis& diagnosis, const std::string& command,
   json["refused"] = ordered_json::array();
   for (const Trial& trial : diagnosis.refused) json["refused"].push_back(trial_json(trial));
   json["errors"] = ordered_json::array();
-  // What was not held out, or not fitted, has no error.
+  // Frames that were not held out, or not fitted, have no error.
   const auto known = [](const ErrorSummary& error, double rms) {
     return error.count > 0 ? ordered_json(rms) : ordered_json(nullptr);
   };

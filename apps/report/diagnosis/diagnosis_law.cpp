@@ -30,8 +30,8 @@ std::vector<ResidualForce::Regression> most_telling_first(const ResidualForce& f
   return sorted;
 }
 
-/// Errors of the model with what was accepted, and of that with the law too, of each recording and
-/// kind of observation, where frames are held out.
+/// Errors without and with the proposed law, where frames are held out. Both models have the
+/// accepted effects. There is an entry for each recording and kind of observation.
 struct ErrorsWithLaw {
   const DiagnosedRecording* recording = nullptr;
   const ObservationErrors* before = nullptr;

@@ -16,7 +16,7 @@
 namespace clothfit {
 namespace {
 
-/// The first recording's name, and how many more were fitted.
+/// Returns the first recording's name, and how many more were fitted.
 std::string names_text(const Diagnosis& diagnosis) {
   const auto fitted =
       std::ranges::count(diagnosis.recordings, false, &DiagnosedRecording::held_out);
@@ -61,7 +61,7 @@ struct Mean {
 
 std::string before_after_text(const Diagnosis& diagnosis) {
   const std::vector<ErrorsBeforeAfter> all = errors_before_after(diagnosis);
-  // Whole recordings held out say more than frames, and frames more than what was fitted.
+  // Whole recordings held out say more than frames, and frames more than fitted ones.
   const bool whole = std::ranges::any_of(
       all, [](const ErrorsBeforeAfter& one) { return one.recording->held_out; });
   const bool frames = std::ranges::any_of(
@@ -97,7 +97,7 @@ std::string before_after_text(const Diagnosis& diagnosis) {
   return text + ".";
 }
 
-/// Recordings that would tell an accepted law from others.
+/// Lists recordings that would tell an accepted mode from others.
 std::string what_to_record(std::span<const Separation> separations) {
   const Table table = separation_table(separations);
   if (table.rows.empty()) return "";
@@ -161,7 +161,7 @@ std::string what_was_missing(const Diagnosis& diagnosis) {
   return content;
 }
 
-/// Two figures beside each other.
+/// Places two figures beside each other.
 std::string side_by_side(const std::string& before, const std::string& after) {
   return "<div class=\"pair\">" + figure(before, "Before.") + figure(after, "After.") + "</div>\n";
 }
@@ -191,7 +191,7 @@ std::string maps_of(const DiagnosedRecording& of, bool changed, const Recording&
   return content;
 }
 
-/// Of one recording open, of several each behind its name.
+/// Shows the maps: those of one recording open, those of several each behind its name.
 std::string maps(const Diagnosis& diagnosis, std::span<const Recording> recordings) {
   const bool changed = diagnosis.changed();
   if (recordings.size() == 1)
@@ -205,7 +205,7 @@ std::string maps(const Diagnosis& diagnosis, std::span<const Recording> recordin
   return content;
 }
 
-/// Searches of twins: of what was accepted, and of planted amplitudes.
+/// Reports searches of twins: of the accepted model, and of planted amplitudes.
 std::string planted(const Diagnosis& diagnosis) {
   std::string content;
   if (diagnosis.reinjected && diagnosis.reinjected->ran)

@@ -8,12 +8,12 @@
 
 namespace clothfit {
 
-/// The diagnosis in one sentence, for the terminal and the head of the page.
+/// Returns the diagnosis in one sentence, for the terminal and the head of the page.
 std::string diagnosis_sentence(const Diagnosis& diagnosis);
 
-/// The page: what was missing, how we know, errors before and after with maps side by side, what
-/// was refused, what would have been seen. `recordings` as the diagnosis has them. `command` as
-/// diagnosis.json keeps it.
+/// Writes the page. It says what was missing and how we know, shows errors before and after with
+/// maps side by side, and says what was refused and what would have been seen. `recordings` are as
+/// the diagnosis has them, `command` as in diagnosis.json.
 std::string diagnosis_page_html(const Diagnosis& diagnosis, std::span<const Recording> recordings,
                                 const std::string& command);
 

@@ -11,7 +11,7 @@
 namespace clothfit {
 namespace {
 
-/// Laws that a reader is shown of all that were scored.
+/// A reader is shown this many of all scored modes.
 constexpr size_t kShown = 12;
 
 std::string shape_text(const Hypothesis& term) {
@@ -25,7 +25,7 @@ std::string sigmas_text(double sigmas) {
   return fmt::format("{:.{}f}", sigmas, sigmas < 9.95 ? 1 : 0);
 }
 
-/// "q_x 0.05 ± 0.01, q_y ..." with as many digits as sigma allows.
+/// Writes "q_x 0.05 ± 0.01, q_y ..." with as many digits as sigma allows.
 std::string amounts_text(const Score& score) {
   std::string text;
   for (Eigen::Index k = 0; k < score.amplitude.size(); ++k)

@@ -7,33 +7,32 @@
 
 namespace clothfit {
 
-/// What the score says of every law (CSV): the shape that it was best at, predicted fall of
-/// chi-square, its share, predicted amplitudes.
+/// Lists the score of every mode (CSV): its best shape, the predicted decrease of chi-square, its
+/// share, and predicted amplitudes.
 Table candidate_table(const Diagnosis& diagnosis);
-/// The most telling ones, for people.
+/// Lists the most telling ones, for people.
 Table short_candidate_table(const Diagnosis& diagnosis);
 
-/// Laws with which the model was fitted again, accepted and refused, and why.
+/// Lists modes with which the model was fitted again, accepted and refused, and why.
 Table trial_table(const Diagnosis& diagnosis);
 
-/// From where on every amplitude would have been seen, and what the score foresees of it.
+/// Lists every amplitude's detection limit, found and as the score predicts it.
 Table limit_table(const Diagnosis& diagnosis);
 
-/// Amplitudes that were planted on twins of the recordings, and what was found there.
+/// Lists amplitudes planted on twins of the recordings, and the results there.
 Table plant_table(const Diagnosis& diagnosis);
 
-/// "named", "not found", or what was found instead.
+/// Returns "named", "not found", or the name of the effect found instead.
 std::string outcome_text(const PlantOutcome& outcome);
 
-/// How far an accepted law is from each that is alike, now and in recordings that could be made.
+/// Lists how far an accepted mode is from each that is alike, now and in possible recordings.
 Table separation_table(std::span<const Separation> separations);
 
-/// "gravity_tilt cannot be told from world_tilt (0.0 sigma; 29 sigma with: twice as long)": the
-/// best recording for each law.
+/// Writes "gravity_tilt cannot be told from world_tilt (0.0 sigma; 29 sigma with: twice as long)".
+/// Each mode has its best recording.
 std::string separation_text(const Hypothesis& accepted, std::span<const Separation> separations);
 
-/// Errors of one kind of observation of one recording, with the model as declared and as it was
-/// found.
+/// Errors of one kind of observation in one recording, with the model as declared and as found.
 struct ErrorsBeforeAfter {
   const DiagnosedRecording* recording = nullptr;
   const ObservationErrors* before = nullptr;
@@ -41,17 +40,17 @@ struct ErrorsBeforeAfter {
 };
 std::vector<ErrorsBeforeAfter> errors_before_after(const Diagnosis& diagnosis);
 
-/// One row for each of these: fitted and held-out error in mm or px, beside the noise and the
+/// Has one row for each of these: fitted and held-out error in mm or px, beside the noise and the
 /// trivial predictors.
 Table before_after_table(const Diagnosis& diagnosis);
 
-/// The tests of step 1, before and after.
+/// Lists the tests of step 1, before and after.
 Table adequacy_table(const Diagnosis& diagnosis);
 
-/// "q_x 0.05, q_y 0.21 Pa (frequency 2 Hz)": values that a fit found for a term, with sigma.
+/// Writes "q_x 0.05, q_y 0.21 Pa (frequency 2 Hz)": a fit's values for a term, with sigma.
 std::string found_text(const Hypothesis& term, const FitResult& result);
 
-/// "a constant for each, 8.31 mm in the mean (rms of a coordinate)".
+/// Writes "a constant for each, 8.31 mm in the mean (rms of a coordinate)".
 std::string seen_elsewhere_text(const SeenElsewhere& seen);
 
 }  // namespace clothfit

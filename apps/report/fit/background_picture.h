@@ -17,13 +17,13 @@ struct BackgroundPicture {
   std::string jpeg;
 };
 
-/// The frame that an overlay shows: the last one, held out where there are any, that still shows
-/// at least half as many markers as the best frame does. The last is the hardest to predict.
-/// -1 when there are no rows.
+/// Returns the frame that an overlay shows: the last one that still shows at least half as many
+/// markers as the best frame does. It is held out where any are. The last is the hardest to
+/// predict. -1 when there are no rows.
 int overlay_frame(const FitReport::Residuals& residuals);
 
-/// For each camera that was fitted and has pictures, the picture of its overlay frame. A picture
-/// that cannot be read is left out: the fit does not depend on it.
+/// Reads the picture of the overlay frame for each camera that was fitted and has pictures. A
+/// picture that cannot be read is left out: the fit does not depend on it.
 std::vector<BackgroundPicture> background_pictures(const FitReport& report,
                                                    const Recording& recording);
 

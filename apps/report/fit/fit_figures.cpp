@@ -42,7 +42,7 @@ struct MeanSquare {
   double rms() const { return std::sqrt(sum / count); }
 };
 
-/// Of each marker, over the fitted and over the held-out frames.
+/// The errors of each marker over the fitted and over the held-out frames.
 struct MarkerErrors {
   std::map<int, MeanSquare> fitted, held_out;
 };
@@ -54,7 +54,7 @@ MarkerErrors marker_errors(const FitReport::Residuals& residuals) {
   return errors;
 }
 
-/// First frame of the residuals that is held out; nothing when none is.
+/// Returns the first held-out frame of the residuals; nothing when none is.
 std::optional<int> first_held_out(const FitReport::Residuals& residuals) {
   std::optional<int> first;
   for (const FitReport::Residuals::Row& row : residuals.rows) {
@@ -63,8 +63,8 @@ std::optional<int> first_held_out(const FitReport::Residuals& residuals) {
   return first;
 }
 
-/// Two axes to look along: as an onlooker sees it, up against gravity, across where the points
-/// spread most.
+/// Two axes to look along, as an onlooker sees the points. One is up against gravity, the other
+/// across where the points spread most.
 struct View {
   Eigen::Vector3d across = Eigen::Vector3d::UnitX();
   Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
@@ -84,14 +84,14 @@ View choose_view(const std::vector<const FitReport::Residuals::Row*>& rows,
     scatter += level * level.transpose();
   }
   view.across = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(scatter).eigenvectors().col(2);
-  // An eigenvector's sign means nothing: point to +x, or +y.
+  // An eigenvector's sign means nothing: it is made to point to +x, or +y.
   const double sign = std::abs(view.across.x()) > 1e-6 ? view.across.x() : view.across.y();
   if (sign < 0) view.across = -view.across;
   return view;
 }
 
-/// Magnification that makes the median residual some 9 px long on the page: 1, 2 or 5 times a
-/// power of ten, at least 1.
+/// Chooses the magnification that makes the median residual some 9 px long on the page. It is 1, 2
+/// or 5 times a power of ten, at least 1.
 double choose_magnification(const std::vector<PointPair>& points, double page_px_per_unit) {
   std::vector<double> length;
   for (const PointPair& point : points) {
@@ -243,7 +243,8 @@ std::string observed_and_predicted_svg(const FitReport::Residuals& residuals,
     box.extend(Eigen::Vector2d(point.observed_x, point.observed_y));
   }
   const double margin = 0.08 * box.diagonal().norm() + 1e-9;
-  // A hanging strip would fill pages: four wide to three high at most, the points in the middle.
+  // A hanging strip would fill pages. The box is four wide to three high at most, the points in its
+  // middle.
   const double widen = std::max(0.0, 2 * box.sizes().y() / 3 - box.sizes().x() / 2);
   const Eigen::Vector2d border(margin + widen, margin);
   box = Eigen::AlignedBox2d(box.min() - border, box.max() + border);

@@ -27,7 +27,7 @@ std::string relative_text(const ParameterEstimate& parameter) {
   return significant(100 * parameter.sigma / std::abs(parameter.value), 2) + "%";
 }
 
-/// With as many digits as sigma asks for.
+/// Writes the interval with as many digits as sigma asks for.
 std::string interval_text(const std::optional<Interval>& interval, double sigma) {
   if (!interval) return "";
   return value_text(interval->lower, sigma) + " to " + value_text(interval->upper, sigma);

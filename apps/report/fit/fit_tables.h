@@ -11,26 +11,26 @@ namespace clothfit {
 
 std::string to_string(FitStop stop);
 
-/// Every parameter with all its digits, effects' and nuisance parameters included (CSV).
+/// Lists every parameter with all its digits, effects' and nuisance parameters included (CSV).
 Table parameter_table(const FitResult& result);
-/// The same rounded by sigma, for people.
+/// Lists the same rounded by sigma, for people.
 Table short_parameter_table(const FitResult& result);
 
-/// The places that searches and refinements ended in, one a column, best first; no rows where there
-/// was no search.
+/// Lists the places in which searches and refinements ended, one a column, best first. There are no
+/// rows without a search.
 Table basin_table(const FitResult& result);
 
-/// One row per kind of observation with all digits (CSV).
+/// Has one row per kind of observation with all digits (CSV).
 Table error_table(const FitResult& result);
-/// The same for people: 3D errors in mm.
+/// Has the same for people: 3D errors in mm.
 Table short_error_table(const FitResult& result);
-/// Chamfer distances from measured clouds; no rows where there are none.
+/// Lists Chamfer distances from measured clouds; no rows where there are none.
 Table cloud_table(const FitResult& result);
 
-/// One row per observation: observed, predicted, sigma (CSV).
+/// Has one row per observation: observed, predicted, sigma (CSV).
 Table residual_table(const FitReport& report, const Recording& recording);
 
-/// Rejected observations by reason.
+/// Lists rejected observations by reason.
 Table rejection_table(const FitResult& result);
 
 /// Factor and unit in which errors of a kind are shown: metres as millimetres.
@@ -40,7 +40,7 @@ struct ShownUnit {
 };
 ShownUnit shown_unit(const std::string& unit);
 
-/// "front, px" or "tracks3d, mm"
+/// Returns "front, px" or "tracks3d, mm".
 std::string kind_title(const std::string& kind, const std::string& unit);
 
 }  // namespace clothfit

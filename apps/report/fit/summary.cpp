@@ -26,8 +26,8 @@ BestTrivial best_trivial(const TrivialErrors& trivial) {
                            [](const auto& a, const auto& b) { return a.rms < b.rms; });
 }
 
-/// Held-out error no larger than this many times the noise counts as "explained to the noise":
-/// 10 % more than noise alone in rms is 20 % in chi-square, which hundreds of observations show.
+/// A held-out error up to this many times the noise counts as "explained to the noise". 10 % more
+/// than noise alone in rms is 20 % in chi-square, which hundreds of observations show.
 constexpr double kNearNoise = 1.1;
 
 enum class Grade { to_the_noise, useful, useless };
@@ -38,7 +38,7 @@ Grade grade(const ObservationErrors& errors) {
   return near ? Grade::to_the_noise : Grade::useful;
 }
 
-/// A kind of observation as a sentence has it.
+/// Returns a kind of observation as a sentence has it.
 std::string kind_words(const std::string& kind) {
   return kind == "tracks3d" ? "the 3D tracks" : "the pictures of camera " + kind;
 }
@@ -66,7 +66,7 @@ std::string error_sentence(const ObservationErrors& errors) {
   return text + ".";
 }
 
-/// A forecast takes every number of the fabric from elsewhere.
+/// Says whether a fit is a forecast, which takes every number of the fabric from elsewhere.
 bool is_forecast(const FitResult& result) {
   return std::ranges::none_of(result.parameters, [](const ParameterEstimate& parameter) {
     return parameter.name != "areal_density" && parameter.state != ParameterState::fixed;

@@ -6,7 +6,7 @@
 
 namespace clothfit {
 
-/// What a fit amounts to, for a reader who reads nothing else.
+/// The meaning of a fit, for a reader who reads nothing else.
 struct FitSummary {
   std::string verdict;    ///< one short line
   std::string paragraph;  ///< plain text

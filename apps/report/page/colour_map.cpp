@@ -18,7 +18,7 @@ std::string mix(const Rgb& a, const Rgb& b, double weight_of_b) {
   return fmt::format("#{:02x}{:02x}{:02x}", channel(0), channel(1), channel(2));
 }
 
-// Ten even samples of matplotlib's viridis (CC0).
+// These are ten even samples of matplotlib's viridis (CC0).
 constexpr std::array<Rgb, 10> kViridis = {{{0x44, 0x01, 0x54},
                                            {0x48, 0x28, 0x78},
                                            {0x3e, 0x4a, 0x89},

@@ -4,11 +4,11 @@
 
 namespace clothfit {
 
-/// Colour "#rrggbb" for `fraction` in [0, 1] (clamped): viridis, whose steps look equally large to
-/// the eye, also to most colour-blind eyes and in grey print.
+/// Returns the colour "#rrggbb" for `fraction` in [0, 1] (clamped). It is viridis, whose steps look
+/// equally large to the eye, also to most colour-blind eyes and in grey print.
 std::string viridis(double fraction);
 
-/// Colour for `value` in [-1, 1]: blue over white to orange, pale enough for dark text on it.
+/// Returns a colour for `value` in [-1, 1]: blue over white to orange, pale enough for dark text.
 std::string diverging(double value);
 
 }  // namespace clothfit

@@ -20,7 +20,7 @@ bool shows(double value) {
   return std::isfinite(value) && value > 0;
 }
 
-/// Borders of the cells of `places`: halfway to the neighbours, and as far beyond the ends.
+/// Returns borders of the cells of `places`: halfway to neighbours, and as far beyond the ends.
 std::vector<double> borders(const std::vector<double>& places, bool logarithmic) {
   const auto at = [&](size_t n) { return logarithmic ? std::log(places[n]) : places[n]; };
   const size_t count = places.size();

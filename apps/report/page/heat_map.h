@@ -18,15 +18,15 @@ struct HeatMark {
 struct HeatMap {
   std::string title;         ///< above the panel
   std::vector<double> x, y;  ///< rising; spaced evenly, or evenly in the logarithm
-  Eigen::MatrixXd value;  ///< x places by y places; what is not finite or not above 0 stays white
+  Eigen::MatrixXd value;     ///< x places by y places; values not finite or not above 0 stay white
   std::vector<HeatMark> marks;
 };
 
-/// Heat maps side by side, each with its colours from its own smallest to its largest value, and
-/// the key of the marks below.
+/// Heat maps side by side, with the key of the marks below. Each has its colours from its own
+/// smallest to its largest value.
 struct HeatMaps {
   std::string title;        ///< for readers who do not see the picture
-  std::string description;  ///< what it shows, for the same
+  std::string description;  ///< content of the picture, for the same
   std::string x_label, y_label, value_label;
   bool log_x = false;
   bool log_y = false;

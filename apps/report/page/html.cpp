@@ -9,7 +9,7 @@
 namespace clothfit {
 namespace {
 
-// Paper-like: one column of text, figures as wide as it, numbers in tabular figures.
+// The page is paper-like: one column of text, figures as wide as it, numbers in tabular figures.
 constexpr const char* kStyle = R"(
 :root { color-scheme: light; --ink: #1c1e21; --soft: #5b616b; --rule: #d4d8de; --accent: #1f4e79; }
 * { box-sizing: border-box; }

@@ -8,24 +8,25 @@
 
 namespace clothfit {
 
-/// Text made safe inside an element or a double-quoted attribute of HTML and SVG.
+/// Makes text safe inside an element or a double-quoted attribute of HTML and SVG.
 std::string escape_xml(std::string_view text);
 
-/// A number's text as print sets it: a true minus sign, exponents as powers of ten. Escaped.
+/// Writes a number's text as print sets it: a true minus sign, exponents as powers of ten. Escaped.
 std::string typeset_number(const std::string& text);
 
-/// The table as HTML; columns whose cells are all numbers stand right.
+/// Writes the table as HTML; columns whose cells are all numbers stand right.
 std::string html_table(const Table& table, const std::string& caption);
 
-/// Parts of a page; nothing where the content is empty. Titles, texts and captions are plain text.
+/// Write parts of a page; nothing where the content is empty. Titles, texts and captions are plain
+/// text.
 std::string section(const std::string& title, const std::string& content);
 std::string paragraph(const std::string& text);
 std::string figure(const std::string& svg, const std::string& caption);
 
-/// `bytes` as a data: URI.
+/// Returns `bytes` as a data: URI.
 std::string data_uri(std::string_view media_type, std::string_view bytes);
 
-/// A whole page: head with the style sheet, `body` inside <main>.
+/// Writes a whole page: head with the style sheet, `body` inside <main>.
 std::string html_page(const std::string& title, const std::string& body);
 
 }  // namespace clothfit

@@ -59,12 +59,12 @@ std::string polylines(const Series& series, const Axis& x_axis, const Axis& y_ax
   return svg;
 }
 
-/// Room a text takes, good enough to lay out a legend.
+/// Estimates the room that a text takes, well enough to lay out a legend.
 double text_width(const std::string& text) {
   return 6.4 * static_cast<double>(text.size());
 }
 
-/// Names of the lines in rows below a plot; sets `height` to the room taken.
+/// Writes names of the lines in rows below a plot and sets `height` to the room taken.
 std::string legend(const std::vector<Series>& series, double left, double right, double top,
                    double& height) {
   std::string svg;
@@ -84,7 +84,8 @@ std::string legend(const std::vector<Series>& series, double left, double right,
   return svg;
 }
 
-/// Median distance from a value's place to its nearest neighbour; infinite for fewer than two.
+/// Returns the median distance from a value's place to its nearest neighbour; infinite for fewer
+/// than two.
 double usual_spacing(const std::vector<ClothValue>& values) {
   std::vector<double> nearest(values.size(), std::numeric_limits<double>::infinity());
   for (std::size_t i = 0; i < values.size(); ++i) {
@@ -188,7 +189,7 @@ std::string line_plot(const LinePlot& plot) {
     body += line_at(kLeft, y, kRight, y, {kSoft, "1 3", 1.4});
     body += text_at(kLeft + 6, y - 5, plot.level->label, "start", kSoft);
   }
-  // The first series is the one the plot is about: drawn last, on top.
+  // The plot is about the first series, which is drawn last, on top.
   for (auto series = plot.series.rbegin(); series != plot.series.rend(); ++series) {
     body += polylines(*series, x_axis, y_axis);
   }
@@ -224,7 +225,7 @@ std::string cloth_maps(const ClothMaps& maps) {
     }
   }
   if (highest == 0) highest = 1;
-  // As large as neighbours allow without touching.
+  // Dots are as large as neighbours allow without touching.
   const double radius = std::clamp(0.47 * scale * spacing_m, 1.5, 12.0);
 
   std::string body;
@@ -251,7 +252,7 @@ std::string cloth_maps(const ClothMaps& maps) {
       "fill=\"{}\">← t, down</text>\n",
       kMargin - 22, kTop, kSoft);
 
-  // Colour bar: 0 at the bottom.
+  // The colour bar has 0 at the bottom.
   const double bar_left = left - kGap + 28;
   constexpr int kSteps = 48;
   for (int step = 0; step < kSteps; ++step) {
@@ -307,7 +308,7 @@ std::string point_overlay(const PointOverlay& overlay) {
                          ox, oy, escape_xml(point.label));
   }
 
-  // What lies outside the rectangle is cut off by the inner <svg>.
+  // The inner <svg> cuts off all that lies outside the rectangle.
   std::string body = fmt::format("<svg width=\"{:.1f}\" height=\"{:.1f}\">\n", kWidth, height);
   const bool on_picture = !overlay.picture_uri.empty();
   if (on_picture) {
@@ -327,7 +328,7 @@ std::string point_overlay(const PointOverlay& overlay) {
   }
   body += fmt::format("<g fill=\"none\" pointer-events=\"all\">\n{}</g>\n</svg>\n", names);
 
-  // Key below the picture.
+  // The key is below the picture.
   const double y = height + 20;
   body +=
       path(ring(10, y - 4), on_picture ? "#0094a0" : "#1f4e79", 1.4) + text_at(22, y, "observed");

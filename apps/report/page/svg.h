@@ -8,14 +8,15 @@
 
 namespace clothfit {
 
-/// Round numbers inside [low, high], about `wanted` of them: steps of 1, 2 or 5 times a power of
-/// ten.
+/// Returns round numbers inside [low, high], about `wanted` of them. Steps are 1, 2 or 5 times a
+/// power of ten.
 std::vector<double> nice_ticks(double low, double high, int wanted);
 
-/// Powers of ten inside [low, high], with 2 and 5 times them where there are fewer than three.
+/// Returns powers of ten inside [low, high], with 2 and 5 times them where there are fewer than
+/// three.
 std::vector<double> log_ticks(double low, double high);
 
-/// A line through (x, y); points that are not finite (or not positive on a log axis) leave a gap.
+/// A line through (x, y). Points that are not finite (or not positive on a log axis) leave a gap.
 struct Series {
   std::string label;
   std::vector<double> x;
@@ -23,14 +24,14 @@ struct Series {
   LineStyle style;
 };
 
-/// Range of x that is shaded, with its name.
+/// A shaded range of x, with its name.
 struct Band {
   double from = 0;
   double to = 0;
   std::string label;
 };
 
-/// Horizontal line, with its name.
+/// A horizontal line, with its name.
 struct Level {
   double value = 0;
   std::string label;
@@ -38,7 +39,7 @@ struct Level {
 
 struct LinePlot {
   std::string title;        ///< for readers who do not see the picture
-  std::string description;  ///< what it shows, for the same
+  std::string description;  ///< content of the picture, for the same
   std::string x_label;
   std::string y_label;
   bool log_y = false;
@@ -47,7 +48,7 @@ struct LinePlot {
   std::optional<Level> level;
 };
 
-/// The plot as one <svg> element with axes, grid and legend.
+/// Draws the plot as one <svg> element with axes, grid and legend.
 std::string line_plot(const LinePlot& plot);
 
 /// A value somewhere on the flat cloth; s to the right, t down.
@@ -63,8 +64,8 @@ struct ClothMap {
   std::vector<ClothValue> values;
 };
 
-/// Maps of one quantity over the cloth, side by side, with one colour scale from 0 and a labelled
-/// bar.
+/// Maps of one quantity over the cloth, side by side. They share one colour scale from 0 and a
+/// labelled bar.
 struct ClothMaps {
   std::string title;
   std::string description;
@@ -86,7 +87,7 @@ struct PointPair {
 struct PointOverlay {
   std::string title;
   std::string description;
-  double left = 0, top = 0, width = 0, height = 0;  ///< what is shown, in the points' unit
+  double left = 0, top = 0, width = 0, height = 0;  ///< the shown rectangle, in the points' unit
   std::string picture_uri;                          ///< may be empty
   double picture_left = 0, picture_top = 0, picture_width = 0, picture_height = 0;
   double magnification = 1;  ///< of the lines from observed towards predicted places

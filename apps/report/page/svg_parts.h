@@ -4,13 +4,13 @@
 
 namespace clothfit {
 
-// What the figures of a report are made of.
+// The figures of a report are made of these parts.
 
 inline constexpr const char* kInk = "#1c1e21";
 inline constexpr const char* kSoft = "#5b616b";
 inline constexpr const char* kGrid = "#e4e7eb";
 
-/// How a line is drawn; told apart by dashes as well as by colour.
+/// The look of a line; told apart by dashes as well as by colour.
 struct LineStyle {
   std::string colour;
   std::string dashes;  ///< SVG stroke-dasharray; empty for a solid line
@@ -29,19 +29,19 @@ struct Axis {
   bool shows(double value) const;  ///< whether the value has a place
 };
 
-/// The opening tag of a figure, with what is read to those who do not see it.
+/// Writes the opening tag of a figure, with text for readers who do not see it.
 std::string open_svg(double width, double height, const std::string& title,
                      const std::string& description);
 
 std::string text_at(double x, double y, const std::string& text, const char* anchor = "start",
                     const char* colour = kInk);
 
-/// The same, read from below upwards.
+/// Writes a text to be read from below upwards.
 std::string upward_text_at(double x, double y, const std::string& text, const char* colour = kInk);
 
 std::string line_at(double x1, double y1, double x2, double y2, const LineStyle& style);
 
-/// The number at a tick of an axis, with a true minus sign.
+/// Writes the number at a tick of an axis, with a true minus sign.
 std::string tick_text(double value);
 
 }  // namespace clothfit

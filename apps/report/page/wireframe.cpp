@@ -12,7 +12,7 @@
 namespace clothfit {
 namespace {
 
-/// Rows: to the right, down the page, towards the viewer.
+/// Returns rows to the right, down the page, and towards the viewer.
 Eigen::Matrix3d page_from_world(const Viewpoint& from) {
   const double ca = std::cos(from.azimuth_rad), sa = std::sin(from.azimuth_rad);
   const double ce = std::cos(from.elevation_rad), se = std::sin(from.elevation_rad);
@@ -29,7 +29,7 @@ struct Face {
   double depth = 0;
 };
 
-/// Quadrilaterals between neighbouring threads, the farthest first.
+/// Returns quadrilaterals between neighbouring threads, the farthest first.
 std::vector<Face> faces_from_far(const Wireframe& cloth, const Eigen::Matrix3Xd& on_page) {
   std::vector<Face> faces;
   for (int row = 0; row + 1 < cloth.rows; ++row)

@@ -15,17 +15,17 @@ struct Wireframe {
   Eigen::Matrix3Xd position_m;
 };
 
-/// From where cloths are looked at: from far away, so that lengths compare.
+/// The direction from which cloths are seen: from far away, so that lengths compare.
 struct Viewpoint {
   double azimuth_rad = 0.6;    ///< from the -y axis towards +x
   double elevation_rad = 0.3;  ///< above the horizontal
 };
 
 /// Cloths in panels, `columns` a row, all at one scale and about one place, so that they compare.
-/// Nearer parts hide what lies behind them.
+/// Nearer parts hide parts behind them.
 struct Wireframes {
   std::string title;        ///< for readers who do not see the picture
-  std::string description;  ///< what it shows, for the same
+  std::string description;  ///< content of the picture, for the same
   int columns = 3;
   Viewpoint viewpoint;
   std::vector<Wireframe> cloths;

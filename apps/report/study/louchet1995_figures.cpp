@@ -21,8 +21,8 @@ const std::array<LineStyle, 5> kStyles{{{"#1f4e79", ""},
                                         {"#8a5a9e", "8 3 2 3"},
                                         {"#b58900", "1 3"}}};
 
-/// Where the curves of the searches are cut off: the race of the small populations, and a cost
-/// below which only rounding is left to win.
+/// The curves of the searches are cut off here. The limits are the race of the small populations,
+/// and a cost below which only rounding can improve.
 constexpr double kMostAsked = 12500;
 constexpr double kLowestShown = 1e-8;
 

@@ -6,25 +6,26 @@
 
 namespace clothfit {
 
-/// Figure 2: the cloth at the end of its motion.
+/// Draws figure 2: the cloth at the end of its motion.
 std::string hanging_cloth_svg(const Louchet1995Study& study);
 
-/// Figures 3 and 4: both costs over K and tau, for the motion of one reference elongation.
+/// Draws figures 3 and 4: both costs over K and tau, for the motion of one reference elongation.
 std::string landscapes_svg(const Louchet1995Study& study, double reference_elongation);
 
-/// Figure 5: the original, the printed good and the printed bad reconstruction at some instants.
+/// Draws figure 5: the original, the printed good and the printed bad reconstruction at some
+/// instants.
 std::string reconstructions_svg(const Louchet1995Study& study);
 
-/// Distance of each reconstruction over the motion.
+/// Draws the distance of each reconstruction over the motion.
 std::string distances_svg(const Louchet1995Study& study);
 
-/// Costs of the strategy's best individuals, sorted, before and after refinement.
+/// Draws costs of the strategy's best individuals, sorted, before and after refinement.
 std::string cost_distribution_svg(const Louchet1995Study& study);
 
-/// Median best cost of each search against the costs it asked for.
+/// Draws the median best cost of each search against the number of costs computed.
 std::string races_svg(const Louchet1995Study& study);
 
-/// Relative sigma of each parameter from one transition, along the motion.
+/// Draws the relative sigma of each parameter from one transition, along the motion.
 std::string places_svg(const Louchet1995Study& study);
 
 }  // namespace clothfit

@@ -13,7 +13,7 @@
 namespace clothfit {
 namespace {
 
-/// Cells that a clock measured, in elements of their own.
+/// Puts cells that a clock measured into elements of their own.
 std::string with_measured_cells(std::string html) {
   const std::string mark = ">measured: ";
   for (size_t at = html.find(mark); at != std::string::npos; at = html.find(mark, at)) {

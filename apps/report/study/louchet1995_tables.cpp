@@ -12,7 +12,7 @@ namespace {
 
 using Row = std::vector<std::string>;
 
-/// "3.2e-05" as `significant` has it, "none" where there is no bound.
+/// Writes "3.2e-05" as `significant` does, or "none" where there is no bound.
 std::string sigma_text(double sigma) {
   return std::isfinite(sigma) ? significant(100 * sigma, 2) + " %" : "unbounded";
 }
@@ -193,7 +193,7 @@ Table sigma_file(const RecoveryTrials& trials) {
   return table;
 }
 
-/// How many individuals have K within `share` of the reference.
+/// Counts individuals that have K within `share` of the reference.
 template <class Trials, class Pick>
 std::string with_stiffness(const Trials& trials, double truth, double share, const Pick& pick) {
   const auto good = std::count_if(trials.begin(), trials.end(), [&](const auto& trial) {

@@ -8,21 +8,22 @@
 
 namespace clothfit {
 
-/// All digits, in the rows' units (CSV).
+/// Lists all digits, in the rows' units (CSV).
 Table study_table(const std::vector<StudyRow>& rows);
 
-/// The same for people, metres as millimetres. Columns that no row has a number for are left out.
+/// Lists the same for people, metres as millimetres. Columns without any number are left out.
 Table short_study_table(const std::vector<StudyRow>& rows);
 
-/// Per model and unit: recordings fitted, medians over them, and how many beat the rigid guess.
+/// Lists per model and unit: recordings fitted, medians over them, and how many beat the rigid
+/// guess.
 Table study_summary(const std::vector<StudyRow>& rows);
 
-/// Per model: of the recordings with a weighted error, in how many it is below that of what moves
-/// rigidly, below the published one, and below the lower of both, beside the target of half of
-/// them. No rows without such recordings.
+/// Counts, per model, recordings whose weighted error is below others. These are the error of a
+/// rigid motion, the published one, and the lower of both. The target of half of the recordings
+/// with a weighted error stands beside. There are no rows without such recordings.
 Table study_contest(const std::vector<StudyRow>& rows);
 
-/// The page: summary, table, reasons of what could not be fitted, how to do it again.
+/// Writes the page: summary, table, reasons of failed fits, the command to do it again.
 std::string study_page_html(const std::vector<StudyRow>& rows, const std::string& command);
 
 }  // namespace clothfit

@@ -13,8 +13,8 @@
 namespace clothfit {
 namespace {
 
-/// Sorted errors in units of what the fit said of them, against what normal ones would be: honest
-/// sigmas lie on the diagonal.
+/// Draws sorted errors over the fit's own sigmas against those of normal ones. Honest sigmas lie on
+/// the diagonal.
 std::string pulls_svg(const RecoverResult& result) {
   LinePlot plot{.title = "Errors over their sigma",
                 .description =
@@ -61,7 +61,7 @@ std::string pulls_svg(const RecoverResult& result) {
   return line_plot(plot);
 }
 
-/// What the tracker made of the pictures, and one of them.
+/// Shows the tracker's result on the pictures, and one of them.
 std::string tracker_html(const TrackerErrors& tracker, const std::string& picture_png) {
   std::string body =
       html_table(tracker_table(tracker),

@@ -5,22 +5,22 @@
 
 namespace clothfit {
 
-/// A line for each parameter: bias, spread, coverage.
+/// Has a line for each parameter: bias, spread, coverage.
 Table recovery_table(const RecoverResult& result);
 
-/// Counts beside every rate: trials, failures, unconverged fits, wrong ones.
+/// Lists counts beside every rate: trials, failures, unconverged fits, wrong ones.
 Table recovery_counts(const RecoverResult& result);
 
-/// A line for each parameter of each trial, with full digits.
+/// Has a line for each parameter of each trial, with full digits.
 Table recovery_trials_table(const RecoverResult& result);
 
-/// What the tracker said of the places of markers, against where they were.
+/// Compares the tracker's places of markers with the true ones.
 Table tracker_table(const TrackerErrors& tracker);
 
-/// What it rejected, by reason; no rows where that is nothing.
+/// Lists the tracker's rejections, by reason; no rows where there are none.
 Table tracker_rejections(const TrackerErrors& tracker);
 
-/// A line for each trial with pictures, with full digits.
+/// Has a line for each trial with pictures, with full digits.
 Table tracker_trials_table(const RecoverResult& result);
 
 }  // namespace clothfit

@@ -12,7 +12,7 @@
 namespace clothfit {
 namespace {
 
-/// Counts shaded by their share of the row: blue where that counts as right, orange where not.
+/// Shades counts by their share of the row: blue where that counts as right, orange where not.
 std::string confusion_html(const Confusion& confusion) {
   if (confusion.hidden.empty()) return "";
   std::string html = "<div class=\"wide\"><table class=\"matrix\"><thead><tr><td></td>";

@@ -6,8 +6,8 @@
 
 namespace clothfit {
 
-/// The study as one HTML page: how often the diagnosis named what was hidden, what it took it for,
-/// and what errors were left.
+/// Writes the study as one HTML page: how often the diagnosis named the hidden effect, for what it
+/// took it, and which errors remained.
 std::string undeclared_page_html(const UndeclaredOptions& options, const UndeclaredResult& result,
                                  const std::string& command);
 

@@ -25,7 +25,7 @@ std::string ratio_text(double value) {
   return std::isfinite(value) ? fmt::format("{:.3f}", value) : "-";
 }
 
-/// What all hidden laws of a trial have to say, joined.
+/// Joins the texts of all hidden modes of a trial.
 template <class Text>
 std::string joined(const UndeclaredTrial& trial, const Text& text) {
   std::vector<std::string> parts;
@@ -182,7 +182,7 @@ Table short_undeclared_effects_table(const UndeclaredResult& result) {
                           ratio_text(row.amplitude_ratio.value()), percent(row.covered.share()),
                           ratio_text(row.before_noise.value()), ratio_text(row.over_noise.value()),
                           ratio_text(row.over_truth.value()), significant(row.seconds.value(), 2)});
-  // Of all trials, the last line.
+  // The last line is of all trials.
   if (summaries.empty() || summaries.back().law_halves.trials == 0) return table;
   constexpr std::ptrdiff_t kBehindPartly = 7;
   table.header.insert(table.header.begin() + kBehindPartly, "law halves");

@@ -7,13 +7,13 @@
 namespace clothfit {
 namespace {
 
-/// A combination of parameters is told by nothing when its information, with columns of unit
-/// length, is below this: what rounding leaves of none.
+/// No data determine a combination of parameters whose information is below this rounding error.
+/// Columns are of unit length.
 constexpr double kNoInformation = 1e-13;
-/// And a parameter takes part in a combination from this share on.
+/// A parameter takes part in a combination from this share on.
 constexpr double kTakesPart = 1e-3;
 
-/// Every vertex is a marker, seen without error where the model has it.
+/// Makes every vertex a marker, seen without error where the model has it.
 void observe_vertices(FitProblem& problem, const RecordedStates& states, double frame_rate_hz,
                       double noise_m) {
   const int vertices = problem.cloth.mesh.vertex_count();

@@ -5,7 +5,7 @@
 namespace clothfit {
 namespace {
 
-/// K from a tenth of the reference to ten times; tau over its range up to 1.
+/// K ranges from a tenth of the reference to ten times; tau over its range up to 1.
 constexpr double kStiffnessFactor = 10;
 constexpr double kHighestElongation = 1;
 

@@ -7,24 +7,25 @@
 
 namespace clothfit {
 
-/// A cost over stiffness and critical elongation, the natural lengths at their reference, as
-/// figures 3 and 4 of the paper show it.
+/// A cost over stiffness and critical elongation, as figures 3 and 4 of the paper show it. The
+/// natural lengths are at their reference.
 struct CostLandscape {
   double reference_elongation = 0;  ///< of the motion
   PaperCost cost = PaperCost::full;
   std::vector<double> stiffness_n_per_m;  ///< rising, evenly in the logarithm
   std::vector<double> elongation;         ///< rising, evenly
   Eigen::MatrixXd value_m2;               ///< stiffness x elongation; infinite: diverged
-  int transitions = 0;                    ///< that the cost sums over
+  int transitions = 0;                    ///< in the cost's sum
 
-  /// Place of the smallest value.
+  /// Returns the place of the smallest value.
   std::pair<Eigen::Index, Eigen::Index> lowest() const;
-  /// Places lower than all their neighbours, up to eight, and not the lowest of all: where a
-  /// descent on this grid is trapped.
+  /// Counts places lower than all their neighbours, up to eight, without the lowest of all. A
+  /// descent on this grid is trapped there.
   int other_minima() const;
 };
 
-/// `points` a side, both references among them; the full cost over at most `most_transitions`.
+/// Computes `points` a side, both references among them; the full cost over at most
+/// `most_transitions`.
 CostLandscape cost_landscape(PaperExperiment experiment, double reference_elongation,
                              PaperCost cost, int points, int most_transitions);
 

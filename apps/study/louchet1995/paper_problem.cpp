@@ -24,7 +24,7 @@ Cloth paper_cloth(const PaperExperiment& experiment) {
   return cloth;
 }
 
-/// The flat sheet, its held edge along x, z up.
+/// Returns the flat sheet, its held edge along x, z up.
 Eigen::Matrix3Xd released(const PaperExperiment& experiment, const Mesh& mesh) {
   const Eigen::Vector3d along_t = experiment.release == PaperRelease::level
                                       ? Eigen::Vector3d(0, 1, 0)
@@ -33,7 +33,7 @@ Eigen::Matrix3Xd released(const PaperExperiment& experiment, const Mesh& mesh) {
   return Eigen::Vector3d::UnitX() * flat.row(0) + along_t * flat.row(1);
 }
 
-/// Mean length of the springs of each type over all states.
+/// Returns the mean length of the springs of each type over all states.
 std::array<double, kSpringTypes> mean_lengths(const SpringNet& springs,
                                               const RecordedStates& states) {
   std::array<double, kSpringTypes> mean{};
@@ -47,7 +47,7 @@ std::array<double, kSpringTypes> mean_lengths(const SpringNet& springs,
   return mean;
 }
 
-/// Largest deformation rate of a spring in the last state.
+/// Returns the largest deformation rate of a spring in the last state.
 double largest_rate(const SpringNet& springs, const Louchet5& reference,
                     const RecordedStates& states) {
   const SpringParameters numbers = spring_parameters(reference);

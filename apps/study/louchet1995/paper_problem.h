@@ -12,15 +12,16 @@
 
 namespace clothfit {
 
-/// How the founding paper's cloth begins, which the paper does not say.
+/// Ways in which the founding paper's cloth may begin, which the paper does not say.
 enum class PaperRelease {
   level,   ///< flat and level, let go
   upright  ///< flat in the vertical plane below its held corners
 };
 
-/// The founding paper's experiment [louchet1995, section 3.4]: a cloth of 17 x 17 equal masses held
-/// by two neighbouring corners, moved by gravity. What the paper does not say has a value here that
-/// makes the cost functions agree best with the costs it prints (docs/theory/louchet1995.md).
+/// The founding paper's experiment [louchet1995, section 3.4]. A cloth of 17 x 17 equal masses is
+/// held by two neighbouring corners and moved by gravity. Numbers that the paper does not state
+/// have values that make the cost functions agree best with the costs it prints
+/// (docs/theory/louchet1995.md).
 struct PaperExperiment {
   Louchet5 reference{.natural_length_01_m = 0.09375,
                      .natural_length_23_m = 0.132582521472478,  ///< l01 sqrt(2); 0.132583 printed
@@ -44,32 +45,33 @@ enum class PaperCost { full, small };
 std::string to_string(PaperCost cost);
 std::vector<int> transitions_of(PaperCost cost, const RecordedStates& states);
 
-/// At most `most` of the transitions, at equal distances, the last among them; all for 0.
+/// Returns at most `most` of the transitions, at equal distances, the last among them; all for 0.
 std::vector<int> thinned_out(const std::vector<int>& transitions, int most);
 
-/// The reference motion, at every time step.
+/// Returns the reference motion, at every time step.
 RecordedStates paper_states(const PaperExperiment& experiment);
 
-/// The search for `set` (louchet5 or louchet18) in this experiment, ranges around the lengths that
-/// the states show: the natural lengths of each type from 0.6 to 1.2 times its springs' mean length
-/// over all states ("around the average length values observed on the reference data"), K from 0.1
-/// to 40 N/m, tau from 0.01 to 1.
+/// Makes the search for `set` (louchet5 or louchet18) in this experiment. Ranges lie around the
+/// lengths that the states show. The natural lengths of each type have 0.6 to 1.2 times its
+/// springs' mean length over all states ("around the average length values observed on the
+/// reference data"). K has 0.1 to 40 N/m, tau 0.01 to 1.
 FitProblem paper_problem(const PaperExperiment& experiment, const RecordedStates& states,
                          SpringSet set);
 
-/// The reference as values of that problem.
+/// Returns the reference as values of that problem.
 Eigen::VectorXd paper_truth(const PaperExperiment& experiment, SpringSet set);
 
-/// Ranges of a problem's parameters, as a search takes them.
+/// Returns ranges of a problem's parameters, as a search takes them.
 std::vector<SearchParameter> search_ranges(const FitProblem& problem);
 
-/// The sum of squared residuals as a search's cost.
+/// Returns the sum of squared residuals as a search's cost.
 GenerationCost sum_of_squares(const Objective& objective);
 
-/// How far a cloth with the numbers of `set` moves from the reference when both run freely from the
-/// start: root mean square distance of vertices over the motion. Infinite: one of them diverged.
+/// Returns how far a cloth with the numbers of `set` moves from the reference in a free run from
+/// the start. It is the root mean square distance of vertices over the motion. Infinite: one of
+/// them diverged.
 double free_run_distance_m(const PaperExperiment& experiment, const Louchet5& set);
-/// Between two motions of the same times.
+/// Returns the distance between two motions of the same times.
 double rms_distance_m(const RecordedStates& a, const RecordedStates& b);
 
 /// A line of the paper's listing of the ten best individuals after 49 generations.
@@ -78,32 +80,32 @@ struct PaperIndividual {
   Louchet5 set;
   double cost = 0;
 };
-/// In its good and in its bad situation, in the order printed.
+/// The listings in the paper's good and in its bad situation, in the order printed.
 extern const std::array<PaperIndividual, 10> kPaperGoodListing, kPaperBadListing;
 
-/// The individuals of both listings, the good one first, as values of a louchet5 problem.
+/// Returns the individuals of both listings, the good one first, as values of a louchet5 problem.
 std::vector<Eigen::VectorXd> listed_individuals();
-/// Their printed costs.
+/// Returns their printed costs.
 std::vector<double> listed_costs();
 
-/// How far an experiment's costs of the listed individuals agree with the printed ones. The paper's
-/// formula divides its costs by nothing; should it have been done all the same, a common factor is
-/// free.
+/// The agreement of an experiment's costs of the listed individuals with the printed ones. The
+/// paper's formula divides its costs by nothing. In case it was done all the same, a common factor
+/// is free.
 struct ListingMatch {
   bool usable = false;       ///< neither the reference motion nor a prediction diverged
-  std::vector<double> cost;  ///< of listed_individuals()
+  std::vector<double> cost;  ///< one for each of listed_individuals()
   double factor = 0;         ///< geometric mean of our cost over the printed one
   /// Root mean square of log(our cost / printed cost) about its mean; 0: the same up to the factor.
   double spread = std::numeric_limits<double>::infinity();
-  /// Of the reference motion's last state: the largest (|L| - l0) / l0 of a spring, over tau. One
-  /// sweep a step does not always keep it near 1, as the paper means it to be.
+  /// Largest (|L| - l0) / l0 of a spring, over tau, in the reference motion's last state. One sweep
+  /// a step does not always keep it near 1, as the paper means it to be.
   double overshoot = 0;
 
-  /// Root mean square of log(our cost / printed cost), the factor not free.
+  /// Returns the root mean square of log(our cost / printed cost), the factor not free.
   double distance() const;
 };
-/// `most_transitions`, where given, thins the full cost's transitions out evenly, each then
-/// counting for more: for screening.
+/// Compares an experiment with the listing. For screening, `most_transitions` thins the full cost's
+/// transitions out evenly, each then counting for more.
 ListingMatch match_listing(const PaperExperiment& experiment, PaperCost cost,
                            int most_transitions = 0);
 

@@ -9,8 +9,8 @@
 
 namespace clothfit {
 
-// Finished pieces of the study as the journal keeps them: JSON, numbers with all their digits,
-// infinite ones as null. What the reader knows anyway is not written.
+// The journal keeps finished pieces of the study as JSON. Numbers have all their digits, infinite
+// ones are null. Anything that the reader knows anyway is not written.
 
 std::string to_payload(const SettingSearch& search);
 std::string to_payload(const CostLandscape& landscape);

@@ -15,7 +15,7 @@ bool is_cma(Racer racer) {
   return racer == Racer::cma_5 || racer == Racer::cma_18;
 }
 
-/// As many individuals for each parameter as the paper has for five.
+/// Returns as many individuals for each parameter as the paper has for five.
 int population_of(Racer racer) {
   return racer == Racer::strategy_18_large ? kPopulation * 18 / 5 : kPopulation;
 }

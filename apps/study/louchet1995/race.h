@@ -17,17 +17,18 @@ SpringSet parameters_of(Racer racer);
 /// Relative costs whose first passing is noted.
 inline constexpr std::array kRaceMarks{1e-1, 1e-2, 1e-3, 1e-4, 1e-5};
 
-/// How the best cost of a search falls. Costs are relative to the median cost of 100 random
+/// The decrease of a search's best cost. Costs are relative to the median cost of 100 random
 /// individuals of the same problem.
 struct Race {
-  std::vector<long> evaluations;      ///< that a generation ended with, thinned out
+  std::vector<long> evaluations;      ///< at the end of a generation, thinned out
   std::vector<double> relative_cost;  ///< the best until then
-  /// When each of kRaceMarks was reached; -1: not within the race.
+  /// Generation that reached each of kRaceMarks; -1: not within the race.
   std::array<int, kRaceMarks.size()> generations{};
   std::array<long, kRaceMarks.size()> costs_asked{};
 };
 
-/// Evaluations a racer has; the large strategy has as much more as its population is larger.
+/// Returns how many evaluations a racer has. The large strategy has as much more as its population
+/// is larger.
 long race_length(Racer racer, bool quick);
 
 Race race(const PaperExperiment& experiment, const RecordedStates& states, Racer racer,

@@ -8,8 +8,8 @@
 namespace clothfit {
 namespace {
 
-constexpr int kMostSteps = 1000;          ///< of a setting: what a search has patience for
-constexpr int kScreenedTransitions = 25;  ///< of the full cost on the grid
+constexpr int kMostSteps = 1000;          ///< for a setting: the limit of a search
+constexpr int kScreenedTransitions = 25;  ///< for the full cost on the grid
 constexpr int kSearchedTransitions = 50;  ///< and in the search
 constexpr double kMostDampingPerStep = 0.5;
 constexpr size_t kShown = 3;  ///< of the grid

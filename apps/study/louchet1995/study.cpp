@@ -20,7 +20,7 @@ constexpr std::array kLandscapeElongations{0.1, 0.5};  // figures 3 and 4 of the
 constexpr int kPlaces = 10;
 constexpr int kRecoveryGenerations = 100;
 
-/// What differs between a whole run and a quick one.
+/// The differences between a whole run and a quick one.
 struct Extent {
   int landscape_points = 41;
   int landscape_transitions = 60;
@@ -56,8 +56,8 @@ Recovery recovery_piece(const Setting& setting, SpringSet set, const std::vector
                  options);
 }
 
-/// Transitions at equal distances over the motion, the first one (whose state says nothing of
-/// springs, the paper says) and the last among them.
+/// Returns transitions at equal distances over the motion, the first one and the last among them.
+/// The paper says that the first one's state says nothing of springs.
 std::vector<int> places_in_motion(const RecordedStates& states, int count) {
   std::vector<int> places;
   for (int n = 0; n < count; ++n) places.push_back(1 + (states.last() - 1) * n / (count - 1));
@@ -66,7 +66,7 @@ std::vector<int> places_in_motion(const RecordedStates& states, int count) {
 
 using Pieces = std::vector<std::function<std::string()>>;
 
-/// Pieces by number; the readers below take their payloads in the same order.
+/// Returns pieces by number; the readers below take their payloads in the same order.
 Pieces pieces_of(const Louchet1995Options& options, const Setting& setting) {
   const Extent extent = Extent::of(options);
   Pieces pieces;
@@ -135,7 +135,7 @@ Reconstruction reconstruction(const Setting& setting, const std::string& name,
   return result;
 }
 
-/// The best and the worst final cost of the strategy alone on the full cost.
+/// Returns the best and the worst final cost of the strategy alone on the full cost.
 std::pair<const FullCostTrial*, const FullCostTrial*> best_and_worst(
     const std::vector<FullCostTrial>& trials) {
   const auto [best, worst] = std::minmax_element(
@@ -194,7 +194,7 @@ Louchet1995Study study_louchet1995(const Louchet1995Options& options, Journal* j
     return study;
   }
 
-  // The payloads, in the order of the pieces.
+  // Payloads come in the order of the pieces.
   size_t next = 0;
   const auto payload = [&]() -> const std::string& { return done.payloads[next++]; };
   const auto seed_of = [&](int n) { return options.seed + static_cast<unsigned long long>(n); };

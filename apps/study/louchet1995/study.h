@@ -12,17 +12,17 @@
 
 namespace clothfit {
 
-/// The founding paper's section 3 [louchet1995], and where it points.
+/// Options of the study of the founding paper's section 3 [louchet1995], and of its open ends.
 struct Louchet1995Options {
-  int seeds = 100;              ///< > 0, of the recoveries; the slower comparisons take a fifth
+  int seeds = 100;              ///< > 0, for the recoveries; the slower comparisons take a fifth
   unsigned long long seed = 1;  ///< the first of them
   int threads = 0;              ///< 0: as many as the machine has
   bool quick = false;           ///< coarser grids, shorter searches
   void validate() const;        ///< throws InputError
 
-  /// How many seeds the comparisons of searches and of places in the motion take.
+  /// Returns how many seeds the comparisons of searches and of places in the motion take.
   int compared_seeds() const { return (seeds + 4) / 5; }
-  /// All that determines the results, in one line.
+  /// Returns all that determines the results, in one line.
   std::string key() const;
 };
 
@@ -43,14 +43,14 @@ struct RecoveryTrials {
   std::vector<RecoveryTrial> trials;
 
   bool determined(Eigen::Index p) const;  ///< its sigma is below kDeterminedSigma
-  /// Largest relative error of a trial among the determined parameters.
+  /// Returns the largest relative error of a trial among the determined parameters.
   double determined_error(const RecoveryTrial& trial) const;
 };
 inline constexpr double kDeterminedSigma = 0.1;
 inline constexpr double kMeasuringNoise_m = 1e-3;
 inline constexpr double kFrameRate_hz = 60;
 
-/// The strategy alone on the full cost, which the printed listing agrees with.
+/// The strategy alone on the full cost, with which the printed listing agrees.
 struct FullCostTrial {
   unsigned long long seed = 0;
   Recovery recovery;  ///< not refined
@@ -70,7 +70,7 @@ struct RaceResults {
   std::vector<Race> races;  ///< for each seed
 };
 
-/// A set of parameters, how it moves from the same start, and how far from the original.
+/// A set of parameters, its motion from the same start, and its distance from the original.
 struct Reconstruction {
   std::string name;
   Louchet5 set;
@@ -81,8 +81,8 @@ struct Reconstruction {
 
 struct Louchet1995Study {
   PaperExperiment experiment;
-  std::vector<SettingSearch> settings;   ///< of setting_readings()
-  ListingMatch full_match, small_match;  ///< of `experiment`
+  std::vector<SettingSearch> settings;   ///< one for each of setting_readings()
+  ListingMatch full_match, small_match;  ///< for `experiment`
   std::vector<CostLandscape> landscapes;
   RecoveryTrials five, eighteen;
   std::vector<FullCostTrial> full_cost;
@@ -94,8 +94,8 @@ struct Louchet1995Study {
   bool cancelled = false;                       ///< the rest is then empty
 };
 
-/// Everything but the seconds is a function of the options. `journal`, when given, has the options'
-/// key.
+/// Runs the study. Everything but the seconds is a function of the options. `journal`, when given,
+/// has the options' key.
 Louchet1995Study study_louchet1995(const Louchet1995Options& options, Journal* journal,
                                    const ProgressCallback& progress);
 

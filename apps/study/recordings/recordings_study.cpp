@@ -53,7 +53,7 @@ MarkerTracks no_tracks(std::size_t markers, int dimension, int frames) {
   return {.observed = Tracks(markers, nothing), .predicted = Tracks(markers, nothing)};
 }
 
-/// The markers that a fit was compared with.
+/// Returns the markers with which a fit was compared.
 MarkerTracks compared_markers(const FitReport::Residuals& residuals, std::size_t markers) {
   const int dimension =
       residuals.rows.empty() ? 3 : static_cast<int>(residuals.rows.front().observed.size());
@@ -66,7 +66,7 @@ MarkerTracks compared_markers(const FitReport::Residuals& residuals, std::size_t
   return tracks;
 }
 
-/// The markers that drive held points, where these were driven to.
+/// Returns the markers that drive held points, at their driven places.
 MarkerTracks driving_markers(const FitInput& input, std::size_t markers, int frames) {
   MarkerTracks tracks = no_tracks(markers, 3, frames);
   Recording driven = input.recording;
@@ -88,7 +88,7 @@ MarkerTracks driving_markers(const FitInput& input, std::size_t markers, int fra
   return tracks;
 }
 
-/// The error on the frames from `held_out_from` on, with the mean error before taken off.
+/// Returns the error from `held_out_from` on, with the mean error before subtracted.
 double centred_held_out_rms(const Tracks& observed, const Tracks& predicted, int held_out_from) {
   Tracks later, foreseen = centred(observed, predicted, held_out_from);
   for (std::size_t m = 0; m < observed.size(); ++m) {
@@ -99,7 +99,7 @@ double centred_held_out_rms(const Tracks& observed, const Tracks& predicted, int
   return rms_distance(later, foreseen);
 }
 
-/// Errors over all frames, of the model and of what moves rigidly with the driven points.
+/// Computes errors over all frames, of the model and of a rigid motion with the driven points.
 void judge_whole(const FitInput& input, const FitReport::Residuals& residuals,
                  const std::optional<MarkerWeights>& weights, StudyRow& row) {
   const std::size_t markers = input.recording.markers.markers.size();
@@ -135,7 +135,7 @@ void judge_whole(const FitInput& input, const FitReport::Residuals& residuals,
       tracks.observed, predict_rigid(tracks.observed, displacement, frames).predicted, by_marker);
 }
 
-/// The rows of a fit that worked out, one per kind of observation.
+/// Returns the rows of a fit that worked out, one per kind of observation.
 std::vector<StudyRow> rows_of(const FitInput& input, const FitReport& report,
                               const RecordingsStudyOptions& options, StudyRow row) {
   row.fitted = true;

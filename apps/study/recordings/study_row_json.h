@@ -8,10 +8,10 @@
 
 namespace clothfit {
 
-/// A row as study.json and a study's journal have it; a number that is not one is null.
+/// Writes a row as study.json and a study's journal have it; a number that is not one is null.
 nlohmann::ordered_json to_json(const StudyRow& row);
 
-/// All digits and words of some rows as one line, and back.
+/// Write all digits and words of some rows as one line, and read them back.
 std::string rows_to_text(const std::vector<StudyRow>& rows);
 std::vector<StudyRow> rows_from_text(const std::string& text);
 
