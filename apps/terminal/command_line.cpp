@@ -13,7 +13,7 @@
 
 namespace clothfit {
 
-/// What options and verbs leave while arguments are parsed.
+/// Receives what options and verbs report while arguments are parsed.
 struct ParsedCommandLine {
   VerbAction action;
   std::set<const CLI::Option*> shape_no_result;

@@ -16,37 +16,37 @@ class Option;
 
 namespace clothfit {
 
-/// What a verb does; returns an exit code.
+/// The action of a verb; returns an exit code.
 using VerbAction = std::function<int()>;
 
-/// Where an option's text goes once it is parsed. Lists take several texts; an empty std::optional
+/// Target of an option's text once it is parsed. Lists take several texts; an empty std::optional
 /// stays empty where the option is not given.
 using OptionTarget = std::variant<int*, unsigned long long*, double*, std::optional<double>*,
                                   std::string*, std::filesystem::path*, std::vector<std::string>*,
                                   std::vector<std::filesystem::path>*>;
 
-/// Empty, or what is wrong with the text of an option.
+/// Returns nothing, or what is wrong with the text of an option.
 using TextCheck = std::function<std::string(const std::string& text)>;
 
 struct ParsedCommandLine;
 
-/// An option or flag of a verb. A handle: copies mean the same option.
+/// An option or flag of a verb. It is a handle: copies mean the same option.
 class Option {
  public:
   Option required() const;
-  /// How help calls its value: "DIR".
+  /// Sets the name of its value in help: "DIR".
   Option type_name(const std::string& name) const;
-  /// Help shows the value that the target holds now.
+  /// Makes help show the value that the target holds now.
   Option shows_default() const;
   Option check(const TextCheck& check) const;
   Option one_of(const std::vector<std::string>& texts) const;
-  /// Lengths such as 10mm, 1cm, 0.01m or 0.01, in metres.
+  /// Takes lengths such as 10mm, 1cm, 0.01m or 0.01, in metres.
   Option is_length() const;
   /// Takes one value each time that it is given.
   Option one_at_a_time() const;
   Option needs(Option other) const;
   Option excludes(Option other) const;
-  /// Results are the same with and without it, so that Verb::command_text leaves it out.
+  /// Tells Verb::command_text to leave the option out: results are the same with and without it.
   Option shapes_no_result() const;
 
  private:
@@ -56,25 +56,25 @@ class Option {
   ParsedCommandLine* parsed_;
 };
 
-/// A verb with its options. A handle: copies mean the same verb, which lives as long as the
+/// A verb with its options. It is a handle: copies mean the same verb, which lives as long as the
 /// CommandLine.
 class Verb {
  public:
   Verb add_verb(const std::string& name, const std::string& what);
-  /// One of its verbs has to be named.
+  /// Requires that one of its verbs is named.
   void requires_verb();
-  /// `name` is "--NAME", or a bare word for what is told by its place.
+  /// Adds an option: `name` is "--NAME", or a bare word for an argument told by its place.
   Option add_option(const std::string& name, OptionTarget target, const std::string& what);
   Option add_flag(const std::string& name, bool& given, const std::string& what);
-  /// An option that was added before.
+  /// Returns an option that was added before.
   Option option(const std::string& name) const;
-  /// What help ends with.
+  /// Sets the end of the help text.
   void footer(const std::string& text);
-  /// What is run where this verb is named.
+  /// Sets the action to run where this verb is named.
   void runs(VerbAction action);
 
   bool is_given(const std::string& name) const;
-  /// Verb and options as they were given, for results to keep: "clothfit fit swing_plain --seed 2".
+  /// Returns verb and options as given, for results to keep: "clothfit fit swing_plain --seed 2".
   std::string command_text() const;
 
  private:
@@ -84,16 +84,16 @@ class Verb {
   ParsedCommandLine* parsed_;
 };
 
-/// The command line of the program. All that is known of CLI11 stays in its source file: that
-/// library is expensive to compile.
+/// The command line of the program. Only its source file includes CLI11, because that library is
+/// expensive to compile.
 class CommandLine {
  public:
   CommandLine(const std::string& what, const std::string& name, const std::string& version);
   ~CommandLine();
   Verb program();
 
-  /// Prints help, the version, or what is wrong with the arguments; then the exit code is set.
-  /// Otherwise the action of the verb that was named is.
+  /// Parses the arguments. Sets the exit code after printing help, the version, or what is wrong
+  /// with the arguments; otherwise sets the action of the named verb.
   struct Parsed {
     std::optional<int> exit_code;
     VerbAction action;

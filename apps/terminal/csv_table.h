@@ -7,7 +7,7 @@
 namespace clothfit {
 
 /// Writes a result table: a header line, then the rows. Cells with a comma, quote or line break are
-/// quoted as RFC 4180 has it. Throws InputError where the file cannot be written.
+/// quoted as in RFC 4180. Throws InputError where the file cannot be written.
 void write_csv_table(const std::vector<std::string>& header,
                      const std::vector<std::vector<std::string>>& rows,
                      const std::filesystem::path& file);

@@ -12,13 +12,14 @@ struct GridSize {
   bool operator==(const GridSize&) const = default;
 };
 
-/// "17x13": columns and rows. Nothing where the text is not two whole numbers with an x between.
+/// Reads columns and rows from "17x13". Nothing where the text is not two whole numbers with an x
+/// between.
 std::optional<GridSize> parse_grid_size(std::string_view text);
 
-/// The mesh that --mesh names. Nothing where the text is not one that a fit takes.
+/// Returns the mesh that --mesh names; nothing where the text is not one that a fit takes.
 std::optional<GridSize> parse_mesh(std::string_view text);
 
-/// Empty, or what is wrong with the text of --mesh.
+/// Returns nothing, or what is wrong with the text of --mesh.
 std::string check_mesh(const std::string& text);
 
 }  // namespace clothfit

@@ -2,11 +2,11 @@
 
 namespace clothfit {
 
-/// From here on Ctrl-C (SIGINT) and SIGTERM set a flag instead of killing the program, so that the
-/// call at work can end cleanly; a second one, half a second later or more, kills.
+/// Makes Ctrl-C (SIGINT) and SIGTERM set a flag from here on instead of killing the program. The
+/// call at work can then end cleanly. A second one, half a second later or more, kills.
 void catch_interrupts();
 
-/// Whether one arrived. Progress callbacks return the opposite.
+/// Says whether one arrived. Progress callbacks return the opposite.
 bool interrupted();
 
 }  // namespace clothfit

@@ -12,7 +12,7 @@
 namespace clothfit {
 namespace {
 
-/// Power of ten of the first digit of `value` once rounded to `digits` digits.
+/// Returns the power of ten of the first digit of `value` once rounded to `digits` digits.
 int first_digit_exponent(double value, int digits) {
   const std::string text = fmt::format("{:.{}e}", std::abs(value), digits - 1);
   return std::stoi(text.substr(text.find('e') + 1));

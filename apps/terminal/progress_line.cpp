@@ -50,7 +50,7 @@ std::string progress_text(const Progress& progress, double elapsed_s, int width)
   const auto limit = static_cast<std::size_t>(std::max(width, 0));
   if (text.size() > limit) {
     std::size_t end = limit;
-    // Never in the middle of a UTF-8 character.
+    // The text is never cut in the middle of a UTF-8 character.
     while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0U) == 0x80U) --end;
     text.resize(end);
   }

@@ -8,7 +8,7 @@
 
 namespace clothfit {
 
-/// One line for a person, at most `width` characters (bytes of UTF-8 aside):
+/// Writes one line for a person, at most `width` characters (bytes of UTF-8 aside):
 ///
 ///   refine  240/1000 evaluations  12.3/s  1:02 left  cost 0.41
 ///

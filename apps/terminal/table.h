@@ -5,7 +5,7 @@
 
 namespace clothfit {
 
-/// Texts in rows under a header; what CSV files, pages and the terminal show.
+/// Texts in rows under a header: the content of CSV files, pages and the terminal.
 struct Table {
   std::vector<std::string> header;
   std::vector<std::vector<std::string>> rows;

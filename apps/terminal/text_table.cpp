@@ -8,7 +8,7 @@
 namespace clothfit {
 namespace {
 
-/// Characters, not bytes: continuation bytes of UTF-8 take no room.
+/// Counts characters, not bytes: continuation bytes of UTF-8 take no room.
 std::size_t width_of(const std::string& cell) {
   return static_cast<std::size_t>(std::count_if(cell.begin(), cell.end(), [](char c) {
     return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U;

@@ -2,7 +2,7 @@
 
 namespace clothfit {
 
-/// "0.1.0", as the build has it.
+/// Returns "0.1.0", as the build has it.
 const char* program_version();
 
 }  // namespace clothfit

@@ -31,8 +31,8 @@ struct CalibrateVerbOptions {
   fs::path out;
 };
 
-/// "chessboard:9x6:0.025": inner corners along and across, side of a square in metres. Nothing
-/// where the text is not a board.
+/// Reads "chessboard:9x6:0.025": inner corners along and across, side of a square in metres.
+/// Nothing where the text is not a board.
 std::optional<BoardDescription> parse_board(const std::string& text) {
   constexpr std::string_view kKind = "chessboard:";
   if (!text.starts_with(kKind)) return std::nullopt;

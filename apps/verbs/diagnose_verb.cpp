@@ -44,7 +44,7 @@ struct DiagnoseFlags {
   DiagnoseOptions options;
 };
 
-/// How many laws are planted.
+/// Reads how many modes are planted.
 int parse_plant(const std::string& text) {
   if (text == "all") return std::numeric_limits<int>::max();
   const std::optional<double> count = parse_number(text);
@@ -53,8 +53,8 @@ int parse_plant(const std::string& text) {
   return static_cast<int>(*count);
 }
 
-/// Those to fit, then those held out. Throws InputError also where one is named twice: a recording
-/// that was fitted judges nothing.
+/// Reads the recordings to fit, then those held out. Throws InputError also where one is named
+/// twice: a recording that was fitted judges nothing.
 std::vector<Recording> read_recordings(const DiagnoseFlags& flags) {
   std::vector<Recording> recordings;
   std::set<fs::path> seen;

@@ -25,7 +25,7 @@ namespace fs = std::filesystem;
 
 constexpr const char* kDefaultFolder = "louchet1995.experiment";
 
-/// "louchet1995.experiment.journal" for that folder.
+/// Returns "louchet1995.experiment.journal" for that folder.
 fs::path journal_beside(const fs::path& folder) {
   fs::path whole = fs::absolute(folder).lexically_normal();
   if (!whole.has_filename()) whole = whole.parent_path();

@@ -44,7 +44,7 @@ struct FitFlags {
   std::vector<std::string> priors;
 };
 
-/// The parameter set that is asked for, or that of the earlier fit which `flag` names.
+/// Returns the parameter set asked for, or that of the earlier fit which `flag` names.
 SpringSet chosen_springs(const std::string& asked, const char* flag, const FitResult* earlier) {
   const std::optional<SpringSet> wanted = spring_set_named(asked);
   if (earlier == nullptr) return wanted.value_or(SpringSet::fabric);
@@ -59,7 +59,7 @@ SpringSet chosen_springs(const std::string& asked, const char* flag, const FitRe
   return *known;
 }
 
-/// What an earlier fit says of the cloth; its measurement unknowns were those of its recording.
+/// Returns an earlier fit's numbers of the cloth; its measurement unknowns belong to its recording.
 std::map<std::string, double> known_values(const FitResult& earlier) {
   std::map<std::string, double> values;
   for (const ParameterEstimate& parameter : earlier.parameters)
@@ -71,7 +71,7 @@ std::map<std::string, double> known_values(const FitResult& earlier) {
   return values;
 }
 
-/// Hours of searching are not written over.
+/// Throws for a checkpoint that exists: hours of searching are not written over.
 void require_new_checkpoint(const FitOptions& options) {
   if (options.checkpoint.empty() || options.resume || !fs::exists(options.checkpoint)) return;
   throw InputError("--checkpoint", options.checkpoint.string() + " exists already",
@@ -79,7 +79,7 @@ void require_new_checkpoint(const FitOptions& options) {
                    "remove it to search anew");
 }
 
-/// What a cancelled fit leaves for the next one.
+/// Tells how to go on from what a cancelled fit leaves.
 std::string how_to_go_on(const FitOptions& options) {
   if (options.checkpoint.empty() || !fs::exists(options.checkpoint)) return "";
   return fmt::format("the search stands in {}: the same command{} goes on from there",

@@ -13,7 +13,7 @@ struct FitVerbOptions {
   std::filesystem::path recording;
   FitOptions fit;
   std::filesystem::path out;  ///< empty: NAME.fit
-  /// Verb and options as fit.json keeps them; nothing that leaves the result as it is (--out,
+  /// Verb and options as fit.json keeps them, without those that change no result (--out,
   /// --threads).
   std::string command;
 };

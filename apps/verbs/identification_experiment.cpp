@@ -43,7 +43,7 @@ Table targets_table(const std::vector<TargetRow>& rows) {
   return table;
 }
 
-/// A line for each parameter and size of the planted drag.
+/// Has a line for each parameter and size of the planted drag.
 Table planted_drag_table(const std::vector<PlantedDrag>& drags) {
   Table table{
       .header = {"drag (sigmas)", "parameter", "trials", "undetermined", "truth", "pseudo-truth",

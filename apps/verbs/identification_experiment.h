@@ -14,11 +14,11 @@ struct IdentificationOptions {
   bool resume = false;
 };
 
-/// Measures what identification is meant to reach, prints and writes the table of targets. Returns
-/// an exit code; throws InputError, Cancelled.
+/// Measures the targets of identification, prints and writes their table. Returns an exit code;
+/// throws InputError, Cancelled.
 int run_identification(const IdentificationOptions& options);
 
-/// `clothfit experiment identification`.
+/// Adds `clothfit experiment identification`.
 void add_identification_experiment(Verb experiment);
 
 }  // namespace clothfit

@@ -20,8 +20,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The library's laws, or those asked for: all that the library has of an effect, the effect's own
-/// where it has none, or the law that is named.
+/// Returns the library's modes, or those asked for. An effect stands for all its modes in the
+/// library, else for its own; a mode stands for itself.
 std::vector<HiddenLaw> laws_asked_for(const std::vector<std::string>& asked,
                                       ObservationKind observations) {
   const std::vector<HiddenLaw> library = hidden_laws(observations);

@@ -13,7 +13,7 @@ namespace clothfit {
 /// Flags of `clothfit recover --undeclared` beyond those of `clothfit recover`.
 struct UndeclaredFlags {
   bool undeclared = false;
-  std::vector<std::string> hidden;  ///< effects, or laws as "EFFECT:LAW"; empty: the library
+  std::vector<std::string> hidden;  ///< effects, or modes as "EFFECT:LAW"; empty: the library
   bool clean = false, pairs = false, withhold = false, same_model = false;
   std::string integrator = "runge-kutta";
   int fitted = 0;  ///< frames; 0: three quarters
@@ -24,7 +24,7 @@ struct UndeclaredFlags {
 
 void add_undeclared_options(Verb verb, UndeclaredFlags& flags);
 
-/// What recover's own flags say already, and where to leave the results.
+/// The options from recover's own flags, and the place of the results.
 struct UndeclaredRun {
   SyntheticScene scene;
   FitOptions fit;

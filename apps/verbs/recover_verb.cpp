@@ -30,7 +30,7 @@ struct RecoverFlags {
   PictureOptions pictures;
   std::string picture_size = "1280x960";
   double exposure_ms = 2;
-  std::string observations;  ///< empty: 3D tracks, or 2D ones of pictures
+  std::string observations;  ///< empty: 3D tracks, or with pictures 2D ones
   std::string loss = "squared";
   double seconds = 1, noise_mm = 1;
   int mesh = 17;
@@ -63,7 +63,7 @@ RecoverOptions options_of(const RecoverFlags& flags) {
   return options;
 }
 
-/// Undeclared effects ask for cloths of their own size, unless they are told another one.
+/// Sets up the study: undeclared effects have cloths of their own size, unless told another one.
 UndeclaredRun undeclared_run(RecoverFlags flags, const Verb& verb, const std::string& command) {
   const auto is_given = [&](const char* option) { return verb.is_given(option); };
   if (!is_given("--mesh")) flags.mesh = 9;

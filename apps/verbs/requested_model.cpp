@@ -73,8 +73,8 @@ GivenParameters parameters_of_fit(const fs::path& fit) {
   return given;
 }
 
-/// Refuses what the words of a model file cannot say; what an effect's number may be is looked at
-/// when the simulation is made.
+/// Sets a parameter. Throws for texts that a model file cannot express; the range of an effect's
+/// number is checked when the simulation is made.
 void set_parameter(const std::string& text, GivenParameters& given) {
   const auto [name, value] = parse_assignment(text).value();
   const std::size_t dot = name.find('.');
@@ -115,7 +115,7 @@ void add(const GivenParameters& more, GivenParameters& given) {
   }
 }
 
-/// What the options give, in front of the input's own.
+/// Returns the options' parameters, in front of the input's own.
 GivenParameters given_parameters(const ModelRequest& request, GivenParameters given = {}) {
   if (!request.fit.empty()) add(parameters_of_fit(request.fit), given);
   if (!request.model.empty()) {
@@ -124,14 +124,14 @@ GivenParameters given_parameters(const ModelRequest& request, GivenParameters gi
       throw InputError(request.model.string(), "has springs type by type instead of a fabric",
                        "a model file with a fabric", "simulate that model itself");
     }
-    for (DeclaredEffect& effect : model.effects) effect.line = 0;  // of another file
+    for (DeclaredEffect& effect : model.effects) effect.line = 0;  // lines refer to another file
     add({SpringSet::fabric, model.fabric, model.effects}, given);
   }
   for (const std::string& assignment : request.set) set_parameter(assignment, given);
   return given;
 }
 
-/// The model file that a path means: the path itself, or the one in that folder.
+/// Returns the model file that a path means: the path itself, or the one in that folder.
 std::optional<fs::path> model_file(const fs::path& path) {
   std::error_code error;
   if (fs::is_directory(path, error)) {
@@ -144,7 +144,7 @@ std::optional<fs::path> model_file(const fs::path& path) {
 
 ModelDescription model_of_fit(const fs::path& fit) {
   const fs::path file = fit_file(fit);
-  read_fit_result(file);  // refuses what is no fit
+  read_fit_result(file);  // throws for a file that is no fit
   const fs::path model = file.parent_path() / kModelFile;
   if (!fs::exists(model)) {
     throw InputError(file.string(), "no model.yaml lies beside it",
@@ -156,7 +156,7 @@ ModelDescription model_of_fit(const fs::path& fit) {
   return read_model(model);
 }
 
-/// A recording's parameters with those given in front; refuses what is still missing.
+/// Returns a recording's parameters with the given ones in front; throws for what is still missing.
 FitResult complete_parameters(const Recording& recording, GivenParameters given) {
   const std::string file = (recording.folder / "recording.yaml").string();
   std::string missing;
@@ -174,10 +174,10 @@ FitResult complete_parameters(const Recording& recording, GivenParameters given)
     throw InputError(file, "a recording has no parameters, and nobody gave " + missing,
                      "a number for each parameter of the fabric", kHowToGive);
   }
-  // What is declared, where the options say nothing else.
+  // Declared parameters serve where the options say nothing else.
   GivenParameters all;
   all.effects = recording.declared;
-  // How things were measured changes nothing in what moves.
+  // The measurement changes nothing in the motion.
   std::erase_if(all.effects, [&](const DeclaredEffect& effect) {
     const MeasurementEffectEntry* entry = measurement_effect_named(effect.name);
     if (entry == nullptr) return false;
@@ -264,7 +264,7 @@ void set_frames(const ModelRequest& request, ModelDescription& model) {
   model.frame_time_s = *times;
 }
 
-/// Puts the parameters in the place of the model's springs.
+/// Replaces the model's springs by the parameters.
 void set_springs(const GivenParameters& given, ModelDescription& model) {
   if (!given.set) return;
   const std::vector<std::string> names = names_of(*given.set);
@@ -277,7 +277,8 @@ void set_springs(const GivenParameters& given, ModelDescription& model) {
     numbers[static_cast<Eigen::Index>(n)] = found->second;
   }
   if (*given.set == SpringSet::fabric) {
-    if (model.springs) model.strain_limit = StrainLimitKind::off;  // it was that of the springs
+    if (model.springs)
+      model.strain_limit = StrainLimitKind::off;  // the limit was that of the springs
     model.springs.reset();
     model.fabric = given.springs;
     return;

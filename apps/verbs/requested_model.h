@@ -11,7 +11,7 @@
 
 namespace clothfit {
 
-/// What `clothfit simulate` is asked to simulate.
+/// The request to `clothfit simulate`.
 struct ModelRequest {
   std::filesystem::path input;   ///< a recording, a model file or a folder with one; may be empty
   std::filesystem::path fit;     ///< fit.json or its folder; may be empty
@@ -22,17 +22,17 @@ struct ModelRequest {
   std::optional<double> frame_rate_hz;
 };
 
-/// NAME and NUMBER of an assignment; nothing where the text is none.
+/// Returns NAME and NUMBER of an assignment; nothing where the text is none.
 std::optional<std::pair<std::string, double>> parse_assignment(const std::string& text);
 
-/// The name of the model or recording that is asked for. Throws InputError.
+/// Returns the name of the model or recording that is asked for. Throws InputError.
 std::string requested_name(const ModelRequest& request);
 
-/// The model with every number: that of a model file or of a fit (`model.yaml` in its folder), or a
-/// recording's cloth, held points, start and frames with the parameters given by `fit`, `model` and
-/// `set`, each taking the place of what was known before. A model's
-/// own time step holds for its own springs and mesh only. Steps that a recording lacks are run and
-/// kept under `steps`. Throws InputError, also where a parameter is given by nobody.
+/// Returns the model with every number. It is that of a model file or of a fit (`model.yaml` in its
+/// folder), or a recording's cloth, held points, start and frames. The parameters are those of
+/// `fit`, `model` and `set`, each taking the place of what was known before. A model's own time
+/// step holds for its own springs and mesh only. Steps that a recording lacks are run and kept
+/// under `steps`. Throws InputError, also where a parameter is given by nobody.
 ModelDescription requested_model(const ModelRequest& request, const std::filesystem::path& steps,
                                  const ProgressCallback& progress);
 

@@ -32,9 +32,9 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-/// A run's positions are kept: some gigabytes of them.
+/// A run keeps at most this many numbers of positions: some gigabytes.
 constexpr double kMostKeptNumbers = 1e9;
-/// Some days of computing; more is a slip in a step or a stiffness.
+/// A run takes some days at most; more is a slip in a step or a stiffness.
 constexpr double kMostSpringSteps = 1e13;
 
 struct SimulateVerbOptions {
@@ -45,14 +45,14 @@ struct SimulateVerbOptions {
   fs::path out;
 };
 
-/// The time step of a run, and why it was taken.
+/// The time step of a run, and the reason for it.
 struct StepChoice {
   double time_step_s = 0;  ///< at most this
   double stable_s = 0;     ///< largest stable one
   std::string source;      ///< "stability", "model" or "--time-step"
   int substeps = 0;        ///< in the longest frame interval
   double steps = 0;        ///< in all
-  double longest_s = 0;    ///< of the steps as taken: frame intervals are cut evenly
+  double longest_s = 0;    ///< of the steps taken: frame intervals are cut evenly
   bool stable() const { return longest_s < stable_s; }
 };
 
@@ -76,7 +76,7 @@ StepChoice choose_step(const Simulation& simulation, const ModelDescription& mod
   return choice;
 }
 
-/// Three digits, never above the value: a step that is read off the message is a stable one.
+/// Writes three digits, never above the value: a step that is read off the message is a stable one.
 std::string rounded_down(double value) {
   const double digit = std::pow(10, std::floor(std::log10(value)) - 2);
   return significant(std::floor(value / digit * (1 + 1e-12)) * digit, 3);
@@ -118,7 +118,7 @@ std::string node_text(const Mesh& mesh, int vertex) {
   return fmt::format("[{}, {}]", vertex / mesh.columns, vertex % mesh.columns);
 }
 
-/// Why there is no simulation, for a person.
+/// Says for a person why there is no simulation.
 std::string divergence_text(const Divergence& divergence, const StepChoice& choice,
                             const Mesh& mesh) {
   std::string text = fmt::format("in step {} (frame {}, t = {} s) ", divergence.step,
@@ -138,7 +138,7 @@ std::string divergence_text(const Divergence& divergence, const StepChoice& choi
   }
   if (divergence.vertex >= 0)
     return text + "; look at the effects' parameters and the paths of held points";
-  // Half a step that should have been stable: crumpled cloth may need it.
+  // Half of a step that should have been stable is suggested: crumpled cloth may need it.
   const double suggested_s = choice.stable() ? choice.longest_s / 2 : choice.stable_s;
   text += fmt::format("; try --time-step {}", rounded_down(suggested_s));
   if (choice.stable()) text += ", or look at the effects' parameters and the paths of held points";
@@ -150,7 +150,7 @@ SimulateResult run_or_explain(const Simulation& simulation, const StepChoice& ch
   SimulateResult result = run(simulation, choice.time_step_s, progress);
   if (result.reason == StopReason::cancelled || interrupted()) throw Cancelled();
   if (result.usable()) return result;
-  // A start that does not come to rest is looked at as the sheet is let go.
+  // A start that does not come to rest is examined as the sheet is let go.
   const bool never_rested = result.diverged_frame == 0;
   const ParameterSet parameters =
       never_rested ? simulation.parameters : started(simulation, choice.time_step_s);
@@ -165,7 +165,7 @@ SimulateResult run_or_explain(const Simulation& simulation, const StepChoice& ch
   throw NoResult(text);
 }
 
-/// Largest length of any spring in any frame, as a multiple of its natural one.
+/// Returns the largest length of any spring in any frame, as a multiple of its natural one.
 double largest_stretch(const Simulation& simulation, const SimulateResult& result) {
   double largest = 0;
   for (const Eigen::Matrix3Xd& position_m : result.position_m) {
@@ -188,7 +188,7 @@ Json named_value(const std::string& name, const std::string& unit, double value)
   return {{"name", name}, {"unit", unit}, {"value", value}};
 }
 
-/// The springs' own numbers, named by type.
+/// Adds the springs' own numbers, named by type.
 void add_springs(const ModelSprings& springs, Json& parameters) {
   const auto add = [&](const char* name, const char* unit, const ModelSprings::ByType& numbers) {
     for (std::size_t type = 0; type < numbers.size(); ++type)
@@ -200,7 +200,7 @@ void add_springs(const ModelSprings& springs, Json& parameters) {
   if (springs.critical_elongation) add("critical_elongation", "", *springs.critical_elongation);
 }
 
-/// How the strain limit was kept; null without one.
+/// Describes the strain limit and how it was kept; null without one.
 Json describe_strain_limit(const ModelDescription& model, const SimulateResult& result) {
   if (model.strain_limit == StrainLimitKind::off) return nullptr;
   return {{"mode", to_string(model.strain_limit)},
@@ -210,7 +210,7 @@ Json describe_strain_limit(const ModelDescription& model, const SimulateResult& 
           {"unmet_steps", result.unmet_steps}};
 }
 
-/// Says so where springs went far beyond the limit that the model sets them.
+/// Warns where springs went far beyond the limit that the model sets them.
 void warn_of_strain(const ModelDescription& model, const SimulateResult& result,
                     const StepChoice& choice) {
   if (model.strain_limit == StrainLimitKind::off) return;
@@ -303,8 +303,8 @@ int run_simulate(const SimulateVerbOptions& options) {
   {
     ProgressLine line;
     const ProgressCallback progress = watch(line);
-    // The name that the result folder bears by default is known once the model is read, and the
-    // steps of a recording are kept in that folder.
+    // The result folder's default name is known once the model is read, and the steps of a
+    // recording are kept in that folder.
     const fs::path name = options.out.empty()
                               ? fs::path(requested_name(options.request) + ".simulation")
                               : options.out;
@@ -333,7 +333,7 @@ int run_simulate(const SimulateVerbOptions& options) {
 
     model.time_step_s = choice.time_step_s;
     write_model(model, out->path());
-    // As it stands there, with the files of its held points.
+    // The model is read as it stands there, with the files of its held points.
     const ModelDescription written = read_model(out->path() / "model.yaml");
     files =
         write_simulation_files(written, result.position_m, options.formats, out->path(), progress);
@@ -347,7 +347,7 @@ int run_simulate(const SimulateVerbOptions& options) {
   return kExitGood;
 }
 
-/// "csv,obj"; nothing where the text is no list of formats.
+/// Reads "csv,obj"; nothing where the text is no list of formats.
 std::optional<std::vector<SimulationFormat>> parse_formats(const std::string& text) {
   std::vector<SimulationFormat> formats;
   std::string rest = text + ",";

@@ -14,7 +14,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A marker at every vertex.
+/// Returns a marker at every vertex.
 MarkerSet vertex_markers(const ModelDescription& model) {
   const Mesh mesh{model.mesh_columns, model.mesh_rows, model.cloth.width_m, model.cloth.height_m};
   const Eigen::Matrix3Xd flat = flat_positions(mesh);
@@ -29,8 +29,8 @@ MarkerSet vertex_markers(const ModelDescription& model) {
   return set;
 }
 
-/// The simulation as a recording: what was measured is where every vertex was. `written` is the
-/// model as it stands in the folder, with the files of its held points and its obstacle.
+/// Writes the simulation as a recording, in which the place of every vertex was measured. `written`
+/// is the model as it stands in the folder, with the files of its held points and its obstacle.
 void write_as_recording(const ModelDescription& written,
                         const std::vector<Eigen::Matrix3Xd>& position_m, const fs::path& folder) {
   Recording recording;

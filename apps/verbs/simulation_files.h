@@ -19,7 +19,7 @@ enum class SimulationFormat { csv, obj, pc2, gltf };
 ///   pc2   cloth.pc2, and cloth.obj (the first frame) for the point cache to move
 ///   gltf  cloth.glb
 ///
-/// Returns what was written, relative to the folder. Throws InputError, Cancelled.
+/// Returns the files written, relative to the folder. Throws InputError, Cancelled.
 std::vector<std::string> write_simulation_files(const ModelDescription& model,
                                                 const std::vector<Eigen::Matrix3Xd>& position_m,
                                                 const std::vector<SimulationFormat>& formats,

@@ -39,21 +39,21 @@ struct StudyFlags {
   RecordingsStudyOptions options;
 };
 
-/// Searches of a study look at all fitted frames, with CMA-ES: docs/verbs/study.md says why.
+/// Makes searches of a study look at all fitted frames, with CMA-ES: docs/verbs/study.md says why.
 FitOptions study_defaults() {
   FitOptions options;
   options.search = SearchMethod::cma;
   options.search_share = 1;
-  options.stop_cost = 0;  // what refinement is allowed here replaces no search
+  options.stop_cost = 0;  // the work that refinement is allowed here replaces no search
   options.marker_offset_sigma_m = 0.01;
   return options;
 }
 
-/// What a model has beside effects.
+/// The name of a model's part that is no effect.
 constexpr const char* kMarkerOffsets = "marker_offsets";
 
-/// The base model, and one more for each --effect: NAME, or NAME+NAME for several effects at once,
-/// the offsets of markers among them.
+/// Returns the base model, and one more for each --effect. That is NAME, or NAME+NAME for several
+/// effects at once, the offsets of markers among them.
 std::vector<StudiedModel> models_of(const std::vector<std::string>& effects) {
   std::vector<StudiedModel> models{{.name = "base", .effects = {}}};
   for (const std::string& text : effects) {

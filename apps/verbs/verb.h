@@ -11,7 +11,7 @@ namespace clothfit {
 enum class ObservationKind;
 struct ParameterPrior;
 
-/// Each adds its verb, with its options and what it runs, to the command line.
+/// Each adds its verb, with its options and its action, to the command line.
 void add_calibrate_verb(Verb program);
 void add_track_verb(Verb program);
 void add_fit_verb(Verb program);
@@ -22,11 +22,11 @@ void add_demo_verb(Verb program);
 void add_experiment_verb(Verb program);
 void add_study_verb(Verb program);
 
-/// Empty, or what is wrong with the text of --seed. (CLI11 wraps a negative number into a huge
-/// one.)
+/// Returns nothing, or what is wrong with the text of --seed. CLI11 wraps a negative number into a
+/// huge one.
 std::string check_seed(const std::string& text);
 
-/// What --observations names: tracks3d, tracks2d, or anything else for automatic.
+/// Returns what --observations names: tracks3d, tracks2d, or anything else for automatic.
 ObservationKind parse_observations(const std::string& text);
 
 /// Binds --out, whose default is `default_name` in the current directory.
@@ -35,18 +35,18 @@ void add_out_option(Verb verb, std::filesystem::path& out, const std::string& de
 /// Binds --prior; each text is for parse_prior.
 void add_prior_option(Verb verb, std::vector<std::string>& priors);
 
-/// PARAMETER=MEAN,SIGMA. Throws InputError.
+/// Reads PARAMETER=MEAN,SIGMA. Throws InputError.
 ParameterPrior parse_prior(const std::string& text);
 
-/// The folder that was asked for, or `default_name` in the current directory.
+/// Returns the folder that was asked for, or `default_name` in the current directory.
 std::filesystem::path out_folder(const std::filesystem::path& asked,
                                  const std::string& default_name);
 
-/// Path of a result as the user can type it: relative to the current directory where that is
-/// shorter.
+/// Returns the path of a result as the user can type it: relative to the current directory where
+/// that is shorter.
 std::string shown_path(const std::filesystem::path& path);
 
-/// The recording's folder from what was typed: the folder, or its recording.yaml.
+/// Returns the recording's folder from what was typed: the folder, or its recording.yaml.
 std::filesystem::path recording_folder(const std::filesystem::path& typed);
 
 }  // namespace clothfit

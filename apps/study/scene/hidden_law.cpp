@@ -17,7 +17,7 @@
 namespace clothfit {
 namespace {
 
-constexpr double kSame = 0.9;             ///< multiple correlation of what cannot be told apart
+constexpr double kSame = 0.9;  ///< multiple correlation of modes that cannot be told apart
 constexpr double kStabilityMargin = 1.5;  ///< as fits leave it
 
 /// Series of draws under a trial's seed.
@@ -39,7 +39,7 @@ double between(double least, double most, double share) {
   return least + (most - least) * share;
 }
 
-/// The state of the truth's cloth at the first frame, as the guess that a fit corrects.
+/// Sets the start to the truth's state at the first frame, as the guess that a fit corrects.
 void start_at_truth(const SyntheticScene& scene, std::uint64_t seed, FitProblem& problem) {
   constexpr double kApartS = 1e-3;
   const auto positions_m = simulate_scene(
@@ -86,7 +86,7 @@ std::vector<HiddenLaw> hidden_laws(ObservationKind observations) {
 
 RecordingInformation recording_information(const SyntheticScene& scene, const FitOptions& fit,
                                            std::uint64_t seed) {
-  // A coarse mesh sees some laws far better than a recording shows them, or far worse.
+  // A coarse mesh sees some modes far better than a recording shows them, or far worse.
   const int mesh = std::min(scene.truth_mesh, 2 * fit.mesh_columns - 1);
   SyntheticScene twin = scene;
   twin.truth_mesh = mesh;
@@ -150,7 +150,7 @@ DrawnLaw draw_law(const RecordingInformation& information, const HiddenLaw& law,
   if (columns.empty()) return {};
   Eigen::VectorXd projected = information.projection.columns({columns.front() * direction});
   if (beside.cols() > 0) projected -= beside * PivotedQr(beside).solve(projected);
-  const double information_along = projected.norm();  // 1 / sigma of the amount along direction
+  const double information_along = projected.norm();  // 1 / sigma along the amplitudes' direction
   if (!(information_along > 0)) return {};
 
   double reach = std::numeric_limits<double>::infinity();
@@ -208,7 +208,7 @@ std::vector<std::string> right_class(const RecordingInformation& information, co
 
 double mimicked_by_others(const RecordingInformation& information, const DrawnLaw& drawn,
                           const std::vector<std::vector<Eigen::MatrixXd>>& projected, int most) {
-  // Forward selection: what is left of the hidden law, and of the others, beside those taken.
+  // Forward selection removes the chosen modes from the hidden one's derivatives and all others'.
   Eigen::VectorXd left = drawn.projected;
   std::vector<Eigen::MatrixXd> others;
   for (size_t n = 0; n < projected.size(); ++n)

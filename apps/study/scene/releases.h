@@ -10,8 +10,8 @@
 
 namespace clothfit {
 
-/// What recordings of one release say of laws, computed when it is first asked for, by whichever
-/// thread asks.
+/// The information of one release's recordings on modes. The first thread that asks for it computes
+/// it.
 class Release {
  public:
   Release(const SyntheticScene& scene, const FitOptions& fit, std::uint64_t seed)
@@ -33,7 +33,7 @@ class Release {
 /// The releases that were asked for last: each is some tens of megabytes.
 class Releases {
  public:
-  /// Both must outlive it.
+  /// Both arguments must outlive the object.
   Releases(const SyntheticScene& scene, const FitOptions& fit) : scene_(scene), fit_(fit) {}
   std::shared_ptr<const Release> at(std::uint64_t seed);
 

@@ -20,13 +20,13 @@
 namespace clothfit {
 namespace {
 
-constexpr double kTagShare = 0.72;     // of the spacing of tags that one is wide, border to border
+constexpr double kTagShare = 0.72;     // a tag's width, border to border, over the spacing of tags
 constexpr int kMostTags = 24;          // a side: tag36h11 has 587
 constexpr double kSmallestTagPx = 16;  // two pixels for each of the eight cells across
 constexpr double kMostBlurPx = 5;
 constexpr int kMostPixels = 8192;  // a side
 
-/// Tags row by row, each with its four corners.
+/// Returns tags row by row, each with its four corners.
 MarkerSet tag_corners(int tags, double size_m) {
   constexpr std::array<std::array<double, 2>, 4> kCorners{{{-1, 1}, {1, 1}, {1, -1}, {-1, -1}}};
   const double spacing_m = size_m / tags;
@@ -55,7 +55,7 @@ Eigen::Matrix2Xd places_m(const std::vector<Marker>& markers) {
   return places;
 }
 
-/// Pixels that a length at the distance of the cloth's middle takes in the first camera.
+/// Returns the pixels of a length at the distance of the cloth's middle in the first camera.
 double pixels_of(double length_m, const SyntheticScene& scene, const PictureOptions& options) {
   const CameraParameters camera = scene_camera(scene, 0, options.width_px, options.height_px);
   const Eigen::Vector3d middle_m(0.5 * scene.size_m, 0, -0.5 * scene.size_m);
@@ -63,8 +63,8 @@ double pixels_of(double length_m, const SyntheticScene& scene, const PictureOpti
   return length_m * camera.focal_px.x() / distance_m;
 }
 
-/// Vertices a side of the mesh that is drawn: the truth's cells are cut into equal parts of two
-/// pixels at most. Where the surface bends with a radius of 50 pixels, the triangles then lie a
+/// Returns vertices a side of the mesh that is drawn. The truth's cells are cut into equal parts of
+/// two pixels at most. Where the surface bends with a radius of 50 pixels, the triangles then lie a
 /// hundredth of a pixel beside it, along its normal.
 int drawn_vertices(const SyntheticScene& scene, const PictureOptions& options) {
   constexpr double kLargestPx = 2;
@@ -88,12 +88,13 @@ RenderOptions render_options(const PictureOptions& options) {
           .shot_levels = options.shot_levels};
 }
 
-/// Shapes of the cloth at the instants of every exposure, on the truth's mesh.
+/// Returns shapes of the cloth at the instants of every exposure, on the truth's mesh.
 ///
 /// At the frame itself, the middle of the exposure, the shape is that of the recording without
-/// pictures, to the bit: steps that are cut differently would move it by the integrator's error,
+/// pictures, to the bit. Steps that are cut differently would move it by the integrator's error,
 /// which is no matter of pictures. The other instants come from a second run that stops at them
-/// too, as what moves between them and the frame there. Before it is let go the cloth is held.
+/// too: the motion between them and the frame there is added. Before it is let go the cloth is
+/// held.
 std::vector<std::vector<Eigen::Matrix3Xd>> exposed_shapes(const SyntheticScene& scene,
                                                           const PictureOptions& options,
                                                           std::uint64_t seed) {
@@ -151,7 +152,7 @@ class Stage {
     return CameraRays(camera(number), kMarginPx);
   }
 
-  /// What the camera with these rays takes at a frame.
+  /// Takes the picture of the camera with these rays at a frame.
   cv::Mat picture(const CameraRays& rays, int number, int frame) const {
     std::vector<std::vector<PlacedSheet>> instants;
     for (const Eigen::Matrix3Xd& shape : shapes_[static_cast<std::size_t>(frame)])
@@ -160,8 +161,8 @@ class Stage {
     return render_cloth(rays, instants, render_options(options_), noise_seed);
   }
 
-  /// Where a camera truly has the markers at a frame: whether it sees them is asked of the sheet
-  /// that is drawn, their places are the projected points of the simulated surface.
+  /// Returns where a camera truly has the markers at a frame. Their visibility is that of the sheet
+  /// that is drawn; their places are the projected points of the simulated surface.
   std::vector<TrueMarker> truth(const CameraParameters& camera, int frame) const {
     const std::vector<Eigen::Matrix3Xd>& shapes = shapes_[static_cast<std::size_t>(frame)];
     const Eigen::Matrix3Xd& shape = shapes[shapes.size() / 2];

@@ -9,7 +9,7 @@ namespace {
 
 using Memory = std::vector<EffectMemory<SingleLane>>;
 
-/// How the cloth moves at a time, all held points where they are to be.
+/// The cloth's equation of motion at a time, all held points at their prescribed places.
 class Motion {
  public:
   Motion(const Cloth& cloth, const ParameterSet& parameters)
@@ -17,7 +17,7 @@ class Motion {
         parameters_(parameters),
         lane_(lane_parameters<SingleLane>(cloth, {&parameters, 1})) {}
 
-  /// Puts held points where they are at `time_s`, with the velocities they have.
+  /// Puts held points at their places of `time_s`, with their velocities.
   void hold(double time_s, Eigen::Matrix3Xd& position_m, Eigen::Matrix3Xd& velocity) const {
     constexpr double kApartS = 1e-5;
     for (const HeldVertexWeights& held : cloth_.held) {
@@ -34,7 +34,7 @@ class Motion {
     }
   }
 
-  /// Accelerations (m/s2); the memory moves on by `time_step_s`.
+  /// Returns accelerations (m/s2); the memory moves on by `time_step_s`.
   Eigen::Matrix3Xd acceleration(double time_s, double time_step_s,
                                 const Eigen::Matrix3Xd& position_m,
                                 const Eigen::Matrix3Xd& velocity, Memory& memory) const {

@@ -8,12 +8,12 @@
 
 namespace clothfit {
 
-/// Positions (3 x vertices, world, m) at the schedule's times from rest, by the classical
-/// Runge-Kutta scheme of fourth order [kutta1901], with the springs' forces summed anew: neither
-/// the steps nor the kernels are those of fits. Its error is of fourth order in the step where
-/// forces are smooth; what effects remember moves on once a step, which is of first order. Held
-/// points lie at vertices; no effect shifts them, and nothing limits strain. Empty where the
-/// numbers do not work out.
+/// Returns positions (3 x vertices, world, m) at the schedule's times from rest. The scheme is the
+/// classical one of Runge and Kutta of fourth order [kutta1901], with its own sum of the springs'
+/// forces: neither the steps nor the kernels are those of fits. Its error is of fourth order in the
+/// step where forces are smooth. The memory of effects moves on once a step, which is of first
+/// order. Held points lie at vertices; no effect shifts them, and nothing limits strain. The result
+/// is empty where the numbers do not work out.
 std::vector<Eigen::Matrix3Xd> run_runge_kutta(const Cloth& cloth, const ParameterSet& parameters,
                                               const Schedule& schedule);
 

@@ -20,7 +20,7 @@ Recording recording_of(const SyntheticScene& scene) {
   return recording;
 }
 
-/// Which observations of one observer are lost, and which are gross outliers.
+/// Decides which observations of one observer are lost, and which are gross outliers.
 class Spoiled {
  public:
   Spoiled(const SyntheticScene& scene, std::uint64_t seed, int observer)
@@ -46,7 +46,7 @@ class Spoiled {
     };
     return covered(marker.s_m, hand_s_) && covered(marker.t_m, hand_t_);
   }
-  /// How far off an outlier is in one coordinate, 0 for the others.
+  /// Returns how far off an outlier is in one coordinate, 0 for the others.
   double error(double most) {
     const double share = 2 * losses_.uniform() - 1;
     return outlier_ ? most * share : 0;

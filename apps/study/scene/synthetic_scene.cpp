@@ -19,11 +19,11 @@
 namespace clothfit {
 namespace {
 
-constexpr double kDistanceM = 1.0;  ///< of the cameras
+constexpr double kDistanceM = 1.0;  ///< distance of the cameras
 
-/// The flat sheet before it is let go: turned out of the vertical about its upper edge by 15 to 35
-/// degrees to either side, and that edge by up to 8 degrees out of the level and of the cameras'
-/// plane.
+/// Returns the flat sheet before it is let go. It is turned out of the vertical about its upper
+/// edge by 15 to 35 degrees to either side. That edge is turned by up to 8 degrees out of the level
+/// and of the cameras' plane.
 Eigen::Matrix3Xd released(const Mesh& mesh, std::uint64_t seed) {
   Draws draws(seed, kRelease, 0);
   constexpr double kDegree = std::numbers::pi / 180;
@@ -39,9 +39,9 @@ Eigen::Matrix3Xd released(const Mesh& mesh, std::uint64_t seed) {
   return turn * (Eigen::Vector3d::UnitX() * flat.row(0) - Eigen::Vector3d::UnitZ() * flat.row(1));
 }
 
-/// How far a hidden effect has moved the supports at a time (s, the recording's); nothing where it
-/// leaves them alone. Here the effects' equations stand again, for the truth is to be had another
-/// way than the model's.
+/// Returns how far a hidden effect has moved the supports at a time (s, the recording's); nothing
+/// where it leaves them alone. The effects' equations stand here a second time, because the truth
+/// has to come from other code than the model's.
 std::function<Eigen::Vector3d(double)> support_shift_m(const HiddenEffect& effect) {
   const std::vector<double>& p = effect.values;
   if (effect.name == "support_drift")
@@ -78,7 +78,7 @@ Truth make_truth(const SyntheticScene& scene, std::uint64_t seed) {
       truth.set.effects.push_back(hidden.values);
       continue;
     }
-    // Released where the supports are by then.
+    // The cloth is released where the supports are by then.
     const Eigen::Vector3d first_m = shift_m(-scene.before_s);
     for (HeldVertexWeights& held : truth.cloth.held) {
       Eigen::Vector3d at_rest_m = Eigen::Vector3d::Zero();
@@ -180,10 +180,10 @@ std::vector<Eigen::Matrix3Xd> simulate_scene(const SyntheticScene& scene, std::u
   for (const double since_release_s : time_s)
     schedule.frame_time_s.push_back(since_release_s - scene.before_s);
 
-  // As fits leave room to the largest stable step.
+  // Fits leave room to the largest stable step, and so does this.
   schedule.time_step_s = stable_time_step_s(truth.cloth, truth.set) / (1.5 * scene.truth_steps);
   std::vector<Eigen::Matrix3Xd> position_m;
-  // An effect that shifts supports otherwise than by a prescribed motion is a step's own business.
+  // Only a step itself can shift supports otherwise than by a prescribed motion.
   const bool shifts_supports =
       std::ranges::any_of(truth.cloth.effects, [](const auto& e) { return e->shifts_supports(); });
   if (scene.integrator == TruthIntegrator::runge_kutta && !shifts_supports) {

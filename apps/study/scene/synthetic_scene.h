@@ -13,27 +13,27 @@
 
 namespace clothfit {
 
-/// Series of draws under a scene's seed: a thing drawn anew does not change the others.
+/// Series of draws under a scene's seed: a new draw of one thing does not change the others.
 enum SceneSeries : int { kRelease, kNoise3d, kLosses, kHand, kNoise2d, kPictures };
 
-/// How the truth's motion is had.
+/// The integrator of the truth's motion.
 enum class TruthIntegrator {
   euler,       ///< the scheme of fits
   runge_kutta  ///< another one, of fourth order (apps/study/scene/runge_kutta_run.h)
 };
 std::string to_string(TruthIntegrator integrator);
 
-/// An effect that is at work in the truth and that its recording does not declare: of motion, or of
-/// the measurement.
+/// An effect that acts in the truth and that its recording does not declare. It is one of motion or
+/// of the measurement.
 struct HiddenEffect {
   std::string name;
-  std::vector<double> values;  ///< of all its parameters, in the description's order and units
+  std::vector<double> values;  ///< all its parameters, in the description's order and units
 };
 
-/// What synthetic recordings are made with. The cloth hangs from its two upper corners, is let go
-/// flat, and swings; how it is turned before that is drawn anew for each recording.
+/// Options of synthetic recordings. The cloth hangs from its two upper corners, is let go flat, and
+/// swings. Its turn before that is drawn for each recording.
 struct SyntheticScene {
-  double size_m = 0.4;    ///< of the square cloth, > 0
+  double size_m = 0.4;    ///< side of the square cloth, > 0
   double mass_kg = 0.03;  ///< > 0
   Fabric fabric{.tension_warp_n_per_m = 40,
                 .tension_weft_n_per_m = 50,
@@ -53,7 +53,7 @@ struct SyntheticScene {
   double frame_rate_hz = 60;  ///< > 0
   double before_s = 0;        ///< the cloth has swung so long when the recording begins, >= 0
   int cameras = 1;            ///< 1 to 4, 1 m away around the cloth's front
-  double noise_m = 1e-3;      ///< of 3D tracks, per coordinate, > 0
+  double noise_m = 1e-3;      ///< for 3D tracks, per coordinate, > 0
   double noise_px = 0.3;      ///< > 0
   bool noisy = true;          ///< false: observations state that noise and have none
   double missing = 0;         ///< share of observations dropped at random, 0 to 0.9
@@ -63,25 +63,25 @@ struct SyntheticScene {
   void validate() const;  ///< throws InputError, naming options of `clothfit recover`
 };
 
-/// What is known of the scene before anybody looks: cloth, held points, start; no markers and no
-/// cameras.
+/// Returns what is known of the scene before anybody looks: cloth, held points, start; no markers
+/// and no cameras.
 Recording scene_recording(const SyntheticScene& scene);
 
-/// The fit's parameters, by name.
+/// Returns the fit's parameters, by name.
 std::map<std::string, double> scene_truth(const SyntheticScene& scene);
 
-/// Camera `number` (from 0) of a row before the cloth, all looking at its middle; the first one
-/// straight at it. World x to the right, z up; the cloth hangs around (size / 2, 0, -size / 2) and
-/// fills half of the picture.
+/// Returns camera `number` (from 0) of a row before the cloth. All look at its middle, the first
+/// one straight at it. World x is to the right, z up; the cloth hangs around (size / 2, 0, -size /
+/// 2) and fills half of the picture.
 CameraParameters scene_camera(const SyntheticScene& scene, int number, int width_px, int height_px);
 
-/// Seconds from the release to each frame.
+/// Returns seconds from the release to each frame.
 std::vector<double> scene_frame_times_s(const SyntheticScene& scene);
 
-/// Vertices of the truth's mesh, truth_mesh a side (3 x vertices, world, m), at times (rising, s)
-/// since the release that `seed` draws, with the hidden effects of motion, for which the
-/// recording's first frame is time 0; effects that move supports are prescribed motions. Throws
-/// InputError where that cannot be simulated.
+/// Returns vertices of the truth's mesh, truth_mesh a side, at times (rising, s) since the release
+/// that `seed` draws. They are 3 x vertices, world, m. Hidden effects of motion act; the
+/// recording's first frame is time 0 for them, and effects that move supports are prescribed
+/// motions. Throws InputError where that cannot be simulated.
 std::vector<Eigen::Matrix3Xd> simulate_scene(const SyntheticScene& scene, std::uint64_t seed,
                                              std::span<const double> time_s);
 

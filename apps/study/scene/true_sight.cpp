@@ -11,7 +11,7 @@ namespace clothfit {
 namespace {
 
 /// Instants per frame interval of a motion that is looked at between frames. A cubic through four
-/// of them, 2 ms apart at 60 frames per second, leaves micrometres out.
+/// of them, 2 ms apart at 60 frames per second, errs by micrometres.
 constexpr int kBetween = 8;
 constexpr double kBeyondS = 0.25;  ///< seconds after the last frame that can be looked at
 
@@ -97,7 +97,7 @@ Surface TrueSight::surface_seen(int frame) const {
                       hidden_.places_m(frame));
 }
 
-/// By the cubic through the four instants around.
+/// Interpolates by the cubic through the four instants around.
 Eigen::Vector3d TrueSight::at(double time_s, int marker, const Surface& surface,
                               Instants& known) const {
   const auto place_m = [&](int instant) -> Eigen::Vector3d {

@@ -13,7 +13,7 @@
 
 namespace clothfit {
 
-/// The hidden effects of the measurement, and where they have the markers sit.
+/// The hidden effects of the measurement, and the places of the markers under them.
 struct HiddenMeasurement {
   struct Hypothesis {
     std::shared_ptr<const MeasurementEffect> effect;
@@ -25,8 +25,8 @@ struct HiddenMeasurement {
   Sighting sighting(int frame, int marker, const CameraParameters* camera,
                     const Eigen::Vector3d& sheet_middle_m) const;
 
-  /// Where the markers really are in a frame: s and t (m), 2 x markers. Only on the cloth does the
-  /// truth have a surface that shows them.
+  /// Returns where the markers really are in a frame: s and t (m), 2 x markers. Only on the cloth
+  /// does the truth have a surface that shows them.
   Eigen::Matrix2Xd places_m(int frame) const;
   bool markers_stay_on_cloth() const;
 
@@ -37,19 +37,19 @@ struct HiddenMeasurement {
   Eigen::Matrix2Xd stated_m;                          ///< 2 x markers
 };
 
-/// What an observer of a scene sees of its markers, by the hidden effects of the measurement. Their
-/// laws are the program's; the cloth they look at is not a fit's: between the frames it is the
-/// truth's own motion, beside the markers its own surface.
+/// An observer's view of a scene's markers, by the hidden effects of the measurement. The effects'
+/// laws are the program's. The cloth is not a fit's: between the frames it is the truth's own
+/// motion, beside the markers its own surface.
 class TrueSight {
  public:
-  /// Of the scene that `seed` releases. Throws InputError where that cannot be simulated, and where
-  /// a marker would leave the cloth.
+  /// Takes the scene that `seed` releases. Throws InputError where that cannot be simulated, and
+  /// where a marker would leave the cloth.
   TrueSight(const SyntheticScene& scene, const Recording& recording, std::uint64_t seed);
 
-  /// Where 3D tracks have the markers in a frame (3 x markers, world, m).
+  /// Returns where 3D tracks have the markers in a frame (3 x markers, world, m).
   Eigen::Matrix3Xd places(int frame) const;
 
-  /// Where a camera has them (px); nothing behind it.
+  /// Returns where a camera has them (px); nothing behind it.
   std::vector<std::optional<Eigen::Vector2d>> pixels(int frame,
                                                      const CameraParameters& camera) const;
 

@@ -16,8 +16,7 @@ namespace {
 
 constexpr int kFewestTrials = 5;
 
-/// Sizes of a drag that is planted, in sigmas, and releases over which its pseudo-true values are
-/// pooled.
+/// Sizes of a planted drag, in sigmas, and releases over which its pseudo-true values are pooled.
 constexpr std::array kDragSigmas{1.0, 5.0, 20.0};
 constexpr int kPooledReleases = 50;
 
@@ -38,7 +37,7 @@ const RecoverResult* result_of(const TargetsResult& result, const std::string& n
   return nullptr;
 }
 
-/// Smallest and largest of a number over the parameters.
+/// Returns the smallest and largest of a number over the parameters.
 template <class Number>
 std::pair<double, double> range_of(const RecoverResult& result, const Number& number) {
   double low = std::numeric_limits<double>::infinity(), high = -low;
@@ -132,11 +131,11 @@ bool is_stiffness(const std::string& parameter) {
   return !parameter.starts_with("damping") && parameter.find('.') == std::string::npos;
 }
 
-/// Least and largest of some coverage over the stiffnesses, and how they are printed.
+/// Least and largest of some coverage over the stiffnesses, and their printed form.
 struct Covered {
   double low = 1, high = 0;
   void add(double share) {
-    // No trial at all is no coverage.
+    // Without any trial there is no coverage.
     const double known = std::isnan(share) ? 0 : share;
     low = std::min(low, known);
     high = std::max(high, known);
@@ -206,8 +205,8 @@ void judge_seconds(const FitSeconds& seconds, std::vector<TargetRow>& rows) {
                   .command = command_of("seconds")});
 }
 
-/// Of 9 x 9 vertices and markers: a fit takes a second, and what intervals cover is no matter of
-/// their number.
+/// Sets up a study of 9 x 9 vertices and markers. A fit takes a second, and the coverage of
+/// intervals does not depend on these numbers.
 RecoverOptions drag_study(double sigmas, const TargetsOptions& options) {
   constexpr double kDragSigmaPerS = 1.2e-3;  // drag_sigma_per_s() of this scene
   RecoverOptions study = study_of(500, options);
@@ -261,8 +260,9 @@ std::vector<TargetStudy> target_studies(const TargetsOptions& options) {
   spoiled.scene.outliers = 0.05;
   studies.push_back({"spoiled", "observations missing, hidden by a hand and far off", spoiled});
 
-  // As many observations as the spoiled recordings have good ones: 0.8 of those that the hand, a
-  // quarter of the cloth for a third of the time, leaves, and 0.95 of these.
+  // The clean recordings have as many observations as the spoiled ones have good ones. The hand
+  // hides a quarter of the cloth for a third of the time; 0.8 of the rest remain, and 0.95 of
+  // these.
   RecoverOptions clean = study_of(100, options);
   clean.start_factor = 2;
   clean.scene.missing = 1 - 0.8 * (1 - 1.0 / 12) * 0.95;
@@ -325,7 +325,7 @@ TargetsResult measure_targets(const TargetsOptions& options, const std::filesyst
     return options.only.empty() || std::ranges::find(options.only, name) != options.only.end();
   };
   TargetsResult result;
-  // First, while nothing else runs.
+  // This one is first, while nothing else runs.
   const bool timed = wanted("seconds");
   if (timed) result.seconds = measure_fits(options.seed);
   for (const TargetStudy& study : target_studies(options)) {

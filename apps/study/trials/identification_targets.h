@@ -9,8 +9,8 @@
 
 namespace clothfit {
 
-/// What identification is meant to reach, measured: the studies behind the numbers, and the table
-/// of targets.
+/// Options to measure the targets of identification. The results are the studies behind the
+/// numbers, and the table of targets.
 struct TargetsOptions {
   double share =
       1;  ///< of the trials that a target asks for, in (0, 1]; each study keeps 5 at least
@@ -26,7 +26,7 @@ struct TargetStudy {
   RecoverOptions options;
   double drag_sigmas = 0;  ///< planted in the truth and not in the fit; 0: none
 };
-/// tracks3d, one_camera, spoiled, clean, drag_1, drag_5, drag_20, drag_fitted.
+/// Returns tracks3d, one_camera, spoiled, clean, drag_1, drag_5, drag_20, drag_fitted.
 std::vector<TargetStudy> target_studies(const TargetsOptions& options);
 
 enum class TargetState { met, missed, not_measured };
@@ -58,8 +58,8 @@ struct TargetsResult {
   std::vector<TargetRow> rows;
 };
 
-/// Each study keeps a journal NAME.journal in `journals`, so that a run goes on where it was
-/// interrupted.
+/// Measures the targets. Each study keeps a journal NAME.journal in `journals`, so that a run goes
+/// on where it was interrupted.
 TargetsResult measure_targets(const TargetsOptions& options, const std::filesystem::path& journals,
                               JournalStart start, const ProgressCallback& progress);
 

@@ -4,10 +4,10 @@
 
 namespace clothfit {
 
-/// A number as journals keep it: null where it is not finite.
+/// Writes a number as journals keep it: null where it is not finite.
 nlohmann::ordered_json json_number(double value);
 
-/// Back again; not a number where it is null.
+/// Reads it back; not a number where it is null.
 double number_of_json(const nlohmann::ordered_json& json);
 
 }  // namespace clothfit

@@ -10,7 +10,7 @@
 namespace clothfit {
 namespace {
 
-/// Trials have the indices from 0.
+/// Pooled releases have indices from here, trials those from 0.
 constexpr int kFirstRelease = 1'000'000;
 
 SyntheticRecording release(const RecoverOptions& study, int number) {

@@ -8,11 +8,11 @@
 
 namespace clothfit {
 
-/// What intervals are worth when the model is wrong in a known way: the truth has drag of the air
-/// that the fit lacks. Its estimates then tend to pseudo-true values, not to the true ones.
+/// These functions test intervals when the model is wrong in a known way: the truth has drag of the
+/// air that the fit lacks. Its estimates then tend to pseudo-true values, not to the true ones.
 
-/// Where fits of many releases would agree: each parameter's value in the fit, without the drag,
-/// that leaves least of the noise-free recordings of all releases together.
+/// Values on which fits of many releases would agree. Each parameter has its value in the fit,
+/// without the drag, that minimises the residuals of all releases' noise-free recordings together.
 struct PseudoTruth {
   bool usable = false;
   bool converged = false;
@@ -20,13 +20,13 @@ struct PseudoTruth {
   std::map<std::string, double> values;  ///< by the parameter's name
   int releases = 0;
 };
-/// Of `releases` (>= 1) recordings of the study's scene, drawn from `study.seed`, none of them one
-/// of its trials.
+/// Finds them from `releases` (>= 1) recordings of the study's scene. They are drawn from
+/// `study.seed`, none of them one of its trials.
 PseudoTruth pseudo_truth(const RecoverOptions& study, int releases,
                          const ProgressCallback& progress);
 
-/// Sigma of the drag by Cramer and Rao's bound, root mean square over releases: what a planted drag
-/// is measured in.
+/// Returns the sigma of the drag by Cramer and Rao's bound, root mean square over releases. It is
+/// the unit of a planted drag.
 double drag_sigma_per_s(const RecoverOptions& study, int releases);
 
 /// Intervals of one parameter over the trials of a study.

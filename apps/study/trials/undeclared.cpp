@@ -24,13 +24,13 @@ namespace clothfit {
 namespace {
 
 constexpr double kNothingHidden = std::numeric_limits<double>::quiet_NaN();
-constexpr double kTold = 0.9;      ///< correlation of two hidden laws, below
-constexpr int kWithheldDraws = 3;  ///< each asks for the derivatives of every law
-constexpr int kDraws = 20;         ///< of release, shape and direction, before a trial is given up
-constexpr int kDirections = 20;    ///< of a law in one release
+constexpr double kTold = 0.9;      ///< correlation of two hidden modes, below
+constexpr int kWithheldDraws = 3;  ///< each asks for the derivatives of every mode
+constexpr int kDraws = 20;  ///< draws of release, shape and direction, before a trial is given up
+constexpr int kDirections = 20;  ///< draws of a mode's direction in one release
 enum UndeclaredSeries : int { kPartner = 320, kReleases };
 
-/// What a trial hides, with the release that shows it.
+/// The hidden modes of a trial, with the release that shows them.
 struct Setting {
   std::uint64_t release = 0;
   std::vector<DrawnLaw> laws;
@@ -38,7 +38,7 @@ struct Setting {
   double mimicked = kNothingHidden;
 };
 
-/// The second law of a pair: any other effect's.
+/// Returns a trial's modes. The second of a pair is one of any other effect.
 std::vector<HiddenLaw> laws_of_trial(const UndeclaredOptions& options, int index,
                                      std::uint64_t seed) {
   if (options.hide == UndeclaredOptions::Hide::nothing) return {};
@@ -62,8 +62,9 @@ bool markers_stay_on_cloth(const UndeclaredOptions& options,
   return HiddenMeasurement(scene, information.recording.input.recording).markers_stay_on_cloth();
 }
 
-/// Laws with numbers for one release; nothing where one of them cannot be seen in it, or puts
-/// markers beside the cloth. `mimicked` is lowered to how well others mimic one that is withheld.
+/// Draws modes with numbers for one release. There is nothing where one of them cannot be seen in
+/// it, or puts markers beside the cloth. `mimicked` is lowered to how well others mimic a withheld
+/// one.
 std::optional<Setting> draw_setting(const UndeclaredOptions& options,
                                     const std::vector<HiddenLaw>& laws, std::uint64_t seed,
                                     std::uint64_t release_seed, Releases& releases,
@@ -74,7 +75,8 @@ std::optional<Setting> draw_setting(const UndeclaredOptions& options,
   const RecordingInformation& information = release->information();
   std::vector<std::uint64_t> seeds;
   for (size_t n = 0; n < laws.size(); ++n) {
-    // A pattern of markers that reaches the edges can shrink only: other directions are drawn anew.
+    // A pattern of markers that reaches the edges can shrink only: other directions are drawn
+    // again.
     for (int k = 0; k < kDirections && setting.laws.size() == n; ++k) {
       seeds.resize(n);
       seeds.push_back(derived_seed(seed, static_cast<int>(n) + 2 * k));
@@ -86,7 +88,7 @@ std::optional<Setting> draw_setting(const UndeclaredOptions& options,
     if (setting.laws.size() == n) return std::nullopt;
   }
   if (laws.size() == 2) {
-    // Each is to be seen beside the other, so that the other's direction is nobody's evidence.
+    // Each has to be seen beside the other, so that the other's direction is nobody's evidence.
     const Eigen::VectorXd first = setting.laws[0].projected, second = setting.laws[1].projected;
     if (std::abs(first.dot(second)) > kTold) return std::nullopt;
     setting.laws[0] = draw_law(information, laws[0], options.draw, seeds[0], second);
@@ -121,9 +123,9 @@ const ParameterEstimate* estimate_of(const FitResult& result, const std::string&
   return nullptr;
 }
 
-/// Amplitudes of a hidden law that was accepted as it is, and their ratio to the truth: as the
-/// recording sees them, by the derivatives at the shape that was found, so that a wave's other sign
-/// half a turn later is the same.
+/// Compares the amplitudes of a hidden mode, accepted at its own, with the truth. Their ratio is as
+/// the recording sees them, by the derivatives at the found shape. So a wave's other sign half a
+/// turn later is the same.
 void compare_amplitudes(const RecordingInformation& information, const DrawnLaw& drawn,
                         const FitResult& result, HiddenInTrial& hidden) {
   const EffectDescription effect = describe_effect(drawn.term.effect);
@@ -167,8 +169,8 @@ double fitted_rms(const FitReport& report) {
   return report.result.errors.empty() ? kNothingHidden : report.result.errors.front().fitted.rms;
 }
 
-/// Held-out error of a fit that is told the hidden laws and their shapes, from the truth, on the
-/// mesh that was analysed.
+/// Returns the held-out error of a fit with the hidden modes and their shapes declared. It starts
+/// from the truth, on the mesh that was analysed.
 double error_with_truth(const FitInput& input, const UndeclaredOptions& options,
                         const std::vector<DrawnLaw>& laws, const Diagnosis& diagnosis,
                         const std::map<std::string, double>& truth) {
@@ -195,12 +197,12 @@ double error_with_truth(const FitInput& input, const UndeclaredOptions& options,
   return report.usable() ? held_out_rms(report) : kNothingHidden;
 }
 
-/// Says of each hidden law whether an accepted effect is right about it: one that stands for no
+/// Says of each hidden mode whether an accepted effect is right about it: one that stands for no
 /// other.
 void name_hidden(UndeclaredTrial& trial) {
   std::vector<bool> used(trial.accepted_effects.size(), false);
   for (HiddenInTrial& hidden : trial.hidden) {
-    // Its own name first, so that a member of two classes is left to the other one.
+    // Its own name comes first, so that a member of two classes is left to the other one.
     for (const bool own : {true, false})
       for (size_t k = 0; k < used.size() && !hidden.named; ++k) {
         const std::string& effect = trial.accepted_effects[k];
@@ -349,7 +351,7 @@ UndeclaredTrial undeclared_once(const UndeclaredOptions& options, int index, std
   trial.message = diagnosis.message;
   if (!diagnosis.usable()) return trial;
   trial.verdict = diagnosis.verdict;
-  // Never right: no trial hides such a thing.
+  // This is never right: no trial hides such a thing.
   if (diagnosis.seen_elsewhere) {
     trial.accepted.push_back("markers seen elsewhere");
     trial.accepted_effects.push_back("markers seen elsewhere");

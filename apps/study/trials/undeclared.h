@@ -12,35 +12,35 @@
 
 namespace clothfit {
 
-/// Undeclared effects: recordings whose truth has an effect that they do not declare are diagnosed,
-/// and what the diagnosis says is held against the truth.
+/// Options of the study of undeclared effects. Recordings whose truth has an effect that they do
+/// not declare are diagnosed, and the diagnosis is compared with the truth.
 struct UndeclaredOptions {
   enum class Hide {
-    one,      ///< a law in each trial, in turn
+    one,      ///< a mode in each trial, in turn
     nothing,  ///< clean recordings: whatever is accepted is a false alarm
-    pairs,    ///< that law and another one, each seen beside the other
+    pairs,    ///< that mode and another one, each seen beside the other
     withheld  ///< one, whose effect the diagnosis does not know and the others mimic badly
   };
   SyntheticScene scene;
   DiagnoseOptions diagnosis;
   Hide hide = Hide::one;
-  std::vector<HiddenLaw> laws;  ///< hidden in turn; of pairs the second is drawn from them
-  int trials = 20;              ///< of each law, or in all where nothing is hidden
+  std::vector<HiddenLaw> laws;  ///< hidden in turn; the second of a pair is drawn from them
+  int trials = 20;              ///< for each mode, or in all where nothing is hidden
   DrawOptions draw;
-  /// Squared multiple correlation of what is withheld with all that others can do, below.
+  /// The squared multiple correlation of a withheld mode with all others must be below this.
   double most_mimicked = 0.25;
   unsigned long long seed = 1;
   int threads = 0;
 
-  int count() const;      ///< of trials in all
+  int count() const;      ///< trials in all
   void validate() const;  ///< throws InputError
-  /// One line that names all that determines the trials, for their journal.
+  /// Returns one line that names all that determines the trials, for their journal.
   std::string key() const;
 };
 std::string to_string(UndeclaredOptions::Hide hide);
 
-/// Trial `index` of the study. Pure but for its seconds. All laws are hidden in the same releases,
-/// one for each round of the laws: what `releases` knows of one serves them all.
+/// Runs trial `index` of the study. Pure but for its seconds. All modes are hidden in the same
+/// releases, one for each round of the modes: `releases` serves them all.
 UndeclaredTrial undeclared_once(const UndeclaredOptions& options, int index, std::uint64_t seed,
                                 Releases& releases);
 

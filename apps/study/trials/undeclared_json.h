@@ -6,7 +6,7 @@
 
 namespace clothfit {
 
-/// A trial as its journal keeps it, and back to the last bit.
+/// Write a trial as its journal keeps it, and read it back to the last bit.
 std::string payload_of(const UndeclaredTrial& trial);
 UndeclaredTrial undeclared_trial_of(const std::string& payload);
 

@@ -19,19 +19,19 @@ struct Rate {
 struct Mean {
   double sum = 0;
   int count = 0;
-  void add(double value);  ///< what is not finite is left out
+  void add(double value);  ///< leaves out values that are not finite
   double value() const;    ///< NaN for none
 };
 
-/// What became of one hidden law, or of all trials together.
+/// The results for one hidden mode, or for all trials together.
 struct UndeclaredSummary {
   std::string title;
   int refused = 0;   ///< not drawn, or without a diagnosis
-  Rate right_first;  ///< of clean recordings: nothing accepted
+  Rate right_first;  ///< for clean recordings: nothing accepted
   Rate all_named;    ///< each hidden effect by one of its own
   int explained = 0, partly = 0, unexplained = 0, adequate = 0;
-  /// Where an effect was withheld and something was seen to be missing: whether the law that was
-  /// proposed leaves half of the held-out error at most.
+  /// Share of trials with a withheld effect, seen as missing, whose proposed law leaves at most
+  /// half of the held-out error.
   Rate law_halves;
   Mean class_size, sigmas;
   Mean amplitude_ratio;
@@ -42,16 +42,16 @@ struct UndeclaredSummary {
   Mean seconds;
 };
 
-/// A row for each hidden law, in the order in which they first appear (of a pair both laws), then
-/// one of all.
+/// Has a row for each hidden mode, in the order in which they first appear, then one for all. Of a
+/// pair both modes have rows.
 std::vector<UndeclaredSummary> undeclared_summaries(const UndeclaredResult& result);
 
-/// How often an effect was accepted first, by what was hidden.
+/// Counts of effects accepted first, by the hidden one.
 struct Confusion {
   std::vector<std::string> hidden;  ///< titles, rows
   std::vector<std::string> named;   ///< effects and "nothing", columns
   std::vector<std::vector<int>> count;
-  std::vector<std::vector<int>> right;  ///< of these, as many as count as right
+  std::vector<std::vector<int>> right;  ///< counts of these that are right
 };
 Confusion confusion_of(const UndeclaredResult& result);
 
