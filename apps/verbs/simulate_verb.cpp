@@ -303,8 +303,8 @@ int run_simulate(const SimulateVerbOptions& options) {
   {
     ProgressLine line;
     const ProgressCallback progress = watch(line);
-    // The result folder's default name is known once the model is read, and the steps of a
-    // recording are kept in that folder.
+    // The result folder's default name is known once the model is read. The steps of a recording
+    // are kept in that folder.
     const fs::path name = options.out.empty()
                               ? fs::path(requested_name(options.request) + ".simulation")
                               : options.out;

@@ -32,7 +32,7 @@ struct FitReport {
     std::string name;
     double value = 0;
     double noise = 0, robust = 0, step_shift = 0;  ///< in the parameter's unit
-    double degrees_of_freedom = 0;                 ///< of robust; infinite without blocks
+    double degrees_of_freedom = 0;                 ///< those behind robust; infinite without blocks
     Interval interval_90;                          ///< with all of these
   };
   std::vector<SigmaParts> sigma_parts;

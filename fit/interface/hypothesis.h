@@ -14,7 +14,7 @@ struct Hypothesis {
   std::map<std::string, double> shape;  ///< parameters beside the amplitudes; others are neutral
   /// Standard deviations of the shape's prior, from the spacing of its grid.
   std::map<std::string, double> shape_sigma;
-  bool fits_shape = false;  ///< whether the shape is fitted too
+  bool fits_shape = false;  ///< says whether the shape is fitted too
 
   std::string title() const;  ///< "nonuniform_mass (hem)"
   /// Names of the amplitudes in the space of a fit, EFFECT.PARAMETER.

@@ -15,7 +15,7 @@ struct ShapesFromPixels {
   int nodes = 0;  ///< a side
   /// Places of the nodes (fit/observe/node_weights.h) in each frame, 3 x nodes^2.
   std::vector<Eigen::Matrix3Xd> node_m;
-  double rms_residual = 0;  ///< of the pixels, over the larger of their sigma and a pixel
+  double rms_residual = 0;  ///< for the pixels, over the larger of their sigma and a pixel
 };
 
 /// Finds for each frame the smooth shape that minimises

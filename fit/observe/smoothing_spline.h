@@ -50,7 +50,7 @@ struct SmoothingSpline {
   /// sigmas are given, it is the factor by which to multiply these. NaN when fewer than three
   /// samples are used, which leave nothing to estimate it from.
   double noise_sigma = 0;
-  std::vector<double> value_sigma;  ///< of each knot's value, per coordinate; from noise_sigma
+  std::vector<double> value_sigma;  ///< for each knot's value, per coordinate; from noise_sigma
   std::vector<bool> outlier;        ///< per sample given: left out
 
   Eigen::VectorXd position(double time) const;

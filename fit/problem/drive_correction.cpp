@@ -70,8 +70,8 @@ std::shared_ptr<const Basis> make_basis(double first_s, double last_s, int knots
   basis->second_derivative = Eigen::MatrixXd::Zero(knots + kTail, knots);
   basis->second_derivative.topRows(knots) = each.second_derivative.transpose();
 
-  // The tail follows from steps h and c, slope c', c'' = 0 at the last knot, continuity to the
-  // second derivative at both knots between, and 0, 0, 0 at the end:
+  // The tail follows from steps h and c, slope c', c'' = 0 at the last knot. Further conditions are
+  // continuity to the second derivative at both knots between, and 0, 0, 0 at the end:
   //   c_2 = (c + h c') / 6,  c_1 = (5 c + 4 h c') / 6,
   //   c''_1 = 6 (c_1 - 6 c_2) / h^2,  c''_2 = 6 c_2 / h^2.
   const double h = spacing_s / kTail;

@@ -27,8 +27,8 @@ struct CmaOptions {
   long most_evaluations = 100000;  ///< in all runs; the last generation may exceed it
   /// The search stops once the best cost is at or below this.
   double cost_below = -std::numeric_limits<double>::infinity();
-  /// A run ends when the costs of some generations differ by less than this share of their largest
-  /// magnitude, or less than the smallest normal number.
+  /// A run ends when the costs of some generations hardly differ: by less than this share of their
+  /// largest magnitude, or less than the smallest normal number.
   double cost_tolerance = 1e-12;
   /// A run ends when every standard deviation is below this share of the initial step.
   double step_tolerance = 1e-12;

@@ -90,7 +90,7 @@ struct PointOverlay {
   double left = 0, top = 0, width = 0, height = 0;  ///< the shown rectangle, in the points' unit
   std::string picture_uri;                          ///< may be empty
   double picture_left = 0, picture_top = 0, picture_width = 0, picture_height = 0;
-  double magnification = 1;  ///< of the lines from observed towards predicted places
+  double magnification = 1;  ///< for the lines from observed towards predicted places
   std::vector<PointPair> points;
 };
 std::string point_overlay(const PointOverlay& overlay);

@@ -26,7 +26,7 @@ struct Axis {
   bool logarithmic = false;
 
   double operator()(double value) const;
-  bool shows(double value) const;  ///< whether the value has a place
+  bool shows(double value) const;  ///< says whether the value has a place
 };
 
 /// Writes the opening tag of a figure, with text for readers who do not see it.

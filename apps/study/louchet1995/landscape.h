@@ -10,7 +10,7 @@ namespace clothfit {
 /// A cost over stiffness and critical elongation, as figures 3 and 4 of the paper show it. The
 /// natural lengths are at their reference.
 struct CostLandscape {
-  double reference_elongation = 0;  ///< of the motion
+  double reference_elongation = 0;  ///< motion's elongation
   PaperCost cost = PaperCost::full;
   std::vector<double> stiffness_n_per_m;  ///< rising, evenly in the logarithm
   std::vector<double> elongation;         ///< rising, evenly

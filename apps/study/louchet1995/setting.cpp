@@ -12,7 +12,7 @@ constexpr int kMostSteps = 1000;          ///< for a setting: the limit of a sea
 constexpr int kScreenedTransitions = 25;  ///< for the full cost on the grid
 constexpr int kSearchedTransitions = 50;  ///< and in the search
 constexpr double kMostDampingPerStep = 0.5;
-constexpr size_t kShown = 3;  ///< of the grid
+constexpr size_t kShown = 3;  ///< rows of the grid
 
 ScannedSetting scanned(const PaperExperiment& experiment, PaperCost cost, int most_transitions) {
   return {experiment, cost, match_listing(experiment, cost, most_transitions)};

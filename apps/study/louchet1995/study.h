@@ -62,7 +62,7 @@ struct PlaceInMotion {
   double time_s = 0;
   double share_at_limit = 0;
   Eigen::VectorXd relative_sigma;  ///< louchet5, states measured with kMeasuringNoise_m
-  std::vector<double> errors;      ///< of a recovery from this transition alone, for each seed
+  std::vector<double> errors;  ///< errors of a recovery from this transition alone, for each seed
 };
 
 struct RaceResults {

@@ -33,7 +33,7 @@ struct HiddenMeasurement {
   double size_m = 0, frame_rate_hz = 0;
   int frames = 0;
   std::vector<Hypothesis> terms;
-  bool between_frames = false, shifts_place = false;  ///< whether one looks there
+  bool between_frames = false, shifts_place = false;  ///< says whether one looks there
   Eigen::Matrix2Xd stated_m;                          ///< 2 x markers
 };
 

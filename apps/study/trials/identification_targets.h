@@ -13,7 +13,7 @@ namespace clothfit {
 /// numbers, and the table of targets.
 struct TargetsOptions {
   double share =
-      1;  ///< of the trials that a target asks for, in (0, 1]; each study keeps 5 at least
+      1;  ///< share of the trials that a target asks for, in (0, 1]; each study keeps 5 at least
   unsigned long long seed = 1;
   int threads = 0;
   std::vector<std::string> only;  ///< names of studies, `drag` for all of its levels; empty: all

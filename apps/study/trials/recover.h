@@ -40,7 +40,7 @@ struct RecoveredParameter {
   double truth = 0, estimate = 0;
   double sigma = 0;                          ///< as in fit.json
   double noise_sigma = 0, robust_sigma = 0;  ///< FitReport::SigmaParts
-  double degrees_of_freedom = 0;             ///< of robust_sigma; infinite without blocks
+  double degrees_of_freedom = 0;             ///< those behind robust_sigma; infinite without blocks
   Interval interval_90;                      ///< as in fit.json
   /// The Cramer-Rao bound, from the information of the recording at the truth, with all that is
   /// fitted along. NaN where the model is not the truth's.
