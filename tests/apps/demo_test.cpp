@@ -1,5 +1,5 @@
-// The demo from pictures to parameters, against what was simulated and rendered. That its parts
-// refuse bad input is checked in program_test.cpp.
+// Checks the demo from pictures to parameters against what was simulated and rendered. Refusals of
+// bad input by its parts: program_test.cpp.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -37,7 +37,7 @@ double value_of(const FitResult& result, const std::string& name) {
 
 using VisibleMarkers = std::map<std::pair<int, std::string>, Eigen::Vector2d>;
 
-/// Pixels of the markers that the renderer says are visible: frame,marker,u,v,visible.
+/// Reads the pixels of the markers that the renderer says are visible: frame,marker,u,v,visible.
 VisibleMarkers true_markers(const fs::path& file) {
   std::istringstream lines(read_text(file));
   std::string line;
@@ -60,7 +60,7 @@ CameraParameters camera_after(const fs::path& demo, const std::string& step) {
   return read_camera(demo / "steps" / step / "cameras/front.yaml");
 }
 
-/// The focal length is right to two in a thousand.
+/// Expects a focal length that is right to two in a thousand.
 void expect_true_calibration(const fs::path& demo) {
   const CameraParameters truth = read_camera(kTruth / "truth_camera_front.yaml");
 
@@ -70,7 +70,7 @@ void expect_true_calibration(const fs::path& demo) {
   EXPECT_NEAR(found.focal_px.y(), truth.focal_px.y(), 2e-3 * truth.focal_px.y());
 }
 
-/// Corners are tracked no worse than a plain detector does, and their sigma is honest.
+/// Expects corners tracked no worse than by a plain detector, and honest sigmas.
 void expect_true_tracks(const fs::path& demo) {
   const Recording recording = read_recording(demo / "steps/tracked");
   const Tracks2d found = read_tracks2d(recording.tracks2d.at("front"), recording.markers);
@@ -94,7 +94,7 @@ void expect_true_tracks(const fs::path& demo) {
   EXPECT_NEAR(chi_square / count, 1.0, 0.3);  // sigma is honest
 }
 
-/// The fabric is found within 10 %, held-out frames within a pixel.
+/// Expects the fabric within 10 %, held-out frames within a pixel.
 void expect_true_fabric(const fs::path& demo) {
   const FitResult result = read_fit_result(demo / "fit.json");
   std::ifstream file(kTruth / "truth.json");
@@ -118,16 +118,16 @@ void expect_true_fabric(const fs::path& demo) {
   EXPECT_GT(result.errors[0].trivial.first_frame, 10.0);
 }
 
-/// Gravity in the camera's axes is found better than from the reference points alone.
+/// Expects gravity in the camera's axes to be better than from the reference points alone.
 void expect_true_gravity(const fs::path& demo) {
-  // What is down, as the true camera has it, as the placed one has it, and after the fit
+  // Down is taken as the true camera has it, as the placed one has it, and after the fit.
   const Eigen::Vector3d down(0, 0, -1);
   const Eigen::Vector3d truth =
       camera_from_world(read_camera(kTruth / "truth_camera_front.yaml")).rotation * down;
   const Rigid3 placed = camera_from_world(camera_after(demo, "tracked"));
   const FitResult result = read_fit_result(demo / "fit.json");
   // world_tilt_a turns about the world's x axis, world_tilt_b about x cross down = y
-  // (fit/problem/problem.cpp)
+  // (fit/problem/problem.cpp).
   const Eigen::Vector3d turn =
       value_of(result, "world_tilt_a") * Eigen::Vector3d::UnitX() +
       value_of(result, "world_tilt_b") * Eigen::Vector3d::UnitX().cross(down);
@@ -137,14 +137,14 @@ void expect_true_gravity(const fs::path& demo) {
   const double error_placed = std::acos(std::min(1.0, truth.dot(placed.rotation * down)));
   const double error_fitted = std::acos(std::min(1.0, truth.dot(placed.rotation * fitted_down)));
 
-  // Survey errors of 1 mm leave the placed camera off by up to three of its sigma of 2.7 mrad; the
+  // Survey errors of 1 mm leave the placed camera off by up to three of its sigma of 2.7 mrad. The
   // swing knows better than a third of that sigma.
   EXPECT_LT(error_placed, 8e-3);
   EXPECT_LT(error_fitted, 0.9e-3);
   EXPECT_LT(error_fitted, error_placed);
 }
 
-// One test, because the demo that all of it looks at takes half a minute.
+// This is one test, because the demo that all of it looks at takes half a minute.
 TEST(Demo, ReachesItsTargetsFromThePictures) {
   const test::ScratchFolder here("demo");
 

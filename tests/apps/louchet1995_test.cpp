@@ -1,6 +1,7 @@
-// `clothfit experiment louchet1995 --quick` from outside: what it leaves, and that neither threads
-// nor an interruption change it. Its numbers: tests/apps/study/louchet1995/paper_problem_test.cpp;
-// how the page looks is for a person to judge.
+// Runs `clothfit experiment louchet1995 --quick` from outside. Checks its files, and that neither
+// threads nor an interruption change them. Its numbers:
+// tests/apps/study/louchet1995/paper_problem_test.cpp. The look of the page is for a person to
+// judge.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -30,7 +31,7 @@ std::string text_of(const fs::path& file) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-/// Every file but the one that holds seconds; in the page they are blanked.
+/// Reads every file but the one that holds seconds; in the page they are blanked.
 std::map<std::string, std::string> results_in(const fs::path& folder) {
   const std::regex measured("<span class=\"measured\">[^<]*</span>");
   std::map<std::string, std::string> files;
@@ -60,7 +61,7 @@ TEST(Louchet1995Experiment, LeavesTheSameForAnyThreadsAndAfterAnInterruption) {
   EXPECT_THAT(expected.at("report.html"), Not(HasSubstr("nan")));
   EXPECT_EQ(results_in(here.path() / "two"), expected);
 
-  // A journal that was cut in the middle of a record, as a kill leaves it.
+  // A kill leaves a journal like this, cut in the middle of a record.
   EXPECT_EQ(run(here.path(), {"--out", "three", "--journal", "kept.journal"}).exit_code, 3);
   fs::resize_file(here.path() / "kept.journal", fs::file_size(here.path() / "kept.journal") / 2);
   const ProgramRun resumed =

@@ -1,5 +1,5 @@
-// Whole runs of the program on bundled recordings, from outside. How good the numbers are:
-// tests/vision, tests/calib and tests/fit compare them with the truth.
+// Runs the whole program on bundled recordings, from outside. The numbers are compared with the
+// truth in tests/vision, tests/calib and tests/fit.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -34,7 +34,7 @@ std::string read_text(const fs::path& file) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-/// A fit kept small: few individuals, few generations.
+/// Keeps a fit small: few individuals, few generations.
 std::vector<std::string> small_fit(const std::string& recording, const std::string& out) {
   return {"fit",           recording, "--population", "16",  "--generations", "2",
           "--refine-best", "1",       "--mesh",       "9x9", "--out",         out};
@@ -75,7 +75,7 @@ TEST(ProgramSimulate, OfAFitGivesTheFitsOwnError) {
   const Recording measured = read_recording(source);
   const Recording simulated = read_recording(here.path() / "swing_plain.simulation");
   EXPECT_EQ(simulated.markers.markers.size(), 81u);
-  // The vertices' tracks, read back, looked at where the markers are.
+  // The vertices' tracks are read back and interpolated at the markers.
   std::vector<Eigen::Matrix3Xd> mesh;
   for (const Position3d& row : read_tracks3d(*simulated.tracks3d, simulated.markers)) {
     if (row.marker == 0) mesh.emplace_back(3, 81);
@@ -96,7 +96,7 @@ TEST(ProgramSimulate, OfAFitGivesTheFitsOwnError) {
   }
   ASSERT_EQ(fitted_count, fit.errors[0].fitted.count);
   ASSERT_EQ(held_out_count, fit.errors[0].held_out.count);
-  // The pose's rounding, 1e-16, is all that differs.
+  // Only the pose's rounding, 1e-16, differs.
   EXPECT_NEAR(std::sqrt(fitted / fitted_count), fit.errors[0].fitted.rms_distance, 1e-9);
   EXPECT_NEAR(std::sqrt(held_out / held_out_count), fit.errors[0].held_out.rms_distance, 1e-9);
 }
@@ -248,13 +248,13 @@ TEST(ProgramFit, OfAClothInMotionCanBeSimulated) {
 TEST(ProgramFit, LeavesNothingWhenInterrupted) {
   const test::ScratchFolder here("interrupt");
   const auto interrupt_once_at_work = [&](int process) {
-    // The hidden folder of the result appears when the work begins; from then on signals are
+    // The hidden folder of the result appears when the work begins. From then on signals are
     // caught.
     const auto give_up = std::chrono::steady_clock::now() + std::chrono::seconds(30);
     while (names_in(here.path()).empty() && std::chrono::steady_clock::now() < give_up) {
       std::this_thread::yield();
     }
-    // Twice at once is one wish: `timeout` tells a program and its group.
+    // Two at once are one wish: `timeout` tells a program and its group.
     kill(process, SIGINT);
     kill(process, SIGINT);
   };

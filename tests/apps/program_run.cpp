@@ -21,7 +21,7 @@ std::string read_all(const std::filesystem::path& file) {
   return text.str();
 }
 
-/// In the child: never returns.
+/// Becomes the program in the child; never returns.
 [[noreturn]] void become_program(std::vector<char*>& arguments, const char* folder) {
   if (chdir(folder) != 0) _exit(126);
   const int out = open(kOut, O_WRONLY | O_CREAT | O_TRUNC, 0644);

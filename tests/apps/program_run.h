@@ -19,7 +19,7 @@ ProgramRun run_program(const std::vector<std::string>& arguments,
                        const std::filesystem::path& folder,
                        const std::function<void(int process)>& while_running = {});
 
-/// Names in `folder`, hidden ones too, sorted; without the two files that hold the output.
+/// Returns names in `folder`, hidden ones too, sorted; without the two files that hold the output.
 std::vector<std::string> names_in(const std::filesystem::path& folder);
 
 }  // namespace clothfit::test

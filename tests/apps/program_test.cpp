@@ -1,5 +1,6 @@
-// What the program answers to wrong usage and bad input: exit code, message, nothing left behind.
-// Each reader's own refusals in detail: tests/data. Whole runs: program_end_to_end_test.cpp.
+// Checks the program's answers to wrong usage and bad input: exit code, message, nothing left
+// behind. Each reader's own refusals in detail: tests/data. Whole runs:
+// program_end_to_end_test.cpp.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -29,7 +30,8 @@ void write_text(const fs::path& file, const std::string& text) {
   std::ofstream(file) << text;
 }
 
-/// recording.yaml of a small recording with pictures; `cloth` and `more` are put in as they are.
+/// Writes recording.yaml of a small recording with pictures; `cloth` and `more` are put in as they
+/// are.
 std::string picture_recording(const std::string& camera,
                               const std::string& cloth = "{size: [0.4, 0.4], mass: 0.03}") {
   return "format: clothfit-recording/1\n"
@@ -74,7 +76,7 @@ class Program : public ::testing::Test {
              fs::copy_options::recursive | fs::copy_options::overwrite_existing);
   }
 
-  /// recording.yaml with the first `from` replaced.
+  /// Replaces the first `from` in recording.yaml.
   void spoil_yaml(const std::string& from, const std::string& to) {
     std::ifstream in(recording_ / "recording.yaml");
     std::string text{std::istreambuf_iterator<char>(in), {}};
@@ -238,7 +240,7 @@ TEST_F(Program, RefusesACameraOfAnotherSizeThanThePictures) {
   camera.camera_from_world = CameraPose{};
   write_camera(camera, recording_ / "front.yaml");
 
-  // The file is named where the user has it, not in the folder that is gone afterwards.
+  // The message names the user's file, not its copy in the folder that is gone afterwards.
   expect_refused("track", (recording_ / "front.yaml").string() + ": ");
   expect_refused("track", "640 x 480 px");
   expect_refused("fit", "320 x 240 px");

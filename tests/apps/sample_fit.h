@@ -5,8 +5,8 @@
 
 namespace clothfit::test {
 
-/// A made-up fit of a made-up recording of 24 frames, 16 of them fitted, with names and reasons
-/// that a careless writer of HTML would stumble over. The residuals are a fixed pattern.
+/// A made-up fit of a made-up recording of 24 frames, 16 of them fitted. A careless writer of HTML
+/// would stumble over its names and reasons. The residuals are a fixed pattern.
 struct SampleFit {
   Recording recording;
   FitReport report;

@@ -7,7 +7,7 @@
 
 namespace clothfit::test {
 
-/// An empty folder of this test alone, gone with the object.
+/// An empty folder for this test alone, gone with the object.
 class ScratchFolder {
  public:
   explicit ScratchFolder(const std::string& name)

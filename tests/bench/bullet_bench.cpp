@@ -1,15 +1,15 @@
-// How fast a time step is beside Bullet's soft body, in one run on one core: simulations in lanes
-// (`exact` and `fast`) and one alone (`single`), with the strain limit off and on, on each
-// instruction set; then how the time grows with the mesh and falls with threads.
+// Compares the speed of a time step with Bullet's soft body, in one run on one core. Simulations
+// run in lanes (`exact` and `fast`) and one alone (`single`), with the strain limit off and on, on
+// each instruction set. Then it shows how the time grows with the mesh and falls with threads.
 //
-// Counted are spring-steps per second: springs times simulations times steps; for Bullet links
-// times steps. Compared cases take turns, many times, and the best turn of each counts, so that a
-// busy machine slows none of them alone. The cloth swings: each case runs the same steps of its own
+// Spring-steps per second are counted: springs times simulations times steps; for Bullet links
+// times steps. Compared cases take turns, many times, and the best turn of each counts. So a busy
+// machine slows none of them alone. The cloth swings: each case runs the same steps of its own
 // swing in every turn.
 //
 //   bullet_bench [--targets targets.json] [--turns N]
 //
-// `of peak`: additions and multiplications, a fused pair counted once, as a share of what the
+// `of peak` counts additions and multiplications, a fused pair once. It is their share of what the
 // core's vector units do when nothing else hinders them (peak_rate.h).
 
 #include <fmt/format.h>
@@ -40,14 +40,15 @@ double wall_s() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-/// Seconds that the processor worked for this thread: others that share the machine do not count.
+/// Returns seconds that the processor worked for this thread: others that share the machine do not
+/// count.
 double thread_s() {
   timespec now{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
-/// Something to be timed, and how fast it was at best.
+/// A case to be timed, and its best speed.
 struct Case {
   std::string name;
   double spring_steps_per_turn = 0;
@@ -71,7 +72,7 @@ double stable_step_s(int vertices_per_side) {
   return 2e-4 * 16 / (vertices_per_side - 1);
 }
 
-/// Soft sets, so that a twentieth is what the weight stretches some springs by. The last is stiffer
+/// Returns soft sets, so that the weight stretches some springs by a twentieth. The last is stiffer
 /// than the first by `spread`.
 std::vector<ParameterSet> soft_sets(const Cloth& cloth, int count, double spread) {
   std::vector<ParameterSet> sets = cotton_sets(cloth, count);
@@ -115,7 +116,7 @@ struct Swing {
                   hwy::GetChosenTarget().Update(highway_target);
                   lanes.restore();
                   lanes.set_limited(limited);
-                  lanes.step(time_step_s);  // what it works on comes into the caches
+                  lanes.step(time_step_s);  // brings its data into the caches
                 },
             .turn =
                 [this] {
@@ -145,16 +146,16 @@ struct Bullet {
 
 std::vector<InstructionSet> vector_sets() {
   std::vector<InstructionSet> sets = instruction_sets();
-  sets.pop_back();  // what every processor runs
+  sets.pop_back();  // every processor runs these
   return sets;
 }
 
 /// Additions and multiplications of a spring-step, a fused pair counted once, with its share of a
-/// vertex's. Counted in cloth_sweep.cpp.
+/// vertex's. They are counted in cloth_sweep.cpp.
 constexpr double kExactOperations = 43 + 9;
 constexpr double kFastOperations = 27 + 3;
 
-/// What a table of targets says (docs/formats.md: clothfit-targets/1).
+/// A row of a table of targets (docs/formats.md: clothfit-targets/1).
 struct Target {
   std::string name;
   double at_least;
@@ -167,7 +168,7 @@ void print_head() {
              "at limit", "bytes");
 }
 
-/// `number_bytes`: 12 numbers of a vertex are read or written in a step.
+/// Prints a row. `number_bytes`: 12 numbers of a vertex are read or written in a step.
 void print_row(const Case& one, double bullet_per_s, double peak_per_s, double operations,
                double at_limit, double bytes) {
   fmt::print("  {:<30}{:>9.0f}{:>10.1f}{:>9.0f} %{:>9.1f} %{:>8.1f}\n", one.name,
@@ -175,13 +176,14 @@ void print_row(const Case& one, double bullet_per_s, double peak_per_s, double o
              100 * one.best_per_s * operations / peak_per_s, 100 * at_limit, bytes);
 }
 
-/// Position and velocity of a vertex, read and written once per step, by the spring.
+/// Returns bytes of a vertex's position and velocity, read and written once per step, by the
+/// spring.
 double bytes_per_spring_step(const Cloth& cloth, size_t number_bytes) {
   return 12.0 * static_cast<double>(number_bytes) * cloth.mesh.vertex_count() /
          static_cast<double>(cloth.spring_count());
 }
 
-/// Everything on one instruction set, with the strain limit off and on; targets by the kind.
+/// All cases on one instruction set, with the strain limit off and on; targets by the kind.
 struct Kind {
   std::string name;
   double operations;
@@ -247,7 +249,7 @@ void compare(Bullet& bullet, const std::vector<InstructionSet>& sets,
   }
 }
 
-/// What each kind is to reach, in Bullet's rates.
+/// Returns the target of each kind, in Bullet's rates.
 double target_of(int64_t highway_target, double on_avx3, double on_avx2) {
   return highway_target == HWY_AVX3 ? on_avx3 : highway_target == HWY_AVX2 ? on_avx2 : 0;
 }
@@ -264,7 +266,7 @@ void compare_17_x_17(int turns, std::vector<Target>& targets) {
     add_rows(exact, kExact, "", set, target_of(set, 9, 6), rows[s]);
     add_rows(fast, kFast, "", set, target_of(set, 35, 22), rows[s]);
     add_rows(single, kSingle, "", set, 0, rows[s]);
-    // Lanes that are at their limits at different times, the last twice as stiff as the first.
+    // These lanes are at their limits at different times, the last twice as stiff as the first.
     add_rows(unlike_exact, kExact, ", unlike", set, 0, rows[s]);
     add_rows(unlike_fast, kFast, ", unlike", set, 0, rows[s]);
   }
@@ -308,7 +310,7 @@ void compare_meshes(int turns) {
   print_growth<SingleLane>("single", turns);
 }
 
-/// Whole simulations of 64 parameter sets, 17 x 17, groups of lanes in parallel.
+/// Times whole simulations of 64 parameter sets, 17 x 17, groups of lanes in parallel.
 void compare_threads(int turns) {
   hwy::GetChosenTarget().Update(vector_sets().front().highway_target);
   const Cloth cloth = swinging_cloth(17);
@@ -374,7 +376,7 @@ int main(int argc, char** argv) {
   int turns = 300;
   app.add_option("--targets", targets_path, "file for the table of targets (clothfit-targets/1)");
   app.add_option("--turns", turns, "how often everything is timed")->check(CLI::PositiveNumber);
-  app.allow_extras();  // what `./run bench` is given is for Google Benchmark too
+  app.allow_extras();  // the arguments of `./run bench` are for Google Benchmark too
   CLI11_PARSE(app, argc, argv);
   return clothfit::run(targets_path, turns);
 }

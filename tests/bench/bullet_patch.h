@@ -4,9 +4,9 @@
 
 namespace clothfit {
 
-/// A square soft body of the Bullet library, the yardstick of our speed: as many vertices, links
-/// along the edges, the diagonals and over two edges, hung by two corners, nothing to collide with.
-/// One step is a prediction, one iteration over the links and an integration.
+/// A square soft body of the Bullet library, the yardstick of our speed. It has as many vertices,
+/// links along the edges, the diagonals and over two edges. It hangs by two corners with nothing to
+/// collide with. One step is a prediction, one iteration over the links and an integration.
 class BulletPatch {
  public:
   explicit BulletPatch(int vertices_per_side);
@@ -14,7 +14,7 @@ class BulletPatch {
 
   int link_count() const;
   void step(double time_step_s);
-  /// Height of the lowest vertex (m), 0 at the beginning.
+  /// Returns the height of the lowest vertex (m), 0 at the beginning.
   double lowest_m() const;
 
  private:

@@ -1,9 +1,9 @@
-// What derivatives cost beside the fastest single simulation, in one run on one core: the Jacobian
-// for eight parameters in one forward pass, the gradient by all fields with checkpoints, and for
-// comparison the eight simulations that differences would take. The cases take turns and the best
-// turn of each counts.
+// Compares the cost of derivatives with the fastest single simulation, in one run on one core. The
+// cases are the Jacobian for eight parameters in one forward pass, the gradient by all fields with
+// checkpoints, and the eight simulations that differences would take. The cases take turns and the
+// best turn of each counts.
 //
-// What limits a Jacobian: a spring's derivative along eight directions is 27 additions and
+// Arithmetic limits a Jacobian. A spring's derivative along eight directions is 27 additions and
 // multiplications (fused pairs count once) on vectors of eight, where its force in a single
 // simulation is 52 on an eighth of one.
 
@@ -28,7 +28,7 @@ double now_s() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-/// Best of `turns` of each case, the cases taking turns.
+/// Returns the best of `turns` of each case, the cases taking turns.
 std::vector<double> best_s(const std::vector<std::function<void()>>& cases, int turns) {
   std::vector<double> best(cases.size(), 1e9);
   for (int n = 0; n < turns; ++n) {
@@ -41,7 +41,7 @@ std::vector<double> best_s(const std::vector<std::function<void()>>& cases, int 
   return best;
 }
 
-/// The eight parameters of a fabric with natural lengths of one kind.
+/// Returns the eight parameters of a fabric with natural lengths of one kind.
 std::vector<Direction> eight_directions(const Cloth& cloth, const ParameterSet& set) {
   std::vector<Direction> directions(8);
   for (size_t type = 0; type < kSpringTypes; ++type) {

@@ -1,11 +1,11 @@
-// How long a hanging cloth takes to find its equilibrium: the founding paper's conjugate gradients
-// on one mesh, its cascade from coarse to fine, and Newton's method with multigrid, all with the
-// same kernels in the same run; how the time grows with the number of particles; and shapes at rest
-// beside relaxation. Prints tables; a minute or two in all.
+// Times how a hanging cloth finds its equilibrium. The founding paper's conjugate gradients run on
+// one mesh, its cascade from coarse to fine, and Newton's method with multigrid, all with the same
+// kernels in the same run. Then it shows how the time grows with the number of particles, and
+// shapes at rest beside relaxation. Prints tables; a minute or two in all.
 //
-// The cloth: square, 0.2 kg/m2, tension 50, shear 20, flexion 10 N/m, held at two corners, starting
-// flat, either `lying` (it has to swing down) or `hung` (it only has to sag). Balanced means that
-// the 2-norm of the forces on all free vertices is below 1e-3 of the weight.
+// The cloth is square, 0.2 kg/m2, tension 50, shear 20, flexion 10 N/m. It is held at two corners
+// and starts flat, either `lying` (it has to swing down) or `hung` (it only has to sag). Balanced
+// means that the 2-norm of the forces on all free vertices is below 1e-3 of the weight.
 //
 // Nothing here is asserted: timings belong to a machine and its load.
 
@@ -35,7 +35,7 @@ double seconds_of(const Work& work) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-/// Time of the processor, of all threads together: what a busy machine disturbs less.
+/// Returns the processor's time, of all threads together, which a busy machine disturbs less.
 template <class Work>
 double processor_seconds_of(const Work& work) {
   const std::clock_t start = std::clock();
@@ -137,7 +137,8 @@ void time_methods(int vertices_per_side, double size_m, Start start) {
   fmt::print("\n");
 }
 
-/// The exponent of a power law through (particles, seconds), by least squares of the logarithms.
+/// Returns the exponent of a power law through (particles, seconds), by least squares of the
+/// logarithms.
 double fitted_exponent(const std::vector<double>& particles, const std::vector<double>& seconds) {
   const auto count = static_cast<Eigen::Index>(particles.size());
   const Eigen::ArrayXd x = Eigen::Map<const Eigen::ArrayXd>(particles.data(), count).log();

@@ -14,7 +14,7 @@ namespace HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-/// Operations per second of twelve chains, as many as cover the latency of two units.
+/// Returns operations per second of twelve chains, as many as cover the latency of two units.
 template <class Number, class D>
 double rate(D d) {
   using V = hn::Vec<D>;

@@ -2,9 +2,9 @@
 
 namespace clothfit {
 
-/// What a core can do at most on the chosen instruction set (numbers per second), one addition,
-/// multiplication or fused pair of them counted once: measured with independent chains that stay in
-/// registers. Takes some milliseconds.
+/// The peak rate of a core on the chosen instruction set (numbers per second). One addition,
+/// multiplication or fused pair of them is counted once. It is measured with independent chains
+/// that stay in registers and takes some milliseconds.
 struct PeakRate {
   double double_per_s = 0;
   double float_per_s = 0;

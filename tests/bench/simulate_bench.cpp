@@ -1,5 +1,6 @@
-// What a fit waits for: whole simulations over the frames of a recording, and the shape at rest.
-// `spring_steps` as in step_bench.cpp, which also says what limits it; `simulations` per second.
+// Times the simulations of a fit: whole ones over the frames of a recording, and the shape at rest.
+// `spring_steps` is as in step_bench.cpp, which also says what limits it; `simulations` is per
+// second.
 
 #include <benchmark/benchmark.h>
 
@@ -11,8 +12,8 @@
 namespace clothfit {
 namespace {
 
-/// 72 frames at 30 Hz, like the bundled demo, at 0.8 of the stable step; `sets` parameter sets on a
-/// 17 x 17 mesh, in real time over all threads.
+/// Times 72 frames at 30 Hz, like the bundled demo, at 0.8 of the stable step. `sets` parameter
+/// sets run on a 17 x 17 mesh, in real time over all threads.
 void simulate_72_frames(benchmark::State& run) {
   const int count = static_cast<int>(run.range(0));
   const Cloth cloth = swinging_cloth(17);

@@ -1,10 +1,10 @@
-// How fast the hot loop is: one thread, all six spring types, kLanes simulations side by side.
+// Times the hot loop: one thread, all six spring types, kLanes simulations side by side.
 //
 // The counter `spring_steps` is springs x lanes x steps per second. The limit is arithmetic: a
 // spring-step takes 43 additions and multiplications (17 of them for the inverse length) and its
 // share of a vertex 9 more, 52 in all, none fused. A core with two AVX-512 units does 16 a cycle at
-// best: 920 million spring-steps a second at 3 GHz. Bytes: a vertex and lane has 48 of position and
-// velocity, read and written once per step, 16 per spring; a 17 x 17 mesh of 8 lanes has 111 kB,
+// best: 920 million spring-steps a second at 3 GHz. A vertex and lane has 48 bytes of position and
+// velocity, read and written once per step, 16 per spring. A 17 x 17 mesh of 8 lanes has 111 kB,
 // which live in the second-level cache.
 //
 // Nothing here is asserted: timings belong to a machine and its load.
@@ -78,7 +78,7 @@ void step_with_viscous_damping(benchmark::State& run) {
 }
 BENCHMARK(step_with_viscous_damping)->Arg(17);
 
-/// A cloth that hangs and swings with some of its springs at their limit; `at_limit` is their
+/// Times a cloth that hangs and swings with some of its springs at their limit; `at_limit` is their
 /// share.
 void step_with_strain_limit(benchmark::State& run) {
   LaneCloth lanes(17);

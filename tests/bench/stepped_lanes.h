@@ -8,14 +8,14 @@
 
 namespace clothfit {
 
-/// A swinging cloth in the lanes of `L`, moved by the two kernels of a time step alone; its held
+/// A swinging cloth in the lanes of `L`, moved by the two kernels of a time step alone. Its held
 /// vertices are put back after each step.
 template <class L>
 class SteppedLanes {
  public:
   using Number = typename L::Number;
 
-  /// `sets` for the lanes; springs limited to `critical` elongation where `limited`.
+  /// Takes `sets` for the lanes; springs are limited to `critical` elongation where `limited`.
   SteppedLanes(const Cloth& cloth, const std::vector<ParameterSet>& sets, double critical,
                bool limited)
       : limited_(limited),
@@ -60,7 +60,7 @@ class SteppedLanes {
     if (limited_) too_long_ = limiter_.limit_positions(limits_, position_m_).too_long.mean();
   }
 
-  /// Springs that the last step's limit shortened, mean of the lanes.
+  /// Returns how many springs the last step's limit shortened, mean of the lanes.
   double too_long() const { return too_long_; }
   void set_limited(bool limited) { limited_ = limited; }
   void save() { saved_ = {position_m_, velocity_m_per_s_}; }

@@ -7,8 +7,8 @@
 
 namespace clothfit {
 
-/// The cloth of the bundled recordings, which the benchmarks move: 0.4 m x 0.4 m, 25 g, held by its
-/// upper corners, waved so that no spring is at rest.
+/// Makes the cloth of the bundled recordings, which the benchmarks move. It is 0.4 m x 0.4 m, 25 g,
+/// held by its upper corners, waved so that no spring is at rest.
 inline Cloth swinging_cloth(int vertices_per_side) {
   const Mesh mesh{
       .columns = vertices_per_side, .rows = vertices_per_side, .width_m = 0.4, .height_m = 0.4};
@@ -17,7 +17,7 @@ inline Cloth swinging_cloth(int vertices_per_side) {
   return cloth;
 }
 
-/// `count` sets like cotton, each a thousandth stiffer than the one before.
+/// Returns `count` sets like cotton, each a thousandth stiffer than the one before.
 inline std::vector<ParameterSet> cotton_sets(const Cloth& cloth, int count) {
   std::vector<ParameterSet> sets;
   for (int n = 0; n < count; ++n) {

@@ -1,5 +1,5 @@
-// Every recording at hand reads, with everything it names: those of the repository and, with
-// CLOTHFIT_DATA set, all below that folder. What the numbers say is for tests/fit/.
+// Checks that every recording at hand reads, with everything it names. These are the repository's
+// and, with CLOTHFIT_DATA set, all below that folder. The meaning of the numbers is for tests/fit/.
 
 #include <algorithm>
 #include <cstdlib>
@@ -27,7 +27,7 @@ std::vector<fs::path> recordings_below(const fs::path& folder) {
   return recordings;
 }
 
-/// Reads a recording and all that it names; checks what every recording keeps to.
+/// Reads a recording and all that it names; checks the rules of every recording.
 void read_all(const fs::path& folder) {
   SCOPED_TRACE(folder);
   const Recording recording = read_recording(folder);

@@ -1,4 +1,4 @@
-// Camera files. What the numbers mean (projection) is checked in tests/calib/.
+// Checks camera files. The meaning of the numbers (projection) is checked in tests/calib/.
 
 #include "data/camera_parameters.h"
 

@@ -1,4 +1,4 @@
-// Measured points of the surface.
+// Checks measured points of the surface.
 #include "data/clouds.h"
 
 #include "tests/data/expect_refused.h"

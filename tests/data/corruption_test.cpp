@@ -1,6 +1,6 @@
-// Damaged files: whatever one or several changed bytes make of a small file, the readers read it
-// or throw InputError, and never anything else. Under the sanitizer presets this also watches
-// memory. Not checked: that a damaged file which still reads means the same.
+// Checks damaged files. Whatever one or several changed bytes make of a small file, the readers
+// read it or throw InputError, and never anything else. Under the sanitizer presets this also
+// watches memory. Not checked: that a damaged file which still reads means the same.
 
 #include <fstream>
 #include <iterator>

@@ -10,8 +10,8 @@
 
 namespace clothfit {
 
-/// `call` throws an InputError whose text, without the path of the temporary folder, is or starts
-/// with `beginning`: file, line and what is wrong.
+/// Expects `call` to throw an InputError whose text is or starts with `beginning`: file, line and
+/// what is wrong. The path of the temporary folder is left out.
 template <class Call>
 void expect_refused(const TemporaryFolder& folder, const std::string& beginning, const Call& call) {
   SCOPED_TRACE(beginning);

@@ -1,4 +1,4 @@
-// fit.json. Whether its numbers are true is the matter of tests/fit/.
+// Checks fit.json. The truth of its numbers is the matter of tests/fit/.
 
 #include "data/fit_result.h"
 

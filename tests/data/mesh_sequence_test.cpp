@@ -1,6 +1,6 @@
-// The files for other programs, parsed back by readers of their own. Not checked here: that those
-// programs like them (Khronos's validator finds no error in a .glb of one part or of three), and
-// tracks (tables_test.cpp).
+// Checks the files for other programs, parsed back by readers of their own. Not checked here: that
+// those programs like them (Khronos's validator finds no error in a .glb of one part or of three),
+// and tracks (tables_test.cpp).
 
 #include "data/mesh_sequence.h"
 
@@ -21,7 +21,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-/// A cloth of 3 columns and 2 rows that hangs (s along x, t down) and moves at random.
+/// Makes a cloth of 3 columns and 2 rows that hangs (s along x, t down) and moves at random.
 MeshSequence moving_cloth(int frames) {
   MeshSequence mesh{.columns = 3, .rows = 2};
   std::mt19937_64 rng(1);
@@ -42,7 +42,7 @@ std::string bytes_of(const std::filesystem::path& file) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-/// A number in a file's bytes, which are little-endian as this machine is.
+/// Reads a number in a file's bytes, which are little-endian as this machine is.
 template <class Number>
 Number at(const std::string& bytes, std::size_t offset) {
   Number value;
@@ -51,7 +51,7 @@ Number at(const std::string& bytes, std::size_t offset) {
   return value;
 }
 
-/// Unit normal of a face by its first three corners, counter-clockwise.
+/// Returns the unit normal of a face by its first three corners, counter-clockwise.
 Eigen::Vector3d normal(const Eigen::Matrix3Xd& p, int a, int b, int c) {
   const Eigen::Vector3d first = p.col(b) - p.col(a), second = p.col(c) - p.col(a);
   return first.cross(second).normalized();
@@ -147,7 +147,7 @@ class Glb {
     EXPECT_EQ(json["asset"]["version"], "2.0");
   }
 
-  /// Components x elements. Bounds that are stated must be those of the data.
+  /// Returns components x elements. Bounds that are stated must be those of the data.
   Eigen::MatrixXd values(int accessor) const {
     const Json& a = json["accessors"].at(static_cast<std::size_t>(accessor));
     const Json& view = json["bufferViews"].at(a["bufferView"].get<std::size_t>());
@@ -172,8 +172,8 @@ class Glb {
     return result;
   }
 
-  /// Value of the animated `path` of a node at a time, as a viewer finds it; nothing where the node
-  /// is not animated there.
+  /// Returns the value of the animated `path` of a node at a time, as a viewer finds it; nothing
+  /// where the node is not animated there.
   std::optional<Eigen::VectorXd> animated(int node, const std::string& path, double time_s) const {
     const Json& animation = json["animations"][0];
     for (const Json& channel : animation["channels"]) {
@@ -193,8 +193,8 @@ class Glb {
     return std::nullopt;
   }
 
-  /// What a viewer shows at a time: positions of the one mesh that is not scaled to nothing, in
-  /// glTF's axes.
+  /// Returns what a viewer shows at a time: positions of the one mesh that is not scaled to
+  /// nothing, in glTF's axes.
   Eigen::Matrix3Xd shown(double time_s) const {
     Eigen::Matrix3Xd visible;
     int count = 0;
@@ -227,7 +227,7 @@ class Glb {
 
 TEST(Glb, ShowsEveryFrameAtItsTimeAndBlendsBetweenThem) {
   const TemporaryFolder folder;
-  // One part, one frame more than a part holds, and three parts.
+  // Sequences have one part, one frame more than a part holds, and three parts.
   for (const int frames :
        {2, kMostMorphTargets + 1, kMostMorphTargets + 2, 2 * kMostMorphTargets + 10}) {
     SCOPED_TRACE(frames);
@@ -240,7 +240,7 @@ TEST(Glb, ShowsEveryFrameAtItsTimeAndBlendsBetweenThem) {
     for (int f = 0; f<frames; f += frames> 20 ? 7 : 1) {
       const auto frame = static_cast<std::size_t>(f);
       const double time_s = static_cast<float>(mesh.time_s[frame] - 2);
-      // Single precision of numbers below 1, once for each of base, displacement and weights.
+      // Numbers below 1 round in single precision once each for base, displacement and weights.
       EXPECT_LT((glb.shown(time_s) - y_up * mesh.position_m[frame]).cwiseAbs().maxCoeff(), 3e-7);
       if (f + 1 == frames) continue;
       const double between_s = 0.5 * (time_s + static_cast<float>(mesh.time_s[frame + 1] - 2));

@@ -1,4 +1,4 @@
-// Model files: what is read, written and refused. Not checked here: what a model's simulation does
+// Checks model files as they are read, written and refused. Not checked here: a model's simulation
 // (tests/fit/problem/simulation_test.cpp), and what recordings share with it in full
 // (recording_test.cpp).
 
@@ -54,7 +54,7 @@ class ModelFile : public testing::Test {
   ModelDescription read(const std::string& text) const {
     return read_model(folder_.write("model.yaml", text));
   }
-  /// The model with the first `from` replaced.
+  /// Replaces the first `from` in the model.
   static std::string with(const std::string& from, const std::string& to) {
     std::string text = kModel;
     const std::size_t at = text.find(from);
@@ -162,7 +162,7 @@ TEST_F(ModelFile, ReadsBackAsWrittenToTheLastBit) {
   EXPECT_EQ(again.start, model.start);
 }
 
-/// The model with springs instead of its fabric.
+/// Returns the model with springs instead of its fabric.
 std::string with_springs(const std::string& damping = "[0, 0, 0, 0, 0, 0.001]") {
   std::string text = kModel;
   const std::size_t begin = text.find("fabric:"), end = text.find("gravity:");
@@ -214,7 +214,7 @@ TEST_F(ModelFile, RefusesSpringsThatCannotBe) {
   expect("springs:\n", "fabric: {}\nsprings:\n", "model.yaml:5: the model has both ");
 }
 
-/// The model with a start in motion on a mesh of 2 x 2.
+/// Returns the model with a start in motion on a mesh of 2 x 2.
 std::string in_motion(const std::string& start = "{kind: in_motion, file: start.csv}") {
   std::string text = kModel;
   text.replace(text.find("{columns: 9, rows: 7}"), 21, "{columns: 2, rows: 2}");

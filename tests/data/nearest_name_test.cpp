@@ -1,4 +1,4 @@
-// Only the words; who uses them, and with which file and line, is in recording_test.cpp.
+// Checks the words only. Their users, with file and line, are in recording_test.cpp.
 
 #include "data/nearest_name.h"
 

@@ -1,4 +1,4 @@
-// Surfaces in Wavefront OBJ files. Not checked here: what an obstacle makes of them
+// Checks surfaces in Wavefront OBJ files. Not checked here: obstacles made of them
 // (tests/model/topology/obstacle_test.cpp), compressed and damaged files (corruption_test.cpp).
 
 #include "data/obj_mesh.h"

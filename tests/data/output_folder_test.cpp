@@ -1,5 +1,5 @@
-// Result folders appear whole or not at all. Not checked: that the data survive a loss of power
-// (no test can pull the plug; the calls to fsync stand in output_folder.cpp).
+// Checks that result folders appear whole or not at all. Not checked: that the data survive a loss
+// of power. No test can pull the plug; the calls to fsync stand in output_folder.cpp.
 
 #include "data/output_folder.h"
 
@@ -33,7 +33,7 @@ void publish(const fs::path& final_path, const std::string& text) {
   out.publish();
 }
 
-/// A process number that nobody bears: that of a child which has ended and been waited for.
+/// Returns a process number that nobody bears: that of a child which has ended and been waited for.
 pid_t dead_process() {
   const pid_t child = fork();
   if (child == 0) _exit(0);

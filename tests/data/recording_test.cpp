@@ -1,5 +1,5 @@
-// recording.yaml and what it names. Not checked: the tables by themselves (tables_test.cpp) and
-// camera files (camera_parameters_test.cpp).
+// Checks recording.yaml and the files that it names. Not checked: the tables by themselves
+// (tables_test.cpp) and camera files (camera_parameters_test.cpp).
 
 #include "data/recording.h"
 

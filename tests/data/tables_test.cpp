@@ -1,6 +1,6 @@
-// The tables of a recording: markers, tracks, reference points, paths of held points and bodies.
-// Not checked here: times.csv and how tables hang together (recording_test.cpp), the tables of the
-// bundled recordings (bundled_recordings_test.cpp), damaged bytes (corruption_test.cpp).
+// Checks the tables of a recording: markers, tracks, reference points, paths of held points and
+// bodies. Not checked here: times.csv and how tables hang together (recording_test.cpp), the tables
+// of the bundled recordings (bundled_recordings_test.cpp), damaged bytes (corruption_test.cpp).
 
 #include <cmath>
 #include <fstream>

@@ -1,6 +1,6 @@
-// The search that adapts the covariance of its steps beside another implementation of the same
-// strategy: pagmo's `cmaes`. Both search the unit cube with one population and one first step; what
-// is compared are the evaluations that they need, because their random numbers differ.
+// Compares the search that adapts the covariance of its steps with another implementation, pagmo's
+// `cmaes`. Both search the unit cube with one population and one first step. The evaluations that
+// they need are compared, because their random numbers differ.
 
 #include <gtest/gtest.h>
 
@@ -39,7 +39,7 @@ double ellipsoid(const std::vector<double>& x) {
   return sum;
 }
 
-/// Rosenbrock's valley, -2 to 2 on the unit interval.
+/// Evaluates Rosenbrock's function, -2 to 2 on the unit interval.
 double rosenbrock(const std::vector<double>& x) {
   const auto at = [&](size_t i) { return 4 * x[i] - 2; };
   double sum = 0;
@@ -56,7 +56,7 @@ struct OfPagmo {
   }
 };
 
-/// Evaluations until a cost is at most kTarget; 0 where none is within 20000.
+/// Counts evaluations until a cost is at most kTarget; 0 where none is within 20000.
 double evaluations_of_pagmo(Function function, unsigned seed) {
   pagmo::population population{pagmo::problem{OfPagmo{function}}, kPopulation, seed};
   pagmo::algorithm strategy{
@@ -88,7 +88,7 @@ double evaluations_of_ours(Function function, unsigned seed) {
   return result.stop == CmaStop::cost_below ? static_cast<double>(result.state.evaluations) : 0;
 }
 
-/// Of the trials that arrive.
+/// Returns the median over the trials that arrive.
 double median(std::vector<double> evaluations) {
   std::erase(evaluations, 0);
   std::ranges::sort(evaluations);

@@ -1,4 +1,4 @@
-// That a step's folder is a complete recording by itself. What the steps add to it:
+// Checks that a step's folder is a complete recording by itself. The steps' additions to it:
 // program_end_to_end_test.cpp.
 #include "apps/steps/recording_copy.h"
 

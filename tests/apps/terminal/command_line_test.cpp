@@ -1,4 +1,4 @@
-// What is made of arguments. Not checked here: the program's own verbs (program_test.cpp).
+// Checks the parsing of arguments. Not checked here: the program's own verbs (program_test.cpp).
 
 #include "apps/terminal/command_line.h"
 

@@ -1,4 +1,5 @@
-// Rounding of numbers for people and for CSV. How tables and pages use it: fit_page_test.cpp.
+// Checks rounding of numbers for people and for CSV. Its use by tables and pages:
+// fit_page_test.cpp.
 #include "apps/terminal/number_text.h"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// The text of the progress line and when it is silent. That Ctrl-C ends a fit:
+// Checks the text of the progress line and when it is silent. That Ctrl-C ends a fit:
 // program_end_to_end_test.cpp.
 #include "apps/terminal/progress_line.h"
 

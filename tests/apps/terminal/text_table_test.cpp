@@ -1,4 +1,4 @@
-// Layout of tables on the terminal. What stands in them: fit_page_test.cpp.
+// Checks the layout of tables on the terminal. Their content: fit_page_test.cpp.
 #include "apps/terminal/text_table.h"
 
 #include <gtest/gtest.h>

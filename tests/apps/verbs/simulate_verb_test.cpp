@@ -1,4 +1,4 @@
-// `clothfit simulate` from outside: what it refuses, what it leaves, what its CSV holds. The other
+// Runs `clothfit simulate` from outside and checks refusals, result files and their CSV. The other
 // formats in detail: tests/data/mesh_sequence_test.cpp; the model's steps: tests/model; the fit
 // that comes out again: program_end_to_end_test.cpp.
 #include <gmock/gmock.h>
@@ -28,7 +28,8 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
 
-/// `held`, `effects` and `more` are put in as they are; the sheet hangs, t downwards.
+/// Writes a model; `held`, `effects` and `more` are put in as they are. The sheet hangs, t
+/// downwards.
 std::string model_text(const std::string& held, const std::string& effects = "[]",
                        const std::string& more = "") {
   return "format: clothfit-model/1\n"
@@ -57,7 +58,7 @@ class Simulate : public ::testing::Test {
   nlohmann::json result(const std::string& folder = "sheet.simulation") const {
     return nlohmann::json::parse(std::ifstream(here_.path() / folder / "simulation.json"));
   }
-  /// Refused with 3 and a message; nothing but the model is there afterwards.
+  /// Expects exit code 3 and a message; nothing but the model is there afterwards.
   void expect_refused(const std::vector<std::string>& options, const std::string& message) const {
     const ProgramRun refused = run(options);
     EXPECT_EQ(refused.exit_code, 3) << refused.error;
@@ -158,7 +159,7 @@ TEST_F(Simulate, BeginsInMotionWhereTheModelSays) {
     const double t = 0.02 * row.frame;
     EXPECT_NEAR(row.position_m.z(), 1 + t - 9.81 * t * (t + h) / 2, 1e-12);
   }
-  // What it leaves begins in motion too.
+  // The result begins in motion too.
   ASSERT_EQ(run({"sheet.simulation", "--format", "csv", "--out", "again"}).exit_code, 0);
   EXPECT_EQ(result("again")["start"], "in_motion");
   EXPECT_EQ(run({"sheet.simulation", "--mesh", "3x3"}).exit_code, 3);

@@ -1,5 +1,5 @@
-// Calibration from board corners: recovered truth, honest sigma, outliers, degenerate input. Does
-// not check our own corner detection: vision's tests do; the bundled stills are read here with
+// Checks calibration from board corners: recovered truth, honest sigma, outliers, degenerate input.
+// Does not check our own corner detection: vision's tests do. The bundled stills are read here with
 // OpenCV's detector, so that the estimate alone is under test.
 
 #include "calib/boards/calibrate.h"
@@ -56,7 +56,8 @@ BoardView view_of(const CameraParameters& camera, const Rigid3& camera_from_boar
   return view;
 }
 
-/// Camera from board: the board's middle at `middle_m`, turned by `w` out of the picture's plane.
+/// Returns camera from board: the board's middle at `middle_m`, turned by `w` out of the picture's
+/// plane.
 Rigid3 board_at(const Eigen::Vector3d& middle_m, const Eigen::Vector3d& w) {
   const Eigen::Vector3d half(0.5 * (kBoard.columns - 1) * kBoard.square_m,
                              0.5 * (kBoard.rows - 1) * kBoard.square_m, 0);
@@ -64,7 +65,7 @@ Rigid3 board_at(const Eigen::Vector3d& middle_m, const Eigen::Vector3d& w) {
          turn_and_shift(w, Eigen::Vector3d::Zero()) * Rigid3{Eigen::Quaterniond::Identity(), -half};
 }
 
-/// Twelve views all round, tilted by 17 to 40 degrees.
+/// Makes twelve views all round, tilted by 17 to 40 degrees.
 std::vector<BoardView> synthetic_views(const CameraParameters& camera, double noise_px,
                                        std::mt19937_64& rng) {
   std::vector<BoardView> views;

@@ -1,6 +1,6 @@
-// Projection through the camera models, against closed forms and OpenCV. Does not check that a
-// camera can be estimated: see calibrate_test.cpp; nor the detector's half pixel, which is
-// vision's business.
+// Checks projection through the camera models against closed forms and OpenCV. Does not check that
+// a camera can be estimated: see calibrate_test.cpp. Nor does it check the detector's half pixel,
+// which is vision's business.
 
 #include "calib/camera/projection.h"
 
@@ -25,7 +25,7 @@ CameraParameters make_camera(CameraModel model, std::vector<double> distortion) 
   return camera;
 }
 
-/// One camera of each kind, with distortion of a size that lenses have.
+/// Returns one camera of each kind, with distortion of a size that lenses have.
 std::vector<CameraParameters> all_cameras() {
   return {
       make_camera(CameraModel::pinhole, {}),
@@ -120,7 +120,7 @@ TEST(Projection, DerivativeAgreesWithCentralDifferencesAndWithJets) {
   for (const auto& camera : all_cameras()) {
     SCOPED_TRACE(name_of(camera));
     for (int trial = 0; trial < 50; ++trial) {
-      // The second and third lie where kannala_brandt leaves its series near the axis.
+      // The second and third points lie where kannala_brandt leaves its series near the axis.
       const Eigen::Vector3d point = trial == 0   ? Eigen::Vector3d(0, 0, 1.2)
                                     : trial == 1 ? Eigen::Vector3d(0.9e-4, 1e-5, 1)
                                     : trial == 2 ? Eigen::Vector3d(1.1e-4, 1e-5, 1)

@@ -1,4 +1,4 @@
-// Algebra and estimation of rigid transforms. Does not check poses found from pixels: see
+// Checks algebra and estimation of rigid transforms. Does not check poses found from pixels: see
 // world_placement_test.cpp.
 
 #include "calib/camera/rigid3.h"
@@ -63,7 +63,7 @@ TEST(Rigid3, AQuarterTurnAboutZTakesXToY) {
 }
 
 TEST(Rigid3, RotationVectorInvertsTurning) {
-  // From far below rounding to just below a half turn, either sign of the quaternion.
+  // Angles go from far below rounding to just below a half turn, either sign of the quaternion.
   for (const double angle : {0.0, 1e-12, 1e-9, 1e-5, 1e-3, 0.5, 3.1}) {
     SCOPED_TRACE(angle);
     const Eigen::Vector3d w = angle * Eigen::Vector3d(1, -2, 2) / 3;
@@ -106,8 +106,8 @@ TEST(FitRigid, NeverReturnsAReflection) {
 }
 
 TEST(FitRigid, ScattersAsTheNormalEquationsPredict) {
-  // Eight corners of a cube of side 2 h: an angle has variance sigma2 / (16 h2), each coordinate
-  // of the middle sigma2 / 8.
+  // The points are eight corners of a cube of side 2 h. An angle has variance sigma2 / (16 h2),
+  // each coordinate of the middle sigma2 / 8.
   constexpr double kHalfSide = 0.1, kSigma = 1e-4;
   constexpr int kTrials = 4000;
   Eigen::Matrix3Xd a(3, 8);
@@ -123,7 +123,7 @@ TEST(FitRigid, ScattersAsTheNormalEquationsPredict) {
     shift2 += fitted.translation_m.squaredNorm() / (3 * kTrials);
   }
 
-  // 12000 squares: their mean is known to 1.3 %.
+  // The mean of 12000 squares is known to 1.3 %.
   EXPECT_NEAR(angle2 / (kSigma * kSigma / (16 * kHalfSide * kHalfSide)), 1, 0.05);
   EXPECT_NEAR(shift2 / (kSigma * kSigma / 8), 1, 0.05);
 }

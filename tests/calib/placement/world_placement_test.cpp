@@ -1,6 +1,6 @@
-// Where camera and sheet stand, from reference points with survey errors: recovered truth and
-// honest covariance. Does not check how well tags are detected (vision's tests) nor that gravity's
-// direction comes out of a whole run (apps' tests).
+// Checks the places of camera and sheet from reference points with survey errors: recovered truth
+// and honest covariance. Does not check how well tags are detected (vision's tests) nor that
+// gravity's direction comes out of a whole run (apps' tests).
 
 #include "calib/placement/world_placement.h"
 
@@ -35,7 +35,7 @@ struct Noise {
   double pixel_px = 0.1;
   double survey_m = 1e-3;
   double side = 0;        ///< relative spread of the tags' sides
-  double flatness_m = 0;  ///< of the corners out of their plane
+  double flatness_m = 0;  ///< distance of the corners from their plane
 };
 
 struct Scene {
@@ -62,7 +62,8 @@ PlacedPixel seen(const Scene& scene, const Eigen::Vector3d& in_world, double sig
   return pixel;
 }
 
-/// Like the bundled recording: five 70 mm tags around a sheet of 0.4 m, seen from 1.1 m.
+/// Makes a scene like the bundled recording: five 70 mm tags around a sheet of 0.4 m, seen from 1.1
+/// m.
 Scene random_scene(const Noise& noise, std::mt19937_64& rng) {
   Scene scene;
   const Rigid3 bundled{
@@ -97,7 +98,7 @@ Scene random_scene(const Noise& noise, std::mt19937_64& rng) {
   return scene;
 }
 
-/// (rotation vector, translation) of truth = (exp(w), d) * estimate.
+/// Returns (rotation vector, translation) of truth = (exp(w), d) * estimate.
 Eigen::Matrix<double, 6, 1> pose_error(const Rigid3& truth, const Rigid3& estimate) {
   const Rigid3 error = truth * inverse(estimate);
   Eigen::Matrix<double, 6, 1> both;
@@ -158,7 +159,7 @@ TEST(PlaceWorld, ItsCovarianceIsThatOfItsErrors) {
   const Trials trials = run_trials(300, {}, true, 2);
 
   // The mean of 300 chi-square 6 is known to 0.2. The survey's sigma is estimated with about 47
-  // degrees of freedom, which raises the expected mean to 6.3; a print better than its tolerance,
+  // degrees of freedom, which raises the expected mean to 6.3. A print better than its tolerance,
   // as here, lowers it.
   EXPECT_NEAR(trials.mean_distance2, 6.0, 0.8);
   EXPECT_GT(trials.coverage95, 0.90);
@@ -187,7 +188,7 @@ TEST(PlaceWorld, KnowingTagsToBeSquareHalvesTheErrorOfTheTilt) {
 }
 
 TEST(PlaceWorld, StaysHonestWhereTagsAreNotQuiteAlikeAndFlat) {
-  // Sides that differ by 0.2 % and corners 0.2 mm out of their plane: twice the print tolerance.
+  // Sides differ by 0.2 % and corners lie 0.2 mm out of their plane: twice the print tolerance.
   SCOPED_TRACE("seed 5");
   const Trials trials = run_trials(150, {.side = 2e-3, .flatness_m = 2e-4}, true, 5);
 
@@ -295,7 +296,7 @@ TEST(PlaceWorld, RefusesWhatDoesNotPlaceACamera) {
 }
 
 TEST(PlaceSheet, FindsTheTrueOneOfTwoPosesThatLookAlike) {
-  // A small tilted square far away: its mirror pose fits to a fraction of a pixel.
+  // The target is a small tilted square far away: its mirror pose fits to a fraction of a pixel.
   std::mt19937_64 rng(10);
   for (int trial = 0; trial < 20; ++trial) {
     SCOPED_TRACE("seed 10, trial " + std::to_string(trial));

@@ -1,5 +1,5 @@
-// The decompositions' promises: that they solve, and what they say of rank and condition. That
-// Eigen's numbers are right to rounding is Eigen's own to test.
+// Checks the decompositions' promises: that they solve, and their statements of rank and condition.
+// Rounding of Eigen's numbers is Eigen's own to test.
 
 #include "data/algebra/dense_factors.h"
 
@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kRounding = 1e-13;
 
-/// Entries in [-1, 1], the same on every machine.
+/// Returns entries in [-1, 1], the same on every machine.
 Eigen::MatrixXd scattered(Eigen::Index rows, Eigen::Index cols) {
   Eigen::MatrixXd matrix(rows, cols);
   for (Eigen::Index i = 0; i < rows; ++i)

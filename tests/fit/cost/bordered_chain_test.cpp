@@ -1,4 +1,4 @@
-// The equations of a chain with a border. What shooting makes of them is checked in
+// Checks the equations of a chain with a border. Their use by shooting is checked in
 // shooting_test.cpp.
 #include "fit/cost/bordered_chain.h"
 
@@ -10,8 +10,8 @@
 namespace clothfit {
 namespace {
 
-/// A chain of blocks of these sizes whose matrix is J'J, J with rows that see a block, the next one
-/// and the border; with that matrix as a whole, blocks first.
+/// A chain of blocks of these sizes whose matrix is J'J. J has rows that see a block, the next one
+/// and the border. Beside it is that matrix as a whole, blocks first.
 struct RandomChain {
   BorderedChain chain;
   Eigen::MatrixXd whole;

@@ -1,5 +1,5 @@
-// Residuals of the trajectory cost and their derivatives. What a step of the model does is checked
-// in tests/model; the search for the minimum in refine_test.cpp.
+// Checks residuals of the trajectory cost and their derivatives. A step of the model is checked in
+// tests/model; the search for the minimum in refine_test.cpp.
 #include "fit/cost/objective.h"
 
 #include <gtest/gtest.h>
@@ -32,7 +32,7 @@ TEST(Objective, VanishesAtTheTruthWhenTheStepIsTheSame) {
 
   ASSERT_EQ(residual.size(), objective.residual_count());
   EXPECT_EQ(residual.size(), 3 * 49 * 36);
-  // sigma is 1e-9 m and so is the noise; the sheet placed on it is off by as little.
+  // Sigma is 1e-9 m and so is the noise; the sheet placed on it is off by as little.
   EXPECT_NEAR(std::sqrt(residual.squaredNorm() / static_cast<double>(residual.size())), 1.0, 0.1);
 }
 
@@ -46,7 +46,8 @@ TEST(Objective, LooksAtTheFirstFramesOnly) {
     EXPECT_LT(problem.observations[0].rows[static_cast<size_t>(block.row)].frame, 5);
 }
 
-/// Another route to derivatives: differences at two large steps, extrapolated; error O(step^4).
+/// Takes another route to derivatives: differences at two large steps, extrapolated; error
+/// O(step^4).
 Eigen::VectorXd richardson(const Objective& objective, const Eigen::VectorXd& values, int p,
                            double step) {
   const ParameterSpace& space = objective.problem().space;

@@ -1,5 +1,5 @@
-// What a report says of a proposed law and of the residual force. Not checked here: how they are
-// found (tests/fit/diagnosis/proposed_law_test.cpp, residual_force_test.cpp).
+// Checks a report's statements of a proposed law and of the residual force. Not checked here: how
+// they are found (tests/fit/diagnosis/proposed_law_test.cpp, residual_force_test.cpp).
 #include "apps/report/diagnosis/diagnosis_law.h"
 
 #include <gmock/gmock.h>

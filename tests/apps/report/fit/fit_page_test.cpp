@@ -1,5 +1,6 @@
-// Structure and safety of report.html and of the tables beside it, from a made-up fit. The numbers
-// of a real fit: program_end_to_end_test.cpp. How the page looks is for a person to judge.
+// Checks structure and safety of report.html and of the tables beside it, from a made-up fit. The
+// numbers of a real fit: program_end_to_end_test.cpp. The look of the page is for a person to
+// judge.
 #include "apps/report/fit/fit_page.h"
 
 #include <gmock/gmock.h>
@@ -20,7 +21,7 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-/// Empty when every element that opens also closes, in order; otherwise what is wrong.
+/// Returns nothing when every element that opens also closes, in order; otherwise what is wrong.
 std::string tag_imbalance(const std::string& page) {
   const std::regex tag("<(/?)([A-Za-z][A-Za-z0-9]*)([^<>]*?)(/?)>");
   std::vector<std::string> open;
@@ -36,7 +37,7 @@ std::string tag_imbalance(const std::string& page) {
   return open.empty() ? "" : "<" + open.back() + "> stays open";
 }
 
-/// The page without its style sheet and embedded pictures.
+/// Returns the page without its style sheet and embedded pictures.
 std::string text_of(const std::string& page) {
   const std::string without_style = page.substr(page.find("</style>"));
   std::string text;

@@ -1,4 +1,4 @@
-// The colour scales of reports. That maps use them alike on both panels: svg_test.cpp.
+// Checks the colour scales of reports. Their use on both panels of maps: svg_test.cpp.
 #include "apps/report/page/colour_map.h"
 
 #include <gtest/gtest.h>
@@ -8,7 +8,7 @@
 namespace clothfit {
 namespace {
 
-/// CIE lightness L* of "#rrggbb": how light the eye finds it.
+/// Returns CIE lightness L* of "#rrggbb": how light the eye finds it.
 double lightness(const std::string& colour) {
   const auto linear = [&](std::size_t at) {
     const double c = std::stoi(colour.substr(at, 2), nullptr, 16) / 255.0;
@@ -19,8 +19,8 @@ double lightness(const std::string& colour) {
 }
 
 TEST(Viridis, GetsLighterInEvenSteps) {
-  // A perceptually uniform scale gains lightness at a constant rate: from about 15 to 91 in 20
-  // steps is 3.8 each; 40 % allowed for interpolation between samples in sRGB.
+  // A perceptually uniform scale gains lightness at a constant rate. From about 15 to 91 in 20
+  // steps is 3.8 each; 40 % is allowed for interpolation between samples in sRGB.
   for (int step = 0; step < 20; ++step) {
     const double gain = lightness(viridis((step + 1) / 20.0)) - lightness(viridis(step / 20.0));
     EXPECT_NEAR(gain, 3.8, 0.4 * 3.8) << "step " << step;

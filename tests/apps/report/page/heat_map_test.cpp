@@ -1,4 +1,4 @@
-// Cells, gaps and marks of heat maps. How they look is for a person to judge.
+// Checks cells, gaps and marks of heat maps. Their look is for a person to judge.
 #include "apps/report/page/heat_map.h"
 
 #include <gmock/gmock.h>

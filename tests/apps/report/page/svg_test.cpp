@@ -1,5 +1,5 @@
-// Ticks, gaps and shared scales of the figures. The page around them: fit_page_test.cpp. How they
-// look is for a person to judge.
+// Checks ticks, gaps and shared scales of the figures. The page around them: fit_page_test.cpp.
+// Their look is for a person to judge.
 #include "apps/report/page/svg.h"
 
 #include <gmock/gmock.h>

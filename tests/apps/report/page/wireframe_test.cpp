@@ -1,4 +1,4 @@
-// Projection and hiding of wireframes. How they look is for a person to judge.
+// Checks projection and hiding of wireframes. Their look is for a person to judge.
 #include "apps/report/page/wireframe.h"
 
 #include <gtest/gtest.h>
@@ -9,7 +9,7 @@
 namespace clothfit {
 namespace {
 
-/// Corners of all faces in the order drawn, in pixels.
+/// Returns corners of all faces in the order drawn, in pixels.
 std::vector<Eigen::Vector2d> drawn_corners(const std::string& svg) {
   const std::regex corner("[ML]([0-9.-]+) ([0-9.-]+)");
   const std::string faces = svg.substr(svg.find("<g "));
@@ -20,7 +20,7 @@ std::vector<Eigen::Vector2d> drawn_corners(const std::string& svg) {
 }
 
 TEST(Wireframe, DrawsNearFacesLastAndUpwardsUp) {
-  // Three vertices along y, two along x: the face at y < 0 is nearer to a viewer at -y.
+  // The vertices are three along y, two along x. The face at y < 0 is nearer to a viewer at -y.
   Wireframe cloth{.columns = 2, .rows = 3, .position_m = Eigen::Matrix3Xd(3, 6)};
   cloth.position_m << 0, 1, 0, 1, 0, 1,  //
       1, 1, 0, 0, -1, -1,                //
@@ -35,7 +35,7 @@ TEST(Wireframe, DrawsNearFacesLastAndUpwardsUp) {
   for (size_t n = 0; n < 4; ++n) EXPECT_EQ(corners[n].y(), corners[0].y());
   EXPECT_LT(corners[6].y(), corners[0].y());  // up the page
   EXPECT_LT(corners[0].x(), corners[1].x());  // x to the right
-  // One scale for both directions: the rise is as long as the cloth is wide.
+  // Both directions have one scale: the rise is as long as the cloth is wide.
   EXPECT_NEAR(corners[0].y() - corners[6].y(), corners[1].x() - corners[0].x(), 0.11);
 }
 

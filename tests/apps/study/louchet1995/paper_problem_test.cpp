@@ -1,6 +1,7 @@
-// The founding paper's experiment: its listing, the setting that agrees with it, and recovery of
-// the reference. Not checked here: the costs themselves (state_objective_test.cpp), the strategy
-// (evolutionary_strategy_test.cpp), and a hundred seeds (`clothfit experiment louchet1995`).
+// Checks the founding paper's experiment: its listing, the setting that agrees with it, and
+// recovery of the reference. Not checked here: the costs themselves (state_objective_test.cpp), the
+// strategy (evolutionary_strategy_test.cpp), and a hundred seeds (`clothfit experiment
+// louchet1995`).
 #include "apps/study/louchet1995/paper_problem.h"
 
 #include <gtest/gtest.h>
@@ -30,7 +31,7 @@ TEST(Louchet1995, SearchesRangesThatHoldTheReference) {
 }
 
 TEST(Louchet1995, ListsWhatThePaperPrints) {
-  // Where a digit could slip: the listing's sums, added up from the paper's text by hand.
+  // A digit could slip in the listing, so its sums were added up from the paper's text by hand.
   const std::vector<double> costs = listed_costs();
   const std::vector<Eigen::VectorXd> individuals = listed_individuals();
   ASSERT_EQ(costs.size(), 20u);
@@ -65,14 +66,15 @@ TEST(Louchet1995, ScreensWithFewTransitionsAboutAsWithAll) {
   const ListingMatch few = match_listing(PaperExperiment{}, PaperCost::full, 60);
 
   ASSERT_TRUE(few.usable);
-  // A tenth of the transitions: the sum is a coarse quadrature of a smooth growth.
+  // The sum over a tenth of the transitions is a coarse quadrature of a smooth growth.
   EXPECT_NEAR(std::log(few.factor / all.factor), 0, 0.2);
   EXPECT_EQ(thinned_out({1, 2, 3, 4, 5, 6, 7}, 3), (std::vector<int>{2, 4, 7}));
   EXPECT_EQ(thinned_out({1, 2}, 3), (std::vector<int>{1, 2}));
 }
 
 TEST(Louchet1995, MovesThePrintedIndividualsAsFarOffAsThePaperSays) {
-  // "About one twentieth of the springs' natural length" and "slightly less than half".
+  // The paper says "about one twentieth of the springs' natural length" and "slightly less than
+  // half".
   const PaperExperiment experiment;
   const auto distance_in_lengths = [&](const Louchet5& set) {
     return free_run_distance_m(experiment, set) / experiment.reference.natural_length_01_m;

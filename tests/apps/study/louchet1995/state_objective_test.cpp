@@ -1,6 +1,6 @@
-// The founding paper's costs over recorded states. Not checked here: a step and its derivatives
-// (tests/model), how the searches lower a cost (evolutionary_strategy_test.cpp), and the paper's
-// experiment as a whole (louchet1995_test.cpp).
+// Checks the founding paper's costs over recorded states. Not checked here: a step and its
+// derivatives (tests/model), how the searches lower a cost (evolutionary_strategy_test.cpp), and
+// the paper's experiment as a whole (louchet1995_test.cpp).
 #include "fit/cost/state_objective.h"
 
 #include <gtest/gtest.h>
@@ -92,7 +92,7 @@ TEST(StateObjective, DerivativesAgreeWithDifferences) {
     for (const StateObjective& objective : {paper.full(), paper.small()}) {
       SCOPED_TRACE(to_string(set) + " " + objective.name());
       const Linearisation exact = objective.linearise(values);
-      // Narrow, so that no spring comes to its limit or leaves it in between.
+      // The step is narrow, so that no spring comes to its limit or leaves it in between.
       const Linearisation narrow = objective.linearise(values, Derivatives::central, 1e-7);
 
       ASSERT_TRUE(exact.usable && narrow.usable);
@@ -107,7 +107,8 @@ TEST(StateObjective, DerivativesAgreeWithDifferences) {
 }
 
 TEST(StateObjective, SaysNothingOfAClothAtRestInItsNaturalLengths) {
-  // The paper's own exception: in its first state no spring is stretched, so no stiffness shows.
+  // The paper itself makes this exception: in its first state no spring is stretched, so no
+  // stiffness shows.
   const SmallExperiment paper;
   const StateObjective first(paper.problem, paper.states, {1}, paper.experiment.time_step_s);
 

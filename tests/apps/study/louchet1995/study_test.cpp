@@ -1,5 +1,5 @@
-// Pieces of the founding paper's study: what determines a parameter, and that finished pieces come
-// back from a journal as they went in. The whole: louchet1995_test.cpp.
+// Checks pieces of the founding paper's study: what determines a parameter, and that finished
+// pieces come back from a journal as they went in. The whole: louchet1995_test.cpp.
 #include "apps/study/louchet1995/study.h"
 
 #include <gtest/gtest.h>
@@ -37,7 +37,7 @@ TEST(Louchet1995Determination, GrowsWithTheNoise) {
 }
 
 TEST(Louchet1995Determination, IsTheInverseOfTheInformation) {
-  // The textbook's way, where the problem is well enough conditioned for it.
+  // The textbook's way serves where the problem is well enough conditioned for it.
   const SmallMotion motion;
   const FitProblem problem = paper_problem(motion.experiment, motion.states, SpringSet::louchet5);
   const Eigen::VectorXd truth = paper_truth(motion.experiment, SpringSet::louchet5);

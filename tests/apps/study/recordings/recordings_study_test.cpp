@@ -1,5 +1,5 @@
-// Many recordings, one table. Not checked here: the fits themselves (tests/fit), threads and
-// journals in general (tests/fit/jobs/executor_test.cpp, journal_test.cpp).
+// Checks one table of many recordings. Not checked here: the fits themselves (tests/fit), threads
+// and journals in general (tests/fit/jobs/executor_test.cpp, journal_test.cpp).
 
 #include "apps/study/recordings/recordings_study.h"
 
@@ -34,7 +34,8 @@ class RecordingsStudy : public ::testing::Test {
       ::testing::UnitTest::GetInstance()->current_test_info()->name()};
   const fs::path folder_ = scratch_.path() / "recordings";
 
-  /// The first 24 frames of the 3D tracks of a bundled recording, the last 8 of them held out.
+  /// Copies the first 24 frames of the 3D tracks of a bundled recording, the last 8 of them held
+  /// out.
   void copy(const std::string& bundled, const std::string& to,
             HeldMotion motion = HeldMotion::fixed) const {
     Recording recording = read_recording(kBundled / bundled);
@@ -49,12 +50,12 @@ class RecordingsStudy : public ::testing::Test {
     write_tracks3d(tracks, recording.markers, *recording.tracks3d);
     write_recording(recording, folder_ / to);
   }
-  /// A recording that names a file which is not there.
+  /// Adds a recording that names a file which is not there.
   void add_broken(const std::string& to) const {
     fs::create_directories(folder_ / to);
     fs::copy(kBundled / "swing_plain" / "recording.yaml", folder_ / to / "recording.yaml");
   }
-  /// Fits that are rough but quick: what is asked here is how they are told, not how good they are.
+  /// Makes fits unrefined but quick: the tests ask how fits are told, not how good they are.
   RecordingsStudyOptions quick() const {
     RecordingsStudyOptions options;
     options.recordings = find_recordings({folder_});
@@ -69,7 +70,7 @@ class RecordingsStudy : public ::testing::Test {
   }
 };
 
-/// All digits of rows but the seconds.
+/// Returns all digits of rows but the seconds.
 std::string text_of(std::vector<StudyRow> rows) {
   for (StudyRow& row : rows) row.seconds = 0;
   return rows_to_text(rows);
@@ -157,11 +158,11 @@ TEST_F(RecordingsStudy, GoesOnWhereItWasCancelled) {
   }
 
   Journal journal(file, options.key(), JournalStart::resume);
-  EXPECT_EQ(journal.finished().size(), 1u);  // of the two fits
+  EXPECT_EQ(journal.finished().size(), 1u);  // one of the two fits
   const std::vector<StudyRow> resumed = study_recordings(options, &journal, {});
 
   EXPECT_EQ(text_of(resumed), whole);
-  // Nothing is left to do: even the seconds are those of the journal.
+  // Nothing remains to be done: even the seconds are those of the journal.
   EXPECT_EQ(rows_to_text(study_recordings(options, &journal, {})), rows_to_text(resumed));
 }
 
@@ -197,8 +198,8 @@ TEST_F(RecordingsStudy, WeightsOfOneForEveryMarkerLeaveTheErrorOfTheWholeRecordi
 
   const StudyRow row = study_recordings(options, nullptr, {}).front();
 
-  // No marker drives the cloth here, and hardly one is missed in any frame: means over markers of
-  // means over frames are the mean over all to a few thousandths.
+  // No marker drives the cloth here, and hardly one is missed in any frame. Means over markers of
+  // means over frames are therefore the mean over all to a few thousandths.
   ASSERT_TRUE(row.fitted) << row.reason;
   EXPECT_NEAR(row.weighted_rms, row.whole_rms, 5e-3 * row.whole_rms);
   EXPECT_NEAR(row.weighted_rigid_rms, row.whole_rigid_rms, 5e-3 * row.whole_rigid_rms);
@@ -217,7 +218,7 @@ TEST_F(RecordingsStudy, AMarkerThatDrivesTheClothIsOffByWhatSmoothingItsTrackToo
 
   const StudyRow row = study_recordings(options, nullptr, {}).front();
 
-  // The corner stands still, so what is left is its noise, 0.5 mm in each coordinate.
+  // The corner stands still, so its residual is its noise, 0.5 mm in each coordinate.
   ASSERT_TRUE(row.fitted) << row.reason;
   EXPECT_NEAR(row.weighted_rms, std::sqrt(3) * 5e-4, 3e-4);
 }
@@ -247,7 +248,7 @@ TEST_F(RecordingsStudy, CountsWhatIsBelowTheRigidGuessAndThePublishedError) {
 
   ASSERT_EQ(rows.size(), 2u);
   EXPECT_EQ(rows[0].published_rms, 1e-9);
-  // The offsets take what is constant out of the held-out frames' error as well.
+  // The offsets remove constant errors from the held-out frames as well.
   EXPECT_NE(rows[1].weighted_rms, rows[0].weighted_rms);
   const std::string rigid = rows[0].weighted_rms < rows[0].weighted_rigid_rms ? "1 of 1" : "0 of 1";
   EXPECT_THAT(study_contest(rows).rows.front(),

@@ -1,6 +1,6 @@
-// Recordings through pictures: the renderer, the tracker, and what becomes of both in a fit. The
-// renderer alone is in tests/vision/render/render_cloth_test.cpp, statistics over many recordings
-// are what `clothfit recover --render` prints. Pictures here are small and few.
+// Checks recordings through pictures: the renderer, the tracker, and a fit of both. The renderer
+// alone is in tests/vision/render/render_cloth_test.cpp. `clothfit recover --render` prints
+// statistics over many recordings. Pictures here are small and few.
 #include "apps/study/scene/rendered_recording.h"
 
 #include <gmock/gmock.h>
@@ -30,12 +30,12 @@ SyntheticScene small_scene() {
   return scene;
 }
 
-/// Tags of 36 px.
+/// Makes tags of 36 px.
 PictureOptions small_pictures() {
   return {.tags = 4, .width_px = 480, .height_px = 360, .instants = 1};
 }
 
-/// Pixels of the markers, computed without renderer and sheets: markers x frames.
+/// Computes pixels of the markers without renderer and sheets: markers x frames.
 std::vector<std::vector<Eigen::Vector2d>> projected(const SyntheticScene& scene,
                                                     const FitInput& input) {
   const std::vector<Marker>& markers = input.recording.markers.markers;
@@ -85,7 +85,7 @@ TEST(RenderedRecording, HasItsMarkersWhereTheyTrulyAreWithinTheStatedSigma) {
     const auto m = static_cast<std::size_t>(row.marker);
     const Eigen::Vector2d true_px = truth_px[static_cast<std::size_t>(row.frame)][m];
     const Eigen::Vector2d error_px = row.position_px - true_px;
-    // 1280 numbers, the most of them 3.4 sigma off were they normal; tags that bend add to it
+    // The most of 1280 normal numbers are 3.4 sigma off; tags that bend add to it.
     EXPECT_LT(error_px.cwiseAbs().maxCoeff(), 6 * row.sigma_px)
         << "frame " << row.frame << ", marker " << row.marker;
     EXPECT_LT(row.sigma_px, 0.1);
@@ -97,7 +97,7 @@ TEST(RenderedRecording, HasItsMarkersWhereTheyTrulyAreWithinTheStatedSigma) {
   EXPECT_EQ(rendered.tracker.shown, 10 * 4 * 16);
   EXPECT_GE(accepted, 0.98 * rendered.tracker.shown);
   EXPECT_GT(moved_px.maxCoeff(), 10) << "it swings";
-  // What is reported of the tracker is what is seen from outside.
+  // The report on the tracker agrees with what is seen from outside.
   EXPECT_EQ(rendered.tracker.accepted, accepted);
   EXPECT_NEAR(rendered.tracker.chi_squared, chi_squared, 1e-6 * chi_squared);
   EXPECT_GT(rendered.tracker.chi_squared_per_number(), 0.4);
@@ -141,8 +141,8 @@ TEST(RenderedRecording, BlursWhatMovesWhileTheShutterIsOpen) {
     return cv::norm(decoded(still), decoded(open), cv::NORM_L1);
   };
 
-  // At the first frame it has been held for half the exposure and has fallen since: the last of
-  // five instants by 0.7 mm, a third of a pixel. Four frames on it swings, by pixels.
+  // At the first frame the cloth has been held for half the exposure and has fallen since: in the
+  // last of five instants by 0.7 mm, a third of a pixel. Four frames on it swings, by pixels.
   EXPECT_GT(differ(0), 0);
   EXPECT_GT(differ(4), 2 * differ(0));
 }
@@ -210,11 +210,11 @@ TEST(RenderedRecording, GivesTheFabricBackWithinItsIntervals) {
       const auto p = std::ranges::find(trial.parameters, stiffness, &RecoveredParameter::name);
       ASSERT_NE(p, trial.parameters.end());
       EXPECT_FALSE(p->undetermined) << stiffness;
-      // Started off by a factor of 2
+      // The fit started off by a factor of 2.
       EXPECT_NEAR(p->estimate / p->truth, 1, 0.05) << stiffness;
     }
   }
-  // 21 intervals of 90 %, those of a trial dependent on each other
+  // There are 21 intervals of 90 %, those of a trial dependent on each other.
   EXPECT_GE(count, 15);
   EXPECT_GE(held, 0.7 * count);
 }

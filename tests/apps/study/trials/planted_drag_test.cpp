@@ -1,5 +1,5 @@
-// What intervals are worth under a planted wrong model, in small. At full size it is what
-// `clothfit experiment identification --only drag` prints.
+// Checks intervals under a planted wrong model, in small. At full size `clothfit experiment
+// identification --only drag` prints them.
 #include "apps/study/trials/planted_drag.h"
 
 #include <gtest/gtest.h>
@@ -11,7 +11,7 @@
 namespace clothfit {
 namespace {
 
-/// A small cloth for half a second, in air that the fits do not know.
+/// Sets up a small cloth for half a second, in air that the fits do not know.
 RecoverOptions small_study(double drag_per_s) {
   RecoverOptions options;
   options.scene.truth_mesh = options.scene.markers = 7;
@@ -46,8 +46,9 @@ TEST(PlantedDrag, IntervalsOverBlocksHoldThePseudoTruthWherePlainOnesDoNot) {
     truth += row.holds_truth.plain;
   }
   ASSERT_EQ(stiffnesses, 5);
-  // 40 intervals, those of a trial alike: as many as about 17 independent ones, of which a share of
-  // 0.9 scatters by 0.07. Drag this large is seen at a glance: of plain intervals half fail.
+  // The 40 intervals, those of a trial alike, are as many as about 17 independent ones. A share of
+  // 0.9 of these scatters by 0.07. Drag this large is seen at a glance: half of the plain intervals
+  // fail.
   EXPECT_GT(robust / 5, 0.75);
   EXPECT_GE(stated, robust);
   EXPECT_LT(plain / 5, robust / 5 - 0.1);

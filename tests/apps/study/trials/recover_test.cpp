@@ -1,5 +1,5 @@
-// Simulate-and-recover as a whole: fits of recordings whose every number is known. Its statistics
-// at full size are what `clothfit recover` prints; here they are small, to notice when they break.
+// Checks simulate-and-recover as a whole: fits of recordings whose every number is known. `clothfit
+// recover` prints its statistics at full size; here they are small, to notice when they break.
 #include "apps/study/trials/recover.h"
 
 #include <gtest/gtest.h>
@@ -14,7 +14,7 @@
 namespace clothfit {
 namespace {
 
-/// A small cloth for half a second: a trial takes a fraction of a second.
+/// Sets up a small cloth for half a second: a trial takes a fraction of a second.
 RecoverOptions small_study() {
   RecoverOptions options;
   options.scene.truth_mesh = 7;
@@ -28,7 +28,7 @@ RecoverOptions small_study() {
   return options;
 }
 
-/// All that a trial found, without how long it took.
+/// Returns all that a trial found, without its duration.
 std::vector<double> found(const RecoverTrial& trial) {
   std::vector<double> numbers{static_cast<double>(trial.stop)};
   for (const RecoveredParameter& p : trial.parameters)
@@ -59,8 +59,8 @@ TEST(Recover, ScattersAsTheBoundAllowsAndKnowsIt) {
       ++count;
     }
   }
-  // 140 pulls, those of a trial correlated: as many as about 60 independent ones, whose mean square
-  // scatters by 0.18 about 1 and whose share within 1.96 sigma by 0.03 about 0.95.
+  // The 140 pulls, those of a trial correlated, are as many as about 60 independent ones. Their
+  // mean square scatters by 0.18 about 1 and their share within 1.96 sigma by 0.03 about 0.95.
   EXPECT_NEAR(squared_by_bound / count, 1, 0.5);
   EXPECT_NEAR(squared_by_sigma / count, 1, 0.5);
   EXPECT_GE(covered, static_cast<int>(0.86 * count));
@@ -92,8 +92,8 @@ TEST(Recover, IsTheSameForAnyNumberOfThreadsAndAfterAnInterruption) {
 }
 
 TEST(Recover, BearsGapsAHandAndOutliers) {
-  // The clean twin has as many observations as the spoiled one has good ones: 0.8 of the time
-  // outside the hand's twelfth, and 0.95 of these are no outliers.
+  // The clean twin has as many observations as the spoiled one has good ones. These are 0.8 of the
+  // time outside the hand's twelfth, and 0.95 of these are no outliers.
   RecoverOptions spoiled = small_study();
   spoiled.scene.truth_mesh = spoiled.fit.mesh_columns = spoiled.fit.mesh_rows = 5;
   spoiled.trials = 12;
@@ -120,7 +120,7 @@ TEST(Recover, BearsGapsAHandAndOutliers) {
 }
 
 // Over all frames, and over a third of them, the cost of this release has a basin 24 bounds away
-// from the truth, where tension and flexion along a thread have traded places.
+// from the truth. Tension and flexion along a thread have traded places there.
 TEST(Recover, LeavesABasinWhereTensionAndFlexionTradePlaces) {
   CLOTHFIT_ONLY_IN_WHOLE_RUNS();
   RecoverOptions options;
@@ -139,8 +139,8 @@ TEST(Recover, LeavesABasinWhereTensionAndFlexionTradePlaces) {
     EXPECT_LT(std::abs(p.estimate - p.truth), 5 * p.bound_sigma) << p.name;
 }
 
-// Where its first state is corrected through 6 x 6 nodes only, which leave up to 0.6 mm of it, this
-// fit does not settle.
+// This fit does not converge where its first state is corrected through 6 x 6 nodes only. Such
+// corrections leave up to 0.6 mm of it.
 TEST(Recover, FindsAClothThatOneCameraSeesAlreadySwinging) {
   CLOTHFIT_ONLY_IN_WHOLE_RUNS();
   RecoverOptions options;

@@ -1,6 +1,6 @@
-// Undeclared effects: that truths are what they say, that amplitudes and right answers are fixed as
-// they say, and that whole trials are kept and repeated. How often a diagnosis is right is what
-// `clothfit recover --undeclared` prints.
+// Checks the study of undeclared effects. Truths, amplitudes and right answers are as they say, and
+// whole trials are kept and repeated. `clothfit recover --undeclared` prints how often a diagnosis
+// is right.
 #include "apps/study/trials/undeclared.h"
 
 #include <gtest/gtest.h>
@@ -21,7 +21,7 @@
 namespace clothfit {
 namespace {
 
-/// A small cloth for half a second, of which three quarters are fitted.
+/// Sets up a small cloth for half a second, of which three quarters are fitted.
 SyntheticScene small_scene() {
   SyntheticScene scene;
   scene.truth_mesh = 7;
@@ -36,7 +36,7 @@ FitOptions small_fit() {
   return {.observations = ObservationKind::tracks3d, .mesh_columns = 7, .mesh_rows = 7};
 }
 
-/// Every effect but these.
+/// Lists every effect but these.
 std::vector<std::string> all_but(const std::vector<std::string>& effects) {
   std::vector<std::string> others;
   for (const EffectEntry& entry : effect_registry()) others.push_back(entry.name);
@@ -46,7 +46,7 @@ std::vector<std::string> all_but(const std::vector<std::string>& effects) {
   return others;
 }
 
-/// Of a smaller cloth still, with a short search. A few effects compete.
+/// Sets up a study of a smaller cloth still, with a short search. A few effects compete.
 UndeclaredOptions small_undeclared_study() {
   UndeclaredOptions options{.scene = small_scene(), .diagnosis = {.fit = small_fit()}};
   options.scene.truth_mesh = options.scene.markers = 5;
@@ -69,7 +69,7 @@ double rms(const Eigen::Matrix3Xd& difference) {
 }
 
 TEST(SyntheticScene, IsTheSameMotionByEitherIntegrator) {
-  // Effects of every kind: a force, inertia, supports, and a memory.
+  // The effects are of every kind: a force, inertia, supports, and a memory.
   for (const HiddenEffect& hidden :
        {HiddenEffect{"viscous_damping", {0.4}}, HiddenEffect{"added_air_mass", {0.01}},
         HiddenEffect{"support_motion", {0.002, 0.001, 0, 3, 0.2}},
@@ -91,7 +91,7 @@ TEST(SyntheticScene, IsTheSameMotionByEitherIntegrator) {
     const Eigen::Matrix3Xd there = runge_kutta(4);
     const double at_16 = rms(euler(16) - there), at_32 = rms(euler(32) - there);
 
-    // Where it goes as its steps shrink, the scheme of fits goes too, at first order.
+    // As its steps shrink, the scheme of fits converges to the same motion, at first order.
     EXPECT_LT(at_32, 1e-5);
     EXPECT_NEAR(at_16 / at_32, 2, 0.3);
     EXPECT_LT(rms(runge_kutta(1) - there), 0.1 * at_32 + 1e-6);
@@ -125,7 +125,7 @@ TEST(TrueSight, SeesAFasterClockAsFewerFramesPerSecond) {
 
   const size_t last = hidden.input.tracks3d.size() - 1;
   ASSERT_EQ(hidden.input.tracks3d.size(), other_rate.input.tracks3d.size());
-  // Both cut time into steps of their own: the scheme's error differs by micrometres.
+  // Both cut time into steps of their own, so the scheme's error differs by micrometres.
   for (const size_t row : {last / 2, last})
     EXPECT_LT(
         (hidden.input.tracks3d[row].position_m - other_rate.input.tracks3d[row].position_m).norm(),
@@ -185,7 +185,7 @@ TEST(HiddenLaw, AmountsToAsManySigmasAsItSays) {
   const DrawnLaw drawn =
       draw_law(information, {"viscous_damping", ""}, {.least = 8, .most = 50}, 7);
 
-  // Another way to its sigma: the Cramer-Rao bound of a fit that has it free.
+  // The Cramer-Rao bound of a fit that has it free is another way to its sigma.
   FitOptions with_drag = small_fit();
   with_drag.effects = {"viscous_damping"};
   const double sigma = bound_sigmas(information.recording, with_drag).at("viscous_damping.rate");
@@ -204,8 +204,7 @@ TEST(HiddenLaw, IsRefusedWhereItsBoundsKeepItFromBeingSeen) {
 }
 
 TEST(HiddenLaw, SharesItsClassWithItsTwin) {
-  // With still supports and free stiffness and damping a clock that is fast is gravity that is
-  // stronger, exactly.
+  // With still supports and free stiffness and damping a fast clock is exactly stronger gravity.
   const RecordingInformation information = recording_information(small_scene(), small_fit(), 7);
   const DrawnLaw drawn =
       draw_law(information, {"frame_rate_error", ""}, {.least = 8, .most = 50}, 7);
@@ -244,7 +243,7 @@ TEST(UndeclaredSummaries, CountLawsThatHalveTheErrorWhereAnEffectWasWithheld) {
                         .noise = 1,
                         .with_law = 2};
   UndeclaredResult result;
-  result.trials.push_back(trial);  // half is left
+  result.trials.push_back(trial);  // half of the error is left
   trial.with_law = 2.1;
   result.trials.push_back(trial);
   trial.with_law = std::numeric_limits<double>::quiet_NaN();  // none was found
@@ -292,8 +291,8 @@ TEST(Undeclared, AcceptsNothingInACleanRecording) {
 
 TEST(Undeclared, FindsAPlaceThatACoarserMeshDoesNotShow) {
   CLOTHFIT_ONLY_IN_WHOLE_RUNS();
-  // Stiffer by a tenth around a place between those that are tried: by the derivatives of 9 x 9
-  // vertices it explains nothing.
+  // The truth is stiffer by a tenth around a place between those that are tried. By the derivatives
+  // of 9 x 9 vertices it explains nothing.
   SyntheticScene scene;
   scene.truth_mesh = 17;
   scene.markers = 9;
@@ -319,7 +318,7 @@ TEST(Undeclared, FindsAPlaceThatACoarserMeshDoesNotShow) {
 
 TEST(Undeclared, GoesOnFromItsJournalToTheSameNumbers) {
   UndeclaredOptions options = small_undeclared_study();
-  options.diagnosis.most_effects = 0;  // of the diagnosis' own work this asks nothing
+  options.diagnosis.most_effects = 0;  // this asks nothing of the diagnosis' own work
   options.diagnosis.without = all_but({"viscous_damping"});
   options.scene.noise_m = 1e-3;
   options.scene.markers = 4;
