@@ -1,5 +1,5 @@
-// Diagnoses of whole recordings that another simulator made, against what was simulated: two hide
-// an effect that they do not declare, one hides none.
+// Diagnoses whole recordings that another simulator made, and compares with what was simulated. Two
+// hide an effect that they do not declare, one hides none.
 #include <gtest/gtest.h>
 
 #include <Eigen/Core>
@@ -20,8 +20,9 @@ double found_value(const FitResult& result, const std::string& effect, const std
   return 0;
 }
 
-/// What nonuniform_mass (hem) puts on the bottom edge of a cloth whose vertices weigh the same: the
-/// share of what a vertex carries that lies in the hem, times the factor (docs/effects).
+/// Returns the mass that nonuniform_mass (hem) adds to the bottom edge of a cloth with equal
+/// vertices. It is the share of a vertex's mass that lies in the hem, times the factor
+/// (docs/effects).
 double added_mass_kg(const FitResult& result, double mass_kg, double height_m) {
   const double factor = found_value(result, "nonuniform_mass", "hem_bottom");
   const double spacing_m = height_m / (result.mesh_rows - 1);
@@ -31,7 +32,7 @@ double added_mass_kg(const FitResult& result, double mass_kg, double height_m) {
   return mass_kg / result.mesh_rows * factor * (last_row + row_above);
 }
 
-/// Whether what is left on frames that took no part is the noise.
+/// Expects the residuals of frames that took no part to be the noise.
 void expect_only_noise(const FitReport& report) {
   ASSERT_EQ(report.result.errors.size(), 1u);
   const ObservationErrors& errors = report.result.errors.front();
@@ -79,7 +80,7 @@ TEST(DiagnosedRecordings, SwingHemLacksTheMassOfItsHem) {
   const FitResult& result = diagnosis.found().result;
   EXPECT_NEAR(added_mass_kg(result, 0.0347, 0.4), truth_kg, 0.1 * truth_kg);
   const ObservationErrors& errors = result.errors.front();
-  // Without it: 21 times the noise. In truth the mass hangs beside the edge, not on it.
+  // The error without it is 21 times the noise. In truth the mass hangs beside the edge, not on it.
   EXPECT_LT(errors.held_out.rms, 1.6 * errors.noise);
 }
 

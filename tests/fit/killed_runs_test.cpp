@@ -1,5 +1,5 @@
-// Runs that are killed and resumed, in processes of their own: no thread is ever started in the
-// process of the tests, which therefore may fork. Not checked here: journals cut or damaged
+// Checks runs that are killed and resumed, in processes of their own. No thread is ever started in
+// the process of the tests, which therefore may fork. Not checked here: journals cut or damaged
 // otherwise (journal_test.cpp).
 
 #include <fcntl.h>
@@ -26,7 +26,7 @@ namespace {
 constexpr int kPieces = 30;
 constexpr const char* kKey = "30 pieces, seed 1";
 
-/// Between 0 and 70 kB of any bytes, after between none and 10000 draws.
+/// Returns between 0 and 70 kB of any bytes, after between none and 10000 draws.
 std::string piece(int index, std::uint64_t seed) {
   Draws draws(seed, 0, 0);
   std::string bytes = std::to_string(index) + "\n";
@@ -88,7 +88,7 @@ std::multiset<int> noted(const std::filesystem::path& file) {
   return {std::istream_iterator<int>(in), std::istream_iterator<int>()};
 }
 
-/// The indices that the journal holds.
+/// Returns the indices that the journal holds.
 std::set<int> finished_in(const std::filesystem::path& file) {
   std::set<int> indices;
   const Journal journal(file, kKey, JournalStart::resume);
@@ -99,7 +99,7 @@ std::set<int> finished_in(const std::filesystem::path& file) {
 enum class Moment { before_the_piece, after_its_record };
 
 /// Resumes the run in another process, which kills itself at `moment` once `kill_at` pieces were
-/// begun or recorded; the bytes of a run that ends go to `out`.
+/// begun or recorded. The bytes of a run that ends go to `out`.
 int run_until(Moment moment, int kill_at, int threads, const TemporaryFolder& folder) {
   return in_another_process([&] {
     Journal journal(folder / "journal", kKey, JournalStart::resume);
@@ -193,7 +193,7 @@ TEST(KilledRuns, ResumeFromAJournalTornAtAnyByteOfItsLastTwoRecords) {
     std::filesystem::remove(folder / "out");
     ASSERT_EQ(run_until(Moment::before_the_piece, kNever, 1, folder), 0);
 
-    // then what was torn is done again, and nothing else.
+    // then the torn pieces are done again, and nothing else.
     std::multiset<int> redone;
     if (size < last) redone.insert(kPieces - 2);
     if (size < whole.size()) redone.insert(kPieces - 1);

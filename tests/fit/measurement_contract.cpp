@@ -26,14 +26,14 @@ void check_measurement_effect(const std::string& name, const FitInput& input) {
     const FitProblem with = make_problem(input, {.observations = kind, .effects = {name}}, 7, 7);
     const TrajectoryObjective plain(without, kFrames, kStepS), objective(with, kFrames, kStepS);
 
-    // A cubic through two frames at one of them is that one but for rounding, which pixels of
-    // 0.3 px sigma and places of 0.5 mm sigma show as 1e-12.
+    // A cubic through two frames at one of them is that one but for rounding. Pixels of 0.3 px
+    // sigma and places of 0.5 mm sigma show it as 1e-12.
     const Eigen::VectorXd neutral = objective.residuals({with.space.start()}).front();
     const Eigen::VectorXd bare = plain.residuals({without.space.start()}).front();
     ASSERT_EQ(neutral.size(), bare.size());
     EXPECT_LT((neutral - bare).cwiseAbs().maxCoeff(), 1e-9);
 
-    // Away from neutral, on either side, by a typical change of each parameter.
+    // The values are away from neutral, on either side, by a typical change of each parameter.
     const EffectDescription description = measurement_effect_named(name)->describe();
     for (const double side : {1.0, -1.0}) {
       SCOPED_TRACE(side);

@@ -6,9 +6,9 @@
 
 namespace clothfit {
 
-/// What every effect of the measurement must keep to, on the recording of a small cloth: at its
-/// neutral values the residuals are those without it, and its derivatives are those of the
-/// residuals, from 3D tracks and from pixels. Effects of a camera refuse 3D tracks.
+/// Checks the rules of every effect of the measurement, on the recording of a small cloth. At its
+/// neutral values the residuals are those without it. Its derivatives are those of the residuals,
+/// from 3D tracks and from pixels. Effects of a camera refuse 3D tracks.
 void check_measurement_effect(const std::string& name, const FitInput& input);
 
 }  // namespace clothfit

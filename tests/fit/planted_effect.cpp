@@ -10,7 +10,7 @@
 namespace clothfit {
 namespace {
 
-/// Of a nuisance parameter, or of an effect of motion.
+/// Finds a nuisance parameter, or one of an effect of motion.
 const ParameterEstimate* find(const FitResult& result, const std::string& effect,
                               const std::string& parameter) {
   const auto nuisance =
@@ -42,7 +42,7 @@ void expect_found(const FitInput& input, const PlantedEffect& planted) {
     ASSERT_NE(found, nullptr);
     EXPECT_EQ(found->state, ParameterState::fitted);
     EXPECT_NEAR(found->value, truth, 4 * found->sigma);
-    // Found means told from nothing.
+    // "Found" means told from nothing.
     EXPECT_GT(std::abs(truth), 5 * found->sigma);
   }
   const ObservationErrors& errors = report.result.errors.front();

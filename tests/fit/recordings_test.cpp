@@ -1,6 +1,6 @@
-// Fits of whole recordings: the bundled ones, made by another simulator, against what was
-// simulated, and recordings of real cloth where CLOTHFIT_DATA says there are some. From pictures
-// instead of tracks: tests/apps/demo_test.cpp.
+// Checks fits of whole recordings. The bundled ones, made by another simulator, are compared with
+// what was simulated; CLOTHFIT_DATA names recordings of real cloth. From pictures instead of
+// tracks: tests/apps/demo_test.cpp.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -18,7 +18,7 @@ double true_stiffness(const std::string& recording, const std::string& types) {
   return bundled_truth(recording).at("springs").at(types).at("k");
 }
 
-/// Whether fabric parameters are within `share` of what was simulated, with a sigma of 5 % at most.
+/// Expects fabric parameters within `share` of the simulated ones, with a sigma of 5 % at most.
 void expect_true_fabric(const FitResult& result, const std::string& recording, double share) {
   for (const ParameterEstimate& parameter : result.parameters) {
     std::string types;
@@ -34,7 +34,7 @@ void expect_true_fabric(const FitResult& result, const std::string& recording, d
   }
 }
 
-/// A fit that begins with stiffness a third too large, further off than is asked of its end.
+/// Makes a fit begin with stiffness a third too large, further off than is asked of its end.
 FitOptions started_beside(const std::string& recording) {
   constexpr double kBeside = 4.0 / 3;
   FitOptions options;
@@ -47,7 +47,7 @@ FitOptions started_beside(const std::string& recording) {
   return options;
 }
 
-/// The fit of the plain recording's 3D tracks, which several tests look at.
+/// Returns the fit of the plain recording's 3D tracks, which several tests look at.
 const FitReport& plain_fit() {
   static const FitReport report =
       fit(bundled_recording("swing_plain"), started_beside("swing_plain"), {});
@@ -65,8 +65,8 @@ TEST(Recordings, SwingPlainFrom3dTracks) {
   ASSERT_TRUE(report.usable()) << report.message;
   expect_true_fabric(report.result, "swing_plain", 0.1);
   const ObservationErrors& errors = only_errors(report);
-  // The noise is 0.5 mm; a plain model on the positions without noise left 0.58 mm as a distance,
-  // 0.34 mm per coordinate, which adds in squares to 0.60 mm.
+  // The noise is 0.5 mm. The residual of a plain model on the positions without noise was 0.58 mm
+  // as a distance, 0.34 mm per coordinate, which adds in squares to 0.60 mm.
   EXPECT_LT(errors.fitted.rms, 0.54e-3);
   EXPECT_LT(errors.held_out.rms, 0.66e-3);
   EXPECT_GT(errors.trivial.first_frame, 20e-3);
@@ -118,7 +118,7 @@ TEST(Recordings, AWindThatWasNotDeclaredIsFoundWhenAskedFor) {
   EXPECT_LT(wind[0].value, 0.02);  // c: the wind did not depend on the cloth's speed
   for (size_t axis = 0; axis < 3; ++axis)
     EXPECT_NEAR(wind[1 + axis].value, pressure * direction[axis], 0.03 * pressure) << axis;
-  // Then nothing but the noise is left, in frames that took no part too
+  // Then the residual is the noise, in frames that took no part too
   EXPECT_LT(only_errors(report).held_out.rms, 1.1 * only_errors(report).noise);
   expect_true_fabric(report.result, "swing_breeze", 0.03);
 }
@@ -130,7 +130,7 @@ TEST(Recordings, AHiddenWindLeavesAnErrorThatThePlainModelCannotHide) {
       {.mesh_columns = 9, .mesh_rows = 9, .population = 40, .generations = 10, .refine_best = 1},
       {});
 
-  // Then springs alone, however they are fitted, stay far above the noise
+  // Then springs alone, whatever their fit, stay far above the noise
   ASSERT_TRUE(report.usable()) << report.message;
   EXPECT_GT(only_errors(report).fitted.rms, 3 * only_errors(report).noise);
   EXPECT_GT(only_errors(report).held_out.rms, 5 * only_errors(report).noise);
@@ -152,7 +152,7 @@ TEST(Recordings, RealClothOnARobotArmIsFittedWithNumbersWhateverTheyAre) {
                                 .work = 0.05},
                                {});
 
-  // Then the fit ends, everything is finite, and what drives the cloth is not judged
+  // Then the fit ends, everything is finite, and the markers that drive the cloth are not judged
   ASSERT_TRUE(report.usable()) << report.message;
   const ObservationErrors& errors = only_errors(report);
   EXPECT_TRUE(std::isfinite(errors.held_out.rms));

@@ -13,7 +13,7 @@ constexpr int kSide = 6;
 constexpr int kFrames = 20;
 constexpr double kLength_m = 0.4;
 
-/// Cholesky factor of a squared-exponential covariance between evenly spaced places.
+/// Returns the Cholesky factor of a squared-exponential covariance between evenly spaced places.
 Eigen::MatrixXd factor(int count, double spacing, double range) {
   Eigen::MatrixXd covariance(count, count);
   for (int i = 0; i < count; ++i)
@@ -44,7 +44,7 @@ MisfitReplicate draw_misfit(const SmoothMisfit& misfit, std::uint64_t seed, int 
   int fields = 0;
   const auto field = [&] {
     Draws draws(seed, replicate, fields++);
-    // Frames x markers: time runs down the columns.
+    // White is frames x markers: time runs down the columns.
     Eigen::MatrixXd white(kFrames, kSide * kSide);
     for (double& number : white.reshaped()) number = draws.normal();
     Eigen::MatrixXd smooth(kFrames, kSide * kSide);
@@ -61,7 +61,7 @@ MisfitReplicate draw_misfit(const SmoothMisfit& misfit, std::uint64_t seed, int 
   Eigen::VectorXd error = misfit.misfit_sigma * field();
   Draws noise(seed, replicate, fields);
   for (double& number : error) number += noise.normal();
-  // Prediction less observation, J x - error, is least at:
+  // The prediction less the observation, J x - error, is least here.
   const Eigen::MatrixXd& j = result.fit.jacobian;
   result.estimate = (j.transpose() * j).ldlt().solve(j.transpose() * error);
   result.fit.residual = j * result.estimate - error;

@@ -22,7 +22,7 @@ CameraParameters synthetic_camera() {
                           .focal_px = {1000, 1000},
                           .centre_px = {480, 360},
                           .distortion = {-0.1, 0.03, 5e-4, -5e-4}};
-  // World x to the right, z up; the camera looks along +y at the cloth's middle.
+  // World x is to the right, z up; the camera looks along +y at the cloth's middle.
   Eigen::Matrix3d rotation;
   rotation << 1, 0, 0, 0, 0, -1, 0, 1, 0;
   camera.camera_from_world =
@@ -38,8 +38,8 @@ Eigen::VectorXd start_with(const FitProblem& problem, const Fabric& fabric) {
 
 namespace {
 
-/// The motion between the frames of a run with velocities, of which those of 1 / 480 s leave less
-/// than a micrometre out.
+/// Returns the motion between the frames of a run with velocities. Frames 1 / 480 s apart miss less
+/// than a micrometre of it.
 SyntheticMotion motion_of(SimulateResult run, double interval_s, int mesh, double size_m) {
   return [run = std::move(run), interval_s, mesh, size_m](double time_s,
                                                           const Eigen::Vector2d& place_m) {
@@ -97,7 +97,7 @@ FitInput synthetic_input(const SyntheticCloth& truth) {
     cloth.strain_limit.mode = StrainLimitMode::positions;
     parameters.springs.critical_elongation.fill(truth.critical_elongation);
   }
-  // The flat sheet: s to the right, t down and, turned, away from the camera.
+  // The flat sheet has s to the right, t down and, turned, away from the camera.
   const double tilt = 25.0 / 180.0 * std::numbers::pi;
   const Eigen::Vector3d along_t(0, std::sin(tilt), -std::cos(tilt));
   const Eigen::Matrix3Xd flat = flat_positions(mesh);

@@ -8,16 +8,16 @@
 
 namespace clothfit {
 
-/// A recording with all of its tracks and cameras.
+/// Reads a recording with all of its tracks and cameras.
 FitInput whole_recording(const std::filesystem::path& folder);
 
-/// One that comes with the sources.
+/// Reads one that comes with the sources.
 FitInput bundled_recording(const std::string& name);
 
-/// What was simulated for it.
+/// Reads the numbers with which it was simulated.
 nlohmann::json bundled_truth(const std::string& name);
 
-/// The folder of further recordings that CLOTHFIT_DATA names; empty where it names none.
+/// Returns the folder of further recordings that CLOTHFIT_DATA names; empty where it names none.
 std::filesystem::path further_data();
 
 }  // namespace clothfit

@@ -1,6 +1,6 @@
-// A time step allocates nothing: it is taken ten thousand times a second, by several threads.
-// Counted are calls of operator new, which containers and aligned arrays use; this program's are
-// replaced.
+// Checks that a time step allocates nothing: it is taken ten thousand times a second, by several
+// threads. Calls of operator new are counted, which containers and aligned arrays use; this
+// program's are replaced.
 
 #include <gtest/gtest.h>
 
@@ -94,7 +94,7 @@ long allocations_in_ten_steps_with_tangents() {
   const TangentParameters parameters = TangentParameters::of(busy.cloth, busy.set, {});
   TangentState state = TangentState::of(busy.cloth, busy.set, {});
   const TangentVectors target = stepper.locate(state);
-  // Effects list the blocks of their derivatives that are not zero: the lists have room for all
+  // Effects list the blocks of their derivatives that are not zero. The lists have room for all
   // once the cloth moves.
   for (int n = 0; n < 10; ++n) stepper.step(parameters, target, n * 1e-4, 1e-4, state);
 

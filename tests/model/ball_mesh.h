@@ -8,7 +8,8 @@
 
 namespace clothfit {
 
-/// The unit ball as an octahedron whose faces are cut in four `times` times, corners on the sphere.
+/// Makes the unit ball of an octahedron whose faces are cut in four `times` times, corners on the
+/// sphere.
 inline TriangleMesh ball_mesh(int times) {
   std::vector<Eigen::Vector3d> vertices;
   for (int axis = 0; axis < 3; ++axis)

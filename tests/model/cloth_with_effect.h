@@ -26,7 +26,7 @@ struct ClothWithEffect {
   struct State {
     Eigen::Matrix3Xd position_m, velocity_m_per_s;
   };
-  /// After `steps` steps from rest; `watch(step, state)` is called after each, if given.
+  /// Takes `steps` steps from rest; `watch(step, state)` is called after each, if given.
   State after(int steps, double time_step_s,
               const std::function<void(int, const State&)>& watch = {}) const {
     SteppedCloth<> run(cloth, set, velocity_m_per_s());
@@ -37,7 +37,7 @@ struct ClothWithEffect {
     return {run.position_m(), run.velocity_m_per_s()};
   }
 
-  /// The effect's force on every vertex in the given state at 0.3 s, 3 x vertices (N).
+  /// Returns the effect's force on every vertex in the given state at 0.3 s, 3 x vertices (N).
   Eigen::Matrix3Xd force_n(const Eigen::Matrix3Xd& position_m,
                            const Eigen::Matrix3Xd& velocity_m_per_s) const {
     Uniform unused(0);
@@ -60,8 +60,8 @@ struct ClothWithEffect {
   }
 };
 
-/// Attitudes of a flat cloth: facing up, and standing upright with its rows along x and its normal
-/// along -y.
+/// Return attitudes of a flat cloth: facing up, and standing upright with its rows along x and its
+/// normal along -y.
 inline Eigen::Matrix3d lying() {
   return Eigen::Matrix3d::Identity();
 }

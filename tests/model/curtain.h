@@ -32,7 +32,7 @@ struct Curtain {
     start_at_rest(cloth, {&start, 1}, 9.81, 0, time_step_s());
     return start;
   }
-  /// How far any vertex comes from where it starts within half a second.
+  /// Returns how far any vertex comes from its start within half a second.
   double way_m(const ParameterSet& start) const {
     Schedule schedule{.time_step_s = time_step_s()};
     for (int f = 0; f <= 30; ++f) schedule.frame_time_s.push_back(f / 60.0);

@@ -92,12 +92,12 @@ void expect_to_add_to_what_is_there(const EffectEntry& entry, Uniform& uniform) 
             1e-15 * std::max(1.0, alone_n.cwiseAbs().maxCoeff()) * 4);
 }
 
-/// One law, three kinds of lanes: a single simulation to the bit, float to its rounding.
+/// Expects one law in three kinds of lanes: a single simulation to the bit, float to its rounding.
 void expect_every_kind_of_lanes_to_agree(const EffectEntry& entry, Uniform& uniform) {
   const State state(uniform, entry.name);
   const Parameters parameters = random_parameters(entry.describe(), uniform);
   const auto effect = entry.make();
-  // What changes a force must have one to change.
+  // An effect that changes a force must have one to change.
   const Eigen::Matrix3Xd there_n = uniform.vectors(36, effect->changes_force() ? 1 : 0);
   const Eigen::Matrix3Xd exact_n = force_n(*effect, state, parameters, there_n);
 
@@ -144,20 +144,20 @@ void expect_neither_push_nor_torque(const EffectEntry& entry, Uniform& uniform) 
   const Eigen::Matrix3Xd f = force_n(entry, state, random_parameters(entry.describe(), uniform));
 
   EXPECT_GT(f.norm(), 0);
-  // Sums of 36 numbers: rounding, a few times the largest.
+  // The tolerance is rounding of sums of 36 numbers, a few times the largest.
   const double largest = f.cwiseAbs().maxCoeff();
   EXPECT_LT(f.rowwise().sum().norm(), 1e-14 * largest);
   EXPECT_LT(torque(state.position_m, f).norm(), 1e-14 * largest);
 }
 
-/// Tangents, the adjoint and the implicit integrator rest on these.
+/// Expects true derivatives: tangents, the adjoint and the implicit integrator rest on these.
 void expect_true_derivatives(const EffectEntry& entry, Uniform& uniform) {
   const EffectDescription effect = entry.describe();
   EXPECT_EQ(derivative_mismatch(*entry.make(), effect, random_parameters(effect, uniform), uniform),
             "");
 }
 
-/// The rates that an effect gives must bound what it does to a step, up to a fit's bounds.
+/// Expects the rates of an effect to bound its action on a step, up to a fit's bounds.
 void expect_the_stable_step_to_be_stable(const EffectEntry& entry, Uniform& uniform) {
   Cloth cloth = touched_cloth(6);
   cloth.held = {held_at(cloth.mesh, 0, 0), held_at(cloth.mesh, 0.31, 0.02)};
@@ -175,8 +175,8 @@ void expect_the_stable_step_to_be_stable(const EffectEntry& entry, Uniform& unif
   EXPECT_TRUE(result.usable()) << testing::PrintToString(set.effects[0]);
 }
 
-/// Of an effect inside the fabric: springs and effect together are no stiffer and damp no more than
-/// the stable step is chosen for.
+/// Expects rates of an effect inside the fabric to bound the spectrum. Springs and effect together
+/// must be no stiffer and damp no more than the stable step allows.
 void expect_rates_to_bound_the_spectrum(const EffectEntry& entry, Uniform& uniform) {
   const Cloth cloth = touched_cloth(6);
   const SpringParameters springs = spring_parameters(cotton(), cloth.mesh);

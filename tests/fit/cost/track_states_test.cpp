@@ -1,4 +1,4 @@
-// States from smoothed 3D tracks and what the founding paper's costs make of them. The spline is
+// Checks states from smoothed 3D tracks and the founding paper's costs over them. The spline is
 // checked in smoothing_spline_test.cpp, the costs over exact states in state_objective_test.cpp.
 #include "fit/cost/track_states.h"
 
@@ -20,7 +20,7 @@ namespace {
 /// A slow, well damped cloth with a marker at every vertex, filmed at `rate_hz`, and its states.
 struct DenseRecording {
   FitProblem problem;
-  RecordedStates truth;  ///< of all frames
+  RecordedStates truth;  ///< states of all frames
 
   static constexpr Fabric kFabric{.tension_warp_n_per_m = 8,
                                   .tension_weft_n_per_m = 10,
@@ -31,11 +31,12 @@ struct DenseRecording {
                                   .damping_weft_s = 6e-3};
 
   DenseRecording(double rate_hz, double noise_m, double duration_s) {
-    constexpr double kBegin = 0.25;  // s: what starts too fast is over
+    constexpr double kBegin = 0.25;  // s: fast motion at the start is over
     SyntheticCloth cloth{
         .fabric = kFabric, .mesh = 5, .markers = 5, .frames = 2, .held_out_from = 2};
     FitInput input = synthetic_input(cloth);
-    // Simulated here, from a flat start, so that velocities are known and recording begins later.
+    // The run is simulated here, from a flat start, so that velocities are known and recording
+    // begins later.
     problem = make_problem(input, {}, 5, 5);
     Eigen::VectorXd values = true_values();
     ParameterSet set = parameter_set(problem, values);
@@ -96,14 +97,14 @@ TEST(TrackStates, ApproachTheTruthAsTheFrameRateGrows) {
     const DenseRecording recording(rate_hz, 0, 1.0);
     error.emplace_back(recording, recorded_states_of_tracks(recording.problem));
   }
-  // Cubic splines: positions in the fourth power of the interval, velocities in the third; the
-  // slowest rates do not resolve all of the motion yet.
+  // Errors of cubic splines go with the fourth power of the interval in positions, with the third
+  // in velocities. The slowest rates do not resolve all of the motion yet.
   EXPECT_GT(error[1].position_m, 8 * error[2].position_m);
   EXPECT_GT(error[2].position_m, 8 * error[3].position_m);
   EXPECT_GT(error[0].velocity_m_per_s, 5 * error[1].velocity_m_per_s);
   EXPECT_GT(error[1].velocity_m_per_s, 5 * error[2].velocity_m_per_s);
-  // Of 1.9 m/s. The scheme's velocity at a time is that of half a step before: 18 m/s2 times 5e-5
-  // s.
+  // Velocities reach 1.9 m/s. The scheme's velocity at a time is that of half a step before: 18
+  // m/s2 times 5e-5 s.
   EXPECT_LT(error[3].position_m, 5e-6);
   EXPECT_LT(error[3].velocity_m_per_s, 1.2e-3);
 }
@@ -165,7 +166,7 @@ TEST(TrackStates, AreRefusedWhereThereAreNone) {
   EXPECT_THROW(recorded_states_of_tracks(brief), InputError);
 }
 
-/// Largest |log| of the ratio to the truth, of the five stiffnesses.
+/// Returns the largest |log| of the ratio to the truth, over the five stiffnesses.
 double stiffness_error(const DenseRecording& recording, const Eigen::VectorXd& values) {
   return (values.head(5).array() / recording.true_values().head(5).array()).log().abs().maxCoeff();
 }
@@ -198,11 +199,11 @@ TEST(TrackStates, LeadThePapersCostsNearTheStiffnessButNotTheDamping) {
         refine(problem, objective_at, problem.space.start(), {.loss = Loss::squared}, {});
 
     ASSERT_TRUE(result.usable) << result.message;
-    // Seen: 3.5 % of the whole record, 5 % of its last transition.
+    // The errors seen were 3.5 % of the whole record, 5 % of its last transition.
     EXPECT_LT(stiffness_error(recording, result.values), full ? 0.05 : 0.08);
     EXPECT_GT(start_error, 0.3);
     EXPECT_GT(best_of_random, 0.2);
-    // What smoothing takes from fast motion passes for damping.
+    // The fast motion that smoothing removes passes for damping.
     const Eigen::VectorXd ratio =
         result.values.array() / recording.true_values().array().max(1e-12);
     EXPECT_GT(ratio[problem.space.index("damping_warp")], 1.1);

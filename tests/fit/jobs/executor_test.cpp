@@ -1,5 +1,5 @@
-// The executor: payloads, failures and cancellation for any number of threads. Not checked here:
-// runs that are killed (killed_runs_test.cpp), the journal's file (journal_test.cpp).
+// Checks the executor: payloads, failures and cancellation for any number of threads. Not checked
+// here: runs that are killed (killed_runs_test.cpp), the journal's file (journal_test.cpp).
 
 #include "fit/jobs/executor.h"
 
@@ -23,7 +23,7 @@ namespace {
 
 constexpr int kThreads[] = {1, 2, 3, 8};
 
-/// Draws from one to a million numbers, as the seed has it, and gives back their sum's bytes.
+/// Draws from one to a million numbers, as the seed has it, and returns their sum's bytes.
 std::string uneven_piece(int index, std::uint64_t seed) {
   Draws draws(seed, 0, 0);
   const int count = static_cast<int>(std::pow(10, 6 * draws.uniform()));
@@ -95,7 +95,7 @@ TEST(Executor, RethrowsTheExceptionOfTheLowestIndexForAnyNumberOfThreads) {
 }
 
 TEST(Executor, LetsNoThreadDoAnotherPiecesWorkWhileItWaitsInOne) {
-  // Two pieces at work and idle threads that help both: a thread whose last tasks an idle one took
+  // Two pieces are at work, and idle threads help both. A thread whose last tasks an idle one took
   // must wait for them and not turn to the other piece.
   static thread_local int at_work_on = -1;
   for (const int threads : kThreads) {

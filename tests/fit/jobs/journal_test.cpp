@@ -1,5 +1,5 @@
-// The journal of a run: what it gives back after it was cut, damaged or opened by the wrong run.
-// Not checked here: runs that are killed (killed_runs_test.cpp), the executor that goes on with one
+// Checks a run's journal after it was cut, damaged or opened by the wrong run. Not checked here:
+// runs that are killed (killed_runs_test.cpp), the executor that goes on with one
 // (executor_test.cpp), power cuts (no test can pull the plug).
 
 #include "fit/jobs/journal.h"
@@ -16,7 +16,7 @@ namespace {
 
 constexpr const char* kKey = "trials of towel, options default, seed 3";
 
-/// Payloads with all that could be mistaken for the journal's own text.
+/// Returns payloads with all that could be mistaken for the journal's own text.
 std::map<int, std::string> awkward_payloads() {
   std::string all_bytes;
   for (int byte = 0; byte < 256; ++byte) all_bytes += static_cast<char>(byte);
@@ -79,7 +79,7 @@ TEST(Journal, CutAtAnyByteLosesOnlyTheRecordThatWasCut) {
     SCOPED_TRACE(size);
     folder.write("cut", whole.substr(0, size));
     const auto above = held_from.upper_bound(size);
-    // A header that was cut is written anew.
+    // A header that was cut is written again.
     const auto& [end, held] = above == held_from.begin() ? *above : *std::prev(above);
     {
       Journal cut(folder / "cut", kKey, JournalStart::resume);
@@ -193,7 +193,7 @@ TEST(Journal, HasOneWriterAtATime) {
     first.append(0, "zero");
     expect_refused(folder, "journal: is being written by another process", second);
 
-    // Another process, too; it uses no threads.
+    // Another process is refused, too; it uses no threads.
     const pid_t child = fork();
     if (child == 0) {
       try {
@@ -213,7 +213,7 @@ TEST(Journal, HasOneWriterAtATime) {
 }
 
 TEST(Journal, KeepsItsRecordsWhenTheDiskIsFull) {
-  // A limit on the size of files, beyond which writing stops in the middle of a record.
+  // The size of files has a limit, beyond which writing stops in the middle of a record.
   const TemporaryFolder folder;
   rlimit before{};
   ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);

@@ -1,5 +1,5 @@
-// Which effects of the measurement apply to which recordings. That fits refuse the others: in
-// problem_test.cpp and, effect by effect, in measurement_contract.cpp.
+// Checks which effects of the measurement apply to which recordings. That fits refuse the others:
+// in problem_test.cpp and, effect by effect, in measurement_contract.cpp.
 #include "fit/measurement_effects/applicability.h"
 
 #include <gmock/gmock.h>

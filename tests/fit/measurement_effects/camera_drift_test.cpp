@@ -1,4 +1,4 @@
-// A camera that creeps: found again where it was planted.
+// Checks that a creeping camera is found where it was planted.
 #include "fit/measurement_effects/camera_drift.h"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// A camera that shakes: found again where it was planted.
+// Checks that a shaking camera is found where it was planted.
 #include "fit/measurement_effects/camera_shake.h"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// A clock that is late: found again where it was planted, and told from everything else.
+// Checks that a late clock is found where it was planted, and told from everything else.
 #include "fit/measurement_effects/clock_offset.h"
 
 #include <gtest/gtest.h>
@@ -39,7 +39,7 @@ TEST(ClockOffset, IsFoundWhereItWasPlantedAndMendsTheFit) {
   ASSERT_NE(shear, nullptr);
   EXPECT_NEAR(shear->value, 18, 4 * shear->sigma);
 
-  // A fit that trusts the clock leaves far more than the noise.
+  // The residual of a fit that trusts the clock is far above the noise.
   options.effects.clear();
   const FitReport without = fit(input, options, {});
   ASSERT_TRUE(without.usable()) << without.message;

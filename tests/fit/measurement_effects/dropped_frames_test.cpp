@@ -1,4 +1,4 @@
-// Frames that were lost: found again where they were, as many as there were.
+// Checks that lost frames are found where they were, as many as there were.
 #include "fit/measurement_effects/dropped_frames.h"
 
 #include <gtest/gtest.h>

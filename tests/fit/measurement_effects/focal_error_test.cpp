@@ -1,4 +1,4 @@
-// A focal length that is not the calibrated one: found again where it was planted.
+// Checks that a wrong focal length is found where it was planted.
 #include "fit/measurement_effects/focal_error.h"
 
 #include <gtest/gtest.h>

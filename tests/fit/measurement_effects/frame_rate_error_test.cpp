@@ -1,4 +1,4 @@
-// A frame rate that is not the stated one: found again where it was planted.
+// Checks that a wrong frame rate is found where it was planted.
 #include "fit/measurement_effects/frame_rate_error.h"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// A pattern that slides over the cloth: found again where it was planted.
+// Checks that a pattern's sliding over the cloth is found where it was planted.
 #include "fit/measurement_effects/in_surface_sliding.h"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// A lens that bends more than stated: found again where it was planted.
+// Checks that a lens that bends more than stated is found where it was planted.
 #include "fit/measurement_effects/lens_distortion.h"
 
 #include <gtest/gtest.h>

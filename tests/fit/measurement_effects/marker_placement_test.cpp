@@ -1,4 +1,4 @@
-// A pattern that sits elsewhere than stated: found again where it was planted.
+// Checks that a wrong place of the pattern is found where it was planted.
 #include "fit/measurement_effects/marker_placement.h"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// The table of the effects of the measurement.
+// Checks the table of the effects of the measurement.
 #include "fit/measurement_effects/registry.h"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// A picture that is read row by row: found again where it was planted.
+// Checks that a picture's reading row by row is found where it was planted.
 #include "fit/measurement_effects/rolling_shutter.h"
 
 #include <gtest/gtest.h>
@@ -19,7 +19,7 @@ TEST(RollingShutter, IsFoundWhereItWasPlanted) {
   constexpr double kReadoutS = 0.012;
   const auto seen = [](const SyntheticMotion& motion, double time_s,
                        const Eigen::Vector2d& place_m) {
-    // A marker is in the row that is read when it is there: few rounds find it, as it crosses a
+    // A marker is in the row that is read when it is there. Few rounds find it, as it crosses a
     // hundredth of the rows while all are read.
     const CameraParameters camera = synthetic_camera();
     Eigen::Vector3d point = motion(time_s, place_m);

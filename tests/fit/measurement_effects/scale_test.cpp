@@ -1,4 +1,4 @@
-// What is measured is too large: found again where it was planted.
+// Checks that a scale of the measurement is found where it was planted.
 #include "fit/measurement_effects/scale.h"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// Tracks that were smoothed: found again where they were.
+// Checks that smoothing of the tracks is found where it was planted.
 #include "fit/measurement_effects/temporal_smoothing.h"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// "Down" that is not: found again where it was planted, and as gravity that is tilted.
+// Checks that a wrong "down" is found where it was planted, and as gravity that is tilted.
 #include "fit/measurement_effects/world_tilt.h"
 
 #include <gtest/gtest.h>
@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kAboutX = 0.03, kAboutY = -0.02;
 
-/// The middle of the sheet, where it was let go.
+/// Returns the middle of the sheet, where it was let go.
 Eigen::Vector3d middle_m(const SyntheticMotion& motion) {
   return motion(0, {0.2, 0.2});
 }

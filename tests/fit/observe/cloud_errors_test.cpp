@@ -1,4 +1,4 @@
-// Distances of measured clouds from a surface: closed forms.
+// Checks distances of measured clouds from a surface by closed forms.
 #include "fit/observe/cloud_errors.h"
 
 #include <gtest/gtest.h>
@@ -20,7 +20,8 @@ TEST(ChamferDistance, IsTwiceTheSquareBetweenASetAndItsCopyNearby) {
 }
 
 TEST(ChamferDistance, CountsBothWays) {
-  // One point of the second set is far from all of the first; of the first none is from the second.
+  // One point of the second set is far from all of the first; none of the first is far from the
+  // second.
   const Eigen::Matrix3Xd first = Eigen::Matrix3Xd::Zero(3, 4);
   Eigen::Matrix3Xd second = Eigen::Matrix3Xd::Zero(3, 2);
   second(0, 1) = 2;
@@ -30,7 +31,7 @@ TEST(ChamferDistance, CountsBothWays) {
 
 class CloudsOfASheet : public testing::Test {
  protected:
-  /// Points of the flat sheet of 0.4 m, moved off it.
+  /// Returns points of the flat sheet of 0.4 m, moved off it.
   static Eigen::Matrix3Xd cloud(double off_m, int seed) {
     Draws draws(static_cast<std::uint64_t>(seed), 1, 0);
     Eigen::Matrix3Xd points_m(3, 4000);
@@ -47,8 +48,8 @@ class CloudsOfASheet : public testing::Test {
 TEST_F(CloudsOfASheet, AreAsFarAsTheyWereMoved) {
   const double off_m = 0.02;
   const CloudErrors errors = cloud_errors({{0, cloud(off_m, 1)}}, mesh_, position_m_, 4);
-  // The nearest of 4000 random points of a square is about half a spacing aside: half of its area
-  // per point, over pi, in the mean square.
+  // The nearest of 4000 random points of a square is about half a spacing aside. In the mean square
+  // that is half of its area per point, over pi.
   const double sampling_m2 = 0.16 / 4000 / M_PI;
   EXPECT_NEAR(errors.all.chamfer_m2, 2 * (off_m * off_m + sampling_m2), 0.2 * 2 * sampling_m2);
 }

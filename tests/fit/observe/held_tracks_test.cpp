@@ -1,4 +1,4 @@
-// Where tracked held points are, from pixels alone.
+// Checks the places of tracked held points from pixels alone.
 #include "fit/observe/held_tracks.h"
 
 #include <gtest/gtest.h>
@@ -11,12 +11,12 @@
 namespace clothfit {
 namespace {
 
-/// Half a swing towards the camera by 3 cm, and 1 cm aside.
+/// Moves half a swing towards the camera by 3 cm, and 1 cm aside.
 Eigen::Vector3d way_m(double time_s) {
   return std::sin(M_PI * time_s) * Eigen::Vector3d(0.01, -0.03, 0);
 }
 
-/// The synthetic cloth carried along a way, with both upper corners said to be tracked.
+/// Makes the synthetic cloth carried along a way, with both upper corners said to be tracked.
 FitInput carried_cloth() {
   SyntheticCloth cloth;
   cloth.seen = [](const SyntheticMotion& motion, double time_s, const Eigen::Vector2d& place_m) {
@@ -52,14 +52,14 @@ TEST(HeldTracks, FollowTheShapeOfTheClothAndThenTheirOwnPixels) {
     across_square += (error_m - along_m * ray).squaredNorm();
   }
   const auto count = static_cast<double>(tracks.size());
-  // A metre away a pixel is about a millimetre; how far away is told by the size of what is seen.
+  // A metre away a pixel is about a millimetre; the size of the picture tells the distance.
   EXPECT_LT(std::sqrt(across_square / count), 0.6e-3);
   EXPECT_LT(std::sqrt(along_square / count), 10e-3);
 }
 
 TEST(HeldTracks, AreWhereTheRaysOfTwoCamerasMeet) {
   FitInput input = carried_cloth();
-  // A second camera, a third of a circle around the cloth's upper edge.
+  // A second camera stands a third of a circle around the cloth's upper edge.
   CameraParameters side = input.cameras.front();
   side.name = "side";
   const Eigen::AngleAxisd turn(M_PI / 3, Eigen::Vector3d::UnitZ());

@@ -1,4 +1,4 @@
-// Errors of tracks. Not checked here: what a study makes of them
+// Checks errors of tracks. Not checked here: their use in a study
 // (tests/apps/study/recordings/recordings_study_test.cpp).
 
 #include "fit/observe/marker_error.h"
@@ -59,7 +59,7 @@ TEST(MarkerError, CentringTakesOffTheMeanOfTheFittedFramesOnly) {
 
   const auto shifted = centred(tracks.observed, tracks.predicted, 2);
 
-  // Off by -1, 1 and 4 in place of 2, 4 and 7.
+  // Markers are off by -1, 1 and 4 in place of 2, 4 and 7.
   EXPECT_DOUBLE_EQ(rms_distance(tracks.observed, shifted), std::sqrt((1.0 + 1 + 16 + 1 + 1) / 5));
 }
 

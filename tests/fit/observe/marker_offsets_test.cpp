@@ -1,5 +1,6 @@
-// Constant offsets of markers, taken out of the cost and estimated. Not checked here: residuals
-// without them (objective_test.cpp), files that hold them (tests/data/fit_result_test.cpp).
+// Checks constant offsets of markers, removed from the cost and estimated. Not checked here:
+// residuals without them (objective_test.cpp), files that hold them
+// (tests/data/fit_result_test.cpp).
 #include "fit/observe/marker_offsets.h"
 
 #include <gmock/gmock.h>
@@ -45,7 +46,8 @@ struct Scatter {
     for (Eigen::Index n = 0; n < residual.size(); ++n) residual[n] = normal(rng);
   }
 
-  /// The least cost over offsets, by a linear solver that is told nothing of the closed form.
+  /// Returns the least cost over offsets, by a linear solver that is told nothing of the closed
+  /// form.
   double least_cost(double tau_m) const {
     const Eigen::Index rows = residual.size();
     const auto unknowns = static_cast<Eigen::Index>(3 * markers.size());
@@ -71,7 +73,7 @@ TEST(MarkerOffsets, LeaveTheLeastCostOverAllOffsets) {
 
       profile_out_offsets(scatter.markers, tau_m, left);
 
-      // Rounding of a few dozen numbers.
+      // The tolerance is rounding of a few dozen numbers.
       EXPECT_NEAR(left.squaredNorm(), scatter.least_cost(tau_m), 1e-10 * left.squaredNorm());
     }
 }
@@ -85,9 +87,9 @@ TEST(MarkerOffsets, ThatMayNotBeAreNot) {
   EXPECT_LT((left - scatter.residual).norm(), 1e-15 * scatter.residual.norm());
 }
 
-/// A synthetic input each of whose markers is seen beside its place by a vector of its own, of
-/// about 8 mm, in the frames before `until`, and by twice that later. A third of the rows is
-/// missing, and rows differ in sigma.
+/// Makes a synthetic input each of whose markers is seen beside its place by a vector of its own.
+/// The vector is about 8 mm in the frames before `until`, and twice that later. A third of the rows
+/// is missing, and rows differ in sigma.
 FitInput offset_input(Eigen::Matrix3Xd& offset_m, int until) {
   FitInput input = synthetic_input({.frames = 30, .held_out_from = 20, .noise_m = 3e-4, .seed = 5});
   std::mt19937_64 rng(6);
@@ -152,7 +154,7 @@ std::map<std::string, double> true_values() {
   return named(SyntheticCloth{}.fabric);
 }
 
-/// How far the worst of the five stiffnesses ends from the truth, as a logarithm, from a start that
+/// Returns how far the worst of the five stiffnesses ends from the truth, as a logarithm. The start
 /// is off by a fifth.
 double worst_stiffness_error(const FitProblem& problem) {
   Eigen::VectorXd start = problem.space.start();
@@ -172,7 +174,7 @@ TEST(MarkerOffsets, LeaveStiffnessUnbiasedThatIsBiasedWithoutThem) {
   const FitInput input = offset_input(offset_m, 30);
 
   // Over six seeds of noise and offsets the worst stiffness ended 4 to 10 % off with offsets, which
-  // is its noise, and 51 to 570 % (as a logarithm) off without.
+  // is its noise. Without offsets it ended 51 to 570 % (as a logarithm) off.
   EXPECT_LT(worst_stiffness_error(make_problem(input, with_offsets(0.01), 9, 9)), 0.2);
   EXPECT_GT(worst_stiffness_error(make_problem(input, with_offsets(0), 9, 9)), 0.4);
 }
@@ -188,7 +190,7 @@ TEST(MarkerOffsets, AreFoundAgainAndForeseeHeldOutFramesAndForecasts) {
   const FitReport report = fit(input, options, {});
 
   ASSERT_TRUE(report.usable()) << report.message;
-  // The held-out frames, whose noise is 0.3 mm, are met to about that although the offsets are
+  // The held-out frames have a noise of 0.3 mm. They are met to about that although the offsets are
   // seventeen times as large per coordinate.
   EXPECT_LT(report.result.errors.front().held_out.rms, 6e-4);
   // All markers together can move with the sheet, which is placed on them.

@@ -1,5 +1,5 @@
-// Noise of tracks from their differences in time. Not checked here: noise from the residuals of a
-// smooth path (smoothing_spline_test.cpp) or of a fitted cloth (fit_test.cpp).
+// Checks the noise of tracks from their differences in time. Not checked here: noise from the
+// residuals of a smooth path (smoothing_spline_test.cpp) or of a fitted cloth (fit_test.cpp).
 
 #include "fit/observe/noise.h"
 
@@ -35,7 +35,7 @@ std::vector<double> even_times(int frames, double rate_hz) {
   return time_s;
 }
 
-/// Markers that swing by centimetres about once a second, each with its own phase.
+/// Returns markers that swing by centimetres about once a second, each with its own phase.
 std::vector<Eigen::MatrixXd> swinging_tracks(const std::vector<double>& time_s, int markers,
                                              double sigma, Draws& draws) {
   std::vector<Eigen::MatrixXd> tracks;
@@ -52,7 +52,7 @@ std::vector<Eigen::MatrixXd> swinging_tracks(const std::vector<double>& time_s, 
 }
 
 TEST(Noise, IsRecoveredFromMovingMarkers) {
-  // 20 x 3 x 69 differences, worth about a third of that: scatter 1 to 2 %.
+  // There are 20 x 3 x 69 differences, worth about a third of that: scatter 1 to 2 %.
   const auto time_s = even_times(72, 60);
   for (unsigned long long seed = 1; seed <= 50; ++seed) {
     SCOPED_TRACE(seed);
@@ -81,7 +81,7 @@ TEST(Noise, HardlyFeelsOutliers) {
 
     const NoiseEstimate noise = estimate_noise(time_s, tracks);
 
-    // 5 % of the values spoil 19 % of the differences (1 - 0.95^4); a plain median would be 30 %
+    // 5 % of the values spoil 19 % of the differences (1 - 0.95^4). A plain median would be 30 %
     // too large, a root mean square 20 times.
     EXPECT_NEAR(noise.sigma, clean, 0.08 * clean);
   }
@@ -107,7 +107,7 @@ TEST(Noise, UsesRunsOfConsecutiveFramesOnly) {
   // Six frames on either side hold three differences each.
   EXPECT_EQ(estimate_noise(time_s, tracks).differences, 3 * 6);
 
-  // Without frame 1 only 2 ... 5 is left of the first side.
+  // Without frame 1 only 2 ... 5 remains of the first side.
   tracks[0].col(1).setConstant(kGap);
   EXPECT_EQ(estimate_noise(time_s, tracks).differences, 3 * (1 + 3));
 }

@@ -1,5 +1,5 @@
-// Where the flat sheet lies, from 3D tracks or a camera's pixels. The camera's own place in the
-// world is calib's business (tests/calib/placement/world_placement_test.cpp).
+// Checks the place of the flat sheet, from 3D tracks or a camera's pixels. The camera's own place
+// in the world is calib's business (tests/calib/placement/world_placement_test.cpp).
 #include "fit/observe/sheet_placement.h"
 
 #include <gtest/gtest.h>
@@ -59,8 +59,8 @@ TEST(SheetPlacement, FindsTheSheetInNoiseFreeTracks) {
 }
 
 TEST(SheetPlacement, ErrorFromPixelsIsThatOfLeastSquares) {
-  // Given 200 noisy views; the sheet's pose has 6 unknowns, so the residuals keep 2 N - 6 degrees
-  // of freedom: their mean square must be sigma^2 (2 N - 6) / (2 N)
+  // Given 200 noisy views. The sheet's pose has 6 unknowns, so the residuals keep 2 N - 6 degrees
+  // of freedom: their mean square must be sigma^2 (2 N - 6) / (2 N).
   constexpr double kSigma = 0.2;
   std::mt19937_64 generator(7);
   double sum = 0;

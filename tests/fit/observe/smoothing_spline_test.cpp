@@ -1,4 +1,4 @@
-// A smooth path through a noisy track. Not checked here: held points that follow such paths
+// Checks a smooth path through a noisy track. Not checked here: held points that follow such paths
 // (tests/model/integrate/step_test.cpp), and noise estimates without a path (noise_test.cpp).
 
 #include "fit/observe/smoothing_spline.h"
@@ -17,7 +17,7 @@
 namespace clothfit {
 namespace {
 
-/// Normal numbers by Box and Muller: the library's own differ between libraries.
+/// Draws normal numbers by Box and Muller: the library's own differ between libraries.
 class Noise {
  public:
   explicit Noise(unsigned long long seed) : engine_(seed) {}
@@ -31,7 +31,7 @@ class Noise {
   std::mt19937_64 engine_;
 };
 
-/// Times with a mean interval of 1/60 s, each off by up to a third of it, some left out.
+/// Returns times with a mean interval of 1/60 s, each off by up to a third of it, some left out.
 std::vector<double> irregular_times(int count, unsigned long long seed) {
   Noise noise(seed);
   std::vector<double> time_s;
@@ -57,7 +57,7 @@ Eigen::MatrixXd with_noise(Eigen::MatrixXd samples, double sigma, unsigned long 
   return samples;
 }
 
-/// 10 cm to and fro, once a second; the third coordinate lags.
+/// Swings 10 cm to and fro, once a second; the third coordinate lags.
 Eigen::Vector3d swing(double t) {
   const double w = 2 * std::numbers::pi;
   return {0.1 * std::sin(w * t), 0.03 * std::cos(0.5 * w * t), -0.5 + 0.05 * std::sin(w * t - 1)};
@@ -119,8 +119,8 @@ TEST(SmoothingSpline, BecomesTheRegressionLineWithAllSmoothing) {
 }
 
 TEST(SmoothingSpline, AgreesWithADenseSolveOfItsDefinition) {
-  // min |y - f|^2_W + lambda f' K f, K = Q R^-1 Q': the map from samples to values, its diagonal
-  // and trace, formed densely.
+  // The spline minimises |y - f|^2_W + lambda f' K f, K = Q R^-1 Q'. The map from samples to
+  // values, its diagonal and its trace are formed densely.
   const int n = 25;
   const auto time_s = irregular_times(n, 4);
   const Eigen::MatrixXd samples = with_noise(sample(time_s, swing), kSigma, 4);
@@ -157,8 +157,8 @@ TEST(SmoothingSpline, AgreesWithADenseSolveOfItsDefinition) {
 }
 
 TEST(SmoothingSpline, RecoversTheNoise) {
-  // 200 tracks of 3 x 150 samples. Left over are some 3 x 130 numbers: one estimate scatters by
-  // 1 / sqrt(2 * 390) = 3.6 %, so 10 % is 2.8 of its standard deviations.
+  // There are 200 tracks of 3 x 150 samples. Left over are some 3 x 130 numbers: one estimate
+  // scatters by 1 / sqrt(2 * 390) = 3.6 %, so 10 % is 2.8 of its standard deviations.
   const int trials = 200;
   int within = 0;
   double mean = 0;
@@ -171,12 +171,13 @@ TEST(SmoothingSpline, RecoversTheNoise) {
     mean += spline.noise_sigma / kSigma / trials;
     if (std::abs(spline.noise_sigma / kSigma - 1) < 0.1) ++within;
   }
-  EXPECT_NEAR(mean, 1, 0.02);  // what the smoothing leaves of the motion counts as noise
+  EXPECT_NEAR(mean, 1, 0.02);  // motion that the smoothing removes counts as noise
   EXPECT_GE(within, 195);
 }
 
 TEST(SmoothingSpline, NeverTakesTheNoiseForMotion) {
-  // Short tracks of a slow motion, where cross-validation now and then follows every sample.
+  // The tracks are short and of a slow motion. Cross-validation now and then follows every sample
+  // there.
   for (unsigned long long seed = 0; seed < 200; ++seed) {
     SCOPED_TRACE(seed);
     const auto time_s = irregular_times(60, seed);
@@ -222,8 +223,8 @@ TEST(SmoothingSpline, StatesTheErrorOfItsValues) {
       count += 3;
     }
   }
-  // The prior behind the smoothing is rougher than a sine, so that the stated error is a little
-  // on the safe side.
+  // The prior behind the smoothing is rougher than a sine, so the stated error is a little on the
+  // safe side.
   EXPECT_GT(count, 10000);
   EXPECT_LT(std::sqrt(whitened / count), 1.1);
   EXPECT_GT(std::sqrt(whitened / count), 0.7);
@@ -266,7 +267,7 @@ TEST(SmoothingSpline, LeavesOutGrossOutliers) {
 }
 
 TEST(SmoothingSpline, TakesNoKinkForOutliersAndRoundsItByLessThanASample) {
-  // A gripper that starts at once: the velocity jumps by 0.6 m/s, 10 mm or 20 sigma per sample.
+  // The gripper starts at once: the velocity jumps by 0.6 m/s, 10 mm or 20 sigma per sample.
   const auto path = [](double t) { return Eigen::Vector2d(0.6 * std::max(0.0, t - 1), 0.1); };
   for (unsigned long long seed = 0; seed < 20; ++seed) {
     SCOPED_TRACE(seed);
@@ -283,7 +284,7 @@ TEST(SmoothingSpline, TakesNoKinkForOutliersAndRoundsItByLessThanASample) {
   }
 }
 
-/// A support that rests for three seconds and is swung about for four, along so many axes.
+/// Moves a support that rests for three seconds and is swung about for four, along so many axes.
 Eigen::Vector3d rest_then_motion(double time_s, int axes) {
   const double t = std::max(0.0, time_s - 3);
   Eigen::Vector3d place(0.1 * (1 - std::cos(4 * t)), 0.15 * (1 - std::cos(3 * t)),
@@ -293,8 +294,8 @@ Eigen::Vector3d rest_then_motion(double time_s, int axes) {
 }
 
 TEST(SmoothingSpline, TakesNoFastMotionAfterARestForOutliers) {
-  // Given that support seen ten times a second to half a millimetre, with stamps that are off by up
-  // to 20 ms; twice it is seen 15 cm away, at rest and in motion
+  // Given that support seen ten times a second to half a millimetre. Its stamps are off by up to 20
+  // ms, and twice it is seen 15 cm away, at rest and in motion.
   for (const int axes : {1, 2, 3}) {
     for (const unsigned long long seed : {1, 2, 3, 4, 5}) {
       SCOPED_TRACE(testing::Message() << axes << " axes, seed " << seed);
@@ -315,7 +316,7 @@ TEST(SmoothingSpline, TakesNoFastMotionAfterARestForOutliers) {
       EXPECT_LE(std::count(spline.outlier.begin(), spline.outlier.end(), true), 5);
       for (std::size_t k = 1; k < 69; ++k) {
         if (k == 12 || k == 51) continue;
-        // 20 ms at 0.6 m/s, and what a curve through such samples adds
+        // The tolerance is 20 ms at 0.6 m/s, and what a curve through such samples adds.
         const Eigen::Vector3d truth = rest_then_motion(0.1 * static_cast<double>(k), axes);
         EXPECT_LT((spline.position(stamp_s[k]) - truth).norm(), 0.025) << "sample " << k;
       }

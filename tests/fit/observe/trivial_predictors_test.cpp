@@ -1,5 +1,5 @@
-// Predictions without physics. Not checked here: their place in a report (report_test.cpp), and
-// the reading of tracks (tests/data/tables_test.cpp).
+// Checks predictions without physics. Not checked here: their place in a report (report_test.cpp),
+// and the reading of tracks (tests/data/tables_test.cpp).
 
 #include "fit/observe/trivial_predictors.h"
 
@@ -19,11 +19,11 @@ namespace {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
-/// Frames at uneven times.
+/// The frames have uneven times.
 const std::vector<double> kTime_s = {0, 0.1, 0.25, 0.3, 0.4, 0.6, 0.7, 1.0};
 constexpr int kHeldOutFrom = 5;
 
-/// Two markers at constant velocities: (1, 2) and (-3, 0.5) per second.
+/// Returns two markers at constant velocities: (1, 2) and (-3, 0.5) per second.
 std::vector<Eigen::MatrixXd> straight_tracks() {
   std::vector<Eigen::MatrixXd> tracks(2, Eigen::MatrixXd(2, 8));
   for (Eigen::Index f = 0; f < 8; ++f) {
@@ -39,7 +39,7 @@ TEST(TrivialPredictors, FirstFrameStays) {
 
   const TrivialPrediction first = predict_first_frame(tracks, kHeldOutFrom);
 
-  // Mean of the four squared speeds (1, 4, 9, 0.25) times t^2 is 3.5625 t^2.
+  // The mean of the four squared speeds (1, 4, 9, 0.25) times t^2 is 3.5625 t^2.
   for (std::size_t f = 0; f < 8; ++f) {
     EXPECT_NEAR(first.rms_by_frame[f], std::sqrt(3.5625) * kTime_s[f], 1e-12);
     EXPECT_EQ(first.predicted[1].col(static_cast<Eigen::Index>(f)), Eigen::Vector2d(0, 7));
@@ -156,7 +156,7 @@ TEST(TrivialPredictors, HaveNoErrorWithoutHeldOutFrames) {
   EXPECT_TRUE(predict_first_frame({}, 3).rms_by_frame.empty());
 }
 
-/// A table of the measured positions, as many frames as the recording has.
+/// Reads a table of the measured positions, as many frames as the recording has.
 template <class Tracks, class Position>
 std::vector<Eigen::MatrixXd> table(const Tracks& tracks, std::size_t markers, int coordinates,
                                    const Position& position) {
@@ -178,7 +178,7 @@ std::vector<double> frame_times(const Recording& recording, std::size_t frames) 
   return time_s;
 }
 
-/// The tracks of the markers seen in all of `frames`; the others become all gaps.
+/// Returns the tracks of the markers seen in all of `frames`; the others become all gaps.
 std::vector<Eigen::MatrixXd> seen_in(std::vector<Eigen::MatrixXd> tracks,
                                      const std::vector<Eigen::Index>& frames) {
   for (Eigen::MatrixXd& track : tracks) {
@@ -188,9 +188,9 @@ std::vector<Eigen::MatrixXd> seen_in(std::vector<Eigen::MatrixXd> tracks,
 }
 
 TEST(TrivialPredictors, ReproduceThePublishedNumbersOfABundledRecording) {
-  // rms distances over frames 50 to 71 on the measured tracks, computed by another program when
-  // the recording was made: stays 51.1 mm and 24.2 px, goes on 65.3 mm and 25.2 px. It left out
-  // markers that a frame it needed did not show.
+  // Another program computed rms distances over frames 50 to 71 on the measured tracks when the
+  // recording was made. A marker that stays has 51.1 mm and 24.2 px, one that goes on 65.3 mm and
+  // 25.2 px. That program left out markers that a frame it needed did not show.
   const std::filesystem::path folder =
       std::filesystem::path(CLOTHFIT_SOURCE_DIR) / "data/recordings/swing_plain";
   const Recording recording = read_recording(folder);

@@ -1,4 +1,4 @@
-// What the smoothed tracks of held points are off by. The smoothing itself is checked in
+// Checks corrections of the smoothed tracks of held points. The smoothing itself is checked in
 // smoothing_spline_test.cpp, how shifts of held points move the cloth in
 // tests/model/held_shift_test.cpp, shooting in shooting_test.cpp, model files in
 // simulation_test.cpp.
@@ -33,7 +33,7 @@ constexpr double kJitter = 1e-12;  // m^2: the micrometre that path_covariance()
 
 // --- the prior -----------------------------------------------------------------------------------
 
-/// A smoothed track with uneven times, of samples that are not all as good.
+/// Makes a smoothed track with uneven times, of samples that are not all as good.
 TrackedPoint uneven_track(unsigned seed) {
   std::mt19937_64 generator(seed);
   std::normal_distribution<double> normal;
@@ -52,9 +52,9 @@ TrackedPoint uneven_track(unsigned seed) {
   return point;
 }
 
-/// The covariance of a path whose second derivative is white noise of density 1 / lambda, and of
-/// which nothing else is known, after the samples: kriging with lines of unknown coefficients, by
-/// dense matrices.
+/// Returns the covariance of a path after the samples, by dense matrices. Its second derivative is
+/// white noise of density 1 / lambda, and nothing else is known of it: kriging with lines of
+/// unknown coefficients.
 Eigen::MatrixXd dense_covariance(const TrackedPoint& point, const std::vector<double>& time_s) {
   const SmoothingSpline& path = *point.path;
   const double origin_s = std::min(path.time_s.front(), time_s.front());
@@ -90,7 +90,7 @@ Eigen::MatrixXd dense_covariance(const TrackedPoint& point, const std::vector<do
 
 TEST(PathCovariance, IsThatOfAPathBentByWhiteNoiseAfterItsSamples) {
   const TrackedPoint point = uneven_track(1);
-  // Samples, times between them, in a gap, before the first and behind the last
+  // Times are those of samples, between them, in a gap, before the first and behind the last.
   const std::vector<double>& sample_s = point.path->time_s;
   const std::vector<double> time_s{-0.04, sample_s[1], 0.5 * (sample_s[3] + sample_s[4]),
                                    0.4,   sample_s[9], 0.9};
@@ -158,7 +158,7 @@ TEST(PathCovariance, RefusesATrackThatSaysNothingOfItsNoise) {
 
 // --- the path ------------------------------------------------------------------------------------
 
-/// The synthetic cloth, both corners held where noisy tracks have them.
+/// Makes the synthetic cloth, both corners held where noisy tracks have them.
 FitInput tracked_corners() {
   FitInput input = synthetic_input({.mesh = 5, .markers = 5});
   for (HeldPoint& held : input.recording.held) held.motion = HeldMotion::tracked;
@@ -189,7 +189,7 @@ TEST(DriveCorrection, GoesThroughItsKnotsAndSmoothlyToZeroBehindThem) {
                   1e-15);
   EXPECT_EQ(shift(last_s + spacing_s), Eigen::Vector3d::Zero());
   EXPECT_EQ(shift(last_s + 3 * spacing_s), Eigen::Vector3d::Zero());
-  // Its second derivative does not jump: differences of a step h beside a knot differ by the third
+  // Its second derivative does not jump. Differences of a step h beside a knot differ by the third
   // derivative's share alone, which shrinks with h.
   const auto jump = [&](double at_s, double h) {
     const auto second = [&](double t) -> Eigen::Vector3d {
@@ -250,7 +250,7 @@ TEST(DriveCorrection, HasDerivativesThatAgreeWithDifferences) {
     FitInput input = tracked_corners();
     input.recording.start = start;
     const FitProblem problem = make_problem(input, {.drive_knots = 4}, 5, 5);
-    // Into the held-out frames, where corrections go to zero
+    // The frames reach into the held-out ones, where corrections go to zero.
     const TrajectoryObjective objective(problem, 32, 1.0 / 60 / 100);
     const Eigen::VectorXd values = some_values(problem);
 
@@ -265,7 +265,7 @@ TEST(DriveCorrection, HasDerivativesThatAgreeWithDifferences) {
       SCOPED_TRACE(parameter.name);
       const auto column = exact.residual_by_coordinate.col(p);
       EXPECT_GT(column.norm(), 1e-2);
-      // As in objective_test.cpp.
+      // The tolerance is that of objective_test.cpp.
       EXPECT_LT((column - central.residual_by_coordinate.col(p)).norm(), 1e-5 * column.norm());
     }
   }
@@ -287,7 +287,7 @@ TEST(DriveCorrection, NeedsATrackedPointAndSomeKnots) {
 constexpr double kTruthStep = 1.0 / 60 / 60;  ///< s; fits take the same, so that it biases nothing
 constexpr int kTruthFrames = 60;
 
-/// A cloth of 0.4 m let go 10 degrees out of the vertical while its corners are moved by some
+/// Makes a cloth of 0.4 m let go 10 degrees out of the vertical while its corners are moved by some
 /// centimetres. Markers are measured to a millimetre, the corners to three.
 FitInput driven_input(unsigned seed) {
   constexpr double kSize = 0.4, kNoise = 1e-3, kDriveNoise = 3e-3;
@@ -335,11 +335,11 @@ FitInput driven_input(unsigned seed) {
 struct Found {
   bool converged = false;
   double chi_square_per_dof = 0;
-  Eigen::VectorXd error;      ///< of the fabric's seven numbers, in logarithms
+  Eigen::VectorXd error;      ///< the fabric's seven numbers, in logarithms
   Eigen::VectorXd in_sigmas;  ///< the same over the sigma that the stated noise gives
 };
 
-/// Least squares from the truth.
+/// Finds the optimum by least squares from the truth.
 Found found_in(const FitInput& input, int drive_knots) {
   const FitProblem problem = make_problem(input, {.drive_knots = drive_knots}, 5, 5);
   const Eigen::VectorXd start = start_with(problem, SyntheticCloth().fabric);
@@ -378,8 +378,8 @@ TEST(DriveCorrection, TakesTheNoiseOfTheDriveOutOfThePhysics) {
     const Found corrected = found_in(input, kKnots);
 
     ASSERT_TRUE(plain.converged && corrected.converged);
-    // 4140 residuals: chi-square per degree of freedom is known to 0.022, and to what the prior's
-    // own scale, the noise of two tracks of 60 samples, is off by.
+    // There are 4140 residuals, so chi-square per degree of freedom is known to 0.022. The error of
+    // the prior's own scale adds to that: it is the noise of two tracks of 60 samples.
     EXPECT_GT(plain.chi_square_per_dof, 2);
     EXPECT_NEAR(corrected.chi_square_per_dof, 1, 0.08);
     plain_error += plain.error.squaredNorm();
@@ -387,8 +387,8 @@ TEST(DriveCorrection, TakesTheNoiseOfTheDriveOutOfThePhysics) {
     plain_in_sigmas += plain.in_sigmas.squaredNorm() / (7 * kSeeds);
     in_sigmas += corrected.in_sigmas.squaredNorm() / (7 * kSeeds);
   }
-  // Of 21 normal numbers the root mean square is 1 to 0.15, of some that go together a little less
-  // surely; the drive taken as exact gives 28.
+  // The root mean square of 21 normal numbers is 1 to 0.15. That of numbers of which some go
+  // together is a little less sure; the drive taken as exact gives 28.
   EXPECT_LT(std::sqrt(in_sigmas), 1.5);
   EXPECT_GT(std::sqrt(plain_in_sigmas), 5);
   EXPECT_LT(std::sqrt(error), 0.2 * std::sqrt(plain_error));
@@ -412,7 +412,7 @@ TEST(DriveCorrection, LeavesTheCostsOverRecordedStatesAlone) {
       drive.push_back(p);
     }
 
-  // then transitions are what they are.
+  // then transitions do not change.
   ASSERT_EQ(drive.size(), 24u);
   EXPECT_EQ(objective.residuals({corrected}).front(), objective.residuals({values}).front());
   EXPECT_TRUE(objective.linearise(corrected).residual_by_coordinate(Eigen::all, drive).isZero(0));

@@ -1,4 +1,4 @@
-// How held points are driven. That the model keeps them there is checked in
+// Checks the motion of held points. That the model keeps them there is checked in
 // tests/model/integrate/step_test.cpp, the smoothing itself in smoothing_spline_test.cpp.
 #include "fit/problem/drive.h"
 

@@ -1,5 +1,5 @@
-// The numbers that a fit changes and what is known of them beforehand. What the model makes of them
-// is checked in problem_test.cpp.
+// Checks the numbers that a fit changes and the knowledge of them beforehand. The model's use of
+// them is checked in problem_test.cpp.
 #include "fit/problem/parameter_space.h"
 
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
-// When and where observations see the markers of a run. What each effect of the measurement does is
-// in measurement_effects/; derivatives of whole residuals in objective_test.cpp.
+// Checks when and where observations see the markers of a run. Each effect of the measurement is
+// checked in measurement_effects/; derivatives of whole residuals in objective_test.cpp.
 #include "fit/problem/predictor.h"
 
 #include <gtest/gtest.h>
@@ -16,7 +16,7 @@ FitProblem problem_with(const std::vector<std::string>& effects) {
                       9);
 }
 
-/// Every marker on one cubic in time, with its velocity.
+/// Moves every marker on one cubic in time, with its velocity.
 MarkerRun cubic_run(const FitProblem& problem, int frames) {
   MarkerRun run;
   const auto markers = problem.marker_place_m.cols();

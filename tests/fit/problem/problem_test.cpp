@@ -1,6 +1,6 @@
-// A recording made ready to be fitted: what is observed, held, declared, and what is refused. How
-// the optimum is found is in refine_test.cpp, the whole fit in fit_test.cpp, motion of held points
-// in drive_test.cpp.
+// Checks a recording made ready to be fitted: what is observed, held, declared, and what is
+// refused. The search for the optimum is in refine_test.cpp, the whole fit in fit_test.cpp, motion
+// of held points in drive_test.cpp.
 #include "fit/problem/problem.h"
 
 #include <gmock/gmock.h>
@@ -170,7 +170,7 @@ TEST(Problem, AVectorIsDeclaredAsOne) {
 
   const FitProblem problem = problem_of(input, {});
 
-  // c is left to the fit, q_x, q_y and q_z are what was declared.
+  // c is left to the fit; q_x, q_y and q_z have their declared values.
   ASSERT_EQ(problem.effects.size(), 1u);
   EXPECT_EQ(problem.effects[0][0].parameter, problem.space.index("wind.c"));
   for (size_t axis = 0; axis < 3; ++axis) {

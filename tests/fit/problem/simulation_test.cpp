@@ -1,5 +1,6 @@
-// From model files and fits to simulations and back. Not checked here: the reader and the writer of
-// model files (tests/data/model_description_test.cpp), and the steps of a simulation (tests/model).
+// Checks the way from model files and fits to simulations and back. Not checked here: the reader
+// and the writer of model files (tests/data/model_description_test.cpp), and the steps of a
+// simulation (tests/model).
 
 #include "fit/problem/simulation.h"
 
@@ -41,7 +42,7 @@ double largest_difference_m(const std::vector<Eigen::Matrix3Xd>& a,
 TEST(Simulation, PlacesTheSheetWhereTheModelSays) {
   ModelDescription model = small_model();
   model.sheet.position_m = {1, 2, 3};
-  // A quarter turn about x: t runs down.
+  // The sheet takes a quarter turn about x: t runs down.
   model.sheet.orientation = Eigen::AngleAxisd(-M_PI / 2, Eigen::Vector3d::UnitX());
 
   const Simulation simulation = make_simulation(model);
@@ -163,7 +164,7 @@ TEST(Simulation, RestsOnTheObstacleThatAModelFileNames) {
   const Eigen::VectorXd passing = heights_m(falling);
 
   // Then every vertex sinks in until its area's push, k A depth, carries its mass: 0.1 mm. After a
-  // second less than rounding is left of the bounce.
+  // second the bounce is below rounding.
   const double depth_m = 0.024 / (0.3 * 0.4) * 9.81 / 2e4;
   EXPECT_LT((resting.array() - (0.7 - depth_m)).abs().maxCoeff(), 1e-12);
   EXPECT_LT(passing.maxCoeff(), 0.71 - 0.5 * 9.81);
@@ -207,7 +208,7 @@ TEST(Simulation, OfADescribedFitIsTheFitsOwn) {
     const auto own = run_model(problem, {values}, problem.frames(), time_step_s).front().position_m;
     ASSERT_FALSE(own.empty());
     // A pose is rounded on its way through a quaternion (1e-16), the path through a second spline
-    // (1e-13 of its sizes), and half a second of motion multiplies that by a hundred or so.
+    // (1e-13 of its sizes). Half a second of motion multiplies that by a hundred or so.
     EXPECT_LT(largest_difference_m(result.position_m, own), 1e-9);
     EXPECT_GT((own.back() - own.front()).norm(), 0.1);
   }
@@ -216,7 +217,7 @@ TEST(Simulation, OfADescribedFitIsTheFitsOwn) {
 TEST(Simulation, OfADescribedFitMovesAsTheCorrectedDriveDid) {
   FitInput input = synthetic_input({});
   for (HeldPoint& held : input.recording.held) held.motion = HeldMotion::tracked;
-  // Knots between frames, and held-out frames behind the last.
+  // Knots lie between frames, and held-out frames behind the last.
   const FitProblem problem = make_problem(input, {.drive_knots = 7}, 5, 5);
   Eigen::VectorXd values = problem.space.start();
   for (int p = 0; p < problem.space.size(); ++p)
@@ -230,7 +231,7 @@ TEST(Simulation, OfADescribedFitMovesAsTheCorrectedDriveDid) {
   const SimulateResult result = run(simulation, time_step_s);
   const auto own = run_model(problem, {values}, problem.frames(), time_step_s).front().position_m;
   ASSERT_FALSE(own.empty());
-  // As in the test before: the sum of two splines is one, with the knots of both.
+  // As in the test before, the sum of two splines is one, with the knots of both.
   EXPECT_LT(largest_difference_m(result.position_m, own), 1e-9);
   const auto plain = run_model(problem, {problem.space.start()}, problem.frames(), time_step_s);
   EXPECT_GT(largest_difference_m(plain.front().position_m, own), 1e-3);
@@ -253,7 +254,7 @@ TEST(Simulation, OfADescribedFitTouchesTheRecordingsObstacle) {
         0.5 * stable_time_step_s(problem.cloth, parameter_set(problem, values));
     const auto own = run_model(problem, {values}, problem.frames(), time_step_s).front().position_m;
     const Simulation simulation = make_simulation(describe_model(problem, input.recording, values));
-    // As above, where the sheet's pose is rounded.
+    // As above, the sheet's pose is rounded.
     EXPECT_LT(largest_difference_m(run(simulation, time_step_s).position_m, own), 1e-9);
     double rearmost = 0;
     for (const Eigen::Matrix3Xd& position_m : own)
@@ -267,7 +268,7 @@ TEST(Simulation, OfADescribedFitTouchesTheRecordingsObstacle) {
   EXPECT_GT(rearmost_m(2e4), kWall_m - 0.01);
 }
 
-/// Through model.yaml and back.
+/// Writes a model to model.yaml and reads it back.
 ModelDescription on_disk(const ModelDescription& model) {
   const TemporaryFolder folder;
   write_model(model, folder.path());
@@ -291,8 +292,8 @@ TEST(Simulation, OfAFitOfThePapersSpringsIsTheFitsOwnFromItsFileToo) {
     const ModelDescription model = describe_model(problem, input.recording, values);
     const Simulation simulation = make_simulation(on_disk(model));
 
-    // Every number of the springs to the last bit; the sheet's pose is rounded, and the limit,
-    // which acts or does not, multiplies that.
+    // Every number of the springs is right to the last bit. The sheet's pose is rounded, and the
+    // limit, which acts or does not, multiplies that.
     const SpringParameters springs = parameter_set(problem, values).springs;
     EXPECT_EQ(to_vector(simulation.parameters.springs), to_vector(springs));
     EXPECT_EQ(simulation.cloth.strain_limit.mode, StrainLimitMode::positions);
@@ -338,7 +339,7 @@ TEST(Simulation, StartsAtRestWhereTheModelSays) {
   ASSERT_TRUE(result.usable());
   const auto bottom = simulation.cloth.mesh.vertex(8, 3);
   EXPECT_LT(result.position_m.front()(2, bottom), -0.4);  // it hangs longer than it is
-  // What relaxing leaves of the way to rest is below a percent of the stretch, a few millimetres.
+  // After relaxing, the way left to rest is below a percent of the stretch, a few millimetres.
   EXPECT_LT((result.position_m.back() - result.position_m.front()).cwiseAbs().maxCoeff(), 2e-3);
 }
 

@@ -1,4 +1,5 @@
-// Springs counted on positions that are written down. What a fit says of them is in fit_test.cpp.
+// Checks springs counted on positions that are written down. A fit's report of them is in
+// fit_test.cpp.
 #include "fit/problem/springs_on_limit.h"
 
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
-// A cloth that was moving before its recording began. Shapes from pixels alone are judged here by
-// the first state that they lead to; fits from such a start in
+// Checks a cloth that was moving before its recording began. Shapes from pixels alone are judged
+// here by the first state to which they lead; fits from such a start in
 // tests/apps/study/trials/recover_test.cpp.
 #include "fit/problem/start_state.h"
 
@@ -39,7 +39,7 @@ struct CutRecording {
     for (auto& row : tracks) row.frame -= kCut;
   }
 
-  /// Of a marker, NaN where there is none.
+  /// Returns the place of a marker, NaN where there is none.
   Eigen::Vector3d place(int marker, int frame) const {
     for (const Position3d& row : exact)
       if (row.marker == marker && row.frame == frame) return row.position_m;
@@ -61,7 +61,7 @@ GuessError guess_error(const CutRecording& recording, ObservationKind kind) {
   const int markers = static_cast<int>(at_markers[0].cols());
   for (int m = 0; m < markers; ++m) {
     const Eigen::Vector3d now = recording.place(m, 0);
-    // Second order in the frame interval
+    // The error is of second order in the frame interval.
     const Eigen::Vector3d velocity =
         60 * (-1.5 * now + 2 * recording.place(m, 1) - 0.5 * recording.place(m, 2));
     error.position_m += (at_markers[0].col(m) - now).squaredNorm() / markers;

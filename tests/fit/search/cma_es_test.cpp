@@ -1,5 +1,6 @@
-// The search that adapts the covariance of its steps, on costs given by formulas. Not checked here:
-// costs that simulate a cloth, and the refinement that follows a search (refine_test.cpp).
+// Checks the search that adapts the covariance of its steps, on costs given by formulas. Not
+// checked here: costs that simulate a cloth, and the refinement that follows a search
+// (refine_test.cpp).
 
 #include "fit/search/cma_es.h"
 
@@ -37,7 +38,8 @@ double sphere(const Eigen::VectorXd& x) {
   return (x.array() - 0.7).matrix().squaredNorm();
 }
 
-/// Axes whose curvatures differ by a million, turned out of the parameters' directions.
+/// Evaluates an ellipsoid whose axes' curvatures differ by a million, turned out of the parameters'
+/// directions.
 double turned_ellipsoid(const Eigen::VectorXd& x) {
   const Eigen::Index n = x.size();
   // A reflection at the plane normal to (1, 1, ...) mixes all parameters.
@@ -74,9 +76,9 @@ struct StandardFunction {
 };
 
 TEST(CmaEs, FindsTheOptimaOfStandardFunctions) {
-  // What the strategy is known to need to come to 1e-10: some 200 evaluations a parameter on the
-  // sphere, 600 on the ellipsoid, 800 on Rosenbrock's valley, where one run in ten ends beside it
-  // and begins anew; Rastrigin's thousands of optima take several restarts.
+  // To come to 1e-10 the strategy is known to need some 200 evaluations a parameter on the sphere,
+  // 600 on the ellipsoid, 800 on Rosenbrock's function. There one run in ten ends beside the
+  // minimum and begins again. Rastrigin's thousands of optima take several restarts.
   for (const StandardFunction& f : {StandardFunction{"sphere", sphere, 10, 3000},
                                     {"turned ellipsoid", turned_ellipsoid, 10, 9000},
                                     {"Rosenbrock", rosenbrock, 8, 30000},
@@ -95,7 +97,7 @@ TEST(CmaEs, FindsTheOptimaOfStandardFunctions) {
 }
 
 TEST(CmaEs, ConvergesOnTheSphereByTheSameFactorEachGeneration) {
-  // Linear convergence: the logarithm of the distance falls evenly, from 1e-4 to 1e-8 as fast as
+  // Convergence is linear. The logarithm of the distance falls evenly, from 1e-4 to 1e-8 as fast as
   // from 1e-8 to 1e-12 but for chance.
   std::vector<long> to;
   for (const double cost : {1e-8, 1e-16, 1e-24}) {
@@ -154,7 +156,7 @@ TEST(CmaEs, WorksInTheLogarithmWhereAParameterDoes) {
 }
 
 TEST(CmaEs, ListsTheOptimaThatItsRunsEndedIn) {
-  // Two wells, the deeper one at 0.8.
+  // There are two wells, the deeper one at 0.8.
   const auto wells = [](const Eigen::VectorXd& x) {
     const double left = (x.array() - 0.2).square().sum() + 0.1;
     const double right = (x.array() - 0.8).square().sum();

@@ -1,5 +1,6 @@
-// The founding paper's search on costs given by formulas. Not checked here: costs that simulate a
-// cloth (trajectory_cost_test.cpp), and the refinement that follows the search (refine_test.cpp).
+// Checks the founding paper's search on costs given by formulas. Not checked here: costs that
+// simulate a cloth (trajectory_cost_test.cpp), and the refinement that follows the search
+// (refine_test.cpp).
 
 #include "fit/search/evolutionary_strategy.h"
 
@@ -26,7 +27,7 @@ std::vector<SearchParameter> unit_ranges(int count) {
   return parameters;
 }
 
-/// Squared distance to a point off the centre of the unit cube.
+/// Returns the squared distance to a point off the centre of the unit cube.
 Eigen::VectorXd sphere(const Eigen::MatrixXd& individuals) {
   return (individuals.array() - 0.3).square().colwise().sum();
 }
@@ -39,7 +40,7 @@ GenerationCost one_by_one(const std::function<double(const Eigen::VectorXd&)>& c
   };
 }
 
-/// Never stops but at the last generation.
+/// Stops only at the last generation.
 EvolutionOptions all_generations(int generations, unsigned long long seed) {
   EvolutionOptions options;
   options.generations = generations;
@@ -142,12 +143,12 @@ TEST(EvolutionaryStrategy, ReplacesTheWorseHalfByTheParentRulesOfThePaper) {
     before = after;
   }
 
-  // 780 draws of 80 ranks and 5850 of 50: all of them are met, none beyond.
+  // In 780 draws of 80 ranks and 5850 of 50 all of them are met, none beyond.
   EXPECT_EQ(mutation_parents.size(), 80u);
   EXPECT_EQ(*mutation_parents.rbegin(), 79);
   EXPECT_EQ(crossover_parents.size(), 50u);
   EXPECT_EQ(*crossover_parents.rbegin(), 49);
-  // 780 mutations over five parameters: 156 each, standard deviation 11.2.
+  // 780 mutations over five parameters are 156 each, with a standard deviation of 11.2.
   for (int p = 0; p < parameter_count; ++p) EXPECT_NEAR(mutated_parameter_count[p], 156, 4 * 11.2);
 }
 
@@ -219,7 +220,8 @@ TEST(EvolutionaryStrategy, FirstGenerationIsUniformOverTheRangesLinearOrLogarith
 
   const EvolutionState state = first_generation(parameters, options, sphere);
 
-  // Mean of a uniform number over a range r: the middle, standard error r / sqrt(12 n).
+  // The mean of a uniform number over a range r is the middle, with a standard error of r / sqrt(12
+  // n).
   double mean = 0, mean_log10 = 0;
   for (const Individual& individual : state.population) {
     mean += individual.values(0) / options.population;
@@ -267,9 +269,9 @@ TEST(EvolutionaryStrategy, StartsFromGivenIndividuals) {
 }
 
 TEST(EvolutionaryStrategy, FindsTheBottomOfASphere) {
-  // Redrawing one of five parameters over its whole range tries each about four times a
-  // generation; over 99 generations the nearest of some 400 draws, selection and crossover
-  // included, lies well within a hundredth of the range.
+  // Redrawing one of five parameters over its whole range tries each about four times a generation.
+  // Over 99 generations the nearest of some 400 draws, selection and crossover included, lies well
+  // within a hundredth of the range.
   for (unsigned long long seed = 1; seed <= 10; ++seed) {
     SCOPED_TRACE(seed);
     const EvolutionResult result = evolve(unit_ranges(5), all_generations(100, seed), sphere);
@@ -315,7 +317,8 @@ TEST(EvolutionaryStrategy, FindsStiffnessesOnALogarithmicScaleThroughAnEllipsoid
 }
 
 TEST(EvolutionaryStrategy, LeavesLocalMinima) {
-  // Rastrigin's function over [-5.12, 5.12]^5: about 10^5 local minima, one at every whole number.
+  // Rastrigin's function over [-5.12, 5.12]^5 has about 10^5 local minima, one at every whole
+  // number.
   std::vector<SearchParameter> parameters = unit_ranges(5);
   for (SearchParameter& parameter : parameters) {
     parameter.lower = -5.12;
@@ -329,7 +332,7 @@ TEST(EvolutionaryStrategy, LeavesLocalMinima) {
     const EvolutionResult result = evolve(parameters, all_generations(150, seed), rastrigin);
     if (result.best().values.cwiseAbs().maxCoeff() < 0.5) ++found;
   }
-  EXPECT_GE(found, 9);  // in the valley of the global minimum
+  EXPECT_GE(found, 9);  // in the basin of the global minimum
 }
 
 TEST(EvolutionaryStrategy, CostsThatAreNotFiniteRankLast) {
@@ -401,7 +404,7 @@ TEST(EvolutionaryStrategy, MeasuresHowFarItsIndividualsDiffer) {
   // The first parameter does not vary; the second lies at both ends of its range.
   EXPECT_NEAR(diversity(parameters, state), 0.5 * (0 + 0.5), 1e-15);
 
-  // A uniform draw: 1 / sqrt(12); off by a few per cent for a thousand individuals
+  // A uniform draw has 1 / sqrt(12); a thousand individuals are off by a few per cent.
   EvolutionOptions options = all_generations(1, 3);
   options.population = 1000;
   const EvolutionState drawn = first_generation(unit_ranges(3), options, sphere);

@@ -1,5 +1,5 @@
-// Searches on disk: what is read back, and what is refused. Not checked here: that a search goes on
-// from a state in memory (cma_es_test.cpp, evolutionary_strategy_test.cpp), power cuts.
+// Checks searches on disk: what is read back, and what is refused. Not checked here: that a search
+// goes on from a state in memory (cma_es_test.cpp, evolutionary_strategy_test.cpp), power cuts.
 
 #include "fit/search/search_checkpoint.h"
 
@@ -21,7 +21,7 @@ std::vector<SearchParameter> ranges() {
           {.name = "c", .lower = -1.0 / 3, .upper = 5}};
 }
 
-/// Of many optima; a part of the ranges diverges.
+/// Evaluates a cost of many optima; a part of the ranges diverges.
 Eigen::VectorXd bumpy(const Eigen::MatrixXd& individuals) {
   Eigen::VectorXd costs(individuals.cols());
   for (Eigen::Index k = 0; k < costs.size(); ++k) {
@@ -106,7 +106,7 @@ TEST(SearchCheckpoint, OfCmaAtEveryGenerationLeadsToTheEndOfTheUninterruptedSear
   const CmaResult whole = search_by_cma(ranges(), options, bumpy, start_cma(ranges(), options));
   ASSERT_EQ(whole.state.optima.size(), 2u);
 
-  // A search that dies after each generation and is resumed from its file.
+  // The search dies after each generation and is resumed from its file.
   struct Died {};
   save_checkpoint(file, kProblem, ranges(), options, start_cma(ranges(), options));
   for (int generation = 1;; ++generation) {
@@ -241,7 +241,7 @@ TEST(SearchCheckpoint, RefusesAnotherSearch) {
   evolution_refused("evolution:10: belongs", [](auto& o) { o.seed = 13; });
 }
 
-/// Both kinds of checkpoint, small ones.
+/// Returns both kinds of checkpoint, small ones.
 std::vector<std::pair<std::string, std::function<void()>>> small_checkpoints(
     const TemporaryFolder& folder) {
   EvolutionOptions evolution = evolution_options();
@@ -329,7 +329,7 @@ TEST(SearchCheckpoint, NamesTheLineWhereAFileWasCutSwappedOrGoesOn) {
 }
 
 TEST(SearchCheckpoint, LeavesTheOlderOneWhenItCannotBeWritten) {
-  // Given that the place of the file that is written beside it is taken,
+  // Given that something occupies the place of the file that is written beside it,
   const TemporaryFolder folder;
   const CmaState start = start_cma(ranges(), {});
   save_checkpoint(folder / "search", kProblem, ranges(), CmaOptions{}, start);

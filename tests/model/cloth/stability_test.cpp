@@ -1,5 +1,5 @@
-// How long a time step may be. Not checked here: what a step does (step_test.cpp) and what a run
-// that diverges reports (simulate_test.cpp).
+// Checks the longest time step. Not checked here: a step itself (step_test.cpp) and what a run that
+// diverges reports (simulate_test.cpp).
 
 #include "model/cloth/stability.h"
 
@@ -34,7 +34,7 @@ struct Pair {
     set.start_position_m(1, 2) += 1e-6;
   }
 
-  /// Largest extension within `steps` steps, as a multiple of the first.
+  /// Returns the largest extension within `steps` steps, as a multiple of the first.
   double growth(double time_step_s, int steps) const {
     SteppedCloth<> run(cloth, set, at_rest(set.start_position_m));
     double largest_m = 0;
@@ -48,8 +48,8 @@ struct Pair {
   }
 };
 
-/// Elastic plus kinetic energy after `steps` steps without gravity, as a multiple of the first;
-/// infinite if it is no number any more.
+/// Returns elastic plus kinetic energy after `steps` steps without gravity, as a multiple of the
+/// first. It is infinite if it is no number any more.
 double energy_growth(const Cloth& cloth, const ParameterSet& set, double time_step_s, int steps) {
   SteppedCloth<> run(cloth, set, at_rest(set.start_position_m));
   for (int n = 0; n < steps; ++n) run.step(time_step_s);
@@ -59,8 +59,8 @@ double energy_growth(const Cloth& cloth, const ParameterSet& set, double time_st
   return std::isfinite(growth) ? growth : INFINITY;
 }
 
-/// The step at which the stiffest mode of the flat cloth at rest becomes unstable without damping:
-/// 2 / omega, from all its eigenfrequencies.
+/// Returns the step at which the stiffest mode of the flat cloth at rest becomes unstable without
+/// damping. It is 2 / omega, from all its eigenfrequencies.
 double flat_limit_s(const Cloth& cloth, const SpringParameters& springs) {
   const Eigen::Matrix3Xd flat = flat_positions(cloth.mesh);
   const Eigen::Index vertices = flat.cols();
@@ -94,7 +94,8 @@ TEST(StableTimeStep, OfASpringPairHasAClosedForm) {
 
     const double h = stable_time_step_s(pair.cloth, pair.set);
 
-    // 2 h gamma + h^2 omega^2 = 4 with omega^2 = 2 k / m and gamma = 2 c / m, both with the margin.
+    // At the limit 2 h gamma + h^2 omega^2 = 4 with omega^2 = 2 k / m and gamma = 2 c / m, both
+    // with the margin.
     EXPECT_NEAR(kMargin * (2 * h * 2 * c / m + h * h * 2 * k / m), 4, 1e-12);
   }
 }
@@ -189,9 +190,10 @@ TEST(StableTimeStep, KeepsFlatClothBounded) {
 }
 
 TEST(StableTimeStep, KeepsCrumpledClothBounded) {
-  // Springs of a cloth whose vertices are moved by half a spacing are far from their lengths and
-  // some turn inside out. With dashpots it comes to rest all the same; without any, steps close to
-  // the limit pump energy into what is crumpled so violently, and half of them do not.
+  // Vertices of this cloth are moved by half a spacing. Its springs are then far from their
+  // lengths, and some turn inside out. With dashpots it comes to rest all the same. Without any,
+  // steps close to the limit pump energy into what is crumpled so violently, and half of them do
+  // not come to rest.
   struct Case {
     double crumpling, damping, share_of_step;
   };
