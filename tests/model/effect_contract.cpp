@@ -204,7 +204,7 @@ void expect_to_damp_only(const EffectEntry& entry, Uniform& uniform) {
       force_n(entry, state, parameters).cwiseProduct(state.velocity_m_per_s).sum();
 
   EXPECT_LT(power_w, 0);
-  // and no faster than it tells those who choose the time step: -F.v <= rate m v^2.
+  // It damps no faster than it tells those who choose the time step: -F.v <= rate m v^2.
   const SpringParameters springs = spring_parameters(cotton(), state.cloth.mesh);
   EXPECT_LE(-power_w, entry.make()->rates(state.cloth, springs, parameters).damping_per_s * 2 *
                           kinetic_energy_j(state.cloth.mass_kg, state.velocity_m_per_s) *

@@ -17,7 +17,7 @@
 
 namespace clothfit {
 
-/// What an effect claims beyond the contract that all of them keep.
+/// The claims of an effect beyond the contract that all of them keep.
 struct EffectTraits {
   bool isotropic = false;     ///< its force turns with the scene; it prefers no direction of space
   bool only_damps = false;    ///< its power is never positive
@@ -36,7 +36,7 @@ inline Parameters neutral(const EffectDescription& effect) {
   return values;
 }
 
-/// Somewhere within the bounds, a few typical changes away from neutral.
+/// Draws parameters somewhere within the bounds, a few typical changes away from neutral.
 inline Parameters random_parameters(const EffectDescription& effect, Uniform& uniform) {
   Parameters values;
   for (const EffectParameter& p : effect.parameters)
@@ -63,8 +63,8 @@ struct State {
         velocity_m_per_s(uniform.vectors(36, 3.0)) {}
 };
 
-/// The force on every vertex, 3 x vertices (N), as lanes of kind L compute it; `there_n` is what
-/// other forces have added before.
+/// Returns the force on every vertex, 3 x vertices (N), as lanes of kind L compute it. `there_n` is
+/// the sum of other forces added before.
 template <class L = ExactLanes>
 Eigen::Matrix3Xd force_n(const Effect& effect, const State& state, const Parameters& parameters,
                          const Eigen::Matrix3Xd& there_n) {
@@ -96,8 +96,8 @@ Eigen::Matrix3Xd force_n(const EffectEntry& entry, const State& state,
   return force_n<L>(*entry.make(), state, parameters, at_rest(state.position_m));
 }
 
-/// The largest eigenvalues, per mass, of the stiffness (1/s2) and the damping (1/s) that effects
-/// amount to in a crumpled cloth at rest.
+/// The largest eigenvalues, per mass, of the stiffness (1/s2) and the damping (1/s) of effects in a
+/// crumpled cloth at rest.
 struct Spectrum {
   double frequency2_per_s2 = 0, damping_per_s = 0;
 };
@@ -106,10 +106,10 @@ Spectrum spectrum(const std::vector<std::pair<const Effect*, Parameters>>& effec
 
 }  // namespace effect_contract
 
-/// What every effect must keep, so that diagnosis can ask "is this physics missing?" of each alike:
-/// it describes itself, its bounds hold its neutral value, at which it does nothing to the last
-/// bit; lanes are separate; its derivatives are those of what it does; the step that its rates
-/// allow is stable; and what its traits claim is true.
+/// Checks what every effect must keep, so that diagnosis can ask "is this physics missing?" of each
+/// alike. It describes itself, and its bounds hold its neutral value, at which it does nothing to
+/// the last bit. Lanes are separate. Its derivatives are those of its action. The step that its
+/// rates allow is stable. Its traits' claims are true.
 void expect_effect_contract(const std::string& name, const EffectTraits& traits);
 
 }  // namespace clothfit

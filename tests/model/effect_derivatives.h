@@ -12,8 +12,8 @@ namespace clothfit {
 /// The three things that an effect may do.
 enum class EffectDeed { add_force, change_force, shift_supports };
 
-/// What an effect does to one simulation as a map between plain vectors, so that its linearisation
-/// can be held against differences.
+/// An effect's action on one simulation as a map between plain vectors. Its linearisation can then
+/// be compared with differences.
 ///
 /// In:  positions, velocities, forces (on vertices; for `shift_supports` pulls on held points),
 ///      memory, parameters by ParameterNumber.
@@ -37,7 +37,7 @@ class EffectMap {
   int first_memory() const { return first_force() + 3 * acted_on_; }
   int first_parameter() const { return first_memory() + memory_; }
 
-  /// Everything that an effect looks at, nothing remembered and no forces.
+  /// Returns everything that an effect looks at, nothing remembered and no forces.
   Eigen::VectorXd input(const Eigen::Matrix3Xd& position_m,
                         const Eigen::Matrix3Xd& velocity_m_per_s, const SpringParameters& springs,
                         const Eigen::Vector3d& gravity_m_per_s2,
@@ -79,7 +79,7 @@ class EffectMap {
     return out;
   }
 
-  /// What the effect says its derivative is, outputs x inputs.
+  /// Returns the effect's own derivative, outputs x inputs.
   Eigen::MatrixXd stated_jacobian(const Eigen::VectorXd& in) const {
     const Arguments at(*this, in);
     EffectLinearisation d;
@@ -188,17 +188,17 @@ class EffectMap {
   int vertices_, acted_on_, memory_, own_;
 };
 
-/// Where a stated derivative differs from central differences; nothing where it agrees.
+/// Says where a stated derivative differs from central differences; nothing where it agrees.
 ///
-/// `in` is where to compare, `size` how much each input changes by to matter. Steps are 1e-5 of
-/// that: the differences' own error is some 1e-10 of the third derivative and, from rounding, 1e-11
-/// of the output. Laws of springs and surfaces that are nearly folded to nothing bend a few
-/// thousand times as much as smooth ones: 1e-6 of a column's largest entry is granted.
+/// `in` is where to compare, `size` the change of each input that matters. Steps are 1e-5 of that:
+/// the differences' own error is some 1e-10 of the third derivative and, from rounding, 1e-11 of
+/// the output. Laws of springs and surfaces that are nearly folded to nothing bend a few thousand
+/// times as much as smooth ones: 1e-6 of a column's largest entry is granted.
 std::string derivative_mismatch(const EffectMap& map, const Eigen::VectorXd& in,
                                 const Eigen::VectorXd& size);
 
-/// Compares everything that an effect says of its derivatives with differences, in a moving,
-/// crumpled cloth that is held at two points.
+/// Compares all derivatives that an effect states with differences, in a moving, crumpled cloth
+/// that is held at two points.
 std::string derivative_mismatch(const Effect& effect, const EffectDescription& description,
                                 const std::vector<double>& own, Uniform& uniform);
 

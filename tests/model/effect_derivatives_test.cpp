@@ -1,5 +1,5 @@
-// The checker of effects' derivatives: that it catches a wrong one. Not checked here: the effects'
-// own derivatives (effect_contract.h asks that of each).
+// Checks that the checker of effects' derivatives catches a wrong one. Not checked here: the
+// effects' own derivatives (effect_contract.h asks that of each).
 
 #include "tests/model/effect_derivatives.h"
 
@@ -10,8 +10,8 @@
 namespace clothfit {
 namespace {
 
-/// Lets every vertex be pulled to the origin by a spring that creeps, m'' = ... - k (x - y) with y
-/// remembered along x, and gives derivatives that are wrong by chosen factors.
+/// Pulls every vertex to the origin by a spring that creeps, m'' = ... - k (x - y) with y
+/// remembered along x. Its derivatives are wrong by chosen factors.
 class CreepingAnchor final : public Effect {
  public:
   double position_factor = 1, memory_factor = 1, parameter_factor = 1, force_factor = 1;

@@ -1,5 +1,5 @@
-// What a parameter set adds to the motions of held points. That held points are where they belong
-// is checked in step_test.cpp and simulate_test.cpp.
+// Checks a parameter set's shifts of the motions of held points. That held points are at their
+// places is checked in step_test.cpp and simulate_test.cpp.
 #include <gtest/gtest.h>
 
 #include <vector>
@@ -15,7 +15,7 @@ namespace {
 
 using Motion = std::function<Eigen::Vector3d(double time_s)>;
 
-/// A drift and a swing that differ from set to set.
+/// Returns a drift and a swing that differ from set to set.
 Motion random_shift(Uniform& uniform) {
   const Eigen::Vector3d drift = uniform.vectors(1, 0.1), swing = uniform.vectors(1, 5e-3);
   return [drift, swing](double time_s) -> Eigen::Vector3d {
@@ -23,7 +23,7 @@ Motion random_shift(Uniform& uniform) {
   };
 }
 
-/// A cloth whose motions have the shifts of a set in them.
+/// Makes a cloth whose motions have the shifts of a set in them.
 Cloth with_shifts(Cloth cloth, const ParameterSet& set) {
   for (size_t h = 0; h < set.held_shift.size(); ++h)
     if (set.held_shift[h] && cloth.held[h].motion)
@@ -34,7 +34,7 @@ Cloth with_shifts(Cloth cloth, const ParameterSet& set) {
   return cloth;
 }
 
-/// One corner fixed, one that moves.
+/// Makes a cloth with one corner fixed and one that moves.
 Cloth driven_cloth() {
   Cloth cloth = hung_cloth(5);
   cloth.held[1].motion = [](double time_s) {
@@ -43,7 +43,8 @@ Cloth driven_cloth() {
   return cloth;
 }
 
-/// Every third set shifts nothing, the others the moving corner, and in vain the fixed one.
+/// Returns sets of which every third shifts nothing. The others shift the moving corner, and in
+/// vain the fixed one.
 std::vector<ParameterSet> shifting_sets(const Cloth& cloth, int count, Uniform& uniform) {
   std::vector<ParameterSet> sets = random_sets(cloth, count, 8);
   for (int n = 0; n < count; ++n) {
@@ -57,7 +58,7 @@ std::vector<ParameterSet> shifting_sets(const Cloth& cloth, int count, Uniform& 
 TEST(HeldShift, GivesTheBitsOfAMotionThatHasItInIt) {
   Uniform uniform(1);
   const Cloth cloth = driven_cloth();
-  // Whole groups of lanes of either kind, and a few left over that run one by one.
+  // These are whole groups of lanes of either kind, and a few left over that run one by one.
   const std::vector<ParameterSet> sets = shifting_sets(cloth, 2 * kLanes + 3, uniform);
   std::vector<ParameterSet> plain = sets;
   for (ParameterSet& set : plain) set.held_shift.clear();
@@ -150,7 +151,7 @@ TEST(HeldShift, HasItsDerivativeInTheDirectionsHeldMotion) {
   for (size_t f = 1; f < swing.schedule.frame_time_s.size(); ++f) {
     SCOPED_TRACE(testing::Message() << "seed 4, frame " << f);
     const Eigen::Matrix3Xd& tangent = result.position_tangent[0][f];
-    // As in tangents_test.cpp.
+    // The tolerance is that of tangents_test.cpp.
     EXPECT_LT((tangent - (ahead[f] - behind[f]) / (2 * kStep)).norm(), 1e-6 * tangent.norm());
   }
 }

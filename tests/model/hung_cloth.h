@@ -6,14 +6,14 @@
 
 namespace clothfit {
 
-/// A cloth held by its two upper corners.
+/// Makes a cloth held by its two upper corners.
 inline Cloth hung_cloth(int vertices_per_side) {
   Cloth cloth = square_cloth(vertices_per_side);
   cloth.held = {held_at(cloth.mesh, 0, 0), held_at(cloth.mesh, 0.4, 0)};
   return cloth;
 }
 
-/// Random fabrics and crumpled starts, with one effect of one parameter.
+/// Returns random fabrics and crumpled starts, with one effect of one parameter.
 inline std::vector<ParameterSet> random_sets(const Cloth& cloth, int count, unsigned seed) {
   Uniform uniform(seed);
   std::vector<ParameterSet> sets;

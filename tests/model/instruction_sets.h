@@ -21,7 +21,7 @@ inline std::vector<InstructionSet> instruction_sets() {
   std::vector<InstructionSet> sets;
   for (const int64_t target : {HWY_AVX3, HWY_AVX2, HWY_SSE4})
     if ((hwy::SupportedTargets() & target) != 0) sets.push_back({target});
-  sets.push_back({HWY_STATIC_TARGET});  // what every processor of this kind runs
+  sets.push_back({HWY_STATIC_TARGET});  // every processor of this kind runs these
   return sets;
 }
 

@@ -8,10 +8,10 @@
 
 namespace clothfit {
 
-/// The laws that the tests hold the model against, in their plainest form. The force is the only
-/// thing taken from the model; energies and momenta are written here a second time.
+/// These are the laws with which the tests compare the model, in their plainest form. Only the
+/// force is taken from the model; energies and momenta are written here a second time.
 
-/// Elastic energy (J): sum of k (l - l0)^2 / 2.
+/// Returns the elastic energy (J): sum of k (l - l0)^2 / 2.
 inline double elastic_energy_j(const SpringNet& net, const SpringParameters& springs,
                                const Eigen::Matrix3Xd& position_m) {
   double energy = 0;
@@ -34,21 +34,21 @@ inline Eigen::Vector3d momentum_kg_m_per_s(const Eigen::VectorXd& mass_kg,
   return velocity * mass_kg;
 }
 
-/// Sum of x cross f; with f = m v the angular momentum.
+/// Returns the sum of x cross f; with f = m v the angular momentum.
 inline Eigen::Vector3d torque(const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& f) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (Eigen::Index k = 0; k < x.cols(); ++k) sum += x.col(k).head<3>().cross(f.col(k).head<3>());
   return sum;
 }
 
-/// The same vectors in every lane.
+/// Puts the same vectors in every lane.
 inline LaneVectors<> every_lane(const Eigen::Matrix3Xd& values) {
   LaneVectors<> lanes = LaneVectors<>::zero(static_cast<int>(values.cols()));
   for (int l = 0; l < kLanes; ++l) lanes.set_lane(l, values);
   return lanes;
 }
 
-/// The same springs in every lane.
+/// Puts the same springs in every lane.
 inline LaneSprings<> every_lane(const SpringParameters& springs) {
   LaneSprings<> lanes;
   for (size_t type = 0; type < kSpringTypes; ++type) {
@@ -67,7 +67,7 @@ inline void set_lane(int l, const SpringParameters& springs, LaneSprings<>& lane
   }
 }
 
-/// The model's spring forces on one state, 3 x vertices (N).
+/// Returns the model's spring forces on one state, 3 x vertices (N).
 inline Eigen::Matrix3Xd spring_forces_n(const Mesh& mesh, const SpringParameters& springs,
                                         const Eigen::Matrix3Xd& position_m,
                                         const Eigen::Matrix3Xd& velocity_m_per_s) {
@@ -81,7 +81,7 @@ inline Eigen::Matrix3Xd at_rest(const Eigen::Matrix3Xd& position_m) {
   return Eigen::Matrix3Xd::Zero(3, position_m.cols());
 }
 
-/// One simulation, step by step; held points without a motion stay where they start.
+/// Runs one simulation, step by step; held points without a motion stay where they start.
 template <class L = ExactLanes>
 class SteppedCloth {
  public:

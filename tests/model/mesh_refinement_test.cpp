@@ -1,4 +1,4 @@
-// One fabric on several meshes moves alike. Not checked here: effects one by one, each of which
+// Checks that one fabric on several meshes moves alike. Not checked here: effects one by one. Each
 // says in its own file how it survives a change of mesh.
 
 #include <gtest/gtest.h>
@@ -17,9 +17,9 @@ namespace {
 
 constexpr int kCoarsest = 9;  // vertices per side, all of them on every mesh
 
-/// A cloth without flexion springs but with bending stiffness, released from 45 degrees and held
-/// along its upper edge; where the vertices of the coarsest mesh are at 20 times in a second.
-/// (Single held points would be point loads, under which no continuum converges.)
+/// Swings a cloth with bending stiffness but without flexion springs, released from 45 degrees and
+/// held along its upper edge. Returns where the vertices of the coarsest mesh are at 20 times in a
+/// second. Single held points would be point loads, under which no continuum converges.
 std::vector<Eigen::Matrix3Xd> swing(int vertices_per_side, double time_step_s) {
   Cloth cloth = square_cloth(vertices_per_side);
   for (int j = 0; j < vertices_per_side; ++j)
@@ -51,7 +51,7 @@ std::vector<Eigen::Matrix3Xd> swing(int vertices_per_side, double time_step_s) {
   return seen;
 }
 
-/// Root mean square distance over vertices and times (m).
+/// Returns the root mean square distance over vertices and times (m).
 double distance_m(const std::vector<Eigen::Matrix3Xd>& a, const std::vector<Eigen::Matrix3Xd>& b) {
   double sum = 0;
   for (size_t n = 0; n < a.size(); ++n)
@@ -68,7 +68,8 @@ TEST(MeshRefinement, AClothWithBendingStiffnessMovesAlikeOnEveryMesh) {
   const std::vector<Eigen::Matrix3Xd> start(fine.size(), fine.front());
   EXPECT_GT(distance_m(fine, start), 0.1);  // it did swing
   std::printf("9 to 17: %.3f mm, 17 to 33: %.3f mm\n", 1e3 * coarse_m, 1e3 * fine_m);
-  // Between the first order of the lattice's border springs and the second of its differences.
+  // The order is between the first of the lattice's border springs and the second of its
+  // differences.
   EXPECT_GT(coarse_m / fine_m, 2.5);
   EXPECT_LT(fine_m, 2e-3);
 }

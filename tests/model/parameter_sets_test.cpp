@@ -1,6 +1,6 @@
-// The parameter sets louchet5, louchet18 and fabric: conversion to springs and back, derivatives of
-// both ways, refusals. Not checked here: what a fabric amounts to as a continuum, by its energy
-// (fabric_test.cpp), and what longer flexion springs do (preconstraint_test.cpp).
+// Checks the parameter sets louchet5, louchet18 and fabric: conversion to springs and back,
+// derivatives of both ways, refusals. Not checked here: a fabric as a continuum, by its energy
+// (fabric_test.cpp), and longer flexion springs (preconstraint_test.cpp).
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -33,7 +33,7 @@ SpringParameters random_springs(Uniform& uniform) {
   return springs_of(numbers);
 }
 
-/// Central differences of `f` at `x`.
+/// Returns central differences of `f` at `x`.
 template <class Function>
 Eigen::MatrixXd differences(const Function& f, const Eigen::VectorXd& x) {
   Eigen::MatrixXd result;
@@ -49,7 +49,8 @@ Eigen::MatrixXd differences(const Function& f, const Eigen::VectorXd& x) {
   return result;
 }
 
-/// Largest error, relative to the largest entry. Differences leave 1e-9 of rounding and truncation.
+/// Returns the largest error, relative to the largest entry. Differences have 1e-9 of rounding and
+/// truncation.
 double error(const Eigen::MatrixXd& derivative, const Eigen::MatrixXd& difference) {
   return (derivative - difference).cwiseAbs().maxCoeff() / difference.cwiseAbs().maxCoeff();
 }
@@ -121,7 +122,7 @@ TEST(Louchet5, IsTheNearestThereIs) {
       EXPECT_GT(sum_of_squares(other), least) << n;
     }
   }
-  // What is left over is said, kind by kind.
+  // The rest is reported, kind by kind.
   EXPECT_NEAR(
       6 * (std::pow(nearest.natural_length_m, 2) + std::pow(nearest.stiffness_n_per_m, 2) +
            std::pow(nearest.damping_ns_per_m, 2) + std::pow(nearest.critical_elongation, 2)),
@@ -154,7 +155,7 @@ TEST(Louchet5, HasTheDerivativesOfBothWays) {
       1e-9);
   EXPECT_LT(error(louchet5_by_springs(), differences(set_at, to_vector(random_springs(uniform)))),
             1e-9);
-  // There and back is the same set.
+  // The way there and back leads to the same set.
   EXPECT_LT(
       (louchet5_by_springs() * springs_by_louchet5() - Eigen::Matrix<double, 5, 5>::Identity())
           .norm(),
@@ -225,7 +226,7 @@ TEST(FabricConversion, IsTheNearestThereIs) {
   springs.critical_elongation = SpringParameters::kNoLimit;
   const Nearest<Fabric> nearest = nearest_fabric(springs, kSevenByNine);
   ASSERT_TRUE(nearest.usable());
-  // In stiffnesses first, then in dampings.
+  // Squares are least in stiffnesses first, then in dampings.
   const auto squares = [&](const FabricVector& numbers, SpringBlock block) {
     return (to_vector(spring_parameters(fabric_of(numbers), kSevenByNine)) - to_vector(springs))
         .segment<6>(block)
@@ -283,7 +284,7 @@ TEST(FabricConversion, HasTheDerivativesOfBothWays) {
     const Eigen::MatrixXd difference = differences(fabric_at, to_vector(springs));
     EXPECT_LT(error(derivative.topRows<5>(), difference.topRows<5>()), 1e-8);
     EXPECT_LT(error(derivative.bottomRows<2>(), difference.bottomRows<2>()), 1e-6);
-    // There and back is the same fabric.
+    // The way there and back leads to the same fabric.
     const SpringParameters own = spring_parameters(fabric, kSevenByNine);
     EXPECT_LT((fabric_by_springs(own) * springs_by_fabric(fabric) -
                Eigen::Matrix<double, 7, 7>::Identity())

@@ -4,8 +4,8 @@
 
 namespace clothfit {
 
-/// The springs themselves as a law, k (l - l0) + c dl/dt: a second route to what the kernel
-/// computes, with derivatives.
+/// The springs themselves as a law, k (l - l0) + c dl/dt. It is a second route to the kernel's
+/// result, with derivatives.
 struct PlainSprings {
   static constexpr int kParameters = 0, kMemory = 0;
 

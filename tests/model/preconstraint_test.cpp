@@ -1,4 +1,4 @@
-// Flexion springs that are longer than twice the structural ones give a cloth planar rigidity
+// Checks that flexion springs longer than twice the structural ones give a cloth planar rigidity
 // [louchet1995, section 2.1]. Not checked here: the springs' forces (cloth_sweep_test.cpp).
 
 #include <gtest/gtest.h>
@@ -16,12 +16,12 @@ namespace {
 
 constexpr int kAlong = 11;  ///< vertices along the strip
 constexpr double kSpacing_m = 0.02;
-constexpr double kMass_kg = 4e-5;  ///< of a vertex: 0.1 kg/m^2
+constexpr double kMass_kg = 4e-5;  ///< mass of a vertex: 0.1 kg/m^2
 constexpr double kTension_n_per_m = 400;
 constexpr double kFlexion_n_per_m = 20;
 constexpr double kGravity_m_per_s2 = 0.02;  ///< sags the strip by about a hundredth of its length
 
-/// A strip of three vertices across, clamped at its first two rows, whose flexion springs along it
+/// A strip of three vertices across, clamped at its first two rows. Its flexion springs along it
 /// are `share` longer than twice the spacing. It has no shear springs: each of its three chains
 /// bends for itself, and all alike.
 struct Strip {
@@ -59,7 +59,7 @@ struct Strip {
     return along_t ? cloth.mesh.vertex(n, across) : cloth.mesh.vertex(across, n);
   }
 
-  /// Where the strip is after `duration_s` under a weight across its plane.
+  /// Returns the strip after `duration_s` under a weight across its plane.
   Eigen::Matrix3Xd after(double duration_s, double gravity_m_per_s2) const {
     ParameterSet loaded = set;
     loaded.gravity_m_per_s2 = {0, 0, -gravity_m_per_s2};
@@ -85,9 +85,10 @@ TEST(Preconstraint, GivesAStripTheBendingStiffnessOfTheTheory) {
 
     const double sag_m = strip.sag_m(strip.after(12, kGravity_m_per_s2));
 
-    // A chain of rigid links with a hinge at every inner vertex: where links p and q meet at an
-    // angle, the flexion spring across them, pushing with C, is shorter by p q angle^2 / (2 (p +
-    // q)), which makes it a hinge of stiffness C p q / (p + q). Statics do the rest.
+    // The strip is a chain of rigid links with a hinge at every inner vertex. Links p and q meet at
+    // an angle there, and the flexion spring across them pushes with C. It is shorter by p q
+    // angle^2 / (2 (p + q)), which makes it a hinge of stiffness C p q / (p + q). Statics do the
+    // rest.
     double expected_m = 0, bending_n_m = 0;
     for (int hinge = 1; hinge < kAlong - 1; ++hinge) {
       const double p = place_m(hinge) - place_m(hinge - 1);
@@ -101,12 +102,12 @@ TEST(Preconstraint, GivesAStripTheBendingStiffnessOfTheTheory) {
       bending_n_m += stiffness_n_m / (kAlong - 2);
     }
     ASSERT_GT(sag_m, 1e-3);
-    // Small angles: the sag is two hundredths of the length, squared 4e-4. Swaying has died down to
-    // exp(-2 * 12) of it.
+    // Angles are small: the sag is two hundredths of the length, squared 4e-4. Swaying has died
+    // down to exp(-2 * 12) of it.
     EXPECT_NEAR(sag_m, expected_m, 2e-3 * expected_m);
 
-    // As a continuum: B = k45 (l45 - 2 a) a / 2 (N m). Each structural spring holds two flexion
-    // springs back and is stretched by them, which takes 4 k45 / k01 of what they push away again.
+    // As a continuum it has B = k45 (l45 - 2 a) a / 2 (N m). Each structural spring holds two
+    // flexion springs back and is stretched by them, which removes 4 k45 / k01 of their push again.
     const double theory_n_m = kFlexion_n_per_m * (2 * kSpacing_m * share) * kSpacing_m / 2;
     const double held_back = 1 + 4 * kFlexion_n_per_m / kTension_n_per_m;
     EXPECT_NEAR(bending_n_m, theory_n_m / held_back, 0.04 * theory_n_m);  // the ends, and a' > a

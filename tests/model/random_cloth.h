@@ -8,7 +8,8 @@
 
 namespace clothfit {
 
-/// Uniform numbers that are the same with every standard library (its distributions are not).
+/// Draws uniform numbers that are the same with every standard library, whose distributions are
+/// not.
 class Uniform {
  public:
   explicit Uniform(std::uint64_t seed) : rng_(seed) {}
@@ -29,7 +30,7 @@ class Uniform {
   std::mt19937_64 rng_;
 };
 
-/// A cloth of the size and make of the bundled recordings': 0.4 m, 25 g, cotton-like.
+/// Makes the mesh of the bundled recordings' cloth: 0.4 m, 25 g, cotton-like.
 inline Mesh square_mesh(int vertices_per_side) {
   return {.columns = vertices_per_side, .rows = vertices_per_side, .width_m = 0.4, .height_m = 0.4};
 }
@@ -61,14 +62,15 @@ inline Fabric random_fabric(Uniform& uniform) {
           .damping_weft_s = uniform(0, 3e-3)};
 }
 
-/// The flat cloth with every vertex moved by up to `share` of a spacing, in all three directions.
+/// Returns the flat cloth with every vertex moved by up to `share` of a spacing, in all three
+/// directions.
 inline Eigen::Matrix3Xd crumpled(const Mesh& mesh, double share, Uniform& uniform) {
   return flat_positions(mesh) +
          uniform.vectors(mesh.vertex_count(),
                          share * std::min(mesh.spacing_s_m(), mesh.spacing_t_m()));
 }
 
-/// The flat cloth hung up: s to the right along x, t down along -z.
+/// Returns the flat cloth hung up: s to the right along x, t down along -z.
 inline Eigen::Matrix3Xd hung_flat(const Mesh& mesh) {
   const Eigen::Matrix3Xd flat = flat_positions(mesh);
   Eigen::Matrix3Xd hung(3, flat.cols());

@@ -9,7 +9,8 @@ namespace clothfit {
 
 namespace {
 
-/// 1 / sqrt(x) as the model defines it: a guess from the exponent's bits and four Newton steps.
+/// Computes 1 / sqrt(x) as the model defines it: a guess from the exponent's bits and four Newton
+/// steps.
 double inverse_square_root(double x) {
   x = std::max(x, 1e-290);
   double y = std::bit_cast<double>(0x5fe6eb50c7b537a9 - (std::bit_cast<std::int64_t>(x) >> 1));
@@ -22,7 +23,7 @@ double inverse_square_root(double x) {
 Eigen::Matrix3Xd reference_spring_forces(const Mesh& mesh, const SpringParameters& springs,
                                          const Eigen::Matrix3Xd& position_m,
                                          const Eigen::Matrix3Xd& velocity_m_per_s) {
-  // What the spring of each type exerts on the vertex that it leaves to the right or down.
+  // Forces of the spring of each type on the vertex that it leaves to the right or down.
   std::array<Eigen::Matrix3Xd, kSpringTypes> leaving;
   const SpringNet net = make_springs(mesh);
   for (size_t type = 0; type < kSpringTypes; ++type) {

@@ -9,12 +9,12 @@
 
 namespace clothfit {
 
-/// A fabric of which only the structural springs along t pull.
+/// Makes a fabric of which only the structural springs along t pull.
 inline SpringParameters warp_springs(const Mesh& mesh, double stiffness_n_per_m) {
   return spring_parameters({.tension_warp_n_per_m = stiffness_n_per_m}, mesh);
 }
 
-/// A ribbon of two columns whose rows are put where a test wants them, with an effect that answers
+/// A ribbon of two columns whose rows are put at a test's places. It has an effect that answers
 /// with tensions and remembers.
 class DrivenRibbon {
  public:
@@ -29,8 +29,8 @@ class DrivenRibbon {
 
   double natural_length_m() const { return cloth_.mesh.spacing_t_m(); }
 
-  /// One step: the effect's tension in each spring of the first column (N), when these have these
-  /// elongations (ratios), which grow at these rates (1/s).
+  /// Takes one step: returns the effect's tension in each spring of the first column (N). The
+  /// springs have these elongations (ratios), which grow at these rates (1/s).
   Eigen::VectorXd tensions_n(const Eigen::VectorXd& elongation, const Eigen::VectorXd& rate_per_s,
                              double time_step_s) {
     const Mesh& mesh = cloth_.mesh;
@@ -55,7 +55,7 @@ class DrivenRibbon {
     for (int i = 0; i < mesh.rows - 1; ++i) tension_n[i] = sum_n += f.y(0, mesh.vertex(i, 0));
     return tension_n;
   }
-  /// The same for a single spring.
+  /// Does the same for a single spring.
   double tension_n(double elongation, double rate_per_s, double time_step_s) {
     return tensions_n(Eigen::VectorXd::Constant(1, elongation),
                       Eigen::VectorXd::Constant(1, rate_per_s), time_step_s)[0];
@@ -92,7 +92,7 @@ class SpringOscillator {
     set_.start_position_m.row(1).tail<2>().array() += extension_m;
   }
 
-  /// The extension (m) at the start and after each of `steps` steps.
+  /// Returns the extension (m) at the start and after each of `steps` steps.
   std::vector<double> extensions_m(double time_step_s, int steps) const {
     SteppedCloth<> run(cloth_, set_, at_rest(set_.start_position_m));
     std::vector<double> extension_m{run.position_m()(1, 2) - kLength_m};

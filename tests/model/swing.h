@@ -29,7 +29,7 @@ struct Swing {
   }
 };
 
-/// Something for every effect to remember.
+/// Returns something for every effect to remember.
 inline std::vector<Eigen::VectorXd> random_memory(const Cloth& cloth, Uniform& uniform) {
   std::vector<Eigen::VectorXd> memory;
   for (const std::shared_ptr<const Effect>& effect : cloth.effects) {
@@ -39,8 +39,8 @@ inline std::vector<Eigen::VectorXd> random_memory(const Cloth& cloth, Uniform& u
   return memory;
 }
 
-/// The swing under one more effect, some typical changes away from neutral, that remembers
-/// something where it remembers.
+/// Makes the swing under one more effect, some typical changes away from neutral. It remembers
+/// something where it has a memory.
 inline Swing swing_under(const EffectEntry& entry, Uniform& uniform) {
   Swing swing(uniform);
   add_effect(swing.cloth, entry.name, "test");
@@ -51,17 +51,17 @@ inline Swing swing_under(const EffectEntry& entry, Uniform& uniform) {
   return swing;
 }
 
-/// A law that a cloth may come to have, of which one parameter says how much.
+/// An effect that a cloth may come to have, with its amplitude.
 struct EmergingLaw {
   const char* effect;
   const char* amplitude;
 };
 
-/// The way from neutral along a law's amplitude: of a cloth that does not have the effect, and of
-/// the same cloth with the effect behind its own ones, at its neutral values.
+/// The way from neutral along a law's amplitude for two cloths. One does not have the effect. The
+/// other is the same cloth with the effect behind its own ones, at its neutral values.
 struct TwoWays {
   Direction emerging, present;
-  Cloth cloth;       ///< that has the effect
+  Cloth cloth;       ///< the one that has the effect
   ParameterSet set;  ///< its own
 
   TwoWays(const Cloth& without, const ParameterSet& own, const EmergingLaw& law)

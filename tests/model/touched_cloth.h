@@ -8,8 +8,8 @@
 
 namespace clothfit {
 
-/// A hilly ground through z = 0, of triangles, 1.4 m on a side: hills and valleys 4 cm apart in
-/// height, so that points below it are nearest to faces, edges and corners.
+/// Makes a hilly ground of triangles, 1.4 m on a side, about z = 0. Tops and hollows are 4 cm apart
+/// in height, so that points below it are nearest to faces, edges and corners.
 inline TriangleMesh hilly_ground() {
   constexpr int kSide = 8;
   TriangleMesh mesh{Eigen::Matrix3Xd(3, kSide * kSide),
@@ -28,15 +28,15 @@ inline TriangleMesh hilly_ground() {
   return mesh;
 }
 
-/// A cloth with whatever else an effect may act on.
+/// Makes a cloth with whatever else an effect may act on.
 inline Cloth touched_cloth(int vertices_per_side) {
   Cloth cloth = square_cloth(vertices_per_side);
   cloth.obstacle = std::make_shared<const Obstacle>(hilly_ground());
   return cloth;
 }
 
-/// Two points of the cloth that drift, each its own way, from where the flat cloth has them: for
-/// effects that act on driven points.
+/// Returns two points of the cloth that drift, each its own way, from their places in the flat
+/// cloth. They serve effects that act on driven points.
 inline std::vector<HeldVertexWeights> drifting_points(const Mesh& mesh) {
   std::vector<HeldVertexWeights> held = {held_at(mesh, 0, 0), held_at(mesh, 0.31, 0.02)};
   held[0].motion = [](double time_s) { return Eigen::Vector3d(0.05 * time_s, 0.02 * time_s, 0); };
@@ -46,7 +46,7 @@ inline std::vector<HeldVertexWeights> drifting_points(const Mesh& mesh) {
   return held;
 }
 
-/// The flat cloth folded in two along t, layers `gap_m` apart.
+/// Returns the flat cloth folded in two along t, layers `gap_m` apart.
 inline Eigen::Matrix3Xd folded(const Mesh& mesh, double gap_m) {
   Eigen::Matrix3Xd shape = flat_positions(mesh);
   for (Eigen::Index k = 0; k < shape.cols(); ++k) {
@@ -57,8 +57,8 @@ inline Eigen::Matrix3Xd folded(const Mesh& mesh, double gap_m) {
   return shape;
 }
 
-/// A crumpled cloth on which the effect has something to act on: one that is folded, and crumpled
-/// less so that its layers still meet, where an effect is about cloth that touches itself.
+/// Returns a crumpled cloth on which the effect can act. For an effect of cloth that touches itself
+/// it is folded, and crumpled less so that its layers still meet.
 inline Eigen::Matrix3Xd crumpled_for(const std::string& effect, const Mesh& mesh, double share,
                                      Uniform& uniform) {
   if (effect != "self_contact") return crumpled(mesh, share, uniform);

@@ -1,5 +1,5 @@
-// The whole path from a moving sheet over rendered pictures to tracks, against the truth. Single
-// pictures are in render_cloth_test.cpp; tracking of pictures from another program is in
+// Checks the whole path from a moving sheet over rendered pictures to tracks, against the truth.
+// Single pictures are in render_cloth_test.cpp; tracking of pictures from another program is in
 // track_test.cpp.
 
 #include <gtest/gtest.h>
@@ -19,7 +19,7 @@ namespace {
 
 constexpr double kWidth_m = 0.24;
 
-/// A sheet that swings and waves gently: up to 3 px from frame to frame.
+/// Returns a sheet that swings and waves gently: up to 3 px from frame to frame.
 PlacedSheet swinging(const SheetPrint& print, int frame) {
   const double phase = 0.25 * frame;
   return place_sheet(print, 97, [&](double s, double t) {
@@ -87,8 +87,8 @@ TEST(RenderedTrack, FindsTheMarkersOfASwingingSheetWithinTheStatedSigma) {
   EXPECT_GE(good, 0.99 * seen);
   EXPECT_LT(mean_px.cwiseAbs().maxCoeff(), 0.003);  // 768 corners of 0.012 px: 0.0005
   EXPECT_LT(rms_px, 0.02);
-  // 1536 numbers, four corners of a tag not independent: within 0.06 of what it is. Nearly flat
-  // tags find the allowance for bending idle, and their sigma a fifth too large.
+  // There are 1536 numbers, four corners of a tag not independent: within 0.06 of the true value.
+  // Nearly flat tags find the allowance for bending idle, and their sigma a fifth too large.
   EXPECT_GT(chi2, 0.5);
   EXPECT_LT(chi2, 1.5);
 }

@@ -50,13 +50,14 @@ Eigen::Vector3d on_surface(double x, double y, double radius) {
   return {radius * std::sin(x / radius), y, radius * (1 - std::cos(x / radius))};
 }
 
-/// Tag coordinates where a ray (in tag axes) meets the sheet on the side that faces the camera.
+/// Returns tag coordinates where a ray (in tag axes) meets the sheet on the side that faces the
+/// camera.
 Eigen::Vector2d meet(const Eigen::Vector3d& from, const Eigen::Vector3d& along, double radius) {
   if (std::isinf(radius)) {
     const Eigen::Vector3d at = from - from.z() / along.z() * along;
     return at.head<2>();
   }
-  // |(x, z - radius)| = radius; the nearer of the two places.
+  // The place satisfies |(x, z - radius)| = radius; the nearer of the two places is taken.
   const Eigen::Vector2d o(from.x(), from.z() - radius), d(along.x(), along.z());
   const double a = d.squaredNorm(), b = o.dot(d), c = o.squaredNorm() - radius * radius;
   const double root = b * b - a * c;

@@ -9,19 +9,19 @@
 
 namespace clothfit {
 
-/// The corners of `across` x `across` tags of tag36h11 on a square sheet, row by row; a tag is 0.72
-/// of the spacing wide, as on the bundled cloth.
+/// Returns the corners of `across` x `across` tags of tag36h11 on a square sheet, row by row. A tag
+/// is 0.72 of the spacing wide, as on the bundled cloth.
 MarkerSet tag_markers(int across, double width_m);
 
-/// A sheet with `columns` x `columns` vertices at `shape`(s, t).
+/// Places a sheet with `columns` x `columns` vertices at `shape`(s, t).
 PlacedSheet place_sheet(const SheetPrint& print, int columns,
                         const std::function<Eigen::Vector3d(double, double)>& shape);
 
-/// World axes for a sheet that hangs: x to the right, z up; the camera at (0, -distance, 0) looks
-/// along y, its pixel (width - 1, height - 1) / 2 on the axis.
+/// Returns a camera in world axes for a sheet that hangs: x to the right, z up. The camera at (0,
+/// -distance, 0) looks along y, its pixel (width - 1, height - 1) / 2 on the axis.
 CameraParameters camera_before(double distance_m, double focal_px, int width_px, int height_px);
 
-/// A flat sheet around the origin that faces that camera; use with place_sheet.
+/// Returns a flat sheet around the origin that faces that camera; use with place_sheet.
 std::function<Eigen::Vector3d(double, double)> hanging_flat(double width_m);
 
 }  // namespace clothfit

@@ -1,4 +1,4 @@
-// Inertia of air along the surface's normal.
+// Checks the inertia of air along the surface's normal.
 
 #include "model/effects/added_air_mass.h"
 
@@ -37,7 +37,7 @@ TEST(AddedAirMass, SlowsASheetThatFallsFlatAndNoneThatFallsEdgeOn) {
 }
 
 TEST(AddedAirMass, MakesATiltedSheetGlide) {
-  // n . a = g m cos / (m + mu A), across the normal g sin: it slides sideways as it falls.
+  // With n . a = g m cos / (m + mu A), across the normal g sin, it slides sideways as it falls.
   const double mu = 0.1;
   const Eigen::Matrix3d tilt = Eigen::AngleAxisd(0.5, Eigen::Vector3d::UnitY()).toRotationMatrix();
   const Eigen::Vector3d n = tilt.col(2), g(0, 0, -9.81);
@@ -51,14 +51,13 @@ TEST(AddedAirMass, MakesATiltedSheetGlide) {
 }
 
 TEST(AddedAirMass, KeepsTheMomentumOfClothAndAirThatNothingActsOn) {
-  // A flat sheet that ripples along its normal: springs pull along the sheet and, to first order,
-  // across it. In a sheet whose normals stay put the momentum is (m + mu A) v along n and m v
-  // across.
+  // A flat sheet ripples along its normal: springs pull along the sheet and, to first order, across
+  // it. In a sheet whose normals stay put the momentum is (m + mu A) v along n and m v across.
   const double mu = 0.1, h = 2e-4;
   ClothWithEffect sheet = in_air(mu, lying());
   sheet.set.gravity_m_per_s2.setZero();
   Uniform uniform(1);
-  // In the plane only, so that the normals are e_z; and all of it moves along e_z.
+  // Vertices are moved in the plane only, so that the normals are e_z; all of it moves along e_z.
   sheet.set.start_velocity_m_per_s = uniform.vectors(25, 0.3);
   sheet.set.start_velocity_m_per_s.row(2).setConstant(0.7);
   const Eigen::Vector3d before =
@@ -72,7 +71,7 @@ TEST(AddedAirMass, KeepsTheMomentumOfClothAndAirThatNothingActsOn) {
 }
 
 TEST(AddedAirMass, DividesAForceAlongTheNormalByBothMasses) {
-  // F' / m = F / (m + mu A) for a force along the normal, whatever gravity does beside it.
+  // F' / m = F / (m + mu A) holds for a force along the normal, whatever gravity does beside it.
   const double mu = 0.3;
   ClothWithEffect sheet = in_air(mu, lying());
   add_effect(sheet.cloth, "wind", "test");

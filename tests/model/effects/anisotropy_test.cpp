@@ -1,4 +1,4 @@
-// Warp against weft. Not checked here: what the fabric's own stiffnesses do (fabric_test.cpp).
+// Checks warp against weft. Not checked here: the fabric's own stiffnesses (fabric_test.cpp).
 
 #include "model/effects/anisotropy.h"
 
@@ -14,7 +14,7 @@ TEST(Anisotropy, KeepsTheContractOfEffects) {
 }
 
 TEST(Anisotropy, IsAFabricWithStifferWarpAndSofterWeft) {
-  // Two routes to one force: the effect on cotton, and the fabric that its definition names.
+  // Two routes lead to one force: the effect on cotton, and the fabric that its definition names.
   for (const double a : {0.4, -0.7}) {
     Uniform uniform(2);
     effect_contract::State state(uniform);
@@ -40,7 +40,7 @@ TEST(Anisotropy, IsAFabricWithStifferWarpAndSofterWeft) {
 TEST(Anisotropy, AStripUnderLoadStretchesByLoadOverStiffness) {
   DrivenRibbon ribbon(2, 40, "anisotropy", {0.5});
 
-  // Of T = k (1 + a) dl the effect's part.
+  // This is the effect's part of T = k (1 + a) dl.
   EXPECT_NEAR(ribbon.tension_n(0.03, 0, 1e-3), 0.5 * 40 * 0.03 * 0.4, 1e-15);
 }
 

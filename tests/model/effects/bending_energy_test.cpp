@@ -1,5 +1,5 @@
-// Bending stiffness of a plate. Not checked here: that a whole cloth moves alike on several meshes
-// (mesh_refinement_test.cpp).
+// Checks the bending stiffness of a plate. Not checked here: that a whole cloth moves alike on
+// several meshes (mesh_refinement_test.cpp).
 
 #include "model/effects/bending_energy.h"
 
@@ -25,7 +25,8 @@ Eigen::Matrix3Xd forces_n(const Cloth& cloth, const Eigen::Matrix3Xd& position_m
   return effect_contract::force_n(find_effect("bending_energy", "test"), state, {kB_nm});
 }
 
-/// The energy (J), from the forces: they are linear in the positions, f = -K x and E = x K x / 2.
+/// Returns the energy (J) from the forces, which are linear in the positions: f = -K x and E = x K
+/// x / 2.
 double energy_j(const Cloth& cloth, const Eigen::Matrix3Xd& position_m) {
   return -0.5 * forces_n(cloth, position_m).cwiseProduct(position_m).sum();
 }
@@ -81,8 +82,8 @@ TEST(BendingEnergy, OfACylinderIsHalfTheStiffnessOverTheRadiusSquaredPerArea) {
 
       const double energy = energy_j(cloth, rolled);
 
-      // Half a spacing along each free edge carries no moment; the polygon's second difference is
-      // 2 R (1 - cos(a / R)) / a^2 of the circle's 1 / R.
+      // Half a spacing along each free edge carries no moment. The polygon's second difference is 2
+      // R (1 - cos(a / R)) / a^2 of the circle's 1 / R.
       const double a = mesh.spacing_t_m(), share = (rows - 2.0) / (rows - 1);
       const double chord = 2 * (1 - std::cos(a / radius_m)) * radius_m * radius_m / (a * a);
       const double circle = kB_nm / (2 * radius_m * radius_m) * 0.16;
@@ -92,7 +93,7 @@ TEST(BendingEnergy, OfACylinderIsHalfTheStiffnessOverTheRadiusSquaredPerArea) {
 }
 
 TEST(BendingEnergy, OfATwistedSheetIsTheStiffnessTimesItsTwistSquared) {
-  // z = w s t: x_st = w, counted twice in E = B / 2 (... + 2 x_st^2), the same on every mesh.
+  // For z = w s t, x_st = w counts twice in E = B / 2 (... + 2 x_st^2), the same on every mesh.
   const double twist_per_m = 3;
   for (const int rows : {5, 11}) {
     const Cloth cloth = sheet(7, rows);
@@ -103,8 +104,8 @@ TEST(BendingEnergy, OfATwistedSheetIsTheStiffnessTimesItsTwistSquared) {
   }
 }
 
-/// Sag (m) of the free end of a horizontal ribbon of 0.4 m whose first two rows are held, under its
-/// weight per area, from the effect's own derivatives: K w = load.
+/// Returns the sag (m) of the free end of a horizontal ribbon of 0.4 m under its weight per area.
+/// Its first two rows are held. The sag follows from the effect's own derivatives: K w = load.
 double sag_m(int rows, double load_n_per_m2) {
   const Mesh mesh{.columns = 3, .rows = rows, .width_m = 0.1, .height_m = 0.4};
   const Cloth cloth = Cloth::of(mesh, masses_by_area(mesh, 0.01));
@@ -124,8 +125,8 @@ double sag_m(int rows, double load_n_per_m2) {
 }
 
 TEST(BendingEnergy, AClampedRibbonSagsLikeABeam) {
-  // Bernoulli's beam: q L^4 / (8 B b) with q b the load per length. Two held rows clamp the ribbon
-  // in the middle between them: L = 0.4 m less half a spacing.
+  // Bernoulli's beam sags by q L^4 / (8 B b) with q b the load per length. Two held rows clamp the
+  // ribbon in the middle between them: L = 0.4 m less half a spacing.
   const double load_n_per_m2 = 1e-4;
   const auto beam_m = [&](double length_m) {
     return load_n_per_m2 * std::pow(length_m, 4) / (8 * kB_nm);
@@ -137,7 +138,7 @@ TEST(BendingEnergy, AClampedRibbonSagsLikeABeam) {
 
     const double sag = sag_m(rows, load_n_per_m2);
 
-    // The discrete beam in closed form: moments are exact, and sum to q (L (L - a))^2 / (8 B b).
+    // The discrete beam has a closed form: moments are exact, and sum to q (L (L - a))^2 / (8 B b).
     EXPECT_NEAR(sag, load_n_per_m2 * std::pow(0.4 * (0.4 - a), 2) / (8 * kB_nm), 1e-9 * sag);
     const double error = std::abs(sag / beam_m(0.4 - a / 2) - 1);
     if (coarser > 0) {
@@ -149,7 +150,7 @@ TEST(BendingEnergy, AClampedRibbonSagsLikeABeam) {
 }
 
 TEST(BendingEnergy, TheStepThatItsRatesAllowIsStableAndTwiceItIsNot) {
-  // A cloth that is bending stiffness and little else.
+  // This cloth is bending stiffness and little else.
   const Mesh mesh = square_mesh(17);
   Cloth cloth = Cloth::of(mesh, masses_by_area(mesh, 0.025));
   cloth.held = {held_at(mesh, 0, 0), held_at(mesh, 0.4, 0)};

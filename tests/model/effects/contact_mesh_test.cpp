@@ -1,4 +1,4 @@
-// Contact with an obstacle of triangles. Not checked here: the search for what is nearest
+// Checks contact with an obstacle of triangles. Not checked here: the search for the nearest part
 // (obstacle_test.cpp), friction and damping (contact_plane_test.cpp).
 
 #include "model/effects/contact_mesh.h"
@@ -25,7 +25,7 @@ Cloth above(const Cloth& bare, const TriangleMesh& mesh) {
   return cloth;
 }
 
-/// A square of 2 m in the plane through `point` normal to `turn`'s third column.
+/// Returns a square of 2 m in the plane through `point` normal to `turn`'s third column.
 TriangleMesh square(const Eigen::Matrix3d& turn, const Eigen::Vector3d& point) {
   TriangleMesh mesh{Eigen::Matrix3Xd(3, 4), Eigen::Matrix3Xi(3, 2)};
   mesh.vertex_m << -1, 1, 1, -1, -1, -1, 1, 1, 0, 0, 0, 0;
@@ -82,7 +82,7 @@ TEST(ContactMesh, OfAFinelyCutBallComesToContactWithABall) {
     EXPECT_LT(difference, 0.6 * before);
     before = difference;
   }
-  // Sides of 7 mm lie within 0.05 mm of the ball, of some 3 mm of depth, and lean by up to 3 %.
+  // Sides of 7 mm lie within 0.05 mm of the ball, at some 3 mm of depth, and lean by up to 3 %.
   EXPECT_LT(before, 0.05);
 }
 
@@ -114,7 +114,7 @@ TEST(ContactMesh, ASheetComesToRestOnHillsAndIsCarried) {
 
   const auto rest = sheet.after(3000, 0.8 * stable_time_step_s(sheet.cloth, sheet.set));
 
-  // Some creeping is left, and accelerations of a percent of gravity with it.
+  // Some creeping remains, and accelerations of a percent of gravity with it.
   EXPECT_NEAR(sheet.force_n(rest.position_m, rest.velocity_m_per_s).row(2).sum(), 0.025 * 9.81,
               0.01 * 0.025 * 9.81);
 }

@@ -1,4 +1,4 @@
-// Contact with a plane, and the law of contact that all obstacles share (contact_law.h).
+// Checks contact with a plane, and the law of contact that all obstacles share (contact_law.h).
 
 #include "model/effects/contact_plane.h"
 

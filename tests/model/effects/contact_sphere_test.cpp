@@ -1,4 +1,4 @@
-// Contact with a ball. Not checked here: friction and damping (contact_plane_test.cpp).
+// Checks contact with a ball. Not checked here: friction and damping (contact_plane_test.cpp).
 
 #include "model/effects/contact_sphere.h"
 
@@ -57,12 +57,12 @@ TEST(ContactSphere, ASheetDroppedOnItsTopDrapesSymmetrically) {
       lopsided_m = std::max(lopsided_m, (here - mirrored).norm());
     }
   }
-  // Rounding, which buckling may enlarge.
+  // The tolerance is rounding, which buckling may enlarge.
   EXPECT_LT(lopsided_m, 1e-7);
 }
 
 TEST(ContactSphere, TakesUpTheWeightOfWhatComesToRestOnIt) {
-  // A small sheet on a large ball: what the ball pushes it with must carry its weight.
+  // A small sheet lies on a large ball: the ball's push must carry its weight.
   const Mesh mesh{.columns = 5, .rows = 5, .width_m = 0.1, .height_m = 0.1};
   const Cloth bare = Cloth::of(mesh, masses_by_area(mesh, 0.002));
   Eigen::Matrix3Xd start = flat_positions(mesh);

@@ -1,4 +1,4 @@
-// An empirical force per mass.
+// Checks an empirical force per mass.
 
 #include "model/effects/force_law.h"
 
@@ -21,7 +21,7 @@ std::vector<double> coefficients(const std::map<std::string, double>& named) {
   return values;
 }
 
-/// The force of some terms on a moving, crumpled cloth, 3 x vertices (N).
+/// Returns the force of some terms on a moving, crumpled cloth, 3 x vertices (N).
 class CrumpledCloth {
  public:
   explicit CrumpledCloth(unsigned seed) {
@@ -113,7 +113,7 @@ TEST(ForceLaw, PushesAlongTheAxesEveryVertexAlike) {
 TEST(ForceLaw, OverTheClothAndWithTheHeightRunsInStraightLines) {
   CrumpledCloth cloth(6);
   const Mesh& mesh = cloth.bare.mesh;
-  // Upright: t runs down, so that the height is -t.
+  // The cloth is upright: t runs down, so that the height is -t.
   cloth.position_m = upright() * flat_positions(mesh);
   const double height_at_top = cloth.position_m(2, 0);
   const double height_at_bottom = cloth.position_m(2, mesh.vertex(mesh.rows - 1, 0));

@@ -1,4 +1,4 @@
-// A frame that shakes.
+// Checks a frame that shakes.
 
 #include "model/effects/frame_acceleration.h"
 
@@ -25,7 +25,7 @@ std::vector<double> parameters() {
           kPhase_turns};
 }
 
-/// Where the frame is after each step of the scheme, V += h a, P += h V, from rest.
+/// Returns the frame's place after each step of the scheme, V += h a, P += h V, from rest.
 std::vector<Eigen::Vector3d> frame_places_m(int steps, double h) {
   std::vector<Eigen::Vector3d> places = {Eigen::Vector3d::Zero()};
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
@@ -81,7 +81,7 @@ TEST(FrameAcceleration, IsWhatMovingSupportsLookLikeFromTheMovingFrame) {
   const Eigen::Matrix3Xd seen = shaken.after(steps, h).position_m;
   const Eigen::Matrix3Xd world = carried.after(steps, h).position_m;
   EXPECT_GT((world - seen).cwiseAbs().maxCoeff(), 0.02);
-  // Rounding of 2000 steps, which crumpled cloth makes ten thousand times larger at most.
+  // Crumpled cloth makes the rounding of 2000 steps ten thousand times larger at most.
   EXPECT_LT((world.colwise() - frame.back() - seen).cwiseAbs().maxCoeff(), 1e-9);
 }
 

@@ -1,4 +1,4 @@
-// Gravity of another strength.
+// Checks gravity of another strength.
 
 #include "model/effects/gravity_scale.h"
 
@@ -26,7 +26,7 @@ TEST(GravityScale, IsGravityOfThatStrength) {
   const auto scaled = ClothWithEffect(bare, "gravity_scale", {0.25}, start).after(1000, h);
 
   EXPECT_GT((scaled.position_m - start).cwiseAbs().maxCoeff(), 0.1);
-  // 1000 steps of rounding, spread by the springs.
+  // The springs spread the rounding of 1000 steps.
   EXPECT_LT((scaled.position_m - stated.after(1000, h).position_m).cwiseAbs().maxCoeff(), 1e-10);
 }
 

@@ -1,4 +1,4 @@
-// Gravity in another direction.
+// Checks gravity in another direction.
 
 #include "model/effects/gravity_tilt.h"
 

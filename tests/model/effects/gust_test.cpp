@@ -1,4 +1,4 @@
-// Wind with one harmonic. Not checked here: drag, which wind has.
+// Checks wind with one harmonic. Not checked here: drag, which wind has.
 
 #include "model/effects/gust.h"
 

@@ -1,4 +1,4 @@
-// Dry friction inside the fabric.
+// Checks dry friction inside the fabric.
 
 #include "model/effects/hysteresis.h"
 
@@ -20,7 +20,8 @@ TEST(Hysteresis, KeepsTheContractOfEffects) {
 TEST(Hysteresis, ACycleLosesTheAreaOfItsParallelogram) {
   DrivenRibbon ribbon(2, kStiffness_n_per_m, "hysteresis", {kRatio, kYield});
   const double amplitude = 0.04;
-  // Up and down along straight lines, corners and slips on the grid: the trapezoids are exact.
+  // The path goes up and down along straight lines, corners and slips on the grid. The trapezoids
+  // are exact.
   constexpr int kQuarter = 40;
   std::vector<double> cycle;
   for (int n = 1; n <= 2 * kQuarter; ++n) cycle.push_back(amplitude * (1 - double(n) / kQuarter));
@@ -43,7 +44,7 @@ TEST(Hysteresis, ACycleLosesTheAreaOfItsParallelogram) {
 TEST(Hysteresis, ASmallOscillationLosesNothing) {
   DrivenRibbon ribbon(2, kStiffness_n_per_m, "hysteresis", {kRatio, kYield});
 
-  // Lengths of 0.4 m, rounded at 1e-16 m, times 28 N/m.
+  // Lengths of 0.4 m are rounded at 1e-16 m, times 28 N/m.
   for (const double e : {0.009, -0.003, 0.0, 0.01, -0.01}) {
     EXPECT_NEAR(ribbon.tension_n(e, 0, 1e-3),
                 kRatio * kStiffness_n_per_m * ribbon.natural_length_m() * e, 1e-14)
@@ -77,7 +78,8 @@ TEST(Hysteresis, AnOscillatorLosesTheSameOfItsAmplitudeInEveryCycle) {
 }
 
 TEST(Hysteresis, WhereItSticksItIsNoStifferThanItsRatesSay) {
-  // Crumpled less than the yield; the contract's cloth is crumpled beyond it, where all slips.
+  // The cloth is crumpled less than the yield. The contract's cloth is crumpled beyond it, where
+  // all slips.
   Uniform uniform(1);
   const Cloth cloth = square_cloth(6);
   const auto effect = hysteresis::make();

@@ -1,5 +1,5 @@
-// Natural lengths other than the stated ones. Not checked here: springs at ease at their natural
-// length (step_test.cpp), and that fits find a size again (no test does).
+// Checks natural lengths other than the stated ones. Not checked here: springs at ease at their
+// natural length (step_test.cpp), and that fits find a size again (no test does).
 
 #include "model/effects/natural_size.h"
 
@@ -15,7 +15,8 @@ TEST(NaturalSize, KeepsTheContractOfEffects) {
 }
 
 TEST(NaturalSize, IsAFabricWithOtherNaturalLengths) {
-  // Two routes to one force: the effect on cotton, and springs whose natural lengths were changed.
+  // Two routes lead to one force: the effect on cotton, and springs whose natural lengths were
+  // changed.
   Uniform uniform(3);
   effect_contract::State state(uniform);
   const Mesh& mesh = state.cloth.mesh;
@@ -37,7 +38,7 @@ TEST(NaturalSize, IsAFabricWithOtherNaturalLengths) {
 }
 
 TEST(NaturalSize, ASheetOfItsOwnSizeIsAtEase) {
-  // Shrunk alike in both directions, so that diagonals fit exactly.
+  // The cloth is shrunk alike in both directions, so that diagonals fit exactly.
   Uniform uniform(4);
   effect_contract::State state(uniform);
   const Mesh& mesh = state.cloth.mesh;

@@ -1,4 +1,4 @@
-// Search for points that are near each other.
+// Checks the search for points that are near each other.
 
 #include "model/effects/near_pairs.h"
 

@@ -1,4 +1,4 @@
-// Mass that is not spread as stated.
+// Checks mass that is not spread as stated.
 
 #include "model/effects/nonuniform_mass.h"
 
@@ -11,7 +11,7 @@
 namespace clothfit {
 namespace {
 
-constexpr double kUniformMass_kg = 0.025, kSide_m = 0.4;  // square_cloth's
+constexpr double kUniformMass_kg = 0.025, kSide_m = 0.4;  // those of square_cloth
 
 struct Masses {
   double hem = 0, hem_width = 0.01, hem_left = 0, hem_right = 0, hem_top = 0, hem_bottom = 0,
@@ -28,7 +28,8 @@ ClothWithEffect with(int vertices_per_side, const Masses& masses) {
   return {bare, "nonuniform_mass", masses.values(), flat_positions(bare.mesh)};
 }
 
-/// The masses (kg) that accelerate as if they were the vertices', from what becomes of a force.
+/// Returns the masses (kg) that accelerate as if they were the vertices', from the change of a
+/// force.
 Eigen::VectorXd true_mass_kg(const ClothWithEffect& cloth) {
   Uniform unused(0);
   effect_contract::State state(unused);
@@ -61,9 +62,9 @@ TEST(NonuniformMass, AHemWeighsTheSameOnEveryMesh) {
   }
 }
 
-// Vertices carry their hat functions' parts of the cloth, and these add up to what is constant or
-// linear over it: an edge weighs, and lies, as the band itself, also where the mesh is coarser than
-// the band is wide.
+// Vertices carry their hat functions' parts of the cloth. These add up to any constant or linear
+// function over it. An edge therefore weighs, and lies, as the band itself, also where the mesh is
+// coarser than the band is wide.
 TEST(NonuniformMass, AHeavyEdgeWeighsTheSameAndLiesAtTheSamePlaceOnEveryMesh) {
   for (const double width_m : {0.007, 0.03}) {
     const double band_kg = kUniformMass_kg * width_m / kSide_m;
@@ -118,7 +119,7 @@ TEST(NonuniformMass, GradientsShiftTheCentreOfMassAndKeepTheSum) {
   const Eigen::VectorXd mass = true_mass_kg(cloth);
 
   EXPECT_NEAR(mass.sum(), kUniformMass_kg, 1e-15);
-  // Of a side with unit density and slope, int x (x - 1/2) = 1/12; trapezoids on 8 intervals see
+  // For a side with unit density and slope, int x (x - 1/2) = 1/12. Trapezoids on 8 intervals give
   // 1/12 (1 + 2 / 64).
   const Eigen::Vector3d centre = cloth.set.start_position_m * mass / kUniformMass_kg;
   EXPECT_NEAR(centre.x() / kSide_m - 0.5, 0.4 / 12 * (1 + 2.0 / 64), 1e-14);
@@ -126,7 +127,7 @@ TEST(NonuniformMass, GradientsShiftTheCentreOfMassAndKeepTheSum) {
 }
 
 TEST(NonuniformMass, APatchWeighsAQuarterOfItsDisc) {
-  // int (1 - u^2)^3 dA = pi R^2 / 4.
+  // The patch's integral is int (1 - u^2)^3 dA = pi R^2 / 4.
   const Masses patch{.patch = 0.8, .patch_s = 0.55, .patch_t = 0.4, .patch_radius = 0.12};
 
   const double added = true_mass_kg(with(65, patch)).sum() - kUniformMass_kg;

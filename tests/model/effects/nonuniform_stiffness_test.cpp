@@ -1,4 +1,4 @@
-// Stiffness that varies over the cloth.
+// Checks stiffness that varies over the cloth.
 
 #include "model/effects/nonuniform_stiffness.h"
 
@@ -21,8 +21,9 @@ struct Pattern {
   }
 };
 
-/// Elongation (m) of a ribbon of `rows` rows under the tension of 1 N in each column: the sum over
-/// its springs, whose stiffness is read off the effect's tension at a common elongation.
+/// Returns the elongation (m) of a ribbon of `rows` rows under the tension of 1 N in each column.
+/// It sums over its springs, whose stiffness is read off the effect's tension at a common
+/// elongation.
 double stretch_m(const Pattern& pattern, int rows) {
   DrivenRibbon ribbon(rows, kUniform_n_per_m, "nonuniform_stiffness", pattern.values());
   const Eigen::VectorXd e = Eigen::VectorXd::Constant(rows - 1, 0.01);
@@ -37,7 +38,7 @@ TEST(NonuniformStiffness, KeepsTheContractOfEffects) {
 }
 
 TEST(NonuniformStiffness, AStripWithAGradientStretchesByTheIntegralOfItsCompliance) {
-  // integral over t in (0, 1) of 1 / (k (1 + g (2 t - 1))) = log((1 + g) / (1 - g)) / (2 g k).
+  // The integral over t in (0, 1) of 1 / (k (1 + g (2 t - 1))) is log((1 + g) / (1 - g)) / (2 g k).
   const double g = 0.6;
   const double exact = std::log((1 + g) / (1 - g)) / (2 * g) / kUniform_n_per_m;
 
@@ -58,7 +59,7 @@ TEST(NonuniformStiffness, SpringsInSeriesAreSofterThanTheirMean) {
 }
 
 TEST(NonuniformStiffness, APatchIsFullInItsCentreAndNothingOutside) {
-  // Where the ribbon's first column passes through the patch's centre, at t = 0.5.
+  // The ribbon's first column passes through the patch's centre, at t = 0.5.
   DrivenRibbon ribbon(22, kUniform_n_per_m, "nonuniform_stiffness",
                       Pattern{.patch = 2, .patch_s = 0, .patch_radius = 0.25}.values());
   const Eigen::VectorXd e = Eigen::VectorXd::Constant(21, 0.01);
@@ -86,13 +87,13 @@ TEST(NonuniformStiffness, AnEdgeIsFullAtTheBorderAndNothingInside) {
   };
 
   EXPECT_GT(force(0, 3).norm(), 0.01);
-  // Every spring of the inner vertex has its middle 0.2 or more from the border; those of the
+  // Every spring of the inner vertex has its middle 0.2 or more from the border. Those of the
   // border are at rest, to the rounding of their lengths.
   EXPECT_LT(force(2, 2).norm(), 1e-13);
 }
 
 TEST(NonuniformStiffness, SurvivesAChangeOfMesh) {
-  // The compliance of the whole strip, on meshes four times apart.
+  // The compliance is that of the whole strip, on meshes four times apart.
   const Pattern pattern{.patch = 3, .patch_s = 0, .edge = 1, .gradient_t = -0.3};
   const double fine = stretch_m(pattern, 129);
 

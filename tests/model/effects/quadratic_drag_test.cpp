@@ -1,4 +1,4 @@
-// Drag with the square of the speed.
+// Checks drag with the square of the speed.
 
 #include "model/effects/quadratic_drag.h"
 
@@ -22,7 +22,8 @@ TEST(QuadraticDrag, KeepsTheContractOfEffects) {
 }
 
 TEST(QuadraticDrag, AFallingSheetComesToTheSpeedAtWhichDragCarriesIt) {
-  // c v^2 A / 2 = m g, lying flat by normal drag, edge-on by tangential drag, on any mesh.
+  // At the end c v^2 A / 2 = m g, lying flat by normal drag, edge-on by tangential drag, on any
+  // mesh.
   const double c = 1.2;
   const Eigen::Vector3d expected(0, 0, -std::sqrt(2 * 9.81 * kSquareClothDensity_kg_per_m2 / c));
   for (const int vertices : {2, 5}) {

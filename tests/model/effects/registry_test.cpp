@@ -1,4 +1,4 @@
-// The table of effects. Not checked here: what each of them does (a file of its own in this
+// Checks the table of effects. Not checked here: each effect by itself (a file of its own in this
 // folder, with the contract in effect_contract.h).
 
 #include "model/effects/registry.h"

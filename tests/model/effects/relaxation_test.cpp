@@ -1,4 +1,4 @@
-// Stress that relaxes.
+// Checks stress that relaxes.
 
 #include "model/effects/relaxation.h"
 
@@ -17,7 +17,8 @@ TEST(Relaxation, KeepsTheContractOfEffects) {
   expect_effect_contract("relaxation", {.isotropic = true, .proportional = true, .internal = true});
 }
 
-/// The share of the arm's tension that is left of a sudden elongation after `steps` steps.
+/// Returns the share of the arm's tension that remains from a sudden elongation after `steps`
+/// steps.
 double left_after(double time_step_s, int steps) {
   DrivenRibbon ribbon(2, kAtOnce_n_per_m, "relaxation", {kRatio, kTime_s});
   double tension_n = 0;
@@ -62,7 +63,7 @@ TEST(Relaxation, IsASpringForFastMotionsAndNothingForSlowOnes) {
 }
 
 TEST(Relaxation, AnOscillatorLosesMostAtTheArmsOwnFrequency) {
-  // A standard linear solid: the loss is largest where frequency times time is about 1.
+  // In a standard linear solid the loss is largest where frequency times time is about 1.
   using Rig = SpringOscillator;
   const double period_time_s = std::sqrt(Rig::kMass_kg / Rig::kStiffness_n_per_m);
   const auto left = [&](double time_s) {

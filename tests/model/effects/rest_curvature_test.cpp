@@ -1,5 +1,5 @@
-// A cloth that wants to be curved. Not checked here: the bending stiffness that balances it
-// (bending_energy_test.cpp).
+// Checks a cloth whose rest shape is curved. Not checked here: the bending stiffness that balances
+// it (bending_energy_test.cpp).
 
 #include "model/effects/rest_curvature.h"
 
@@ -17,7 +17,7 @@ TEST(RestCurvature, KeepsTheContractOfEffects) {
   expect_effect_contract("rest_curvature", {.isotropic = true, .internal = true});
 }
 
-/// The energy written a second time, vertex by vertex.
+/// Writes the energy a second time, vertex by vertex.
 double energy_j(const Mesh& mesh, const Eigen::Matrix3Xd& x, double m_s, double m_t) {
   double energy = 0;
   for (int i = 0; i < mesh.rows; ++i) {
@@ -57,7 +57,8 @@ TEST(RestCurvature, ItsForceIsMinusTheEnergysGradient) {
     const double slope =
         (energy_j(state.cloth.mesh, up, m_s, m_t) - energy_j(state.cloth.mesh, down, m_s, m_t)) /
         (2 * step_m);
-    // Energies of 1e-4 J, rounded at 1e-20, over 2e-6 m; third derivatives as in the contract.
+    // Energies of 1e-4 J are rounded at 1e-20, over 2e-6 m; third derivatives are as in the
+    // contract.
     EXPECT_NEAR(f.reshaped()[n], -slope, 1e-7 * f.cwiseAbs().maxCoeff()) << n;
   }
 }
@@ -88,7 +89,7 @@ TEST(RestCurvature, AFreeStripWithBendingStiffnessRollsToMomentOverStiffness) {
   add_effect(cloth, "bending_energy", "test");
   add_effect(cloth, "rest_curvature", "test");
   add_effect(cloth, "viscous_damping", "test");
-  Fabric fabric = cotton();  // whose flexion springs would bear a part of the moment
+  Fabric fabric = cotton();  // its flexion springs would bear a part of the moment
   fabric.flexion_warp_n_per_m = fabric.flexion_weft_n_per_m = 0;
   const ParameterSet set{.springs = spring_parameters(fabric, mesh),
                          .gravity_m_per_s2 = Eigen::Vector3d::Zero(),

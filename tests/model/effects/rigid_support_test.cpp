@@ -1,4 +1,4 @@
-// Two driven supports on one rigid body.
+// Checks two driven supports on one rigid body.
 
 #include "model/effects/rigid_support.h"
 
@@ -16,7 +16,8 @@ TEST(RigidSupport, KeepsTheContractOfEffects) {
   expect_effect_contract("rigid_support", {});
 }
 
-/// Held at its upper corners, whose motions come closer and part by a tenth while they swing.
+/// A cloth held at its upper corners, whose motions come closer and part by a tenth while they
+/// swing.
 struct Pair {
   Cloth cloth = square_cloth(6);
   Eigen::Matrix3Xd start_m = flat_positions(cloth.mesh);
@@ -86,7 +87,7 @@ TEST(RigidSupport, IsOfExactlyTwoDrivenPoints) {
         return at;
       };
     }
-    // (nor of a point that a fit holds where it started by a motion that stands still)
+    // Nor is it of a point that a fit holds at its start by a motion that stands still.
     if (driven == 3) {
       Cloth resting = cloth;
       resting.held.back().rests = true;

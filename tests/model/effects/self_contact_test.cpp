@@ -1,4 +1,5 @@
-// Contact of the cloth with itself. Not checked here: the search for pairs (near_pairs_test.cpp).
+// Checks contact of the cloth with itself. Not checked here: the search for pairs
+// (near_pairs_test.cpp).
 
 #include "model/effects/self_contact.h"
 
@@ -18,7 +19,8 @@ TEST(SelfContact, KeepsTheContractOfEffects) {
 }
 
 TEST(SelfContact, ParallelSheetsPressEachOtherApartWithTheIntegralOverBoth) {
-  // p = pi k z (d - z)^2 / d^2, far from edges and from the fold, as the mesh gets finer.
+  // The pressure tends to p = pi k z (d - z)^2 / d^2, far from edges and from the fold, as the mesh
+  // gets finer.
   const double stiffness = 2000, d = 0.05;
   for (const double z : {0.01, 0.02, 0.035}) {
     double before = INFINITY;
@@ -75,8 +77,8 @@ TEST(SelfContact, KeepsMomentumAndAngularMomentum) {
   const auto after = momenta(end.position_m, end.velocity_m_per_s);
   EXPECT_GT((end.velocity_m_per_s - sheet.set.start_velocity_m_per_s).norm(), 1);
   EXPECT_LT((after.first - before.first).norm(), 1e-14);
-  // Forces act along connections of positions that then move on along the new velocities, which the
-  // angular momentum of this scheme does not see.
+  // Forces act along connections of positions that then move on along the new velocities. The
+  // angular momentum of this scheme does not see that.
   EXPECT_LT((after.second - before.second).norm(), 1e-14);
 }
 
@@ -93,7 +95,7 @@ TEST(SelfContact, AClothFoldedOnItselfComesToRestOnItself) {
     sheet.set.effects.push_back({5});
     double lowest = INFINITY;
     sheet.after(8000, 1e-4, [&](int, const ClothWithEffect::State& state) {
-      // Away from the fold, where the halves are one.
+      // The comparison is away from the fold, where the halves are one.
       for (int i = 0; i < mesh.rows; ++i)
         for (int j = 8; j < mesh.columns; ++j)
           lowest = std::min(lowest, state.position_m(2, mesh.vertex(i, j)));

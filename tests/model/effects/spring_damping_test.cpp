@@ -1,4 +1,4 @@
-// Damping along the springs beyond the common one. Not checked here: the common one
+// Checks damping along the springs beyond the common one. Not checked here: the common one
 // (cloth_sweep_test.cpp).
 
 #include "model/effects/spring_damping.h"
@@ -21,8 +21,8 @@ TEST(SpringDamping, AnOscillatorDecaysAsTheSchemeHasIt) {
   const double frequency2 = Rig::kStiffness_n_per_m / Rig::kMass_kg, rate = time_s * frequency2;
   const std::vector<double> x = Rig("spring_damping", {time_s, 0, 0}, 0.02).extensions_m(h, 500);
 
-  // V_n+1 = V_n - h (w^2 x_n + rate V_n), x_n+1 = x_n + h V_n+1, so that
-  // x_n+1 = (2 - h rate - h^2 w^2) x_n - (1 - h rate) x_n-1: a share 1 - h rate per two steps.
+  // The scheme is V_n+1 = V_n - h (w^2 x_n + rate V_n), x_n+1 = x_n + h V_n+1. So x_n+1 = (2 - h
+  // rate - h^2 w^2) x_n - (1 - h rate) x_n-1: a share 1 - h rate per two steps.
   double before = 0.02, now = 0.02 * (1 - h * h * frequency2);
   for (size_t n = 1; n < x.size(); ++n) {
     EXPECT_NEAR(x[n], now, 1e-14) << n;
@@ -53,7 +53,7 @@ TEST(SpringDamping, IsTheFabricsOwnDampingWhereAllTimesAreOne) {
 }
 
 TEST(SpringDamping, EachTimeActsOnItsOwnGroupOfSprings) {
-  // A square of four masses that is pulled along t only: its structural springs stretch at the full
+  // A square of four masses is pulled along t only. Its structural springs stretch at the full
   // rate, the shear springs at half of it, there are no flexion springs.
   DrivenRibbon structural(2, 40, "spring_damping", {1e-3, 0, 0}),
       others(2, 40, "spring_damping", {0, 1e-3, 1e-3});

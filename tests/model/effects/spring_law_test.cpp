@@ -1,4 +1,4 @@
-// Laws of a spring's tension. Not checked here: the effects that are written as such
+// Checks laws of a spring's tension. Not checked here: the effects that are written as such
 // (tests/model/effects/).
 
 #include "model/effects/spring_law.h"

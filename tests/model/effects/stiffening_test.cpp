@@ -1,4 +1,4 @@
-// A tension curve that is not straight.
+// Checks a tension curve that is not straight.
 
 #include "model/effects/stiffening.h"
 
@@ -43,11 +43,11 @@ TEST(Stiffening, FarStretchedOrCompressedItsStiffnessIsTheOneThatTheParametersNa
 }
 
 TEST(Stiffening, AHangingLoadStretchesTheSpringByTheRootOfAQuadratic) {
-  // T = k l0 (e + b e^2 / (e + c)):  (1 + b) e^2 + (c - f) e - f c = 0 with f = T / (k l0).
+  // T = k l0 (e + b e^2 / (e + c)) gives (1 + b) e^2 + (c - f) e - f c = 0 with f = T / (k l0).
   const double b = 4, load_n = 0.9;
   const double f = load_n / (kSoft_n_per_m * kLength_m), q = kStrain - f;
   const double expected = (-q + std::sqrt(q * q + 4 * (1 + b) * f * kStrain)) / (2 * (1 + b));
-  // The masses of the oscillator, loaded by gravity along t and braked until they rest.
+  // The oscillator's masses are loaded by gravity along t and braked until they rest.
   const Mesh mesh{.columns = 2, .rows = 2, .width_m = 0.1, .height_m = kLength_m};
   Cloth cloth = Cloth::of(mesh, Eigen::VectorXd::Constant(4, 0.01));
   cloth.held = {held_at(mesh, 0, 0), held_at(mesh, 0.1, 0)};
@@ -61,7 +61,7 @@ TEST(Stiffening, AHangingLoadStretchesTheSpringByTheRootOfAQuadratic) {
 
   for (int n = 0; n < 4000; ++n) run.step(5e-4);
 
-  // exp(-30 / 2 * 2 s) is left of the start.
+  // A share exp(-30 / 2 * 2 s) of the start remains.
   EXPECT_NEAR((run.position_m()(1, 2) - kLength_m) / kLength_m, expected, 1e-12);
 }
 

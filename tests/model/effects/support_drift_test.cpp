@@ -1,4 +1,4 @@
-// Supports that drift.
+// Checks supports that drift.
 
 #include "model/effects/support_drift.h"
 
@@ -14,7 +14,7 @@ TEST(SupportDrift, KeepsTheContractOfEffects) {
 }
 
 TEST(SupportDrift, IsAStartOfTheClothTheOtherWaySeenFromTheSupports) {
-  // Galilei: cloth at rest under supports that leave with v is cloth that leaves with -v.
+  // By Galilei, cloth at rest under supports that leave with v is cloth that leaves with -v.
   const Eigen::Vector3d v(0.1, -0.2, 0.05);
   Uniform uniform(6);
   Cloth bare = square_cloth(6);
@@ -29,7 +29,7 @@ TEST(SupportDrift, IsAStartOfTheClothTheOtherWaySeenFromTheSupports) {
   const Eigen::Matrix3Xd world = drifting.after(steps, h).position_m;
 
   EXPECT_LT((world.col(0) - start.col(0) - steps * h * v).norm(), 1e-14);
-  // Rounding of 1500 steps, which crumpled cloth makes larger.
+  // Crumpled cloth enlarges the rounding of 1500 steps.
   EXPECT_LT((world.colwise() - (steps * h * v) - resting.after(steps, h).position_m)
                 .cwiseAbs()
                 .maxCoeff(),

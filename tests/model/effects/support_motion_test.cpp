@@ -1,4 +1,4 @@
-// Supports that move to and fro.
+// Checks supports that move to and fro.
 
 #include "model/effects/support_motion.h"
 
@@ -50,8 +50,8 @@ TEST(SupportMotion, AddsToWhereHeldPointsAreWhetherTheyRestOrMove) {
 }
 
 TEST(SupportMotion, IsAShakenFrameSeenFromOutside) {
-  // The scheme's acceleration of A sin(2 pi f t) is its second difference,
-  // -(2 - 2 cos(2 pi f h)) / h^2 A sin(2 pi f t): the cloth moves as in a frame with that.
+  // The scheme's acceleration of A sin(2 pi f t) is its second difference, -(2 - 2 cos(2 pi f h)) /
+  // h^2 A sin(2 pi f t). The cloth moves as in a frame with that.
   Uniform uniform(5);
   Cloth bare = square_cloth(6);
   bare.held = {held_at(bare.mesh, 0, 0), held_at(bare.mesh, 0.31, 0.02)};

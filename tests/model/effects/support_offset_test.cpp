@@ -1,4 +1,4 @@
-// Supports beside where their motion has them.
+// Checks supports beside the places of their motion.
 
 #include "model/effects/support_offset.h"
 
@@ -16,7 +16,7 @@ TEST(SupportOffset, KeepsTheContractOfEffects) {
   expect_effect_contract("support_offset", {});
 }
 
-/// Held at two corners, one of which swings along x.
+/// Holds two corners, one of which swings along x.
 Cloth half_driven() {
   Cloth cloth = square_cloth(6);
   const Eigen::Matrix3Xd start = flat_positions(cloth.mesh);
@@ -68,8 +68,8 @@ TEST(SupportOffset, IsAMotionThatIsElsewhereFromTheRestBeforeTheStartOn) {
     const double rest_s = 0.9 * stable_rest_step_s(cloth->cloth, cloth->set);
     start_at_rest(cloth->cloth, {&cloth->set, 1}, 9.81, 0, rest_s);
   }
-  // The held points glide to their places in one and jump the last 28 mm in the other: a twentieth
-  // of that is left, as the relaxation leaves a little of everything.
+  // The held points glide to their places in one and jump the last 28 mm in the other. A twentieth
+  // of that remains, as the relaxation leaves a little of everything.
   const Eigen::Matrix3Xd& rest = offset.set.start_position_m;
   EXPECT_LT((rest - neutral.set.start_position_m).colwise().norm().maxCoeff(),
             0.05 * kOffset_m.norm());

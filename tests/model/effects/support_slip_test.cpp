@@ -1,4 +1,4 @@
-// Supports that creep where the cloth pulls.
+// Checks supports that creep where the cloth pulls.
 
 #include "model/effects/support_slip.h"
 
@@ -9,10 +9,10 @@
 namespace clothfit {
 namespace {
 
-constexpr double kWeight_n = 0.025 * 9.81;  // square_cloth's
+constexpr double kWeight_n = 0.025 * 9.81;  // weight of square_cloth
 
-/// A cloth of two columns that hangs by its two upper corners, each of which carries half of it.
-/// Without shear springs nothing pulls the corners together.
+/// Makes a cloth of two columns that hangs by its two upper corners, each of which carries half of
+/// it. Without shear springs nothing pulls the corners together.
 ClothWithEffect hung_by_two(double mobility, double threshold) {
   Cloth bare = square_cloth(2);
   bare.held = {held_at(bare.mesh, 0, 0), held_at(bare.mesh, 0.4, 0)};
@@ -30,7 +30,7 @@ TEST(SupportSlip, HangingClothComesDownAtMobilityTimesTheExcessOfItsWeight) {
   for (const auto& [mobility, threshold] : {std::pair{0.02, 0.0}, {0.05, 0.08}}) {
     SCOPED_TRACE(testing::Message() << mobility << ", " << threshold);
 
-    // The springs' swing dies out as e^(-5 t), the supports' own ease only adds to that.
+    // The springs' swing dies out as e^(-5 t); the supports' own ease only adds to that.
     const auto state = hung_by_two(mobility, threshold).after(8000, 1e-3);
 
     const Eigen::Vector3d expected(0, 0, -mobility * (kWeight_n / 2 - threshold));
@@ -39,7 +39,7 @@ TEST(SupportSlip, HangingClothComesDownAtMobilityTimesTheExcessOfItsWeight) {
 }
 
 TEST(SupportSlip, HoldsUpToTheThreshold) {
-  // Twice the weight is the most that a load gives that is let go from a slack spring; below that
+  // A load that is let go from a slack spring pulls with twice its weight at most. Below that
   // nothing creeps.
   const auto state = hung_by_two(0.05, 1.01 * kWeight_n).after(1000, 1e-3);
 

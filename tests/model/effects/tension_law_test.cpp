@@ -1,5 +1,5 @@
-// An empirical tension. That it keeps momentum and angular momentum is part of the contract of
-// internal effects (effect_contract.h).
+// Checks an empirical tension. That it keeps momentum and angular momentum is part of the contract
+// of internal effects (effect_contract.h).
 
 #include "model/effects/tension_law.h"
 
@@ -12,10 +12,10 @@
 namespace clothfit {
 namespace {
 
-constexpr double kLinear_n_per_m = 40, kLength_m = 0.4;  // of the ribbon, along the warp
+constexpr double kLinear_n_per_m = 40, kLength_m = 0.4;  // for the ribbon, along the warp
 constexpr double kScale_n = kLinear_n_per_m * kLength_m;
 
-/// With the warp's coefficients.
+/// Returns the tension with the warp's coefficients.
 double tension_n(double stretched, double compressed, double rate_squared_s2, double elongation,
                  double rate_per_s) {
   DrivenRibbon ribbon(2, kLinear_n_per_m, "tension_law",
@@ -40,7 +40,7 @@ TEST(TensionLaw, IsTheNamedSquaresOfElongationAndItsRate) {
 }
 
 TEST(TensionLaw, GoesStraightOnWhereTheSquaresEnd) {
-  // T(a) + T'(a) (x - a), at a = 0.05 and at 10/s.
+  // The tangent is T(a) + T'(a) (x - a), at a = 0.05 and at 10/s.
   EXPECT_NEAR(tension_n(1, 0, 0, 0.3, 0), kScale_n * (0.0025 + 0.1 * 0.25), 1e-13);
   EXPECT_NEAR(tension_n(0, 1, 0, -0.3, 0), kScale_n * (0.0025 + 0.1 * 0.25), 1e-13);
   for (const double sign : {-1.0, 1.0})

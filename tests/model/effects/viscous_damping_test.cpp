@@ -1,4 +1,4 @@
-// Viscous damping by the air. Not checked here: that time steps are chosen with it in mind
+// Checks viscous damping by the air. Not checked here: that time steps are chosen with it in mind
 // (stability_test.cpp).
 
 #include "model/effects/viscous_damping.h"
@@ -46,7 +46,7 @@ TEST(ViscousDamping, AFallingSheetReachesGravityOverRateWhateverItsAttitude) {
     const Eigen::Matrix3Xd v =
         Fall(square_cloth(5), rate_per_s, attitude).velocity_m_per_s(1e-3, 4000);
 
-    // After 32 time constants nothing is left of the start.
+    // After 32 time constants nothing of the start remains.
     EXPECT_LT((v.colwise() - Eigen::Vector3d(0, 0, -9.81 / rate_per_s)).cwiseAbs().maxCoeff(),
               1e-12);
   }
@@ -57,7 +57,7 @@ TEST(ViscousDamping, VelocityFollowsTheClosedFormOfTheScheme) {
   const Fall fall(square_cloth(5), rate_per_s, Eigen::Matrix3d::Identity());
 
   for (const int steps : {1, 10, 500}) {
-    // V_{n+1} = V_n + h (g - rate V_n), so V_n = g / rate (1 - (1 - h rate)^n).
+    // With V_{n+1} = V_n + h (g - rate V_n), V_n = g / rate (1 - (1 - h rate)^n).
     const double expected = -9.81 / rate_per_s * (1 - std::pow(1 - h * rate_per_s, steps));
 
     EXPECT_LT((fall.velocity_m_per_s(h, steps).row(2).array() - expected).abs().maxCoeff(), 1e-12)
@@ -79,7 +79,8 @@ TEST(ViscousDamping, LetsADriftDieOutGeometrically) {
 }
 
 TEST(ViscousDamping, SurvivesAChangeOfMeshAndOfTheMassesOnIt) {
-  // An amplitude per mass: neither the number of vertices nor the weight of each matters to a fall.
+  // The amplitude is per mass: neither the number of vertices nor the weight of each matters to a
+  // fall.
   const auto speed = [](const Cloth& cloth) {
     return Fall(cloth, 2, Eigen::Matrix3d::Identity()).velocity_m_per_s(1e-3, 500).row(2).mean();
   };

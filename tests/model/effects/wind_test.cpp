@@ -1,4 +1,4 @@
-// Wind and drag along the surface's normal.
+// Checks wind and drag along the surface's normal.
 
 #include "model/effects/wind.h"
 
@@ -10,7 +10,7 @@
 namespace clothfit {
 namespace {
 
-constexpr double kMass_kg = 0.025;  // square_cloth's, on 0.4 m x 0.4 m
+constexpr double kMass_kg = 0.025;  // square_cloth's mass, on 0.4 m x 0.4 m
 constexpr double kArea_m2 = 0.16;
 
 /// A flat cloth, turned, that is let go in the wind.
@@ -48,7 +48,7 @@ TEST(Wind, KeepsTheContractOfEffects) {
 }
 
 TEST(Wind, PressesOnAFlatSheetAlongItsNormal) {
-  // F = A (n . q) n in all, whatever the mesh; each vertex gets the share of its area.
+  // In all F = A (n . q) n, whatever the mesh; each vertex gets the share of its area.
   const Eigen::Vector3d q(0.3, -0.2, 0.5);
   for (const unsigned seed : {1u, 2u}) {
     Uniform uniform(seed);
@@ -74,7 +74,7 @@ TEST(Wind, AHorizontalSheetFallsAtWeightPerAreaOverDrag) {
   const Eigen::Matrix3Xd v =
       Flight(5, c, {0, 0, 0}, Eigen::Matrix3d::Identity()).velocity_m_per_s(1e-3, 6000);
 
-  // c v = g m / A; after 46 time constants nothing is left of the start.
+  // At the end c v = g m / A; after 46 time constants nothing of the start remains.
   EXPECT_LT(
       (v.colwise() - Eigen::Vector3d(0, 0, -9.81 * kMass_kg / kArea_m2 / c)).cwiseAbs().maxCoeff(),
       1e-12);
@@ -123,7 +123,7 @@ TEST(Wind, StillAirOnlyTakesEnergyAway) {
   const double power_w = forces_n(flight, p, v).cwiseProduct(v).sum();
 
   EXPECT_LT(power_w, -1e-4);
-  // and no faster than it tells those who choose the time step: -F.v <= rate m v^2.
+  // It damps no faster than it tells those who choose the time step: -F.v <= rate m v^2.
   const double rate_per_s =
       flight.cloth.effects.front()
           ->rates(flight.cloth, flight.set.springs, flight.set.effects.front())

@@ -1,6 +1,6 @@
-// What a fabric's numbers amount to: springs by type, and the continuum that the lattice stands
-// for. Not checked here: the forces of these springs (cloth_sweep_test.cpp) and how they move the
-// cloth (step_test.cpp).
+// Checks the meaning of a fabric's numbers: springs by type, and the continuum that the lattice
+// approximates. Not checked here: the forces of these springs (cloth_sweep_test.cpp) and the motion
+// under them (step_test.cpp).
 
 #include "model/fabric/fabric.h"
 
@@ -13,9 +13,10 @@
 namespace clothfit {
 namespace {
 
-/// Elastic energy per area (J/m^2) inside a cloth of square cells that is deformed by x = F s.
-/// At one spacing the energy of a whole cloth is p mn + q m + r n + u in its numbers of cells m, n
-/// (cells, edges, corners); the mixed difference leaves p alone, the energy of one inner cell.
+/// Returns the elastic energy per area (J/m^2) inside a cloth of square cells that is deformed by x
+/// = F s. At one spacing the energy of a whole cloth is p mn + q m + r n + u in its numbers of
+/// cells m, n (cells, edges, corners). The mixed difference keeps only p, the energy of one inner
+/// cell.
 double inner_energy_density(const Fabric& fabric, double spacing_m, const Eigen::Matrix2d& f) {
   const auto energy_j = [&](int cells_s, int cells_t) {
     const Mesh mesh{.columns = cells_s + 1,
@@ -30,7 +31,8 @@ double inner_energy_density(const Fabric& fabric, double spacing_m, const Eigen:
   return cell_j / (spacing_m * spacing_m);
 }
 
-/// Second derivative of the energy density by the size of the deformation 1 + size * direction.
+/// Returns the second derivative of the energy density by the size of the deformation 1 + size *
+/// direction.
 double stiffness_n_per_m(const Fabric& fabric, double spacing_m, const Eigen::Matrix2d& direction) {
   const double size = 1e-4;
   const Eigen::Matrix2d one = Eigen::Matrix2d::Identity();

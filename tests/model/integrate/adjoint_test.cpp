@@ -1,5 +1,5 @@
-// Gradients of a cost by whole fields: against tangents, and against differences for what no
-// tangent reaches (single springs, single masses, forces over space and time).
+// Checks gradients of a cost by whole fields. They are compared with tangents, and with differences
+// where no tangent reaches (single springs, single masses, forces over space and time).
 
 #include "model/integrate/adjoint.h"
 
@@ -13,7 +13,7 @@
 namespace clothfit {
 namespace {
 
-/// A cost that looks at every frame, linear so that its derivative is what it says.
+/// A cost that looks at every frame, linear so that its derivative is exact.
 struct Cost {
   std::vector<Eigen::Matrix3Xd> weight;
 
@@ -36,7 +36,7 @@ double sum(const std::vector<double>& values) {
   return std::accumulate(values.begin(), values.end(), 0.0);
 }
 
-/// The cost's derivative along a direction, from its gradient by fields.
+/// Returns the cost's derivative along a direction, from its gradient by fields.
 double along(const CostGradient& gradient, const Swing& swing, const Direction& d) {
   double slope = gradient.by_gravity.dot(d.gravity_m_per_s2) +
                  gradient.by_start_position.cwiseProduct(d.start_position_m).sum() +
@@ -136,7 +136,7 @@ TEST(Adjoint, EqualsTheTangentUnderSeveralEffectsAtOnce) {
   expect_adjoint_to_equal_tangent(swing, uniform);
 }
 
-/// (cost(value + by) - cost(value - by)) / 2 by.
+/// Returns (cost(value + by) - cost(value - by)) / 2 by.
 template <class CostOf>
 double difference(double& value, double by, const CostOf& cost_of) {
   const double here = value;
@@ -174,7 +174,7 @@ TEST(Adjoint, KnowsSingleSpringsMassesAndForces) {
       simulate_with_gradient(swing.cloth, swing.set, swing.schedule, fields, cost.by_position())
           .gradient;
 
-  // then differences agree. (A factor's derivative is the spring's own times the type's constant.)
+  // then differences agree. A factor's derivative is the spring's own times the type's constant.
   const auto expect_near = [](double derivative, double expected) {
     EXPECT_NEAR(derivative, expected, 2e-6 * std::max(std::abs(expected), 1e-3));
   };
@@ -234,7 +234,7 @@ TEST(Adjoint, KnowsMassesAtTheStrainLimit) {
     swing.cloth.strain_limit.mode = mode;
     swing.set.springs.critical_elongation.fill(0.03);
     swing.schedule.frame_time_s = {0, 0.002, 0.004};
-    // So little that no spring reaches or leaves its limit.
+    // The share is so small that no spring reaches or leaves its limit.
     expect_masses_to_agree(swing, 1e-7, uniform);
   }
 }

@@ -1,4 +1,4 @@
-// Which spring a diverging run is blamed on. Not checked here: when a step is stable
+// Checks which spring is blamed for a diverging run. Not checked here: when a step is stable
 // (stability_test.cpp) and how a run reports its end (simulate_test.cpp).
 
 #include "model/integrate/divergence.h"
@@ -13,8 +13,8 @@
 namespace clothfit {
 namespace {
 
-/// A hung cloth of which one vertex is light, so that its springs alone are too stiff for a step
-/// that all others could take.
+/// A hung cloth of which one vertex is light. Its springs alone are too stiff for a step that all
+/// others could take.
 struct LightVertex {
   Cloth cloth = square_cloth(9);
   ParameterSet set;
@@ -49,7 +49,8 @@ TEST(Divergence, NamesASpringOfTheVertexThatCannotFollow) {
   for (const auto& [i, j] : {std::pair(5, 2), {2, 6}, {8, 8}}) {
     SCOPED_TRACE(testing::Message() << "light vertex " << i << ", " << j);
     const LightVertex light(i, j, 0.05);
-    // Stable for all but the light vertex, whose frequency is the root of 20 times as high.
+    // The step is stable for all but the light vertex, whose frequency is the root of 20 times as
+    // high.
     const double h = 0.6 * stable_time_step_s(even.cloth, even.set);
     ASSERT_GT(h, 1.5 * stable_time_step_s(light.cloth, light.set));
 
@@ -73,8 +74,8 @@ TEST(Divergence, IsFoundAtItsStepAndTime) {
   const auto divergence = find_divergence(light.cloth, light.set, schedule);
   ASSERT_TRUE(divergence);
 
-  // Two routes: every step of the run as a frame of its own. No step is longer than that, and times
-  // rise evenly within each frame interval.
+  // The second route has every step of the run as a frame of its own. No step is longer than that,
+  // and times rise evenly within each frame interval.
   Schedule all{.frame_time_s = {0}, .time_step_s = h};
   for (int frame = 1; frame <= 30; ++frame) {
     const double from_s = schedule.frame_time_s[static_cast<size_t>(frame) - 1];

@@ -1,5 +1,5 @@
-// The implicit scheme: closed form of one step, order, stability, momentum, held points. Not
-// checked here: the Euler scheme that it is compared with (step_test.cpp).
+// Checks the implicit scheme: closed form of one step, order, stability, momentum, held points. Not
+// checked here: the Euler scheme with which it is compared (step_test.cpp).
 
 #include "model/integrate/implicit_step.h"
 
@@ -22,7 +22,7 @@ ImplicitState still(const Eigen::Matrix3Xd& position_m) {
 }
 
 TEST(ImplicitStep, OfTwoMassesOnASpringIsTheClosedForm) {
-  // Two pairs along t; the extension e of each is an oscillator of reduced mass m / 2.
+  // There are two pairs along t; the extension e of each is an oscillator of reduced mass m / 2.
   const Mesh mesh{.columns = 2, .rows = 2, .width_m = 1, .height_m = 0.1};
   const double m = 0.02, k = 300, c = 0.5, h = 0.02, e0 = 0.004, v0 = 0.3;
   const Cloth cloth = Cloth::of(mesh, Eigen::VectorXd::Constant(4, m));
@@ -107,7 +107,7 @@ TEST(ImplicitStep, StaysCalmAtAFramesLengthWhereTheEulerSchemeDoesNot) {
     lowest = std::min(lowest, state.position_m.row(2).minCoeff());
     fastest = std::max(fastest, state.velocity_m_per_s.colwise().norm().maxCoeff());
   }
-  // No faster than its fall from the diagonal's height, nor lower than its diagonal hangs.
+  // It is no faster than its fall from the diagonal's height, nor lower than its diagonal hangs.
   EXPECT_LT(fastest, std::sqrt(2 * 9.81 * 0.6) + 1);
   EXPECT_GT(lowest, -0.6);
   EXPECT_LT(state.velocity_m_per_s.norm(), 0.5);
@@ -126,7 +126,7 @@ TEST(ImplicitStep, KeepsTheMomentumOfFreeCloth) {
   const double h = 0.01;
   for (int n = 0; n < 20; ++n) ASSERT_TRUE(stepper.step(set, kNothingHeld, n * h, h, state));
 
-  // What gravity brings in 0.2 s, and nothing else.
+  // Gravity brings this in 0.2 s, and nothing else does.
   const Eigen::Vector3d expected = before + 0.2 * 0.025 * set.gravity_m_per_s2;
   EXPECT_LT((momentum_kg_m_per_s(cloth.mass_kg, state.velocity_m_per_s) - expected).norm(), 1e-13);
   EXPECT_GT((state.velocity_m_per_s - velocity_before).norm(), 1);
@@ -141,7 +141,7 @@ TEST(ImplicitStep, PutsHeldPointsWhereTheyBelong) {
 }
 
 TEST(ImplicitStep, TakesEffectsFromTheBeginningOfTheStep) {
-  // Unstretched cloth that glides: only the drag of still air acts, at rate C.
+  // Unstretched cloth glides: only the drag of still air acts, at rate C.
   Cloth cloth = square_cloth(4);
   add_effect(cloth, "viscous_damping", "test");
   const ParameterSet set{.springs = spring_parameters(cotton(), cloth.mesh),

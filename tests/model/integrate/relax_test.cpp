@@ -1,5 +1,5 @@
-// Shapes at rest. Not checked here: runs over frames (simulate_test.cpp), and the exact minimum of
-// the energy (equilibrium/).
+// Checks shapes at rest. Not checked here: runs over frames (simulate_test.cpp), and the exact
+// minimum of the energy (equilibrium/).
 
 #include "model/integrate/relax.h"
 
@@ -48,7 +48,7 @@ TEST(Relax, AHangingChainStretchesByTheWeightBelowEachSpring) {
   EXPECT_LT(p.row(1).cwiseAbs().maxCoeff(), 1e-12);
 }
 
-/// Largest force that is left on a free vertex, over the cloth's weight.
+/// Returns the largest force that remains on a free vertex, over the cloth's weight.
 double residual_force(const Cloth& cloth, const ParameterSet& set, const Eigen::Matrix3Xd& p) {
   Eigen::Matrix3Xd force_n = spring_forces_n(cloth.mesh, set.springs, p, at_rest(p));
   force_n += set.gravity_m_per_s2 * cloth.mass_kg.transpose();
@@ -61,7 +61,7 @@ TEST(Relax, BalancesTheForcesOfAClothHungByTwoCorners) {
   const Cloth cloth = hung_cloth(9);
   ParameterSet set{.springs = spring_parameters(cotton(), cloth.mesh),
                    .start_position_m = hung_flat(cloth.mesh)};
-  // Corners closer together than the cloth is wide, so that it sags and folds.
+  // Corners are closer together than the cloth is wide, so that it sags and folds.
   Cloth sagging = cloth;
   sagging.held[1].motion = [](double) { return Eigen::Vector3d(0.36, 0, 0); };
 
@@ -91,7 +91,8 @@ TEST(Relax, PutsMovingHeldPointsWhereTheyAreAtThatTime) {
 TEST(Relax, IsSmoothInTheParameters) {
   const Cloth cloth = hung_cloth(6);
   const double h = 1e-3;
-  // Shapes for the stiffness of one type scaled by 1 + step and 1 - step; the derivative between.
+  // Shapes are for the stiffness of one type scaled by 1 + step and 1 - step; the derivative lies
+  // between.
   const auto derivative = [&](size_t type, double step) {
     std::vector<ParameterSet> sets;
     for (const double sign : {1.0, -1.0}) {
@@ -135,7 +136,7 @@ TEST(StartAtRest, AClothWhoseFabricRemembersStaysWhereItIs) {
     SCOPED_TRACE(curtain.cloth.effect_descriptions.front().name);
     ParameterSet start = curtain.at_rest();
 
-    // Relaxing takes 1.4 s, in which a stress that halves in 0.07 s falls a millionfold; it began
+    // Relaxing takes 1.4 s, in which a stress that halves in 0.07 s falls a millionfold. It began
     // as some millimetres of stretch.
     EXPECT_LT(curtain.way_m(start), 1e-6);
     start.start_effect_memory.clear();
@@ -224,7 +225,7 @@ TEST(StartAtRest, HasTangentsThatAgreeWithCentralDifferences) {
     ParameterSet at_rest = swing.set;
     start_at_rest_with_tangents(swing.cloth, at_rest, directions, 9.81, 0.02, kStep);
 
-    // then it is where it is without them, and they are what differences say.
+    // then it is where it is without them, and they agree with differences.
     ParameterSet alone = swing.set;
     start_at_rest(swing.cloth, {&alone, 1}, 9.81, 0.02, kStep);
     EXPECT_EQ(at_rest.start_position_m, alone.start_position_m);
@@ -249,7 +250,7 @@ TEST(StartAtRest, HasTangentsThatAgreeWithCentralDifferences) {
     const Eigen::Matrix3Xd difference =
         (moved[0].start_position_m - moved[1].start_position_m) / (2 * kBy);
     const Eigen::Matrix3Xd& tangent = directions.back().start_position_m;
-    EXPECT_LT((tangent - difference).norm(), 1e-5 * tangent.norm());  // what curvature leaves
+    EXPECT_LT((tangent - difference).norm(), 1e-5 * tangent.norm());  // the rest is curvature
     const Eigen::VectorXd remembered =
         (moved[0].start_effect_memory[1] - moved[1].start_effect_memory[1]) / (2 * kBy);
     EXPECT_LT((directions.back().start_effect_memory[1] - remembered).norm(),
@@ -258,8 +259,8 @@ TEST(StartAtRest, HasTangentsThatAgreeWithCentralDifferences) {
   }
 }
 
-// An effect that the cloth does not have yet remembers what one that it has at its neutral values
-// would, and a run goes on from that.
+// An effect that the cloth does not have yet remembers the same as one that it has at its neutral
+// values. A run goes on from that.
 TEST(StartAtRest, HandsOnWhatEmergingEffectsRemember) {
   constexpr double kStep = 5e-4;
   for (const char* name : {"relaxation", "hysteresis"}) {

@@ -1,5 +1,5 @@
-// Runs over frames. Not checked here: a single step (step_test.cpp), how long it may be
-// (stability_test.cpp), shapes at rest (relax_test.cpp), and what is made of the positions
+// Checks runs over frames. Not checked here: a single step (step_test.cpp), how long it may be
+// (stability_test.cpp), shapes at rest (relax_test.cpp), and the use of the positions
 // (surface_test.cpp, tests/fit/).
 
 #include "model/integrate/simulate.h"
@@ -117,7 +117,7 @@ TEST(Simulate, FallsFreelyThroughIrregularFrames) {
 
   const SimulateResult result = simulate(cloth, {&set, 1}, schedule).front();
 
-  // Within an interval cut into n steps h: z falls by n h v + h^2 g n (n + 1) / 2, v by n h g.
+  // Within an interval cut into n steps h, z falls by n h v + h^2 g n (n + 1) / 2, v by n h g.
   double z = 0, v = 0;
   for (int f = 1; f < 5; ++f) {
     const auto at = static_cast<size_t>(f);
@@ -182,7 +182,7 @@ TEST(Simulate, ReportsWhatDivergesAndLeavesItsNeighboursAlone) {
 }
 
 TEST(Simulate, NamesTheFirstFrameThatLeftTheScene) {
-  // A cloth of 0.4 m counts as lost beyond a hundred diagonals, 56.57 m; free fall takes it there
+  // A cloth of 0.4 m counts as lost beyond a hundred diagonals, 56.57 m. Free fall takes it there
   // after 3.40 s.
   const Cloth cloth = square_cloth(3);
   const ParameterSet set{.springs = spring_parameters(cotton(), cloth.mesh),
@@ -204,7 +204,7 @@ TEST(Simulate, LetsEverySetStartFromItsOwnMemory) {
   const Curtain curtain({{"hysteresis", {0.7, 5e-3}}, {"relaxation", {0.7, 0.1}}});
   for (const Precision precision : {Precision::exact, Precision::fast}) {
     SCOPED_TRACE(static_cast<int>(precision));
-    // Enough to fill lanes, and one more, which goes alone.
+    // The sets fill lanes, and one more goes alone.
     std::vector<ParameterSet> sets(
         (precision == Precision::exact ? ExactLanes::kCount : FastLanes::kCount) + 1, curtain.set);
     for (ParameterSet& set : sets)

@@ -1,6 +1,6 @@
-// One time step and what follows from many: the paper's scheme in closed form, what it conserves,
-// its order, held points. Not checked here: the spring force itself (cloth_sweep_test.cpp), how
-// long a step may be (stability_test.cpp), and runs over frames (simulate_test.cpp).
+// Checks one time step and many: the paper's scheme in closed form, its conserved quantities, its
+// order, held points. Not checked here: the spring force itself (cloth_sweep_test.cpp), how long a
+// step may be (stability_test.cpp), and runs over frames (simulate_test.cpp).
 
 #include "model/integrate/step.h"
 
@@ -22,7 +22,7 @@ ParameterSet cotton_set(const Cloth& cloth, const Eigen::Matrix3Xd& start_m) {
   return {.springs = spring_parameters(cotton(), cloth.mesh), .start_position_m = start_m};
 }
 
-/// A wave over the flat cloth, smooth enough to stay smooth for a while.
+/// Returns a wave over the flat cloth, smooth enough to stay smooth for a while.
 Eigen::Matrix3Xd waved(const Mesh& mesh) {
   Eigen::Matrix3Xd p = flat_positions(mesh);
   for (Eigen::Index k = 0; k < p.cols(); ++k) {
@@ -79,7 +79,8 @@ TEST(Step, FallsFreelyByTheClosedFormOfTheScheme) {
   SteppedCloth<> run(cloth, set, at_rest(set.start_position_m));
   for (int n = 1; n <= 400; ++n) run.step(h);
 
-  // V_n = n h g, P_n = P_0 + h^2 g n (n + 1) / 2; a sheet at rest feels nothing of its springs.
+  // V_n = n h g, P_n = P_0 + h^2 g n (n + 1) / 2 hold; a sheet at rest feels nothing of its
+  // springs.
   const Eigen::Matrix3Xd fallen =
       set.start_position_m.colwise() + set.gravity_m_per_s2 * (h * h * 400 * 401 / 2);
   EXPECT_LT((run.position_m() - fallen).cwiseAbs().maxCoeff(), 1e-12);
@@ -101,7 +102,7 @@ TEST(Step, KeepsMomentumAndAngularMomentumWithoutGravity) {
     for (int n = 0; n < 2000; ++n) run.step(1e-4);
 
     // Each pair of forces sums to zero and acts along the line between its ends at the time it is
-    // taken, so the scheme keeps both; what is left is the rounding of 2000 sums of size 0.01.
+    // taken. The scheme therefore keeps both, up to the rounding of 2000 sums of size 0.01.
     const Eigen::Matrix3Xd p = run.position_m(), v = run.velocity_m_per_s();
     EXPECT_LT(
         (momentum_kg_m_per_s(cloth.mass_kg, v) - momentum_kg_m_per_s(cloth.mass_kg, v0)).norm(),
@@ -114,7 +115,8 @@ TEST(Step, KeepsMomentumAndAngularMomentumWithoutGravity) {
   }
 }
 
-/// Largest deviation of the total energy from its start over 0.1 s without damping, in joules.
+/// Returns the largest deviation of the total energy from its start over 0.1 s without damping, in
+/// joules.
 double energy_error_j(double time_step_s) {
   const Cloth cloth = square_cloth(7);
   ParameterSet set = cotton_set(cloth, waved(cloth.mesh));
@@ -143,8 +145,8 @@ TEST(Step, EnergyErrorFallsWithTheStep) {
 }
 
 TEST(Step, DampingTakesEnergyAway) {
-  // Without gravity and held points nothing but the dashpots can change the energy, up to the
-  // scheme's own swing.
+  // Without gravity and held points only the dashpots can change the energy, up to the scheme's own
+  // swing.
   const Cloth cloth = square_cloth(7);
   ParameterSet set = cotton_set(cloth, waved(cloth.mesh));
   set.gravity_m_per_s2 = kWeightless;
@@ -264,7 +266,7 @@ TEST(HeldPlacement, PutsAVertexExactlyWhereItBelongs) {
   HeldPlacement<>(cloth).place(every_lane(target), h, position_m, velocity_m_per_s);
 
   const Eigen::Matrix3Xd moved = position_m.lane(0) - p;
-  // One rounding of a coordinate below half a metre.
+  // The tolerance is one rounding of a coordinate below half a metre.
   EXPECT_LT((position_m.lane(0)(Eigen::all, {0, 4, 17}) - target).cwiseAbs().maxCoeff(), 1e-16);
   EXPECT_EQ((moved.colwise().norm().array() > 0).count(), 3);  // and nothing else moves
   EXPECT_LT((velocity_m_per_s.lane(0) - (v + moved / h)).cwiseAbs().maxCoeff(), 1e-12);
@@ -290,7 +292,7 @@ TEST(HeldPlacement, MovesTheClothByTheSmallestCorrectionInTheNormOfTheMasses) {
   HeldPlacement<>(cloth).place(every_lane(target), h, position_m, velocity_m_per_s);
   const Eigen::Matrix3Xd moved = position_m.lane(0) - p;
 
-  // then they are where they belong,
+  // then they are at their places,
   EXPECT_LT((position_m.lane(0) * a.transpose() - target).cwiseAbs().maxCoeff(), 1e-15);
   // the correction d minimises d' M d / 2 subject to A d = r, that is M d = A' lambda for some
   // lambda (the conditions of Karush, Kuhn and Tucker),
@@ -317,7 +319,7 @@ TEST(HeldPlacement, LetsTwoPointsInTheSamePlaceShare) {
 
     held.place(every_lane(target), 1e-3, position_m, velocity_m_per_s);
 
-    // They cannot both have their way: the least squares solution is between.
+    // The two points demand different places: the least squares solution is between.
     EXPECT_LT((held.locate(position_m).lane(0).colwise() - Eigen::Vector3d(s, 0.2, 0.02))
                   .cwiseAbs()
                   .maxCoeff(),

@@ -1,6 +1,7 @@
-// Derivatives of whole simulations: against differences, and to the bits of simulate(); along
-// effects that a cloth does not have, against those of a cloth that has them. What single effects
-// contribute is held against differences in effect_contract.h too.
+// Checks derivatives of whole simulations. They are compared with differences, and to the bits with
+// simulate(). Those along effects that a cloth does not have are compared with those of a cloth
+// that has them. Contributions of single effects are compared with differences in effect_contract.h
+// too.
 
 #include "model/integrate/tangents.h"
 
@@ -12,7 +13,7 @@
 namespace clothfit {
 namespace {
 
-/// The simulation a small way along the direction.
+/// Runs the simulation a small way along the direction.
 std::vector<Eigen::Matrix3Xd> moved(const Cloth& cloth, ParameterSet set, const Direction& d,
                                     double by, const Schedule& schedule) {
   for (size_t type = 0; type < kSpringTypes; ++type) {
@@ -38,7 +39,8 @@ std::vector<Eigen::Matrix3Xd> moved(const Cloth& cloth, ParameterSet set, const 
   return simulate(there, {&set, 1}, schedule).front().position_m;
 }
 
-/// Largest difference between tangents and central differences, relative to the tangents' size.
+/// Returns the largest difference between tangents and central differences, relative to the
+/// tangents' size.
 double error_of_tangents(const Cloth& cloth, const ParameterSet& set, const Direction& direction,
                          const Schedule& schedule, double by) {
   const TangentResult result = simulate_with_tangents(cloth, set, {&direction, 1}, schedule);
@@ -60,8 +62,8 @@ TEST(Tangents, AgreeWithCentralDifferences) {
     const Swing swing(uniform);
     const Direction direction = random_direction(swing.cloth, uniform);
 
-    // Differences of 1e-5 are off by 1e-10 from their curvature and 1e-11 from rounding, of what
-    // some hundred steps of a crumpled cloth make of it.
+    // Differences of 1e-5 are off by 1e-10 from their curvature and 1e-11 from rounding. Some
+    // hundred steps of a crumpled cloth enlarge that.
     EXPECT_LT(error_of_tangents(swing.cloth, swing.set, direction, swing.schedule, 1e-5), 1e-6);
   }
 }
@@ -83,7 +85,7 @@ TEST(Tangents, AgreeWithCentralDifferencesAtTheStrainLimit) {
       ASSERT_NE(simulate(unlimited, {&swing.set, 1}, swing.schedule).front().position_m,
                 simulate(swing.cloth, {&swing.set, 1}, swing.schedule).front().position_m);
 
-      // Steps so small that no spring reaches or leaves its limit within them.
+      // Steps are so small that no spring reaches or leaves its limit within them.
       EXPECT_LT(error_of_tangents(swing.cloth, swing.set, direction, swing.schedule, 1e-7), 1e-6);
     }
   }
@@ -115,7 +117,7 @@ TEST(Tangents, AgreeWithCentralDifferencesUnderEveryEffect) {
 }
 
 TEST(Tangents, AlongAnEmergingEffectAreThoseOfAClothThatHasItAtItsNeutralValues) {
-  // Forces, also with a memory; inertia; supports. More than go side by side.
+  // The modes are forces, also with a memory; inertia; supports. More than go side by side.
   constexpr EmergingLaw kLaws[] = {{"wind", "q_x"},
                                    {"wind", "c"},
                                    {"viscous_damping", "rate"},
@@ -132,9 +134,9 @@ TEST(Tangents, AlongAnEmergingEffectAreThoseOfAClothThatHasItAtItsNeutralValues)
   Swing windy = plain;
   add_effect(windy.cloth, "wind", "test");
   windy.set.effects = {{0.1, 0.2, -0.3, 0.4}};
-  // At steps shorter than that forces are carried on between.
+  // At steps shorter than that, forces are carried on between.
   for (const double time_step_s : {kEmergingInterval_s, kEmergingInterval_s / 2}) {
-    // The small change that stands for a derivative leaves 1e-5 of a law's curvature.
+    // The small change that stands for a derivative errs by 1e-5 of the law's curvature.
     const double tolerance = time_step_s < kEmergingInterval_s ? 1e-2 : 1e-4;
     for (const Swing* swing : {&plain, static_cast<const Swing*>(&windy)}) {
       Schedule schedule = swing->schedule;

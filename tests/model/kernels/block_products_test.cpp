@@ -1,5 +1,5 @@
-// Products of small blocks with changes in every lane, on every instruction set, against dense
-// arithmetic lane by lane.
+// Checks products of small blocks with changes in every lane, on every instruction set. They are
+// compared with dense arithmetic lane by lane.
 
 #include "model/kernels/block_products.h"
 
@@ -12,7 +12,7 @@ namespace clothfit {
 namespace {
 
 constexpr int kVertices = 5;
-constexpr double kRounding = 1e-13;  ///< of sums of some ten numbers of size 1
+constexpr double kRounding = 1e-13;  ///< for sums of some ten numbers of size 1
 
 LaneVectors<> random_lanes(Uniform& uniform) {
   LaneVectors<> vectors = LaneVectors<>::zero(kVertices);
@@ -36,7 +36,7 @@ class BlockProductsOn : public testing::TestWithParam<InstructionSet> {
 };
 
 TEST_P(BlockProductsOn, BlocksOfMotionAddWhatDenseOnesDo) {
-  // One acts on the vertex it looks at, two on the same vertex, one has no part by velocity.
+  // One block acts on the vertex it looks at, two on the same vertex, one has no part by velocity.
   std::vector<MotionBlock> blocks;
   for (const auto& [on, of] : {std::pair(0, 0), std::pair(3, 1), std::pair(3, 4)})
     blocks.push_back({on, of, uniform_.vectors(3, 2), uniform_.vectors(3, 2)});

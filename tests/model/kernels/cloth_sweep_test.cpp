@@ -1,6 +1,6 @@
-// The kernel of a time step: the springs' pull and the Euler update, on every instruction set. Not
-// checked here: the whole step with effects and held points (step_test.cpp), and how long a step
-// may be (stability_test.cpp).
+// Checks the kernel of a time step: the springs' pull and the Euler update, on every instruction
+// set. Not checked here: the whole step with effects and held points (step_test.cpp), and how long
+// a step may be (stability_test.cpp).
 
 #include "model/kernels/cloth_sweep.h"
 
@@ -20,7 +20,7 @@ namespace {
 /// Two springs of type structural_t, 1 m apart: between vertices 0 and 2, and between 1 and 3.
 constexpr Mesh kPair{.columns = 2, .rows = 2, .width_m = 1, .height_m = 0.1};
 
-/// Vertex 0 at `from`, vertex 2 at `to`; the other pair the same.
+/// Puts vertex 0 at `from`, vertex 2 at `to`; the other pair the same.
 Eigen::Matrix3Xd pair_of(const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
   const Eigen::Vector3d aside(1, 0, 0);
   Eigen::Matrix3Xd position_m(3, 4);
@@ -36,7 +36,7 @@ SpringParameters one_spring_parameters(double length_m, double stiffness, double
   return springs;
 }
 
-/// Springs as a search may try them: not at rest in the flat cloth.
+/// Returns springs as a search may try them: not at rest in the flat cloth.
 SpringParameters random_springs(const Mesh& mesh, Uniform& uniform) {
   SpringParameters springs = spring_parameters(random_fabric(uniform), mesh);
   for (double& length : springs.natural_length_m) length *= uniform(0.8, 1.1);
@@ -96,7 +96,7 @@ TEST(SpringForce, DashpotResistsTheRateOfStretchingOnly) {
 
   const Eigen::Matrix3Xd force_n = spring_forces_n(kPair, springs, position_m, velocity);
 
-  // c dl/dt along the spring, to the rounding of velocities of size 10.
+  // The force is c dl/dt along the spring, to the rounding of velocities of size 10.
   EXPECT_LT((force_n.col(0) - 0.3 * 2.0 * along).norm(), 1e-14);
   EXPECT_LT(force_n.col(1).norm(), 1e-14);
 }
@@ -146,8 +146,8 @@ TEST(SpringForce, IsMinusTheGradientOfTheElasticEnergy) {
       const double gradient_n =
           (elastic_energy_j(s.net, s.springs, ahead) - elastic_energy_j(s.net, s.springs, behind)) /
           (2 * step_m);
-      // Rounding of an energy below 10 J over the step: 1e-9; the difference's own error k h^2 /
-      // l^2 l is below 1e-7 for springs of 1 cm.
+      // The rounding of an energy below 10 J over the step is 1e-9. The difference's own error k
+      // h^2 / l^2 l is below 1e-7 for springs of 1 cm.
       EXPECT_NEAR(force_n.reshaped()[n], -gradient_n, 1e-6 * (1 + std::abs(gradient_n)));
     }
   }
@@ -193,7 +193,7 @@ TEST(SpringForce, DampingDoesNothingToClothThatTurnsRigidly) {
   const Eigen::Matrix3Xd force_n =
       spring_forces_n(s.mesh, without_stiffness(s.springs), s.position_m, velocity);
 
-  // Rounding of differences of velocities of a few m/s, times at most 1 Ns/m.
+  // Differences of velocities of a few m/s are rounded, times at most 1 Ns/m.
   EXPECT_LT(force_n.cwiseAbs().maxCoeff(), 1e-13);
 }
 
@@ -224,7 +224,7 @@ TEST(SpringForce, LeavesOutASpringOfZeroLength) {
 }
 
 TEST(SpringForce, HasTheInverseLengthToRounding) {
-  // A spring's force over 40 decades of length, against the library's square root.
+  // A spring's force over 40 decades of length is compared with the library's square root.
   Uniform uniform(15);
   for (int n = 0; n < 2000; ++n) {
     const double length_m = std::pow(10, uniform(-20, 20));
@@ -235,7 +235,7 @@ TEST(SpringForce, HasTheInverseLengthToRounding) {
     const Eigen::Matrix3Xd force_n =
         spring_forces_n(kPair, springs, position_m, at_rest(position_m));
 
-    // f = l u = the vector itself; the inverse square root enters twice with 3e-16 each.
+    // f = l u is the vector itself; the inverse square root enters twice with 3e-16 each.
     EXPECT_LT((force_n.col(0) - to).norm(), 1e-15 * length_m) << length_m;
   }
 }
@@ -324,7 +324,7 @@ TEST_P(ClothSweepOn, AgreesWithTheScalarReferenceToTheLastBit) {
     for (int n = 0; n < 200; ++n)
       sweep.step_euler(springs, gravity, mass_kg.cwiseInverse(), nullptr, h, position, velocity);
 
-    // then every lane is where plain arithmetic has it, bit for bit.
+    // then every lane agrees with plain arithmetic, bit for bit.
     for (int l = 0; l < kLanes; ++l) {
       SCOPED_TRACE(l);
       CrumpledState& s = states[static_cast<size_t>(l)];

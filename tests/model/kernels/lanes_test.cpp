@@ -1,4 +1,4 @@
-// One model in three kinds of numbers: `exact` lanes, a single simulation, `fast` lanes. Not
+// Checks one model in three kinds of numbers: `exact` lanes, a single simulation, `fast` lanes. Not
 // checked here: that the exact ones are right (cloth_sweep_test.cpp, strain_limit_test.cpp).
 
 #include "model/kernels/lanes.h"
@@ -17,7 +17,7 @@
 namespace clothfit {
 namespace {
 
-/// A soft cloth of `rows` x `columns`, hung by two corners and crumpled; its springs may stretch by
+/// A soft cloth of `rows` x `columns`, hung by two corners and crumpled. Its springs may stretch by
 /// a twentieth.
 struct Hung {
   Cloth cloth;
@@ -128,8 +128,8 @@ TEST_P(FastLanesOn, StayNearTheExactOnesForASecondOfSwinging) {
                                      StrainLimitMode::rates_first, StrainLimitMode::consistent}) {
     SCOPED_TRACE(static_cast<int>(mode));
     const bool limited = mode != StrainLimitMode::off;
-    // Given a cloth like the bundled recordings', let go from 20 degrees beside where it hangs (one
-    // that folds is chaotic: any difference grows),
+    // Given a cloth like the bundled recordings', let go from 20 degrees beside where it hangs. One
+    // that folds is chaotic: any difference grows.
     Cloth cloth = square_cloth(17);
     cloth.held = {held_at(cloth.mesh, 0, 0), held_at(cloth.mesh, 0.4, 0)};
     cloth.strain_limit.mode = mode;
@@ -153,8 +153,8 @@ TEST_P(FastLanesOn, StayNearTheExactOnesForASecondOfSwinging) {
     }
 
     // then no vertex is far from where it should be. Rounding of 1e-8 m grows where the cloth
-    // buckles, and where it decides which spring is too long: 0.9 mm was seen without a limit, 3 um
-    // where one sweep keeps the cloth taut, 2.7 mm by first rates, 7.2 mm with sweeps until all
+    // buckles, and where it decides which spring is too long. Seen were 0.9 mm without a limit, 3
+    // um where one sweep keeps the cloth taut, 2.7 mm by first rates, 7.2 mm with sweeps until all
     // springs are tolerable.
     RecordProperty("mode_" + std::to_string(static_cast<int>(mode)) + "_um",
                    std::to_string(1e6 * largest_m));
@@ -171,7 +171,7 @@ TEST_P(FastLanesOn, StayNearTheExactOnesForASecondOfSwinging) {
   }
 }
 
-/// Without the last, which takes ten seconds.
+/// Returns the sets without the last, which takes ten seconds.
 std::vector<InstructionSet> vector_sets() {
   std::vector<InstructionSet> sets = instruction_sets();
   if (sets.size() > 1) sets.pop_back();

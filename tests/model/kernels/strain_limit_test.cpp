@@ -1,5 +1,5 @@
-// Springs kept from stretching beyond their critical elongation. Not checked here: what the springs
-// pull with (cloth_sweep_test.cpp).
+// Checks springs kept from stretching beyond their critical elongation. Not checked here: the
+// springs' pull (cloth_sweep_test.cpp).
 
 #include "model/kernels/strain_limit.h"
 
@@ -27,7 +27,7 @@ LaneLimits<> no_limits() {
   return limits;
 }
 
-/// Every type's springs limited to (1 + `critical`) times their flat length.
+/// Limits every type's springs to (1 + `critical`) times their flat length.
 LaneLimits<> limits_of(const Mesh& mesh, double critical, double tolerance = 0) {
   LaneLimits<> limits;
   for (size_t type = 0; type < kSpringTypes; ++type) {
@@ -37,12 +37,12 @@ LaneLimits<> limits_of(const Mesh& mesh, double critical, double tolerance = 0) 
   return limits;
 }
 
-/// A flat cloth, `stretch` times as large, with noise.
+/// Returns a flat cloth, `stretch` times as large, with noise.
 Eigen::Matrix3Xd stretched(const Mesh& mesh, double stretch, Uniform& uniform) {
   return stretch * flat_positions(mesh) + uniform.vectors(mesh.vertex_count(), 0.02);
 }
 
-/// Largest elongation beyond `critical`, as a share of the flat length.
+/// Returns the largest elongation beyond `critical`, as a share of the flat length.
 double largest_excess(const Mesh& mesh, const Eigen::Matrix3Xd& position_m, double critical) {
   double largest = -1;
   const SpringNet net = make_springs(mesh);
@@ -98,7 +98,7 @@ TEST(StrainLimit, MovesTheFreeEndAloneWhenTheOtherIsHeld) {
 }
 
 TEST(StrainLimit, ByFirstRatesSetsWhatWasTooLongAlthoughOthersHaveShortenedItSince) {
-  // Given three vertices in a row, 0.15 m apart where 0.1 m is natural: the spring over both steps
+  // Given three vertices in a row, 0.15 m apart where 0.1 m is natural. The spring over both steps
   // (0.3 m) is limited to 0.29 m, those over one (type 1) to 0.11 m.
   const Mesh row{.columns = 3, .rows = 2, .width_m = 0.2, .height_m = 1};
   LaneLimits<> limits = no_limits();
@@ -112,8 +112,8 @@ TEST(StrainLimit, ByFirstRatesSetsWhatWasTooLongAlthoughOthersHaveShortenedItSin
   limiter.limit_positions(limits, in_turn);
   const LimitOutcome<> outcome = limiter.limit_by_first_rates(limits, by_first);
 
-  // then the first pair moves to 0.02, 0.13; the second to 0.13 + 0.03, 0.30 - 0.03; and the outer
-  // vertices, 0.25 m apart by then, are left there, or moved to 0.29 m as the first look has it.
+  // then the first pair moves to 0.02, 0.13; the second to 0.13 + 0.03, 0.30 - 0.03. The outer
+  // vertices, 0.25 m apart by then, stay there, or move to 0.29 m by the first look.
   const auto x = [](const LaneVectors<>& position, int k) { return position.x(0, k); };
   EXPECT_NEAR(x(in_turn, 0), 0.02, 1e-15);
   EXPECT_NEAR(x(in_turn, 2), 0.27, 1e-15);
@@ -162,7 +162,7 @@ TEST(StrainLimit, KeepsTheCentreOfMassAndMomentum) {
     EXPECT_GT((moved - p).cwiseAbs().maxCoeff(), 0.01);
     EXPECT_LT(((moved - p) * mass_kg).norm(), 1e-16);  // kg m
     EXPECT_LT(((velocity.lane(0) - v) * mass_kg).norm(), 1e-13);
-    // What moved a vertex is in its velocity.
+    // The velocity of a vertex contains its move.
     EXPECT_LT((velocity.lane(0) - v - (moved - p) / 1e-3).cwiseAbs().maxCoeff(), 1e-11);
   }
 }
@@ -188,7 +188,7 @@ TEST(StrainLimit, SweepsUntilNoSpringIsLongerThanToleratedOrSaysSo) {
         const LimitOutcome<> outcome = limiter.limit_consistently(
             limits_of(mesh, critical, 1e-3), StrainLimit{}.most_sweeps, 1e-3, position, velocity);
 
-        // then one sweep leaves springs that are too long, and many none, or that is said.
+        // then one sweep leaves springs that are too long, and many sweeps none, or that is said.
         EXPECT_GT(largest_excess(mesh, once.lane(0), critical), 2e-3);
         const bool is_met = (outcome.unmet == 0).all();
         EXPECT_EQ(is_met, largest_excess(mesh, position.lane(0), critical) < 1e-3 + 1e-12);
@@ -219,8 +219,8 @@ TEST(StrainLimit, SaysWhenHeldPointsAreTooFarApart) {
 
 // --- against plain arithmetic --------------------------------------------------------------------
 
-/// One sweep over plain vectors in the published order; returns whether it shortened a spring.
-/// Where `rates_first`, which springs are too long is seen in the positions as they are given.
+/// Makes one sweep over plain vectors in the published order; returns whether it shortened a
+/// spring. With `rates_first`, the given positions decide which springs are too long.
 bool reference_sweep(const Mesh& mesh, const Eigen::VectorXd& inverse_mass,
                      const LaneLimits<>& limits, Eigen::Index lane, double steps_per_s,
                      Eigen::Matrix3Xd& p, Eigen::Matrix3Xd& v, bool rates_first = false) {
@@ -303,7 +303,7 @@ TEST_P(StrainLimitOn, AgreesWithPlainArithmeticToTheLastBit) {
     }
     const LaneVectors<> start = position;
 
-    // when they are limited until all are done,
+    // when they are limited until all are within their limits,
     StrainLimiter<> limiter(mesh, inverse_mass);
     limiter.limit_consistently(limits, 40, 1e-3, position, velocity);
     LaneVectors<> once = start, by_first = start;
@@ -337,8 +337,9 @@ INSTANTIATE_TEST_SUITE_P(InstructionSets, StrainLimitOn, testing::ValuesIn(instr
 
 // --- in a cloth that swings ----------------------------------------------------------------------
 
-/// Largest elongation beyond 10 % while a soft cloth, let go flat, falls into its two held corners
-/// for half a second; and how many springs the limit had to shorten in the last step.
+/// A soft cloth, let go flat, that falls into its two held corners for half a second. Recorded are
+/// the largest elongation beyond 10 %, and how many springs the limit had to shorten in the last
+/// step.
 struct LimitedSwing {
   double largest_excess = -1;
   double too_long = 0;
@@ -374,7 +375,7 @@ TEST(StrainLimit, HoldsTheWholeClothInTheConsistentMode) {
   EXPECT_GT(free.largest_excess, 0.3);
   EXPECT_TRUE(consistent.met);
   EXPECT_LT(consistent.largest_excess, 1e-3 + 1e-12);
-  // The paper's single sweep lets later springs undo what earlier ones were given.
+  // The paper's single sweep lets later springs undo the corrections of earlier ones.
   EXPECT_GT(paper.largest_excess, 1e-3);
   EXPECT_LT(paper.largest_excess, free.largest_excess);
   EXPECT_GT(paper.too_long, 0);

@@ -1,5 +1,5 @@
-// The same cloth on a coarser mesh, and shapes from one mesh to another. Not checked here: what the
-// cascade makes of them (equilibrium_test.cpp).
+// Checks the same cloth on a coarser mesh, and shapes from one mesh to another. Not checked here:
+// their use by the cascade (equilibrium_test.cpp).
 
 #include "model/rest/coarser_cloth.h"
 
@@ -44,7 +44,8 @@ TEST(CoarserCloth, KeepsTheMassAndItsCentre) {
 }
 
 TEST(CoarserCloth, StoresTheSameEnergyWhenItIsStretchedEvenly) {
-  // Per area, away from the edges: 5 % along s, 3 % along t and some shear.
+  // Strains are 5 % along s, 3 % along t and some shear; energies are per area, away from the
+  // edges.
   Eigen::Matrix3d strain = Eigen::Matrix3d::Identity();
   strain(0, 0) = 1.05;
   strain(1, 1) = 1.03;
@@ -100,7 +101,8 @@ TEST(TransferShape, KeepsWhatIsLinearAndTheVerticesThatBothMeshesHave) {
 }
 
 TEST(TransferShape, GoesThroughTheTriangleThatAVertexLiesIn) {
-  // One cell with a corner raised; the middle lies on the diagonal from [0, 0] to [1, 1].
+  // The mesh is one cell with a corner raised; the middle lies on the diagonal from [0, 0] to [1,
+  // 1].
   const Mesh cell{.columns = 2, .rows = 2, .width_m = 1, .height_m = 1};
   const Mesh finer{.columns = 3, .rows = 3, .width_m = 1, .height_m = 1};
   Eigen::Matrix3Xd shape = flat_positions(cell);

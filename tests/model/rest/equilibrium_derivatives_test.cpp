@@ -1,4 +1,4 @@
-// How an equilibrium moves with the parameters. Not checked here: equilibria themselves
+// Checks how an equilibrium moves with the parameters. Not checked here: equilibria themselves
 // (equilibrium_test.cpp).
 
 #include "model/rest/equilibrium_derivatives.h"
@@ -53,7 +53,7 @@ TEST(EquilibriumDerivatives, AgreeWithDifferencesOfEquilibria) {
   SCOPED_TRACE("seed 1");
   Uniform uniform(1);
   const Sagging sagging;
-  // One mesh only, so that neighbours are found from the shape itself.
+  // The cascade has one mesh only, so that neighbours are found from the shape itself.
   const Eigen::Matrix3Xd shape = sagging.shape(flat_positions(sagging.cloth.mesh));
   std::vector<EquilibriumDirection> directions(5);
   directions[0].stiffness_n_per_m = {1, -2, 3, 1, 2, -1};
@@ -67,13 +67,15 @@ TEST(EquilibriumDerivatives, AgreeWithDifferencesOfEquilibria) {
 
   ASSERT_TRUE(derivatives.usable());
   for (size_t n = 0; n < directions.size(); ++n) {
-    // Between what equilibria are good to, 1e-10 m, and where folds change their stiffness.
+    // The step lies between the error of equilibria, 1e-10 m, and the place where folds change
+    // their stiffness.
     const double h = std::array{1e-2, 1e-5, 1e-4, 1e-4, 1e-5}[n];
     const Eigen::Matrix3Xd difference = (sagging.moved(directions[n], h).shape(shape) -
                                          sagging.moved(directions[n], -h).shape(shape)) /
                                         (2 * h);
     EXPECT_GT(difference.norm(), 1e-4) << n;
-    // Second order in h, of folds whose stiffness itself changes within millimetres.
+    // The error is of second order in h, for folds whose stiffness itself changes within
+    // millimetres.
     EXPECT_LT((derivatives.position_m[n] - difference).norm(), 1e-4 * difference.norm()) << n;
   }
 }

@@ -1,5 +1,5 @@
-// Equilibria of hanging cloth: closed forms, three ways to the same minimum, the time stepper's
-// resting state, held points, bad input. Not checked here: the energy itself
+// Checks equilibria of hanging cloth: closed forms, three ways to the same minimum, the time
+// stepper's resting state, held points, bad input. Not checked here: the energy itself
 // (hanging_energy_test.cpp), derivatives (equilibrium_derivatives_test.cpp), how long it takes
 // (tests/bench/equilibrium_bench.cpp).
 
@@ -20,7 +20,7 @@
 namespace clothfit {
 namespace {
 
-/// A square cloth that hangs by its two upper corners, and its parameters; the start is flat and
+/// A square cloth that hangs by its two upper corners, and its parameters. The start is flat and
 /// lies on its back, so that it has to swing down.
 struct Hung {
   Cloth cloth;
@@ -43,9 +43,9 @@ double largest_distance_m(const Eigen::Matrix3Xd& a, const Eigen::Matrix3Xd& b) 
   return (a - b).colwise().norm().maxCoeff();
 }
 
-/// A chain of elastic links between two points of equal height, whose links carry a horizontal
-/// tension H and a vertical one that grows by a vertex's weight at every vertex: link i is
-/// (H, V_i) (l0 / T_i + 1 / k), T_i = |(H, V_i)|, from Hooke's law T = k (l - l0).
+/// Returns a chain of elastic links between two points of equal height. The links carry a
+/// horizontal tension H and a vertical one that grows by a vertex's weight at every vertex. Link i
+/// is (H, V_i) (l0 / T_i + 1 / k), T_i = |(H, V_i)|, from Hooke's law T = k (l - l0).
 Eigen::Matrix2Xd discrete_catenary(int vertices, double horizontal_n, double vertex_weight_n,
                                    double l0, double k) {
   Eigen::Matrix2Xd place = Eigen::Matrix2Xd::Zero(2, vertices);
@@ -57,7 +57,7 @@ Eigen::Matrix2Xd discrete_catenary(int vertices, double horizontal_n, double ver
 }
 
 TEST(Equilibrium, OfAChainIsTheDiscreteCatenary) {
-  // Given two chains side by side, their ends where a horizontal tension of 0.05 N puts them,
+  // Given two chains side by side, whose ends lie where a horizontal tension of 0.05 N puts them,
   const Mesh mesh{.columns = 2, .rows = 40, .width_m = 0.05, .height_m = 0.78};
   const double vertex_kg = 0.5e-3, k = 30;
   Cloth cloth = Cloth::of(mesh, Eigen::VectorXd::Constant(mesh.vertex_count(), vertex_kg));
@@ -85,7 +85,7 @@ TEST(Equilibrium, OfAChainIsTheDiscreteCatenary) {
     for (int i = 0; i < mesh.rows; ++i)
       for (int j = 0; j < 2; ++j) {
         const Eigen::Vector3d at(0.05 * j, expected(0, i), expected(1, i));
-        // Softest where it is nearly slack; 1e-10 of 0.4 N against some 0.01 N/m.
+        // The chain is softest where it is nearly slack; 1e-10 of 0.4 N against some 0.01 N/m.
         EXPECT_LT((result.position_m.col(mesh.vertex(i, j)) - at).norm(), 1e-7) << i << ", " << j;
       }
     EXPECT_LT(expected(1, mesh.rows / 2), -0.2);  // it does sag
@@ -115,8 +115,8 @@ TEST(Equilibrium, IsTheSameByAllThreeMethods) {
 }
 
 TEST(Equilibrium, ByTheCascadeIsAsLowAndTakesFewerSteps) {
-  // A fabric that resists bending and shear well. One that hardly does buckles anew on every mesh,
-  // and the cascade gains little.
+  // The fabric resists bending and shear well. One that hardly does buckles in a new way on every
+  // mesh, and the cascade gains little.
   Hung hung = hung_by_corners(33);
   hung.set.springs.stiffness_n_per_m = {50, 50, 20, 20, 10, 10};
   const auto find = [&](EquilibriumMethod method) {
@@ -127,8 +127,8 @@ TEST(Equilibrium, ByTheCascadeIsAsLowAndTakesFewerSteps) {
   const EquilibriumResult newton = find(EquilibriumMethod::multigrid_newton);
 
   ASSERT_TRUE(single.usable() && cascade.usable() && newton.usable());
-  // The rule leaves each a little above the minimum: the gradient, 1e-3 of the weight, times what
-  // it still moves, millimetres.
+  // The rule leaves each a little above the minimum: the gradient, 1e-3 of the weight, times the
+  // way that it still moves, millimetres.
   const double left_j = 1e-3 * 0.25 * 0.01;
   EXPECT_LE(cascade.energy_j, single.energy_j + left_j);
   EXPECT_LE(newton.energy_j, single.energy_j + left_j);
@@ -218,7 +218,7 @@ TEST(Equilibrium, TurnsWithTheScene) {
 }
 
 TEST(Equilibrium, HasTheSameBitsForAnyNumberOfThreads) {
-  // Large enough for several tasks in every kernel; a few iterations of each method say it all.
+  // The mesh gives several tasks to every kernel; a few iterations of each method say it all.
   Hung hung = hung_by_corners(121);
   for (const EquilibriumMethod method : kMethods) {
     std::vector<EquilibriumResult> results;
@@ -237,7 +237,7 @@ TEST(Equilibrium, HasTheSameBitsForAnyNumberOfThreads) {
 }
 
 TEST(Equilibrium, SaysWhenTheClothFalls) {
-  // Springs across only: all rows but the held one fall.
+  // There are only springs across: all rows but the held one fall.
   Hung hung = hung_by_corners(9);
   hung.set.springs.stiffness_n_per_m = {0, 50, 0, 0, 0, 0};
   for (const EquilibriumMethod method : kMethods) {

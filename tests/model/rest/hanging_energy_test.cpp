@@ -1,5 +1,5 @@
-// The energy of a hanging cloth with its first and second derivative, on every instruction set. Not
-// checked here: held points (held_projection_test.cpp) and minima (equilibrium_test.cpp).
+// Checks the energy of a hanging cloth with its first and second derivative, on every instruction
+// set. Not checked here: held points (held_projection_test.cpp) and minima (equilibrium_test.cpp).
 
 #include "model/rest/hanging_energy.h"
 
@@ -15,7 +15,7 @@
 namespace clothfit {
 namespace {
 
-/// More rows than one task takes, and columns that fill no whole vector.
+/// The mesh has more rows than one task takes, and columns that fill no whole vector.
 constexpr Mesh kMesh{.columns = 11, .rows = 53, .width_m = 0.2, .height_m = 1.0};
 
 struct Crumpled {
@@ -23,7 +23,7 @@ struct Crumpled {
   Eigen::Matrix3Xd position_m;
 };
 
-/// The model's springs, not at rest in the flat cloth, and the energy of equation 8.
+/// Returns the model's springs, not at rest in the flat cloth, and the energy of equation 8.
 std::vector<Crumpled> crumpled_cloths(const Mesh& mesh, Uniform& uniform) {
   Eigen::VectorXd mass_kg(mesh.vertex_count());
   for (double& m : mass_kg) m = uniform(1e-4, 1e-3);
@@ -159,7 +159,7 @@ TEST(HangingEnergy, ClampedHasNoNegativeCurvatureAndIsExactWhereAllIsStretched) 
   bool exact_is_negative_somewhere = false;
   for (int trial = 0; trial < 20; ++trial) {
     HangingEnergy energy(crumpled.cloth);
-    // Along the normal of a nearly flat, compressed sheet nothing holds.
+    // Nothing holds a nearly flat, compressed sheet along its normal.
     const Eigen::Matrix3Xd squeezed = 0.5 * crumpled.position_m;
     Eigen::Matrix3Xd direction = uniform.vectors(kMesh.vertex_count(), 1);
     direction.topRows<2>() *= 0.01;

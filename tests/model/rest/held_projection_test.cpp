@@ -1,4 +1,4 @@
-// Held points as constraints of a minimisation. Not checked here: equilibria with them
+// Checks held points as constraints of a minimisation. Not checked here: equilibria with them
 // (equilibrium_test.cpp).
 
 #include "model/rest/held_projection.h"
@@ -12,7 +12,7 @@ namespace {
 
 const Mesh kSixBySix = square_mesh(6);
 
-/// A vertex, a point inside a cell, and one on an edge of the same cell.
+/// Returns a vertex, a point inside a cell, and one on an edge of the same cell.
 std::vector<HeldVertexWeights> points() {
   return {held_at(kSixBySix, 0, 0), held_at(kSixBySix, 0.19, 0.23), held_at(kSixBySix, 0.16, 0.2)};
 }

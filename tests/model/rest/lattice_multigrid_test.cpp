@@ -1,5 +1,5 @@
-// The preconditioner of Newton's steps as a linear map. Not checked here: the steps themselves
-// (equilibrium_test.cpp).
+// Checks the preconditioner of Newton's steps as a linear map. Not checked here: the steps
+// themselves (equilibrium_test.cpp).
 
 #include "model/rest/lattice_multigrid.h"
 
@@ -51,7 +51,7 @@ struct System {
     hold(field);
     return field;
   }
-  /// Steps of preconditioned conjugate gradients until the residual is a millionth.
+  /// Counts steps of preconditioned conjugate gradients until the residual is a millionth.
   int steps_to_a_millionth(Uniform& uniform) {
     MeshField residual = random(uniform), product(energy.layout());
     const double enough = 1e-6 * norm(residual);

@@ -1,5 +1,5 @@
-// Shapes at rest of many parameter sets, as a fit needs them. Not checked here: single equilibria
-// (equilibrium_test.cpp).
+// Checks shapes at rest of many parameter sets, as a fit needs them. Not checked here: single
+// equilibria (equilibrium_test.cpp).
 
 #include "model/rest/rest_shapes.h"
 
@@ -22,12 +22,12 @@ Cloth cloth_hung_by(int vertices_per_side, int corners) {
   return cloth;
 }
 
-/// Cotton whose springs of one type are stiffer by a share.
+/// Returns cotton whose springs of one type are stiffer by a share.
 ParameterSet cotton_set(const Cloth& cloth, size_t type, double stiffer) {
   ParameterSet set{.springs = spring_parameters(cotton(), cloth.mesh),
                    .start_position_m = hung_flat(cloth.mesh)};
   set.springs.stiffness_n_per_m[type] *= 1 + stiffer;
-  // Not quite flat: symmetry would keep it flat.
+  // The start is not quite flat: symmetry would keep it flat.
   for (Eigen::Index v = 0; v < set.start_position_m.cols(); ++v)
     set.start_position_m(1, v) =
         0.01 * std::sin(11 * set.start_position_m(0, v) + 5 * set.start_position_m(2, v));

@@ -1,5 +1,5 @@
-// The grid of masses, its springs and how a cloth's mass sits on it. Not checked here: what the
-// springs pull with (cloth_sweep_test.cpp) and the surface between the vertices
+// Checks the grid of masses, its springs and the distribution of a cloth's mass on it. Not checked
+// here: the springs' pull (cloth_sweep_test.cpp) and the surface between the vertices
 // (surface_test.cpp).
 
 #include "model/topology/mesh.h"
@@ -24,7 +24,7 @@ Ends ends(const std::vector<Spring>& springs) {
   return result;
 }
 
-/// Pairs of vertices whose rows and columns differ as `linked` says, found by trying all pairs.
+/// Finds pairs of vertices whose rows and columns differ as `linked` says, by trying all pairs.
 Ends pairs(const Mesh& mesh, const std::function<bool(int di, int dj)>& linked) {
   Ends result;
   for (int p = 0; p < mesh.vertex_count(); ++p) {
@@ -138,14 +138,14 @@ TEST(MassesEqual, AreEqualOnTheirOwnMesh) {
     const Eigen::VectorXd masses = masses_equal(mesh, mesh, 0.025);
 
     const double equal = 0.025 / mesh.vertex_count();
-    // Put together from an area's, two lines' and a corner's share: a few roundings.
+    // A mass is put together from an area's, two lines' and a corner's share: a few roundings.
     EXPECT_LT((masses.array() - equal).abs().maxCoeff(), 2e-15 * equal);
   }
 }
 
 TEST(MassesEqual, KeepTheirDistributionOverTheClothOnAnotherMesh) {
-  // Given the reference as a plate of m0 per cell, its border as bars of m0 / 2 per spacing and
-  // its corners as points of m0 / 4,
+  // Given the reference as a plate of m0 per cell, its border as bars of m0 / 2 per spacing and its
+  // corners as points of m0 / 4,
   const Mesh reference{.columns = 9, .rows = 5, .width_m = 0.3, .height_m = 0.5};
   const double w = reference.width_m, h = reference.height_m, mass = 0.025;
   const double m0 = mass / (9 * 5);
@@ -167,7 +167,7 @@ TEST(MassesEqual, KeepTheirDistributionOverTheClothOnAnotherMesh) {
                 1e-14 * mass);
     EXPECT_NEAR(moment(mesh, masses, [](double s, double t) { return s * t; }), mass * w * h / 4,
                 1e-14 * mass);
-    // the second moments differ by what the trapezoidal rule gives too much for a square.
+    // the second moments differ by the trapezoidal rule's excess for a square.
     const double excess_s = 1 + 1 / (2.0 * (columns - 1) * (columns - 1));
     const double excess_t = 1 + 1 / (2.0 * (rows - 1) * (rows - 1));
     EXPECT_NEAR(moment(mesh, masses, [](double s, double) { return s * s; }),

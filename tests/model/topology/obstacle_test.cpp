@@ -1,4 +1,4 @@
-// The nearest part of an obstacle's surface. Not checked here: the force there
+// Checks the nearest part of an obstacle's surface. Not checked here: the force there
 // (effects/contact_mesh_test.cpp).
 
 #include "model/topology/obstacle.h"
@@ -15,7 +15,7 @@ namespace {
 
 using NearestPoint = Obstacle::Nearest;
 
-/// The unit cube, its corners given once for each of its twelve triangles.
+/// Returns the unit cube, its corners given once for each of its twelve triangles.
 TriangleMesh cube() {
   TriangleMesh mesh{Eigen::Matrix3Xd(3, 36), Eigen::Matrix3Xi(3, 12)};
   Eigen::Index v = 0;
@@ -60,7 +60,7 @@ TEST(Obstacle, OfACubeIsItsNearestFaceForWhatIsInsideAndNothingOutside) {
 }
 
 TEST(Obstacle, IsFoundByTheTreeAsByTryingEveryTriangle) {
-  // Dented, so that edges and corners are nearest too; turned, so that no box is tight.
+  // The cube is dented, so that edges and corners are nearest too; turned, so that no box is tight.
   Uniform uniform(2);
   TriangleMesh ball = ball_mesh(3);
   for (Eigen::Index v = 0; v < ball.vertex_m.cols(); ++v) ball.vertex_m.col(v) *= uniform(0.8, 1);

@@ -1,5 +1,5 @@
-// The surface between the vertices. Not checked here: how the vertices move (step_test.cpp), and
-// how a point of the surface becomes a pixel (tests/calib/camera/projection_test.cpp).
+// Checks the surface between the vertices. Not checked here: how the vertices move (step_test.cpp),
+// and how a point of the surface becomes a pixel (tests/calib/camera/projection_test.cpp).
 
 #include "model/topology/surface.h"
 
@@ -24,7 +24,7 @@ Eigen::Matrix2Xd random_points(int count, unsigned seed) {
   return points;
 }
 
-/// Material coordinates of the vertices, in the order of their indices.
+/// Returns material coordinates of the vertices, in the order of their indices.
 Eigen::Matrix2Xd vertex_points(int columns, int rows) {
   Eigen::Matrix2Xd points(2, columns * rows);
   for (int i = 0; i < rows; ++i) {
@@ -52,8 +52,8 @@ Eigen::Vector3d waves(double s, double t) {
   return {s + 0.01 * std::sin(20 * t), 0.03 * std::sin(16 * s + 0.3) * std::cos(13 * t), -t};
 }
 
-/// Largest distance between the surface through vertices on `waves` and `waves` itself, at points
-/// of the given window of the cloth (fractions of its size, from every edge).
+/// Returns the largest distance between `waves` and the surface through vertices on it. Points lie
+/// in the given window of the cloth (fractions of its size, from every edge).
 double largest_error_m(int vertices_per_side, double margin, SurfaceInterpolation interpolation) {
   Eigen::Matrix2Xd points = random_points(400, 11);
   const Eigen::Vector2d size(kWidth_m, kHeight_m);
@@ -66,8 +66,9 @@ double largest_error_m(int vertices_per_side, double margin, SurfaceInterpolatio
   return (surface.evaluate(vertices) - sample(points, waves)).colwise().norm().maxCoeff();
 }
 
-/// Value and derivatives of the natural cubic spline through `f` at knots 0, 1, 2, ..., from a
-/// dense solve of the conditions on its pieces a + b u + c u^2 + d u^3: another route than moments.
+/// Value and derivatives of the natural cubic spline through `f` at knots 0, 1, 2, ... They come
+/// from a dense solve of the conditions on its pieces a + b u + c u^2 + d u^3: another route than
+/// moments.
 struct PieceSpline {
   Eigen::MatrixXd piece;  ///< 4 x (n - 1)
   explicit PieceSpline(const Eigen::VectorXd& f) {
@@ -124,7 +125,7 @@ TEST(Surface, PassesThroughItsVerticesWithASingleWeight) {
 
   const Eigen::Matrix3Xd at_points = surface.evaluate(vertices);
 
-  // Rounding of (s / spacing) leaves about 1e-15; nothing else is between.
+  // The rounding of (s / spacing) is about 1e-15; nothing else is between.
   EXPECT_LT((at_points - vertices).cwiseAbs().maxCoeff(), 1e-12);
   EXPECT_EQ(surface.row_weights.nonZeros(), columns * rows);
   EXPECT_EQ(surface.column_weights.nonZeros(), columns * rows);
@@ -184,8 +185,8 @@ TEST(Surface, HasNoCurvatureAcrossItsEdges) {
 }
 
 TEST(Surface, ConvergesWithTheFourthPowerOfTheSpacingInside) {
-  // The natural end condition is wrong for a surface that is curved at its edge; that error dies
-  // out by 0.27 per vertex, so a third of the cloth away from the edges only the order is left.
+  // The natural end condition is wrong for a surface that is curved at its edge. That error dies
+  // out by 0.27 per vertex, so a third of the cloth away from the edges only the order matters.
   const double coarse = largest_error_m(25, 0.33, SurfaceInterpolation::bicubic);
   const double fine = largest_error_m(49, 0.33, SurfaceInterpolation::bicubic);
   const double bilinear_coarse = largest_error_m(25, 0.33, SurfaceInterpolation::bilinear);
@@ -229,7 +230,7 @@ TEST(Surface, WeightsOfAPointSumToOne) {
 
     const Eigen::VectorXd sums = vertex_weights(surface) * Eigen::VectorXd::Ones(60 * 17);
 
-    EXPECT_LT((sums.array() - 1).abs().maxCoeff(), 1e-11);  // what is left out is 1e-12 each
+    EXPECT_LT((sums.array() - 1).abs().maxCoeff(), 1e-11);  // each omitted one is 1e-12
   }
 }
 
@@ -239,7 +240,7 @@ TEST(Surface, LeavesOutFarVerticesOfALargeMesh) {
 
   const Surface surface = make_surface(200, 200, kWidth_m, kHeight_m, point);
 
-  // 0.268^k < 1e-12 from k = 21 on, to both sides.
+  // To both sides 0.268^k < 1e-12 from k = 21 on.
   EXPECT_LE(surface.column_weights.nonZeros(), 44);
   EXPECT_GE(surface.column_weights.nonZeros(), 36);
 }
@@ -290,8 +291,8 @@ TEST(Surface, HasTheDerivativesOfItsPlacesAndOfItsSlopes) {
     const Eigen::Matrix3Xd differences =
         (at(points.colwise() + step, of) - at(points.colwise() - step, of)) / (2 * kStep_m);
     const Eigen::Matrix3Xd found = at(points, derivative);
-    // The differences' own error: step^2 / 6 of a third derivative of about 10 / spacing^3. Second
-    // derivatives have corners at the vertices, which a step across blurs.
+    // The differences' own error is step^2 / 6 of a third derivative of about 10 / spacing^3.
+    // Second derivatives have corners at the vertices, which a step across blurs.
     const double scale = found.cwiseAbs().maxCoeff();
     EXPECT_LT((found - differences).cwiseAbs().maxCoeff(), of == place ? 1e-4 : 1e-2 * scale);
     EXPECT_GT(scale, 10);

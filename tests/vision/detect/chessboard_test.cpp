@@ -1,5 +1,5 @@
-// Corners of a chessboard: order on drawn boards, precision on the bundled stills, whose boards'
-// places are known. What a calibration makes of them is in tests/calib.
+// Checks corners of a chessboard: order on drawn boards, precision on the bundled stills, whose
+// boards' places are known. Calibrations from them are checked in tests/calib.
 
 #include "vision/detect/chessboard.h"
 
@@ -22,7 +22,7 @@ namespace {
 
 const std::filesystem::path kSource = CLOTHFIT_SOURCE_DIR;
 
-/// A board of squares of 20 px with its first inner corner at (60, 50), seen from the front.
+/// Draws a board of squares of 20 px with its first inner corner at (60, 50), seen from the front.
 cv::Mat drawn_board(const BoardDescription& board) {
   cv::Mat big(4 * 260, 4 * 320, CV_8UC1, cv::Scalar(230));
   for (int r = 0; r <= board.rows; ++r) {

@@ -1,5 +1,5 @@
-// Tags rendered at known corners: order, pixel centres, bias, sigma. What tracking makes of
-// detections over time is in track_test.cpp.
+// Checks tags rendered at known corners: order, pixel centres, bias, sigma. Tracking of detections
+// over time is checked in track_test.cpp.
 
 #include "vision/detect/tag_detector.h"
 
@@ -43,7 +43,8 @@ struct Errors {
   }
 };
 
-/// Tags 25 to 45 px wide in all turns, tilted up to 45 degrees, at all places within a pixel.
+/// Detects tags 25 to 45 px wide in all turns, tilted up to 45 degrees, at all places within a
+/// pixel.
 Errors detect_many(int tags, double radius, std::uint64_t seed, const SyntheticCamera& camera) {
   std::mt19937_64 rng(seed);
   std::uniform_real_distribution<double> unit(0, 1);
@@ -69,7 +70,7 @@ Errors detect_many(int tags, double radius, std::uint64_t seed, const SyntheticC
 }
 
 TEST(TagDetector, NumbersCornersFromTheBottomLeftOfTheUprightTag) {
-  // Upright, a tag's bottom left corner lies at the left and below in the picture.
+  // On an upright tag the bottom left corner lies at the left and below in the picture.
   const SyntheticCamera camera;
   std::mt19937_64 rng(1);
   for (const std::string family : {"tag36h11", "tag25h9", "tag16h5", "tagStandard41h12"}) {
@@ -133,7 +134,7 @@ TEST(TagDetector, IsUnbiasedAndStatesHonestSigmaOnFlatTags) {
   RecordProperty("chi2", std::to_string(errors.chi2));
   EXPECT_LT(errors.mean.norm(), 0.03);
   EXPECT_LT(errors.rms, 0.06);
-  // 800 coordinates; the allowance for the next degree of bending is idle on a flat tag.
+  // There are 800 coordinates; the allowance for the next degree of bending is idle on a flat tag.
   EXPECT_GT(errors.chi2, 0.4);
   EXPECT_LT(errors.chi2, 1.4);
 }
@@ -151,8 +152,8 @@ TEST(TagDetector, KeepsItsWordOnNoisierAndSofterPictures) {
 }
 
 TEST(TagDetector, FollowsBentTagsWithinItsSigma) {
-  // Radius two tag widths: an edge that runs around the bend is off its chord by 3 % of the tag
-  // where it is seen askew.
+  // The radius is two tag widths. An edge that runs around the bend is off its chord by 3 % of the
+  // tag where it is seen askew.
   for (const double radius : {4.0, 8.0}) {
     const std::uint64_t seed = 5;
     SCOPED_TRACE(testing::Message() << "seed " << seed << " radius " << radius);
@@ -175,7 +176,7 @@ TEST(TagDetector, TrustsAHiddenCornerLess) {
   const auto clear = detector.detect(picture);
   ASSERT_EQ(clear.size(), 1U);
 
-  // A grey patch over corner 2, small enough for the code to be read.
+  // A grey patch lies over corner 2, small enough for the code to be read.
   const cv::Point corner(static_cast<int>(truth[2].x()), static_cast<int>(truth[2].y()));
   cv::rectangle(picture, corner + cv::Point(-7, -7), corner + cv::Point(7, 7), cv::Scalar(125),
                 cv::FILLED);

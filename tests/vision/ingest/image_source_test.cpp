@@ -1,4 +1,4 @@
-// Where pictures come from and what is refused. What is seen in them is tested elsewhere.
+// Checks sources of pictures and refusals. The content of the pictures is tested elsewhere.
 
 #include "vision/ingest/image_source.h"
 
@@ -14,7 +14,7 @@
 namespace clothfit {
 namespace {
 
-/// A picture whose grey level tells which it is.
+/// Makes a picture whose grey level tells which it is.
 cv::Mat plain_picture(int level, cv::Size size = {64, 48}) {
   return cv::Mat(size, CV_8UC1, cv::Scalar(level));
 }

@@ -1,4 +1,4 @@
-// Cached lines of sight against the program's projection. What is seen along them is in
+// Checks cached lines of sight against the program's projection. The scene along them is in
 // sheet_scene_test.cpp and render_cloth_test.cpp.
 
 #include "vision/render/camera_rays.h"
@@ -22,7 +22,7 @@ CameraParameters with_lens(CameraModel model, std::vector<double> distortion) {
   return camera;
 }
 
-/// The farthest that a line of sight projects from its pixel, over a grid of odd places.
+/// Returns the farthest that a line of sight projects from its pixel, over a grid of odd places.
 double worst_error_px(const CameraParameters& camera) {
   const CameraRays rays(camera);
   std::vector<double> u_px;
@@ -40,8 +40,8 @@ double worst_error_px(const CameraParameters& camera) {
 }
 
 TEST(CameraRays, ProjectToTheirPixelsWithEveryLens) {
-  // A straight line is interpolated to rounding, lenses to the stated tolerance, with room for what
-  // the middle between nodes does not show.
+  // A straight line is interpolated to rounding, lenses to the stated tolerance. Errors that the
+  // middle between nodes does not show have room.
   EXPECT_LT(worst_error_px(with_lens(CameraModel::pinhole, {})), 1e-10);
   EXPECT_LT(worst_error_px(with_lens(CameraModel::brown_conrady, {-0.3, 0.1, 1e-3, -5e-4, -0.01})),
             2e-4);

@@ -1,5 +1,5 @@
-// Pictures of sheets against closed forms and against the truth of true_markers, with our own tag
-// detector as the judge of places. Tracking through a rendered sequence is in
+// Checks pictures of sheets against closed forms and against the truth of true_markers, with our
+// own tag detector as the judge of places. Tracking through a rendered sequence is in
 // rendered_track_test.cpp; places on a sheet are in sheet_scene_test.cpp.
 
 #include "vision/render/render_cloth.h"
@@ -28,7 +28,7 @@ cv::Mat render_one(const CameraParameters& camera, const PlacedSheet& sheet,
   return render_cloth(CameraRays(camera), instants, options, noise_seed);
 }
 
-/// Corners that the detector finds, against the truth.
+/// The errors of the corners that the detector finds.
 struct CornerErrors {
   int seen = 0, found = 0;
   Eigen::Vector2d mean_px = Eigen::Vector2d::Zero();
@@ -36,7 +36,7 @@ struct CornerErrors {
   double worst_px = 0;
 };
 
-/// 5 x 5 tags about 44 px wide, without noise.
+/// Detects 5 x 5 tags about 44 px wide, without noise.
 CornerErrors corner_errors(const CameraParameters& camera, int columns, const Shape& shape) {
   const MarkerSet markers = tag_markers(5, 0.3);
   const SheetPrint print(markers, 0.3, 0.3);
@@ -68,7 +68,8 @@ CornerErrors corner_errors(const CameraParameters& camera, int columns, const Sh
 }
 
 TEST(RenderCloth, ShowsTheTagsOfAFlatSheetWhereTheyAre) {
-  // Head on, edges along the rows and columns of pixels: where samples on a grid do worst.
+  // The view is head on, edges along the rows and columns of pixels: the worst case of samples on a
+  // grid.
   const CornerErrors errors = corner_errors(camera_before(1, 1013, 400, 380), 2, hanging_flat(0.3));
 
   EXPECT_EQ(errors.seen, 100);
@@ -97,8 +98,8 @@ TEST(RenderCloth, BendsThePictureAsTheLensDoes) {
 }
 
 TEST(RenderCloth, ShowsTheTagsOfACurvedSheetWhereTheyAre) {
-  // Waves 3 cm high over some 30 cm, bent to a radius of two tags at their crests; a fine mesh, as
-  // a caller refines it.
+  // Waves are 3 cm high over some 30 cm, bent to a radius of two tags at their crests. The mesh is
+  // fine, as a caller refines it.
   const CornerErrors errors =
       corner_errors(camera_before(1, 1013, 400, 380), 121, [](double s, double t) {
         const double x = s - 0.15, z = 0.15 - t;
@@ -107,10 +108,10 @@ TEST(RenderCloth, ShowsTheTagsOfACurvedSheetWhereTheyAre) {
 
   EXPECT_GE(errors.found, 96);
   EXPECT_LT(errors.mean_px.cwiseAbs().maxCoeff(), 0.01);
-  EXPECT_LT(errors.rms_px, 0.04);  // of which the detector's model of bending leaves most
+  EXPECT_LT(errors.rms_px, 0.04);  // most of it from the detector's model of bending
 }
 
-/// Middle and variance along the axes (px, px^2) of what is darker than the paper.
+/// Middle and variance along the axes (px, px^2) of the area darker than the paper.
 struct DarkSpot {
   Eigen::Vector2d middle_px = Eigen::Vector2d::Zero(), variance_px2 = Eigen::Vector2d::Zero();
 };
@@ -155,7 +156,7 @@ class Dot {
 
 TEST(RenderCloth, SpreadsADotByThePixelAndTheLens) {
   // Variances add: a disc's r^2 / 4, a pixel's 1/12, the lens' blur^2; and 1/12 of a squared
-  // distance between samples for the area that each of them stands for. An edge that is placed
+  // distance between samples for the area that each of them represents. An edge that is placed
   // within 0.005 px leaves r 0.005 / 2 = 0.03 px^2.
   const Dot dot;
   constexpr int kSamples = 4;
@@ -178,7 +179,8 @@ TEST(RenderCloth, SpreadsADotByThePixelAndTheLens) {
 }
 
 TEST(RenderCloth, BlursMotionAroundTheMeanOfTheInstants) {
-  // 8 px to the right while the shutter is open, in nine instants that are not evenly spaced.
+  // The dot moves 8 px to the right while the shutter is open, in nine instants that are not evenly
+  // spaced.
   const Dot dot;
   const RenderOptions options{.ambient_levels = Dot::kPaperLevel, .direct_levels = 0};
   std::vector<std::vector<PlacedSheet>> instants;
@@ -211,7 +213,7 @@ TEST(RenderCloth, LightsAPlaneByLambertsLaw) {
         const double x = s - 0.2;
         return Eigen::Vector3d(x * std::cos(tilt), x * std::sin(tilt), 0.2 - t);
       });
-      // Both about the vertical, from the direction to the camera; length is of no meaning.
+      // Both turn about the vertical, from the direction to the camera; length is of no meaning.
       const RenderOptions options{.ambient_levels = 60,
                                   .direct_levels = 180,
                                   .towards_light = {5 * std::sin(light), -5 * std::cos(light), 0}};
@@ -240,7 +242,7 @@ TEST(RenderCloth, AddsNoiseOfTheStatedVariance) {
 
     cv::Scalar mean, deviation;
     cv::meanStdDev(picture, mean, deviation);
-    // 120 000 pixels: the variance's own relative sigma is 0.4 %, the mean's 0.008 levels.
+    // For 120 000 pixels the variance's own relative sigma is 0.4 %, the mean's 0.008 levels.
     const double variance = 2 * 2 + 100.3 * shot_levels + 1.0 / 12;  // and of rounding
     EXPECT_NEAR(mean[0], 100.3, 0.03);
     EXPECT_NEAR(deviation[0] * deviation[0], variance, 0.016 * variance);
@@ -265,7 +267,7 @@ TEST(RenderCloth, ShowsTheBackgroundWhereThereIsNothingElse) {
   const cv::Mat picture = render_one(camera, behind, {.background_level = 77});
   EXPECT_EQ(cv::countNonZero(picture != 77), 0);
 
-  // A lens that shows nothing outside a circle of radius (2/3) / sqrt 3 focal lengths: 38 px.
+  // The lens shows nothing outside a circle of radius (2/3) / sqrt 3 focal lengths: 38 px.
   camera.model = CameraModel::brown_conrady;
   camera.distortion = {-1, 0, 0, 0};
   camera.image_width = 100;

@@ -1,4 +1,4 @@
-// What is printed where on the flat sheet, and refusals. How it looks in a picture is in
+// Checks the print at places of the flat sheet, and refusals. Its look in a picture is in
 // render_cloth_test.cpp.
 
 #include "vision/render/sheet_print.h"
@@ -45,7 +45,7 @@ TEST(SheetPrint, LaysEachCellOfATagBetweenItsCorners) {
       for (int column = 0; column < pattern.total_cells; ++column) {
         const double white =
             pattern.white[static_cast<std::size_t>(row * pattern.total_cells + column)];
-        // Just inside two opposite corners of the cell.
+        // The places are just inside two opposite corners of the cell.
         for (const double inside : {0.01, 0.99}) {
           EXPECT_EQ(print.reflectance({top_left.s_m + (column - margin + inside) * cell_m,
                                        top_left.t_m + (row - margin + inside) * cell_m}),
@@ -58,7 +58,7 @@ TEST(SheetPrint, LaysEachCellOfATagBetweenItsCorners) {
 }
 
 TEST(SheetPrint, TurnsATagWithItsCorners) {
-  // The same tag a quarter turn to the right: its top left corner now lies at the top right.
+  // The same tag is turned a quarter to the right: its top left corner now lies at the top right.
   const double width_m = 0.1;
   MarkerSet markers = tag_markers(1, width_m);
   const SheetPrint upright(markers, width_m, width_m, kBlackAndWhite);
@@ -103,8 +103,8 @@ TEST(SheetPrint, FillsCirclesAroundDots) {
 }
 
 TEST(SheetPrint, AveragesOverAFootprint) {
-  // Rectangles along the tag's axes, from a part of a cell to more than two, against the mean of
-  // many places in them.
+  // Rectangles along the tag's axes, from a part of a cell to more than two, are compared with the
+  // mean of many places in them.
   const std::uint64_t seed = 1;
   SCOPED_TRACE(seed);
   const double width_m = 0.2;

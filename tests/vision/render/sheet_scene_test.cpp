@@ -1,5 +1,5 @@
-// Lines of sight onto sheets: which place, which side, which normal, what is in front. Pictures are
-// in render_cloth_test.cpp, markers in true_markers_test.cpp.
+// Checks lines of sight onto sheets: which place, which side, which normal, which sheet is in
+// front. Pictures are in render_cloth_test.cpp, markers in true_markers_test.cpp.
 
 #include "vision/render/sheet_scene.h"
 
@@ -19,8 +19,8 @@ namespace {
 const MarkerSet kBlank;
 
 TEST(SheetScene, FindsThePlaceThatALineOfSightWasAimedAt) {
-  // A waving sheet far from the world's origin and turned: what Embree does in single precision is
-  // about the camera's centre, and the place is computed in double.
+  // A waving sheet lies far from the world's origin and is turned. Embree's work in single
+  // precision is about the camera's centre, and the place is computed in double.
   const std::uint64_t seed = 1;
   SCOPED_TRACE(seed);
   const SheetPrint print(kBlank, 0.4, 0.5);
@@ -77,7 +77,7 @@ TEST(SheetScene, KnowsHowThePlaceMovesWithTheLineOfSight) {
 }
 
 TEST(SheetScene, TurnsNormalsSmoothlyAroundACylinder) {
-  // Around a cylinder of radius r the normal is that of its circle; the mesh's error is of second
+  // Around a cylinder of radius r the normal is that of its circle. The mesh's error is of second
   // order in its spacing, (0.4 / 40 / r)^2 / 6 = 7e-4 rad between the ends.
   const double r = 0.15;
   const SheetPrint print(kBlank, 0.2, 0.2);
@@ -122,7 +122,7 @@ TEST(SheetScene, SeesTheNearerSheetAndNothingBesideThem) {
 }
 
 TEST(SheetScene, LeavesTheCallersArithmeticAlone) {
-  constexpr unsigned kSettings = 0xffc0;  // of MXCSR: all but the sticky flags
+  constexpr unsigned kSettings = 0xffc0;  // bits of MXCSR: all but the sticky flags
   const unsigned before = _mm_getcsr() & kSettings;
   const SheetPrint print(kBlank, 1, 1);
   const PlacedSheet sheet = place_sheet(

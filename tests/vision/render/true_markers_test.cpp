@@ -1,5 +1,5 @@
-// Where markers truly are and why a camera does not see them. Pictures are held against this truth
-// in render_cloth_test.cpp.
+// Checks the true places of markers and why a camera does not see them. Pictures are compared with
+// this truth in render_cloth_test.cpp.
 
 #include "vision/render/true_markers.h"
 
@@ -34,9 +34,9 @@ TEST(TrueMarkers, AreWhereAPinholeByHandPutsThem) {
 }
 
 TEST(TrueMarkers, SayWhichPartOfAFoldedClothHidesWhich) {
-  // A cloth folded over like a U about a horizontal line: t from 0 down to the fold at 0.2, half a
-  // circle of 2 cm radius towards the camera, and up again in front of itself, where it shows its
-  // back.
+  // A cloth is folded over like a U about a horizontal line. t runs from 0 down to the fold at 0.2,
+  // half a circle of 2 cm radius towards the camera, and up again in front of itself, where it
+  // shows its back.
   const double r = 0.02, fold_m = 0.2;
   const SheetPrint print(kNoPrint, 0.4, 0.4);
   const PlacedSheet sheet = place_sheet(print, 161, [&](double s, double t) {
@@ -63,7 +63,7 @@ TEST(TrueMarkers, SayWhichPartOfAFoldedClothHidesWhich) {
 TEST(TrueMarkers, TellOneReasonFromTheOther) {
   const SheetPrint print(kNoPrint, 3, 3), screen(kNoPrint, 0.2, 0.2);
   const std::vector<PlacedSheet> sheets = {
-      // Lies along the line of sight, from 1 m behind the camera to 2 m before it.
+      // The sheet lies along the line of sight, from 1 m behind the camera to 2 m before it.
       place_sheet(print, 7,
                   [](double s, double t) { return Eigen::Vector3d(s - 1.5, 0 - t, -0.5); }),
       place_sheet(screen, 2,

@@ -1,4 +1,4 @@
-// Colours and places of what is drawn. Whether the right points are drawn is in track_test.cpp.
+// Checks colours and places of the drawing. That the right points are drawn is in track_test.cpp.
 
 #include "vision/track/overlay.h"
 

@@ -1,5 +1,6 @@
-// Tracking: identity, rejection, reference points, refusals, and the bundled recording against its
-// truth. Single detections are in tag_detector_test.cpp, files and videos in image_source_test.cpp.
+// Checks tracking: identity, rejection, reference points, refusals, and the bundled recording
+// against its truth. Single detections are in tag_detector_test.cpp, files and videos in
+// image_source_test.cpp.
 
 #include "vision/track/track.h"
 
@@ -90,7 +91,7 @@ class DrawnRecording {
     cv::imwrite((folder_ / ("frames/" + std::to_string(100 + count_++) + ".png")).string(),
                 picture);
   }
-  /// A 40 px tag off the middle by `shift_px`.
+  /// Draws a 40 px tag off the middle by `shift_px`.
   cv::Mat draw(double shift_u_px, double shift_v_px, int id = 7,
                const std::string& family = "tag36h11") {
     SyntheticTag tag = place_tag(view_, 40, 0, 0, {shift_u_px, shift_v_px});
@@ -151,7 +152,7 @@ TEST(Track, FindsTheBundledClothNearlyAsPlacedAndKnowsHowNearly) {
   std::sort(errors.begin(), errors.end());
   const double count = static_cast<double>(errors.size());
   RecordProperty("chi2", std::to_string(chi2 / count));
-  // docs/results.md says what plain AprilTag reaches.
+  // docs/results.md states plain AprilTag's share.
   EXPECT_GE(count, 0.9982 * visible);
   EXPECT_LT(errors[errors.size() / 2], 0.107);
   EXPECT_LT(errors[errors.size() * 95 / 100], 0.32);
@@ -217,7 +218,7 @@ TEST(Track, ReportsEveryPictureInOrderAndStopsWhenTold) {
 }
 
 TEST(Track, RejectsAJumpButNotSteadyMotion) {
-  // 25 px a frame to the right, but for frame 3, where the tag is 150 px ahead.
+  // The tag moves 25 px a frame to the right, except in frame 3, where it is 150 px ahead.
   DrawnRecording drawn;
   for (int frame = 0; frame < 6; ++frame) {
     drawn.add(drawn.draw(frame == 3 ? 125 : -100 + 25 * frame, 0));
