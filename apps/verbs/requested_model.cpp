@@ -277,8 +277,7 @@ void set_springs(const GivenParameters& given, ModelDescription& model) {
     numbers[static_cast<Eigen::Index>(n)] = found->second;
   }
   if (*given.set == SpringSet::fabric) {
-    if (model.springs)
-      model.strain_limit = StrainLimitKind::off;  // the limit was that of the springs
+    if (model.springs) model.strain_limit = StrainLimitKind::off;  // it was the springs' limit
     model.springs.reset();
     model.fabric = given.springs;
     return;

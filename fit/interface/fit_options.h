@@ -54,11 +54,10 @@ struct FitOptions {
   unsigned long long seed = 1;
   LeadingCost cost = LeadingCost::trajectory;  ///< others: a search only if they lead nowhere
   SearchMethod search = SearchMethod::paper;
-  int population = 100;  ///< individuals of the evolutionary search [louchet1995]
-  int generations = 40;  ///< at most; the search stops earlier when it no longer gains
-  double search_share =
-      0.4;              ///< share of the fitted frames that the search looks at; 0 < share <= 1
-  int refine_best = 3;  ///< individuals, or optima of CMA-ES, that go to refinement
+  int population = 100;       ///< individuals of the evolutionary search [louchet1995]
+  int generations = 40;       ///< at most; the search stops earlier when it no longer gains
+  double search_share = 0.4;  ///< searched share of the fitted frames; 0 < share <= 1
+  int refine_best = 3;        ///< individuals, or optima of CMA-ES, that go to refinement
   /// The search ends once its best cost, the mean error over its window in sigmas, is this low.
   /// Without a value it ends once the model follows the cloth (fit/cost/observed_motion.h).
   std::optional<double> stop_cost;

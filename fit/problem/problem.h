@@ -48,9 +48,8 @@ struct FitProblem {
   std::vector<std::vector<Binding>> effects;  ///< [effect of the cloth][parameter]
   std::vector<Binding> tilt;                  ///< rotation of gravity about two level axes; or none
   Eigen::Matrix<double, 3, 2> level_axes;
-  std::vector<Binding>
-      sheet_motion;  ///< motion of the placed sheet: turn (rad) and shift (m); or none
-  DriveCorrection drive_correction;  ///< for tracked held points; or none
+  std::vector<Binding> sheet_motion;  ///< the sheet's turn (rad) and shift (m); or none
+  DriveCorrection drive_correction;   ///< for tracked held points; or none
   std::vector<GaussianPrior> priors;
   /// An effect of the measurement with its parameters, in the description's order.
   struct MeasurementTerm {

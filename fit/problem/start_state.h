@@ -38,7 +38,6 @@ struct StartStateOptions {
 /// velocities. From pixels it is the shapes of the first frames (fit/observe/shape_from_pixels.h).
 /// Where neither works out it is the flat sheet, at rest, with priors as wide as a cloth can be
 /// away from that.
-/// that.
 StartState make_start_state(const std::vector<ObservationSet>& sets,
                             const Eigen::Matrix2Xd& marker_m,
                             const std::vector<double>& frame_time_s, int first_held_out,

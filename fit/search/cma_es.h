@@ -22,8 +22,7 @@ struct CmaOptions {
   int population = 0;  ///< in the first run; 0: 4 + floor(3 ln n) for n parameters; else >= 4
   double initial_step = 0.3;  ///< standard deviation of the first generation, as a share of ranges
   int restarts = 9;           ///< at most
-  double growth =
-      2;  ///< factor of the population from one restart to the next, up to most_evaluations
+  double growth = 2;  ///< populations grow by it from restart to restart, up to most_evaluations
   long most_evaluations = 100000;  ///< in all runs; the last generation may exceed it
   /// The search stops once the best cost is at or below this.
   double cost_below = -std::numeric_limits<double>::infinity();

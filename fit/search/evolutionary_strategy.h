@@ -43,8 +43,7 @@ struct EvolutionOptions {
   double mutated = 0.2;           ///< share replaced by mutation; crossover gives the rest
   double mutation_parents = 0.8;  ///< share of the best that may be mutated
   MutationLaw mutation = MutationLaw::redraw;
-  double mutation_step =
-      0.1;  ///< share of the range (in the logarithm on a log scale); `gaussian` only
+  double mutation_step = 0.1;  ///< share of the range (or of its logarithm); `gaussian` only
   /// The search stops once the best cost is at or below this.
   double cost_below = -std::numeric_limits<double>::infinity();
   /// The search stops when the best cost fell too little over the last `gain_window` generations:

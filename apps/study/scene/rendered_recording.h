@@ -58,7 +58,6 @@ struct RenderedRecording {
 /// `clothfit track` finds the markers with its own sigma and rejections. True places are those of
 /// the simulated surface at the middle of the exposure. The same arguments give the same bits for
 /// any number of threads; pictures are worked on in parallel.
-/// number of threads; pictures are worked on in parallel.
 ///
 /// Throws InputError where the scene's cloth cannot be simulated and where no tag is found.
 RenderedRecording make_rendered_recording(const SyntheticScene& scene,
