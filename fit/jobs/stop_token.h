@@ -10,8 +10,8 @@ namespace clothfit {
 /// Ends a call that nobody waits for. fit() and diagnose() catch it; it never leaves them.
 struct StopRequested {};
 
-/// A callback that throws StopRequested where `progress` says to stop, and else returns true.
-/// Several threads may call it at once. Empty where there is no `progress`.
+/// Returns a callback that throws StopRequested where `progress` says to stop, and else returns
+/// true. Several threads may call it at once. It is empty where there is no `progress`.
 inline ProgressCallback stop_token(ProgressCallback progress) {
   if (!progress) return progress;
   return [asked = for_threads(std::move(progress))](const Progress& now) {

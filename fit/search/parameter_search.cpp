@@ -15,7 +15,7 @@
 namespace clothfit {
 namespace {
 
-/// What is searched, and how its values are put among the problem's.
+/// The searched parameters, and the places of their values among the problem's.
 struct SearchSpace {
   std::vector<SearchParameter> ranges;
   std::vector<int> searched;  ///< index into the problem's space
@@ -46,9 +46,9 @@ std::uint64_t add_bytes(const double* numbers, Eigen::Index count, std::uint64_t
   return checksum(std::string_view(reinterpret_cast<const char*>(numbers), size), before);
 }
 
-/// A line that differs wherever costs could: it names the mesh, the window and the time step, and
-/// sums what was observed and what one run of the model leaves of it, which no change of cloth,
-/// held points, effects or start leaves alone.
+/// Writes a line that differs wherever costs could. It names the mesh, the window and the time
+/// step. It also sums what was observed and the residuals of one run of the model, which any change
+/// of cloth, held points, effects or start alters.
 std::string problem_line(const Objective& objective, const Eigen::VectorXd& start) {
   std::uint64_t sum = add_bytes(start.data(), start.size(), kEmptyChecksum);
   int last_frame = 0;
@@ -136,7 +136,7 @@ SearchedParameters search_by_restarts(const SearchSpace& space, const FitOptions
                                       const std::string& problem, const ParameterSpace& parameters,
                                       const GenerationCost& cost, double stop_cost,
                                       const ProgressCallback& progress) {
-  // A generation fills the lanes; a run need not end closer than refinement takes over.
+  // A generation fills the lanes; a run may end where refinement takes over.
   const CmaOptions cma{.population = 16,
                        .most_evaluations = search_simulations(options),
                        .cost_below = stop_cost,

@@ -1,5 +1,5 @@
-// The whole fit on a small synthetic cloth, from nothing to a result. Its parts are checked beside
-// their own sources; recordings of other programs and of real cloth in recordings_test.cpp.
+// Checks the whole fit on a small synthetic cloth, from nothing to a result. Its parts are checked
+// beside their own sources; recordings of other programs and of real cloth in recordings_test.cpp.
 #include "fit/fit.h"
 
 #include <gmock/gmock.h>
@@ -49,7 +49,7 @@ TEST(Fit, RecoversTheFabricFrom3dTracksAndForecastsHeldOutFrames) {
   EXPECT_LT(errors.held_out.rms, 1.5 * truth.noise_m);
   EXPECT_GT(errors.trivial.first_frame, 20 * errors.held_out.rms);
   EXPECT_GT(errors.trivial.last_velocity, 20 * errors.held_out.rms);
-  // 10 held-out frames of 49 markers, held ones included
+  // There are 10 held-out frames of 49 markers, held ones included.
   EXPECT_EQ(errors.held_out.count, 10 * 49);
 }
 
@@ -84,7 +84,7 @@ TEST(Fit, FindsDragWhenAskedForAndNeutralWhereThereIsNone) {
   }
 }
 
-// A cloth in thick air, of which the model knows nothing.
+// The cloth moves in thick air, of which the model knows nothing.
 TEST(Fit, OnlyFollowsTheCoarseMeshWhereTheModelIsGrosslyMisfitting) {
   const FitInput input = synthetic_input(
       {.drag_rate_per_s = 8, .mesh = 9, .markers = 5, .frames = 20, .held_out_from = 16});
@@ -155,7 +155,7 @@ TEST(Fit, ForecastsOnTheMeshThatWasFitted) {
   EXPECT_EQ(forecast.result.mesh_rows, 5);
 }
 
-// What is known of a recording from elsewhere is looked at as it is.
+// Knowledge of a recording from elsewhere is used as it is.
 TEST(Fit, ReportsKnownParametersWithKnownOffsetsOfMarkers) {
   const FitInput input = synthetic_input({});
   FitOptions options;
@@ -192,7 +192,7 @@ TEST(Fit, EndsWhenItIsCancelled) {
   }
 }
 
-/// A cloth whose fit takes a moment.
+/// Makes a cloth whose fit takes a moment.
 FitInput tiny_input(unsigned seed = 1) {
   return synthetic_input(
       {.mesh = 5, .markers = 5, .frames = 16, .held_out_from = 12, .seed = seed});
@@ -206,7 +206,7 @@ FitOptions tiny_fit(SearchMethod search) {
   return options;
 }
 
-/// fit.json's bytes, but for the seconds that it took.
+/// Returns fit.json's bytes, without the seconds that it took.
 std::string fit_json(FitReport report, const TemporaryFolder& folder) {
   report.result.seconds = 0;
   const std::filesystem::path file = folder.path() / "fit.json";
@@ -261,7 +261,7 @@ TEST(Fit, TellsTheBasinsThatItCameAcrossBestFirst) {
       EXPECT_GE(basins[n].ended, 1);
       EXPECT_GE(basins[n].cost, basins[n > 0 ? n - 1 : 0].cost);
     }
-    // The noise of a 3D point, sqrt(8 / pi) sigmas long on average, and what the mesh misses
+    // The noise of a 3D point is sqrt(8 / pi) sigmas long on average; the mesh adds its error.
     EXPECT_GT(basins.front().cost, 1.4);
     EXPECT_LT(basins.front().cost, 3);
   }
@@ -336,7 +336,7 @@ TEST(Fit, EndsItsSearchAtTheCostThatItIsAskedFor) {
   }
 }
 
-/// A cloth with one stiffness for all springs, and air that damps it.
+/// Makes a cloth with one stiffness for all springs, and air that damps it.
 SyntheticCloth uniform_springs(double stiffness_n_per_m) {
   return {.fabric = {.tension_warp_n_per_m = stiffness_n_per_m,
                      .tension_weft_n_per_m = stiffness_n_per_m,
@@ -369,7 +369,7 @@ TEST(Fit, FindsThePapersFiveNumbersAndForecastsWithThem) {
   // No spring of the truth has a limit.
   EXPECT_EQ(find(fitted.result, "critical_elongation").state, ParameterState::undetermined);
 
-  // The same cloth once more, with noise of its own
+  // The same cloth is recorded once more, with noise of its own.
   SyntheticCloth again = truth;
   again.seed = 77;
   FitOptions forecast{.spring_set = SpringSet::louchet5, .forecast = fitted.result};
@@ -384,9 +384,9 @@ TEST(Fit, FindsThePapersFiveNumbersAndForecastsWithThem) {
 }
 
 TEST(Fit, SaysThatSpringsOnTheirStrainLimitTellNothingOfTheirStiffness) {
-  // Given springs so soft that the limit carries the cloth, at the step of the truth: one sweep a
-  // step limits strain the more, the more steps there are. The fit begins with the truth and is let
-  // do little.
+  // Given springs so soft that the limit carries the cloth, at the step of the truth. One sweep a
+  // step limits strain the more, the more steps there are. The fit begins with the truth and may do
+  // little.
   SyntheticCloth truth = uniform_springs(0.1);
   truth.critical_elongation = 0.02;
   FitOptions options;
@@ -409,7 +409,7 @@ TEST(Fit, SaysThatSpringsOnTheirStrainLimitTellNothingOfTheirStiffness) {
   const ParameterEstimate& stiffness = find(report.result, "stiffness_0");  // along the fall
   EXPECT_EQ(stiffness.state, ParameterState::undetermined);
   EXPECT_THAT(stiffness.reason, ::testing::HasSubstr("sit on their strain limit"));
-  // What such a spring shows is its longest length: the product of two parameters.
+  // Such a spring shows only its longest length: the product of two parameters.
   EXPECT_THAT(find(report.result, "critical_elongation_0").reason,
               ::testing::HasSubstr("it can hardly be told from natural_length_0"));
 }

@@ -1,4 +1,4 @@
-// The shooting cost and its fit. Steps and their derivatives are checked in tests/model, the
+// Checks the shooting cost and its fit. Steps and their derivatives are checked in tests/model, the
 // elimination by itself in bordered_chain_test.cpp, guesses from tracks in track_states_test.cpp,
 // whole fits that begin with shooting in fit_test.cpp.
 #include "fit/cost/shooting.h"
@@ -31,8 +31,8 @@ Eigen::VectorXd true_values_of(const FitProblem& problem) {
   return start_with(problem, SyntheticCloth{}.fabric);
 }
 
-/// A problem with windows that begin with the states of its own run at the truth, and observations
-/// that are exactly that run.
+/// A problem with windows that begin with the states of its own run at the truth. Its observations
+/// are exactly that run.
 struct ExactWindows {
   FitProblem problem;
   TimeSteps steps{0};
@@ -72,7 +72,7 @@ FitProblem tiny_problem(unsigned seed) {
   return make_problem(synthetic_input(tiny(seed)), {}, 5, 5);
 }
 
-/// Seen by one camera whose vertical is uncertain, let go at rest.
+/// Makes a problem of a cloth let go at rest and seen by one camera whose vertical is uncertain.
 FitProblem pixels_at_rest(unsigned seed) {
   FitInput input = synthetic_input(tiny(seed));
   input.recording.start = StartKind::at_rest;
@@ -80,14 +80,14 @@ FitProblem pixels_at_rest(unsigned seed) {
   return make_problem(input, {.observations = ObservationKind::tracks2d}, 5, 5);
 }
 
-/// One corner follows its noisy track, with corrections.
+/// Makes a problem in which one corner follows its noisy track, with corrections.
 FitProblem driven_by_a_track(unsigned seed) {
   FitInput input = synthetic_input(tiny(seed));
   input.recording.held[1].motion = HeldMotion::tracked;
   return make_problem(input, {.drive_knots = 4}, 5, 5);
 }
 
-/// Corrections of some millimetres and centimetres a second.
+/// Returns corrections of some millimetres and centimetres a second.
 ShootingObjective::Corrections some_corrections(const ShootingObjective& objective, unsigned seed) {
   std::mt19937_64 generator(seed);
   std::normal_distribution<double> normal;
@@ -123,8 +123,8 @@ TEST(ShootingObjective, VanishesAtTheTruthWithTheTrueStates) {
     const ExactWindows exact(std::move(problem), 5, 5);
     const ShootingObjective objective = exact.objective({1e-3, 1e-2});
 
-    // A window goes on from the state that it is given as the run does, to rounding: 1e-15 m over
-    // the smallest sigma, 5e-4 m, grows over 5 frames.
+    // A window goes on from its given state as the run does, to rounding: 1e-15 m over the smallest
+    // sigma, 5e-4 m, grows over 5 frames.
     EXPECT_LT(objective.residuals({exact.truth}).front().cwiseAbs().maxCoeff(), 1e-6);
     Eigen::VectorXd off = exact.truth;
     off[0] *= 1.01;
@@ -153,7 +153,7 @@ TEST(ShootingObjective, DerivativesByTheParametersAgreeWithDifferences) {
   }
 }
 
-/// The cost with the priors, as a function of parameters' coordinates and corrections.
+/// Returns the cost with the priors, as a function of parameters' coordinates and corrections.
 double whole_cost(const ShootingObjective& objective, const Eigen::VectorXd& coordinates,
                   const ShootingObjective::Corrections& corrections, double huber) {
   const Eigen::VectorXd values = objective.problem().space.values(coordinates);
@@ -239,7 +239,7 @@ TEST(ShootingFit, StepsAsTheDenseEquationsSay) {
 
   const BorderedChainSolution step = damped_step(equations.chain, 0.1, held);
 
-  // The same from J'J of the derivatives by everything, which differences of residuals are.
+  // The same follows from J'J of the derivatives by everything, by differences of residuals.
   const int all = parameters + states * state;
   Eigen::MatrixXd jacobian(objective.residual_count(), all);
   jacobian.leftCols(parameters) = objective.linearise(exact.truth).residual_by_coordinate;
@@ -267,7 +267,7 @@ TEST(ShootingFit, StepsAsTheDenseEquationsSay) {
   found.head(parameters) = step.border;
   for (int w = 1; w <= states; ++w)
     found.segment(parameters + (w - 1) * state, state) = step.blocks[static_cast<size_t>(w)];
-  // The differences' error, about 1e-8 of a derivative, through equations damped to a condition of
+  // The differences err by about 1e-8 of a derivative. The equations are damped to a condition of
   // some thousands.
   EXPECT_LT((found - expected).norm(), 1e-4 * expected.norm());
   EXPECT_EQ(step.border[2], 0);
@@ -294,9 +294,9 @@ TEST(ShootingFit, ConvergesFromAfarWhereTheTrajectoryIsLost) {
   EXPECT_LT(found.robust_scale, 1.1);
   for (int p = 0; p < 7; ++p) {
     SCOPED_TRACE(p);
-    // What a round's last gap of 1 mm and its three nodes leave open.
+    // A round's last gap of 1 mm and its three nodes leave this error open.
     EXPECT_NEAR(led.values[p] / truth[p], 1, 0.15);
-    // Half a millimetre of noise over two seconds, and long time steps.
+    // The noise is half a millimetre over two seconds, and time steps are long.
     EXPECT_NEAR(found.values[p] / truth[p], 1, 0.02);
   }
 }
@@ -318,7 +318,7 @@ TEST(ShootingFit, ConvergesFromPixelsToo) {
     EXPECT_NEAR(led.values[p] / truth[p], 1, 0.15) << p;
 }
 
-/// How far Gauss and Newton's step leads from `values` to the optimum of the trajectory's cost.
+/// Returns the Gauss-Newton step from `values` to the optimum of the trajectory's cost.
 Eigen::VectorXd to_the_trajectorys_optimum(const FitProblem& problem, const ShootingFit& fit) {
   const TrajectoryObjective trajectory(
       problem, problem.frames(),
@@ -345,8 +345,8 @@ TEST(ShootingFit, TendsToTheTrajectorysOptimumAsItsGapsClose) {
     ASSERT_TRUE(fit.usable) << fit.message;
     distance.push_back(to_the_trajectorys_optimum(problem, fit).norm());
   }
-  // Gaps as wide as what the observations tell of a state leave the windows their freedom; once
-  // they are narrower the distance falls with the square of their sigma.
+  // Gaps as wide as the observations' information on a state leave the windows their freedom. Once
+  // they are narrower, the distance falls with the square of their sigma.
   EXPECT_GT(distance[0], 0.1);
   EXPECT_LT(distance[1], distance[0]);
   EXPECT_LT(distance[2], 0.03 * distance[1]);
@@ -387,7 +387,7 @@ TEST(ShootingObjective, RefusesWindowsThatDoNotFit) {
   };
   ShootingWindows falling = exact.windows, fine = exact.windows, short_of_one = exact.windows;
   std::swap(falling.first_frame[1], falling.first_frame[2]);
-  fine.nodes = 6;  // of a mesh of 5 x 5
+  fine.nodes = 6;  // for a mesh of 5 x 5
   short_of_one.position_m.pop_back();
 
   EXPECT_NO_THROW(make(exact.windows, {1e-3, 1e-2}));
