@@ -42,7 +42,8 @@ set(CLOTHFIT_ARROWS
   "fit/cost             -> data/algebra data model/cloth model/integrate fit/interface
                            fit/observe fit/problem"
   "fit/search           -> data/algebra data fit/interface fit/jobs fit/problem fit/cost"
-  "fit/refine           -> data/algebra data model/cloth fit/interface fit/problem fit/cost"
+  "fit/refine           -> data/algebra data model/cloth fit/interface fit/jobs fit/problem
+                           fit/cost"
   "fit/uncertainty      -> data/algebra data fit/interface fit/jobs fit/problem fit/cost
                            fit/refine"
   "fit                  -> data model/cloth fit/interface fit/jobs fit/observe fit/problem fit/cost
@@ -56,7 +57,8 @@ set(CLOTHFIT_ARROWS
                            vision/track fit/interface fit/observe apps/terminal"
   "apps/report/page     -> apps/terminal"
   "apps/report/fit      -> data vision/ingest fit/interface apps/terminal apps/report/page"
-  "apps/report/diagnosis -> data fit/diagnosis apps/terminal apps/report/page apps/report/fit"
+  "apps/report/diagnosis -> data fit/problem fit/diagnosis apps/terminal apps/report/page
+                           apps/report/fit"
   "apps/study/scene     -> data/algebra data calib/camera vision/track vision/render
                            model/topology model/fabric model/cloth model/effects
                            model/integrate fit/jobs fit/measurement_effects fit/problem fit

@@ -268,7 +268,7 @@ double mean_square(const FitProblem& problem, const Eigen::VectorXd& values) {
 RefineResult second_look(const FitProblem& problem, const FitOptions& options,
                          const RefineResult& first, const ProgressCallback& progress,
                          FitReport& report) {
-  if (!first.usable || first.cancelled || is_noise_alone(problem, first)) return first;
+  if (!first.usable || is_noise_alone(problem, first)) return first;
   // Of a start in motion there are hundreds of numbers, which few frames do not determine.
   if (problem.start == StartKind::unknown) return first;
   const auto look = [&](double share, const Effort& effort, const Eigen::VectorXd& start) {
@@ -281,12 +281,11 @@ RefineResult second_look(const FitProblem& problem, const FitOptions& options,
     if (horizon_frames(problem, share) == frames) continue;
     frames = horizon_frames(problem, share);
     second = look(share, kSecondLookEffort, second.values);
-    if (second.cancelled || !second.usable) return second.cancelled ? second : first;
+    if (!second.usable) return first;
   }
   if (second.cost >= first.cost) return first;
   second = look(1, kFinalEffort, second.values);
-  const bool better = second.cancelled || (second.usable && second.cost < first.cost);
-  return better ? second : first;
+  return second.usable && second.cost < first.cost ? second : first;
 }
 
 /// What the coarse mesh finds over all frames from `values`, which go there, and how far the fit's
@@ -298,7 +297,7 @@ RefineResult follow_coarse(const FitProblem& coarse_problem, const FitProblem& p
   RefineResult found = refine_stage({.problem = coarse_problem, .effort = kFinalEffort}, options,
                                     values, progress, report);
   found = second_look(coarse_problem, options, found, progress, report);
-  if (found.cancelled || !found.usable) return found;
+  if (!found.usable) return found;
   values = found.values;
   found.usable = mean_square(coarse_problem, values) > options.coarse_beyond;
   if (!found.usable) return found;
@@ -327,7 +326,7 @@ RefineResult refine_on(const FitProblem& coarse_problem, const FitProblem& probl
   best.values = start;
   const auto improve = [&](const Stage& stage) {
     best = refine_stage(stage, options, best.values, progress, report);
-    return !best.cancelled && best.usable;
+    return best.usable;
   };
   const bool follows_it = follows(problem, start) || follows(coarse_problem, start);
   if (!follows_it) {
@@ -339,7 +338,7 @@ RefineResult refine_on(const FitProblem& coarse_problem, const FitProblem& probl
         mean_square(coarse_problem, best.values) > options.coarse_beyond) {
       RefineResult followed =
           follow_coarse(coarse_problem, problem, options, best.values, progress, report);
-      if (followed.cancelled || followed.usable) return followed;
+      if (followed.usable) return followed;
     }
     best.values = away_from_ends(problem, best.values);
     if (!improve({.problem = problem,
@@ -376,7 +375,6 @@ RefineResult pick_best(const TrajectoryObjective& objective, const FitOptions& o
     RefineResult result = refine_stage(
         {.problem = objective.problem(), .share = options.search_share, .effort = kCoarseEffort},
         options, optimum.values, progress, report);
-    if (result.cancelled) return result;
     if (!result.usable) continue;
     const double cost = search_cost(objective, result.values);
     if (std::isfinite(cost))
@@ -413,7 +411,7 @@ RefineResult search_and_refine(const FitProblem& coarse_problem, const FitProble
     const RefineResult first =
         refine_stage({.problem = coarse_problem, .share = 0, .effort = kCoarseEffort}, options,
                      start, progress, report);
-    if (first.cancelled || !first.usable) return first;
+    if (!first.usable) return first;
     for (int p = 0; p < problem.space.size(); ++p)
       if (problem.space.parameters[static_cast<size_t>(p)].role == ParameterRole::start)
         start[p] = first.values[p];
@@ -422,15 +420,13 @@ RefineResult search_and_refine(const FitProblem& coarse_problem, const FitProble
   const TrajectoryObjective objective(coarse_problem, frames,
                                       search_time_steps(coarse_problem, options, frames));
   const SearchedParameters found = search(objective, options, start, progress, report);
-  if (found.optima.empty() || found.cancelled) {
+  if (found.optima.empty()) {
     RefineResult none;
-    none.cancelled = found.cancelled;
     none.message = "no individual of the search could be simulated to the end of its window";
     return none;
   }
   const RefineResult best =
       pick_best(objective, options, found.optima, progress, report, candidates);
-  if (best.cancelled) return best;
   return refine_on(coarse_problem, problem, options, best.values,
                    {.coarse_shares = kHorizonShares,
                     .least_share = options.search_share,
@@ -458,20 +454,17 @@ RefineResult identify(const FitInput& input, const FitProblem& problem, const Fi
     if (led) {
       LeadIn lead = lead_in(problem, coarse_problem, options, start, progress);
       report.stages.push_back(lead.stage);
-      from_start.cancelled = lead.cancelled;
-      if (lead.cancelled) return from_start;
       if (lead.usable) start = std::move(lead.values);
     }
     from_start = refine_on(coarse_problem, problem, options, start, {.coarse_shares = kGivenShares},
                            progress, report);
-    if (from_start.cancelled || (from_start.usable && from_start.converged)) return from_start;
+    if (from_start.usable && from_start.converged) return from_start;
     report.stages.push_back(led ? "the " + to_string(options.cost) + " cost leads to no optimum"
                                 : "the given start leads to no optimum");
   }
   RefineResult found =
       search_and_refine(coarse_problem, problem, options, progress, report, candidates);
-  const bool better =
-      found.cancelled || !from_start.usable || (found.usable && found.cost < from_start.cost);
+  const bool better = !from_start.usable || (found.usable && found.cost < from_start.cost);
   return better ? found : from_start;
 }
 

@@ -1,7 +1,5 @@
 #include "fit/diagnosis/expand.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <limits>
 #include <utility>
@@ -13,6 +11,7 @@
 #include "fit/diagnosis/search_context.h"
 #include "fit/diagnosis/shortlist.h"
 #include "fit/diagnosis/worth.h"
+#include "fit/jobs/parallel.h"
 
 namespace clothfit {
 namespace {
@@ -60,7 +59,7 @@ std::vector<FittedModel> on_analysed_mesh(const SearchContext& search, const Fit
   std::vector<FittedModel> fitted =
       race_on_mesh(search.setup, coarse, search.threshold, search.progress);
   const bool none = std::ranges::none_of(fitted, &FittedModel::usable);
-  tbb::parallel_for(size_t{0}, best.size(), [&](size_t k) {
+  for_each_index(best.size(), [&](size_t k) {
     FittedModel& model = models[best[k]] = std::move(fitted[k]);
     if ((!model.usable() && !none) || search.left_by(model) < search.left_by(without)) return;
     model = with_hypotheses(search.setup, without, coarse[k].hypotheses, {});
@@ -95,7 +94,7 @@ void let_best_err(const SearchContext& search, std::vector<Extended>& extended,
   for (const Extended& child : extended)
     if (child.model.usable())
       best = std::max(best, from - child.model.chi_square(search.threshold));
-  tbb::parallel_for(size_t{0}, extended.size(), [&](size_t k) {
+  for_each_index(extended.size(), [&](size_t k) {
     FittedModel& model = extended[k].model;
     if (model.usable() && model.parts.front().directions.cols() == 0 &&
         from - model.chi_square(search.threshold) >= kCriteria.own_errors_of_best * best)
@@ -109,7 +108,7 @@ std::vector<Trial> try_all(const SearchContext& search, std::vector<Extended>& e
                            const FittedModel& without, const CrossValidation& without_left_out,
                            bool scored_elsewhere) {
   std::vector<Trial> trials(extended.size());
-  tbb::parallel_for(size_t{0}, extended.size(), [&](size_t k) {
+  for_each_index(extended.size(), [&](size_t k) {
     FittedModel& with = extended[k].model;
     const Compared models{.without = without,
                           .without_left_out = without_left_out,

@@ -1,8 +1,6 @@
 #include "fit/diagnosis/proposed_law.h"
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
-
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
@@ -12,6 +10,7 @@
 #include "fit/diagnosis/criteria.h"
 #include "fit/diagnosis/refit.h"
 #include "fit/diagnosis/worth.h"
+#include "fit/jobs/parallel.h"
 #include "fit/jobs/stop_token.h"
 #include "fit/uncertainty/uncertainty.h"
 #include "model/effects/force_law.h"
@@ -187,7 +186,7 @@ class Pursuit {
     std::vector<FittedModel> models = fit_with_hypotheses(
         setup_, law_.model, early, to_fit, first_share, options_.threshold, progress_);
     std::vector<CrossValidation> left_out(models.size());
-    tbb::parallel_for(size_t{0}, models.size(), [&](size_t k) {
+    for_each_index(models.size(), [&](size_t k) {
       if (models[k].usable()) left_out[k] = validation_of(models[k]);
     });
     for (size_t k = 0; k < models.size(); ++k) {

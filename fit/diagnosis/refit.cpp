@@ -1,7 +1,5 @@
 #include "fit/diagnosis/refit.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <functional>
 #include <limits>
@@ -11,6 +9,7 @@
 #include "fit/diagnosis/discretisation.h"
 #include "fit/diagnosis/horizons.h"
 #include "fit/fit.h"
+#include "fit/jobs/parallel.h"
 #include "fit/jobs/stop_token.h"
 #include "fit/problem/effects_of.h"
 
@@ -89,7 +88,7 @@ std::vector<FittedModel> race(size_t models, double first_share, double threshol
   std::iota(running.begin(), running.end(), size_t{0});
   for (const double share : shares_from(first_share)) {
     double least = std::numeric_limits<double>::infinity();
-    tbb::parallel_for(size_t{0}, running.size(), [&](size_t n) {
+    for_each_index(running.size(), [&](size_t n) {
       const size_t k = running[n];
       fitted[k] = fit_over(k, share, fitted[k]);
     });
@@ -150,13 +149,13 @@ std::vector<FittedModel> fit_near(const DiagnosisSetup& setup, const FittedModel
   const double without = model.chi_square(threshold);
   std::vector<FittedModel> fitted(scores.size());
   std::vector<double> fall(scores.size(), 0);
-  tbb::parallel_for(size_t{0}, scores.size(), [&](size_t k) {
+  for_each_index(scores.size(), [&](size_t k) {
     fitted[k] = fit_from_here(setup, model, *scores[k], {.rounds = 1, .unrefined = true}, progress);
     if (fitted[k].usable()) fall[k] = without - fitted[k].chi_square(threshold);
   });
   if (fitted.empty()) return fitted;
   const double enough = kCriteria.exact_fit_of_best * *std::ranges::max_element(fall);
-  tbb::parallel_for(size_t{0}, scores.size(), [&](size_t k) {
+  for_each_index(scores.size(), [&](size_t k) {
     if (fall[k] < enough && fall[k] > kCriteria.kept_promise * scores[k]->decrease) return;
     fitted[k] =
         fit_from_unrefined(setup, model, *scores[k], std::move(fitted[k]), threshold, progress);

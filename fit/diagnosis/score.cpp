@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "data/algebra/dense_factors.h"
+#include "fit/jobs/stop_token.h"
 #include "fit/problem/effects_of.h"
 
 namespace clothfit {
@@ -73,12 +74,11 @@ std::vector<Score> score_hypotheses(const FittedModel& model, const ModelProject
   std::vector<Score> best;
   size_t law_of_best = 0;
   for (size_t first = 0; first < tests.size(); first += kAtOnce) {
-    if (progress && !progress({.stage = "scoring laws",
+    report_progress(progress, {.stage = "scoring laws",
                                .done = static_cast<double>(first),
                                .total = static_cast<double>(tests.size()),
                                .unit = "laws",
-                               .note = ""}))
-      return {};
+                               .note = ""});
     const std::span<const Hypothesis> some =
         std::span(tests).subspan(first, std::min(kAtOnce, tests.size() - first));
     std::vector<Columns> columns = hypothesis_derivatives(model, some);

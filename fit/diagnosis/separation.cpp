@@ -1,7 +1,5 @@
 #include "fit/diagnosis/separation.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <atomic>
 #include <cmath>
@@ -19,6 +17,7 @@
 #include "fit/diagnosis/hypothesis_derivatives.h"
 #include "fit/diagnosis/projection.h"
 #include "fit/diagnosis/refit.h"
+#include "fit/jobs/parallel.h"
 #include "fit/jobs/stop_token.h"
 #include "fit/problem/effects_of.h"
 #include "fit/problem/parameterised_model.h"
@@ -282,13 +281,12 @@ std::vector<Pair> pairs_of(const FittedModel& model, const std::vector<AcceptedE
 void record(const FittedModel& model, const FitProblem* other, const std::vector<Pair>& pairs,
             const ProgressCallback& progress, std::vector<Recorded>& recorded) {
   std::atomic<size_t> begun = 0;
-  tbb::parallel_for(size_t{0}, recorded.size(), [&](size_t n) {
-    if (progress)
-      progress({.stage = "recordings that would tell laws apart",
-                .done = static_cast<double>(begun++),
-                .total = static_cast<double>(recorded.size()),
-                .unit = "recordings",
-                .note = ""});
+  for_each_index(recorded.size(), [&](size_t n) {
+    report_progress(progress, {.stage = "recordings that would tell laws apart",
+                               .done = static_cast<double>(begun++),
+                               .total = static_cast<double>(recorded.size()),
+                               .unit = "recordings",
+                               .note = ""});
     const FittedModel there = in_candidate(*recorded[n].candidate, model, other);
     recorded[n].distances = there.usable()
                                 ? distances(there, narrowed(pairs, recorded[n].distances))

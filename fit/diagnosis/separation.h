@@ -38,7 +38,7 @@ double hypothesis_distance(const FittedModel& model, const Hypothesis& law,
 /// in the model itself. A candidate is the first recording as it would be with the model found,
 /// simulated and linearised there; it counts by itself. (Fitted together with those there are it
 /// says more: squares of distances add up at least.) Candidates that do not run are left out.
-/// Empty where nothing is alike, or when cancelled.
+/// Empty where nothing is alike. Throws StopRequested where `progress` says to stop.
 std::vector<std::vector<Separation>> separating_recordings(
     const DiagnosisSetup& setup, const FittedModel& model,
     const std::vector<AcceptedEffect>& accepted, const ProgressCallback& progress);

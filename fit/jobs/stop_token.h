@@ -11,13 +11,19 @@ namespace clothfit {
 struct StopRequested {};
 
 /// Returns a callback that throws StopRequested where `progress` says to stop, and else returns
-/// true. Several threads may call it at once. It is empty where there is no `progress`.
+/// true. Several threads may call it at once, in loops of for_each_index (fit/jobs/parallel.h). It
+/// is empty where there is no `progress`.
 inline ProgressCallback stop_token(ProgressCallback progress) {
   if (!progress) return progress;
   return [asked = for_threads(std::move(progress))](const Progress& now) {
     if (!asked(now)) throw StopRequested();
     return true;
   };
+}
+
+/// Reports progress, and throws StopRequested where that says to stop.
+inline void report_progress(const ProgressCallback& progress, const Progress& now) {
+  if (progress && !progress(now)) throw StopRequested();
 }
 
 }  // namespace clothfit

@@ -24,7 +24,6 @@ LeadIn by_shooting(const FitProblem& problem, const FitOptions& options,
   const ShootingFit fit =
       fit_by_shooting(problem, problem.first_held_out, start, shooting, progress);
   return {.usable = fit.usable,
-          .cancelled = fit.cancelled,
           .values = fit.values,
           .stage = fmt::format("shooting on {} x {} over {} frames in {} windows: {} iterations, "
                                "{:.0f} simulations, time step {:.3g} s; {}",
@@ -51,7 +50,6 @@ LeadIn by_states(const FitProblem& problem, const FitOptions& options, const Eig
        .most_spring_steps = options.work * kMostSpringSteps},
       progress);
   return {.usable = result.usable,
-          .cancelled = result.cancelled,
           .values = result.values,
           .stage = fmt::format("{} cost over {} states from smoothed tracks ({} frames left out, "
                                "sigma {:.2g} mm): {} iterations, time step {:.3g} s; {}",

@@ -11,7 +11,6 @@ namespace clothfit {
 /// Where a fit's refinement by the trajectory's cost begins after another cost has led there.
 struct LeadIn {
   bool usable = false;
-  bool cancelled = false;
   Eigen::VectorXd values;
   std::string stage;  ///< one line for the report: what was done, and how it ended
 };

@@ -9,7 +9,7 @@ OtherMesh fit_on_other_mesh(const FitProblem& other, const Eigen::VectorXd& valu
                             const RefineOptions& options, const ProgressCallback& progress) {
   assert(other.space.size() == values.size());
   const RefineResult refined = refine(other, other.first_held_out, values, options, progress);
-  OtherMesh result{.usable = refined.usable && !refined.cancelled,
+  OtherMesh result{.usable = refined.usable,
                    .message = refined.message,
                    .columns = other.cloth.mesh.columns,
                    .rows = other.cloth.mesh.rows,

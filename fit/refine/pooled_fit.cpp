@@ -9,6 +9,7 @@
 #include "data/algebra/dense_factors.h"
 #include "data/input_error.h"
 #include "fit/cost/huber.h"
+#include "fit/jobs/stop_token.h"
 #include "fit/problem/parameterised_model.h"
 #include "fit/problem/prior_cost.h"
 #include "fit/refine/refine.h"
@@ -319,16 +320,11 @@ PooledFit fit_pooled(std::span<const FitProblem* const> problems, std::vector<Po
     const auto out_of_work = [&] { return pool.spring_steps() >= options.most_spring_steps; };
     while (!settled && !out_of_work() && result.iterations < options.iterations &&
            refusals < kRefusals * options.iterations) {
-      if (progress && !progress({.stage = "pooled fit",
+      report_progress(progress, {.stage = "pooled fit",
                                  .done = static_cast<double>(result.iterations),
                                  .total = static_cast<double>(options.iterations),
                                  .unit = "iterations",
-                                 .note = "cost " + std::to_string(pool.cost())})) {
-        result.cancelled = true;
-        result.usable = false;
-        result.message = "cancelled";
-        return result;
-      }
+                                 .note = "cost " + std::to_string(pool.cost())});
       const PooledSpace::Expansion here = pool.expand(space);
       if (!here.usable) break;
       std::vector<bool> held = held_at(x, lower, upper, here.gradient);

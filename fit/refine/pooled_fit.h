@@ -57,7 +57,6 @@ struct PooledOptions {
 struct PooledFit {
   bool usable = false;
   bool converged = false;
-  bool cancelled = false;
   std::string message;
   std::map<std::string, double> shared;  ///< values of the parameters of the physics, by name
   std::vector<PooledPart> parts;         ///< where each recording ends

@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <exception>
 #include <limits>
 
 #include "data/median.h"
 #include "fit/cost/huber.h"
+#include "fit/jobs/stop_token.h"
 #include "fit/problem/parameterised_model.h"
 #include "model/cloth/stability.h"
 
@@ -285,10 +287,20 @@ class Reporter final : public ceres::IterationCallback {
   ceres::CallbackReturnType operator()(const ceres::IterationSummary& summary) override {
     now_.done = summary.iteration;
     now_.note = "cost " + std::to_string(summary.cost);
-    if (progress_ && !progress_(now_)) return ceres::SOLVER_ABORT;
+    // No exception passes through Ceres.
+    try {
+      report_progress(progress_, now_);
+    } catch (...) {
+      thrown_ = std::current_exception();
+      return ceres::SOLVER_ABORT;
+    }
     // However large the mesh, one step is tried.
     const bool go_on = summary.iteration == 0 || shared_.spring_steps() < most_spring_steps_;
     return go_on ? ceres::SOLVER_CONTINUE : ceres::SOLVER_TERMINATE_SUCCESSFULLY;
+  }
+  /// Throws what ended the solve, if anything did.
+  void rethrow() const {
+    if (thrown_) std::rethrow_exception(thrown_);
   }
 
  private:
@@ -296,6 +308,7 @@ class Reporter final : public ceres::IterationCallback {
   Progress now_;
   const SharedEvaluation& shared_;
   double most_spring_steps_;
+  std::exception_ptr thrown_;
 };
 
 /// Why a solve ended, for a person.
@@ -308,7 +321,6 @@ std::string ending(const ceres::Solver::Summary& summary) {
     case ceres::NO_CONVERGENCE:
       return "still falling after " + std::to_string(summary.iterations.size()) + " iterations";
     case ceres::USER_FAILURE:
-      return "cancelled";
     case ceres::FAILURE:
       break;
   }
@@ -378,6 +390,7 @@ Round solve(const ObjectiveMaker& make_objective, std::unique_ptr<Objective>& ob
                     shared, most_spring_steps);
   options.callbacks.push_back(&reporter);
   ceres::Solve(options, &least_squares, &round.summary);
+  reporter.rethrow();
   round.values = space.values(coordinates);
   const bool exact =
       refine_options.derivatives == Derivatives::tangents && !objective->has_cheap_derivatives();
@@ -419,10 +432,6 @@ RefineResult refine(const FitProblem& problem, const ObjectiveMaker& make_object
     spring_steps_left -= round.simulations * objective->spring_steps_per_run();
     result.solver_iterations += static_cast<int>(round.summary.iterations.size());
     result.message = ending(round.summary);
-    if (round.summary.termination_type == ceres::USER_FAILURE) {
-      result.cancelled = true;
-      return result;
-    }
     if (!round.summary.IsSolutionUsable()) return result;
     result.usable = true;
     const double moved =

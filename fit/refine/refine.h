@@ -38,7 +38,6 @@ struct RefineOptions {
 
 struct RefineResult {
   bool usable = false;
-  bool cancelled = false;
   bool converged = false;
   Eigen::VectorXd values;
   /// The exact derivatives there, or where they were last had (RefineOptions::kept_within),

@@ -7,6 +7,7 @@
 
 #include "fit/cost/huber.h"
 #include "fit/cost/track_states.h"
+#include "fit/jobs/stop_token.h"
 #include "fit/problem/parameterised_model.h"
 #include "fit/problem/prior_cost.h"
 #include "fit/refine/refine.h"
@@ -240,15 +241,11 @@ ShootingFit fit_by_shooting(const FitProblem& problem, int frames, const Eigen::
     double damping = 1e-3;
     bool settled = false;
     for (int i = 1;; ++i) {
-      if (progress && !progress({.stage = "shooting " + at.objective->name(),
+      report_progress(progress, {.stage = "shooting " + at.objective->name(),
                                  .done = static_cast<double>(result.iterations),
                                  .total = static_cast<double>(options.rounds * options.iterations),
                                  .unit = "iterations",
-                                 .note = "cost " + std::to_string(at.equations.cost)})) {
-        result.cancelled = true;
-        result.message = "cancelled";
-        return result;
-      }
+                                 .note = "cost " + std::to_string(at.equations.cost)});
       ++result.iterations;
       const Step step = take_step(round, ranges, damping, at);
       result.values = space.values(at.coordinates);

@@ -26,7 +26,6 @@ struct ShootingOptions {
 
 struct ShootingFit {
   bool usable = false;
-  bool cancelled = false;
   Eigen::VectorXd values;  ///< of the problem's parameters
   ShootingObjective::Corrections corrections;
   ShootingWindows windows;

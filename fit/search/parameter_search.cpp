@@ -8,6 +8,7 @@
 
 #include "fit/cost/observed_motion.h"
 #include "fit/jobs/checksum.h"
+#include "fit/jobs/stop_token.h"
 #include "fit/search/cma_es.h"
 #include "fit/search/evolutionary_strategy.h"
 #include "fit/search/search_checkpoint.h"
@@ -115,7 +116,6 @@ SearchedParameters search_by_strategy(const SearchSpace& space, const FitOptions
                      : evolve(space.ranges, evolution, cost, progress, {}, save);
 
   SearchedParameters found;
-  found.cancelled = result.stop == EvolutionStop::cancelled;
   found.best_cost = result.state.best_cost;
   found.simulations = result.state.evaluations;
   found.message = fmt::format("evolutionary search: {} generations; {}", result.state.generations(),
@@ -153,7 +153,6 @@ SearchedParameters search_by_restarts(const SearchSpace& space, const FitOptions
       });
 
   SearchedParameters found;
-  found.cancelled = result.stop == CmaStop::cancelled;
   found.best_cost = result.state.best_cost;
   found.simulations = result.state.evaluations;
   found.message =
@@ -195,9 +194,10 @@ SearchedParameters search_parameters(const Objective& objective, const FitOption
   const std::string problem =
       options.checkpoint.empty() ? std::string() : problem_line(objective, start);
   const double stop_cost = options.stop_cost.value_or(cost_of_following(objective));
+  const ProgressCallback token = stop_token(progress);
   return options.search == SearchMethod::cma
-             ? search_by_restarts(space, options, problem, parameters, cost, stop_cost, progress)
-             : search_by_strategy(space, options, problem, parameters, cost, stop_cost, progress);
+             ? search_by_restarts(space, options, problem, parameters, cost, stop_cost, token)
+             : search_by_strategy(space, options, problem, parameters, cost, stop_cost, token);
 }
 
 }  // namespace clothfit

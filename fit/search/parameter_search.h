@@ -22,7 +22,6 @@ struct SearchedParameters {
   std::vector<SearchOptimum> optima;  ///< distinct, best first; empty where nothing was usable
   std::vector<double> best_cost;      ///< after each generation
   long simulations = 0;
-  bool cancelled = false;
   std::string message;  ///< one line for a person
 };
 

@@ -6,6 +6,7 @@
 
 #include "data/algebra/dense_factors.h"
 #include "fit/cost/huber.h"
+#include "fit/jobs/stop_token.h"
 #include "fit/problem/prior_cost.h"
 #include "fit/uncertainty/cluster_covariance.h"
 
@@ -154,12 +155,11 @@ std::vector<ParameterProfile> parameter_profiles(const TrajectoryObjective& obje
     if (std::abs(profile.rise_below - 1) < kNoticeable &&
         std::abs(profile.rise_above - 1) < kNoticeable)
       continue;
-    if (progress && !progress({.stage = "profiles",
+    report_progress(progress, {.stage = "profiles",
                                .done = static_cast<double>(n),
                                .total = static_cast<double>(result.size()),
                                .unit = "parameters",
-                               .note = space.parameters[static_cast<size_t>(p)].name}))
-      return result;
+                               .note = space.parameters[static_cast<size_t>(p)].name});
     const ProfilePoint optimum{
         .usable = true, .value = best[p], .cost = cost_there, .others = best};
     const ProfiledCost least = [&](double value, const Eigen::VectorXd& start) {

@@ -284,7 +284,7 @@ TEST(Fit, GoesOnFromACheckpointToTheSameBytes) {
         return progress.stage != "search" || ++calls < generation;
       });
       EXPECT_EQ(cut.stop, FitStop::cancelled);
-      EXPECT_EQ(cut.search_cost.size(), static_cast<size_t>(generation));
+      EXPECT_EQ(calls, generation);
 
       options.resume = true;
       const FitReport resumed = fit(input, options, {});

@@ -183,14 +183,6 @@ TEST(ClearOfNeutral, CountsTheAmplitudesThatEachRecordingHasOfItsOwn) {
               5 * std::sqrt(2 * one * one / least_decrease(2)), 1e-4 * one);
 }
 
-/// The chance that the sum of so many squared standard normal numbers exceeds `square`; up to four.
-double chance_beyond(int numbers, double square) {
-  const double half = 0.5 * square;
-  if (numbers % 2 == 0) return std::exp(-half) * (numbers == 2 ? 1 : 1 + half);
-  return std::erfc(std::sqrt(half)) +
-         (numbers == 1 ? 0 : 2 * std::sqrt(half / M_PI) * std::exp(-half));
-}
-
 TEST(RiseWithoutLast, IsThatOfAFitWithout) {
   const SyntheticCloth cloth{.drag_rate_per_s = 0.02};
   const FitInput input = synthetic_input(cloth);
@@ -206,16 +198,6 @@ TEST(RiseWithoutLast, IsThatOfAFitWithout) {
   ASSERT_GT(rise, 25);
 
   EXPECT_NEAR(rise_without_last(with, kNoThreshold), rise, 0.1 * rise);
-}
-
-TEST(LeastFall, IsAsUnlikelyAsFiveSigmas) {
-  const double five_sigmas = std::erfc(5 / std::sqrt(2.0));
-  for (const int amplitudes : {1, 2, 3, 4}) {
-    SCOPED_TRACE(amplitudes);
-    // A straight line in the number of amplitudes is near the truth.
-    EXPECT_LT(chance_beyond(amplitudes, least_decrease(amplitudes)), 1.1 * five_sigmas);
-    EXPECT_GT(chance_beyond(amplitudes, 0.95 * least_decrease(amplitudes)), five_sigmas);
-  }
 }
 
 }  // namespace

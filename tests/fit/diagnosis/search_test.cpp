@@ -1,5 +1,5 @@
-// What a law must gain to be named. Whole searches: planting_test.cpp,
-// tests/fit/diagnosis/diagnose_test.cpp.
+// Searches on a coarser mesh and in another basin. The steps have files of their own, from
+// beam_test.cpp to worth_test.cpp; whole searches: planting_test.cpp, diagnose_test.cpp.
 #include "fit/diagnosis/search.h"
 
 #include <gtest/gtest.h>
@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "fit/diagnosis/discretisation.h"
-#include "fit/diagnosis/worth.h"
 #include "tests/data/whole_runs.h"
 #include "tests/fit/diagnosis/true_model.h"
 
@@ -17,63 +16,6 @@ namespace clothfit {
 namespace {
 
 constexpr double kSquares = std::numeric_limits<double>::infinity();
-
-/// A model that leaves so much: chi-square per residual.
-FittedModel that_leaves(const DiagnosisSetup& setup, double chi_square_per_residual) {
-  FittedModel model = true_model(setup, {});
-  Eigen::VectorXd& residual = model.parts.front().linear.residual;
-  residual.setConstant(std::sqrt(chi_square_per_residual));
-  return model;
-}
-
-TEST(WorthNaming, IsOfTheNoiseOrOfWhatIsAboveItOrOfAll) {
-  const FitInput input = synthetic_input({});
-  const FitOptions options;
-  const DiagnosisSetup setup{.inputs = {&input, 1}, .options = options, .columns = 9, .rows = 9};
-  const auto count = static_cast<double>(that_leaves(setup, 1).residual_count());
-  const double scatter = 2 * std::sqrt(2 * count);
-
-  const auto worth = [&](double left) { return worth_naming(that_leaves(setup, left), kSquares); };
-  const double prior = that_leaves(setup, 0).chi_square(kSquares);
-
-  // Noise alone, and less than noise
-  EXPECT_NEAR(worth(1), 0.003 * count, 1e-9 * count);
-  EXPECT_NEAR(worth(0.5), 0.003 * count, 1e-9 * count);
-  // A little above: a third of what two standard deviations do not explain
-  const double little = 1.15;
-  EXPECT_NEAR(worth(little), (0.15 * count - scatter + prior) / 3, 1e-9 * count);
-  EXPECT_GT(worth(little), 0.003 * count);
-  // More: a quarter of the noise is enough
-  EXPECT_NEAR(worth(3), 0.25 * count, 1e-9 * count);
-  // Far above: a twentieth of all
-  EXPECT_NEAR(worth(50), 0.05 * (50 * count + prior), 1e-9 * count);
-}
-
-TEST(WorthNaming, IsMoreBesideALawThatExplainsMuch) {
-  const FitInput input = synthetic_input({});
-  const FitOptions options;
-  const DiagnosisSetup setup{.inputs = {&input, 1}, .options = options, .columns = 9, .rows = 9};
-  const FittedModel model = that_leaves(setup, 1);
-  const auto count = static_cast<double>(model.residual_count());
-
-  // A form that is known to a per cent leaves a ten-thousandth of what it explains.
-  EXPECT_NEAR(worth_naming(model, kSquares, 100 * count), 0.01 * count, 1e-9 * count);
-  EXPECT_NEAR(worth_naming(model, kSquares, 10 * count), 0.003 * count, 1e-9 * count);
-}
-
-TEST(WorthNaming, CountsLargeResidualsAsTheFitDoes) {
-  const FitInput input = synthetic_input({});
-  const FitOptions options;
-  const DiagnosisSetup setup{.inputs = {&input, 1}, .options = options, .columns = 9, .rows = 9};
-  const FittedModel model = that_leaves(setup, 400);
-  const double prior = that_leaves(setup, 0).chi_square(kSquares);
-
-  // Huber's: 3D residuals of length sqrt(3) 20, linear beyond 2.
-  const double length = std::sqrt(3) * 20, threshold = 2;
-  const double blocks = static_cast<double>(model.residual_count()) / 3;
-  EXPECT_NEAR(worth_naming(model, threshold),
-              0.05 * (blocks * threshold * (2 * length - threshold) + prior), 1e-9 * blocks);
-}
 
 /// A cloth that bounces a few times, so that a stiffer one fits it in a basin of its own.
 const SyntheticCloth kBouncing{.mesh = 7, .markers = 5, .frames = 60, .held_out_from = 48};

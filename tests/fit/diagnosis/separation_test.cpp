@@ -17,6 +17,7 @@
 
 #include "fit/diagnosis/candidate_recording.h"
 #include "fit/diagnosis/diagnose.h"
+#include "fit/jobs/stop_token.h"
 #include "fit/problem/parameterised_model.h"
 #include "model/effects/registry.h"
 #include "tests/fit/diagnosis/true_model.h"
@@ -356,9 +357,8 @@ TEST(SeparatingRecordings, AreTheBestOfEachKindBesideTheNumberOfThePresentOne) {
   EXPECT_TRUE(
       separating_recordings(setup, model, {{.trial = {.hypothesis = kGravityScale}}}, {}).empty());
   int calls = 0;
-  EXPECT_TRUE(separating_recordings(setup, model, accepted, [&](const Progress&) {
-                return ++calls < 3;
-              }).empty());
+  const auto stop_at_third = [&](const Progress&) { return ++calls < 3; };
+  EXPECT_THROW(separating_recordings(setup, model, accepted, stop_at_third), StopRequested);
   EXPECT_EQ(calls, 3);
 }
 

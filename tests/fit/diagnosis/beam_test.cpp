@@ -1,0 +1,105 @@
+// The search's loop, on costs alone. Its steps: shortlist_test.cpp, trial_test.cpp, prune_test.cpp;
+// whole searches: search_test.cpp.
+#include "fit/diagnosis/beam.h"
+
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+namespace clothfit {
+namespace {
+
+constexpr double kBase = 100;  ///< cost of the entry that has found nothing
+
+BeamEntry entry_of(double cost, const std::vector<std::string>& effects,
+                   double must_still_beat = BeamEntry::kNothing) {
+  BeamEntry entry{.model = {},
+                  .accepted = {},
+                  .cost = cost,
+                  .must_still_beat = must_still_beat,
+                  .last = {},
+                  .refused = {}};
+  for (const std::string& effect : effects) entry.model.hypotheses.push_back({.effect = effect});
+  return entry;
+}
+
+std::string effects_of(const BeamEntry& entry) {
+  std::string names;
+  for (const Hypothesis& hypothesis : entry.model.hypotheses) names += hypothesis.effect;
+  return names;
+}
+
+/// Finishes the next entry and adds children; its effects.
+std::string extend(Beam& beam, std::vector<BeamEntry> children) {
+  BeamEntry* next = beam.next();
+  if (next == nullptr) return "none";
+  next->finished = true;
+  const std::string effects = effects_of(*next);
+  beam.add(std::move(children), kBase);
+  return effects;
+}
+
+TEST(Beam, ExtendsTheCheapestEntryFirst) {
+  Beam beam(entry_of(kBase, {}), 3, 4);
+  EXPECT_EQ(extend(beam, {entry_of(50, {"b"}), entry_of(40, {"a"})}), "");
+  EXPECT_EQ(extend(beam, {entry_of(45, {"a", "c"})}), "a");
+  EXPECT_EQ(extend(beam, {}), "ac");
+  EXPECT_EQ(extend(beam, {}), "b");
+  EXPECT_EQ(extend(beam, {}), "none");
+  EXPECT_EQ(effects_of(beam.best()), "a");
+}
+
+TEST(Beam, GivesNoEntryMoreEffectsThanAskedFor) {
+  Beam beam(entry_of(kBase, {}), 3, 1);
+  EXPECT_EQ(extend(beam, {entry_of(40, {"a"})}), "");
+  EXPECT_EQ(beam.next(), nullptr);
+}
+
+TEST(Beam, KeepsTheCheaperOfTwoOrdersAndWhatEitherHasBeaten) {
+  Beam beam(entry_of(kBase, {}), 5, 4);
+  extend(beam, {entry_of(40, {"a"}), entry_of(41, {"b"})});
+  // The cheaper order must still beat something, which the other has beaten.
+  EXPECT_EQ(extend(beam, {entry_of(30, {"a", "b"}, 3)}), "a");
+  EXPECT_EQ(extend(beam, {}), "ab");
+  EXPECT_EQ(extend(beam, {entry_of(31, {"b", "a"})}), "b");
+  EXPECT_EQ(beam.next(), nullptr);
+  EXPECT_EQ(effects_of(beam.best()), "ab");
+  EXPECT_TRUE(beam.best().is_sound());
+}
+
+TEST(Beam, DoesNotFollowWhatGainedLessThanHalf) {
+  Beam beam(entry_of(kBase, {}), 5, 4);
+  extend(beam, {entry_of(20, {"a"}), entry_of(61, {"b"}), entry_of(59, {"c"})});
+  EXPECT_EQ(extend(beam, {}), "a");
+  EXPECT_EQ(extend(beam, {}), "c");  // 41 of 80
+  EXPECT_EQ(extend(beam, {}), "none");
+}
+
+TEST(Beam, FollowsNoMoreEntriesThanItIsWide) {
+  Beam beam(entry_of(kBase, {}), 2, 4);
+  extend(beam, {entry_of(20, {"a"}), entry_of(21, {"b"}), entry_of(22, {"c"})});
+  EXPECT_EQ(extend(beam, {}), "a");
+  EXPECT_EQ(extend(beam, {}), "b");
+  EXPECT_EQ(extend(beam, {}), "none");
+}
+
+TEST(Beam, FallsBackOnTheCheapestSoundEntryWhereTheBestIsNone) {
+  Beam beam(entry_of(kBase, {}), 1, 4);
+  // On credit; what is dropped beside it is sound.
+  extend(beam, {entry_of(20, {"a"}, 2), entry_of(60, {"b"}), entry_of(70, {"c"})});
+  EXPECT_EQ(extend(beam, {}), "a");
+  EXPECT_EQ(extend(beam, {}), "b");
+  EXPECT_EQ(beam.next(), nullptr);
+  EXPECT_EQ(effects_of(beam.best()), "b");
+}
+
+TEST(Beam, FallsBackOnWhatItBeganWith) {
+  Beam beam(entry_of(kBase, {}), 3, 1);
+  extend(beam, {entry_of(20, {"a"}, 2)});
+  EXPECT_EQ(beam.next(), nullptr);
+  EXPECT_EQ(effects_of(beam.best()), "");
+}
+
+}  // namespace
+}  // namespace clothfit
