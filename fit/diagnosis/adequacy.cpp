@@ -21,7 +21,7 @@ struct Correlation {
 
 using Place = std::pair<int, int>;  ///< marker, frame
 
-/// Of the residuals of one set of observations, where each marker's lie in each frame.
+/// Returns where each marker's residuals lie in each frame, for one set of observations.
 std::map<Place, const Objective::Block*> blocks_of(const TrajectoryObjective& objective, int set) {
   std::map<Place, const Objective::Block*> found;
   for (const Objective::Block& block : objective.blocks())
@@ -29,7 +29,8 @@ std::map<Place, const Objective::Block*> blocks_of(const TrajectoryObjective& ob
   return found;
 }
 
-/// Pairs of markers that are nearest to each other on the cloth, within a tenth: each once.
+/// Returns pairs of markers that are nearest to each other on the cloth, within a tenth. Each pair
+/// comes once.
 std::vector<std::pair<int, int>> neighbours(const Eigen::Matrix2Xd& place_m) {
   std::vector<std::pair<int, int>> pairs;
   for (Eigen::Index m = 0; m < place_m.cols(); ++m) {
@@ -45,17 +46,17 @@ std::vector<std::pair<int, int>> neighbours(const Eigen::Matrix2Xd& place_m) {
 
 Correlation correlation(double products, double squares, double count) {
   if (count == 0 || squares == 0) return {};
-  // White residuals: each product has variance sigma^4.
+  // Of white residuals each product has variance sigma^4.
   return {products / squares, products / (squares / count * std::sqrt(count))};
 }
 
-/// cos(pi k x), x from 0 to 1: smooth functions over an interval.
+/// Returns cos(pi k x), a smooth function for x from 0 to 1.
 double wave(int k, double x) {
   return std::cos(std::numbers::pi * k * x);
 }
 
-/// Products of `along` waves each way over the cloth and `in_time` over the frames, for each
-/// coordinate of each set of observations.
+/// Returns smooth functions of place and time for each coordinate of each set of observations. They
+/// are products of `along` waves each way over the cloth and `in_time` over the frames.
 Eigen::MatrixXd smooth_functions(const TrajectoryObjective& objective, int along, int in_time) {
   const FitProblem& problem = objective.problem();
   const Eigen::Vector2d first = problem.marker_place_m.rowwise().minCoeff();
@@ -138,7 +139,7 @@ Taken taken_by_smooth(const FittedModel& model, const ModelProjection& projectio
     for (size_t m = 0; m < model.parts.size(); ++m)
       functions.push_back(smooth_functions(model.objective(m), along, in_time));
     if (2 * functions[n].cols() > functions[n].rows()) continue;
-    // Each recording has its own.
+    // Each recording has functions of its own.
     for (size_t m = 0; m < model.parts.size(); ++m)
       if (m != n) functions[m] = Eigen::MatrixXd::Zero(functions[m].rows(), functions[n].cols());
     const Eigen::MatrixXd left = projection.columns(functions);

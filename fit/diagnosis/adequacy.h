@@ -4,25 +4,26 @@
 
 namespace clothfit {
 
-/// Whether projected residuals look like noise. Standard scores are about normal for white ones.
+/// Says whether projected residuals look like noise. The standard scores are about normal for white
+/// residuals.
 struct Adequacy {
-  double chi_square_per_dof = 0;        ///< with what the discretisation may explain taken out
+  double chi_square_per_dof = 0;        ///< without what the discretisation may explain
   double noise_chi_square_per_dof = 0;  ///< against the measured noise alone
   double time_correlation = 0;          ///< of a marker with itself in its next frame
   double time_score = 0;
   double neighbour_correlation = 0;  ///< of neighbouring markers in one frame
   double neighbour_score = 0;
-  /// What smooth functions of place and time take from the residual, beyond their number, of all
-  /// sets of such functions that were tried the most telling.
+  /// Smooth functions of place and time take this much of the residual, beyond their number. Of
+  /// several sets of functions the most telling one counts.
   double smooth_share = 0;  ///< of chi-square
   double smooth_score = 0;
-  /// What the model is thought to err by through its mesh and time step: the mean square, in units
-  /// of the noise's. What cannot be told from it is no structure.
+  /// Mean square of the error that mesh and time step are thought to make, in units of the noise's
+  /// square. Structure that cannot be told from this error does not count.
   double discretisation_square = 0;
   bool adequate = false;
 };
 
-/// Of a linearised model. `loss`: whether large residuals count less (Huber).
+/// Judges a linearised model. `loss` says whether large residuals count less (Huber).
 Adequacy judge_adequacy(const FittedModel& model, Loss loss);
 
 }  // namespace clothfit

@@ -10,13 +10,13 @@
 
 namespace clothfit {
 
-/// Ends a diagnosis that does not work out. diagnose() catches it; it never leaves that.
+/// Ends a diagnosis that does not work out. diagnose() catches it; it never leaves diagnose().
 struct GivenUp {
   FitStop stop = FitStop::diverged;
   std::string message;
 };
 
-/// The fitted recordings as one set of options has them.
+/// The fitted recordings under one set of options.
 struct Analysis {
   Analysis(std::span<const FitInput> inputs, const DiagnoseOptions& asked, FitOptions fit_options)
       : diagnosis(asked),
@@ -38,10 +38,10 @@ struct Analysis {
   }
 };
 
-/// Beyond it residuals count less (Huber), in sigmas; infinite for squares.
+/// Returns the sigmas beyond which residuals count less (Huber). They are infinite for squares.
 double huber_threshold(const FittedModel& model, Loss loss);
 
-/// Searches for hypotheses from the base model, which moves where the search moved it.
+/// Searches for hypotheses from the base model. Where the search moved that model, `base` follows.
 void search_for_effects(Analysis& analysis, const ProgressCallback& progress);
 
 }  // namespace clothfit

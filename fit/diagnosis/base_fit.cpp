@@ -12,7 +12,7 @@
 namespace clothfit {
 namespace {
 
-/// The model that a fit of the first recording found, fitted to all of them and linearised.
+/// Fits the model that a fit of the first recording found to all of them, and linearises it.
 FittedModel fitted_to_all(const DiagnosisSetup& setup, const FitReport& first,
                           const ProgressCallback& progress) {
   const std::vector<NamedValues> values(setup.inputs.size(), first.values);
@@ -26,7 +26,7 @@ FittedModel fitted_to_all(const DiagnosisSetup& setup, const FitReport& first,
   return base;
 }
 
-/// The model on a finer mesh: identified there, or led there from its own.
+/// Fits the model on a finer mesh: identified there from scratch, or led there from its own.
 FittedModel on_finer_mesh(const DiagnosisSetup& finer, const FittedModel& own,
                           const ProgressCallback& progress) {
   // A fit from where the declared mesh's optimum lies can end in another basin.
@@ -35,7 +35,7 @@ FittedModel on_finer_mesh(const DiagnosisSetup& finer, const FittedModel& own,
       return model;
   FittedModel model = fit_on_mesh(finer, own, progress);
   if (model.usable() && model.is_unrefined()) {
-    // Optima are compared, not what updated derivatives stop short of.
+    // Optima are compared, and updated derivatives stop short of them.
     for (PooledPart& part : model.parts) part.linear = {};
     refine_model(model, finer, {}, progress);
   }
@@ -43,8 +43,8 @@ FittedModel on_finer_mesh(const DiagnosisSetup& finer, const FittedModel& own,
   return model;
 }
 
-/// The model on the mesh that is analysed, which `setup` is given. Derivatives of a mesh that
-/// cannot follow the cloth mistake one effect for another.
+/// Returns the model on the mesh that is to be analysed, and gives that mesh to `setup`.
+/// Derivatives of a mesh that cannot follow the cloth mistake one effect for another.
 FittedModel on_mesh_to_analyse(FittedModel own, DiagnosisSetup& setup,
                                const ProgressCallback& progress) {
   if (setup.options.spring_set != SpringSet::fabric) return own;
@@ -62,15 +62,15 @@ FittedModel on_mesh_to_analyse(FittedModel own, DiagnosisSetup& setup,
 }  // namespace
 
 void fit_base(Analysis& analysis, const ProgressCallback& progress) {
-  // A model that lacks something large is drawn far away, at ever shorter time steps, to an optimum
-  // that says no more than what a part of the work finds.
+  // A model that lacks something large is drawn far away, at ever shorter time steps. Its optimum
+  // says no more than what a part of the work finds.
   FitOptions options = analysis.options;
   options.work *= kCriteria.first_work;
   DiagnosisSetup& setup = analysis.setup;
   const ClothDescription& cloth = setup.inputs.front().recording.cloth;
   setup.columns = options.mesh_columns > 0 ? options.mesh_columns : cloth.mesh_columns;
   setup.rows = options.mesh_rows > 0 ? options.mesh_rows : cloth.mesh_rows;
-  // Optima are compared where a finer mesh may be analysed.
+  // A coarse mesh does unless a finer one may be analysed, for then optima are compared.
   const bool coarse_will_do =
       is_coarser(with_coarse_mesh(setup), setup) && is_coarser(with_other_mesh(setup), setup);
   if (coarse_will_do) options.coarse_beyond = kCriteria.grossly_misfitting;

@@ -14,7 +14,7 @@
 namespace clothfit {
 namespace {
 
-/// The model with these hypotheses identified from scratch, refined with the errors of its mesh.
+/// Identifies the model with these hypotheses from scratch, and refines it with its mesh's errors.
 FittedModel from_scratch(const SearchContext& search, const std::vector<Hypothesis>& hypotheses) {
   FittedModel model = identified_from_scratch(search.setup, hypotheses, search.progress);
   if (model.usable()) refine_with_discretisation(model, search.setup, search.progress);
@@ -79,8 +79,8 @@ FittedModel in_basin_of(const SearchContext& search, const Extended& best,
   FittedModel there = with_hypotheses(search.setup, best.model, without.hypotheses, {});
   refine_model(there, search.setup, {}, search.progress);
   if (there.usable()) refine_with_discretisation(there, search.setup, search.progress);
-  // A fit that begins from scratch in the same basin gains a little, which is none of the
-  // hypothesis' doing.
+  // A fit that begins from scratch gains a little even in the same basin. The hypothesis has no
+  // part in that gain.
   const double enough = search.left_by(without) - kCriteria.other_basin * taken;
   if (best.from_scratch || (search.left_by(there) < enough && search.is_far_off(there))) {
     FittedModel other = from_scratch(search, without.hypotheses);

@@ -9,14 +9,14 @@
 namespace clothfit {
 namespace {
 
-/// The cheapest sound entry of two lists of which one has such.
+/// Returns the cheapest sound entry of two lists, one of which has such.
 BeamEntry best_sound(std::vector<BeamEntry> entries, std::vector<BeamEntry> more) {
   std::ranges::move(more, std::back_inserter(entries));
   std::erase_if(entries, [](const BeamEntry& entry) { return !entry.is_sound(); });
   return std::move(*std::ranges::min_element(entries, {}, &BeamEntry::cost));
 }
 
-/// Whether two entries have the same hypotheses, in any order.
+/// Tells whether two entries have the same hypotheses, in any order.
 bool same_hypotheses(const BeamEntry& one, const BeamEntry& other) {
   const std::vector<Hypothesis>& others = other.model.hypotheses;
   return one.model.hypotheses.size() == others.size() &&
@@ -65,7 +65,7 @@ void Beam::drop_repeated() {
       ++n;
       continue;
     }
-    // What the hypotheses have beaten in one order they have beaten.
+    // Hypotheses that have beaten a correction in one order have beaten it in the other.
     same->must_still_beat = std::max(same->must_still_beat, own->must_still_beat);
     entries_.erase(own);
   }

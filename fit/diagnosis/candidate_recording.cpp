@@ -48,13 +48,13 @@ SheetAxes axes_of(const FitProblem& problem) {
   return axes;
 }
 
-/// The line through the held points; through a single one, level and in the sheet.
+/// The line through the held points. Through a single one it is level and in the sheet.
 struct HeldLine {
   Eigen::Vector3d point_m, along;
   bool single = false;
 };
 
-/// Nothing where they lie on none.
+/// Finds the line through the held points, or nothing where they lie on none.
 std::optional<HeldLine> held_line(const FitProblem& problem) {
   constexpr double kStraight = 1e-3;  // of the cloth's size
   const std::vector<Eigen::Vector3d> places = held_places(problem);
@@ -76,13 +76,12 @@ std::optional<HeldLine> held_line(const FitProblem& problem) {
   } else if (const Eigen::Vector3d level = axes.normal.cross(axes.down); level.norm() > 0.1) {
     line.along = level.normalized();
   }
-  // Whichever way the decomposition has it.
+  // The decomposition leaves the sign open.
   if (line.along.dot(axes.along_s) < 0) line.along = -line.along;
   return line;
 }
 
-/// Frames, and rows that repeat the pattern of those there are: of each new frame, its time and the
-/// frame whose rows it has.
+/// A new frame: its time, and the known frame whose rows it repeats.
 struct Frame {
   double time_s = 0;
   int like = 0;
@@ -156,7 +155,7 @@ void turn_about(FitProblem& problem, const HeldLine& line, double angle) {
       (turn * (problem.placed_sheet_m.colwise() - line.point_m)).colwise() + line.point_m;
 }
 
-/// An effect with constants that nobody has to find.
+/// Adds a motion of the supports with constants that nobody has to find.
 void shake(FitProblem& problem, const Eigen::Vector3d& amplitude_m, double frequency_hz) {
   // A quarter of a turn on, the sine begins at rest.
   const std::map<std::string, double> numbers{{"amplitude_x", amplitude_m.x()},
@@ -171,7 +170,7 @@ void shake(FitProblem& problem, const Eigen::Vector3d& amplitude_m, double frequ
   problem.effects.push_back(std::move(bindings));
 }
 
-/// Turns the cloth in its plane by as many quarters: vertices come to lie where others lay, and
+/// Turns the cloth in its plane by as many quarters. Vertices come to lie where others lay, and
 /// those that lie at the held points are held.
 void turn_in_plane(FitProblem& problem, int quarters) {
   const Mesh& mesh = problem.cloth.mesh;
@@ -190,7 +189,7 @@ void turn_in_plane(FitProblem& problem, int quarters) {
       at.vertex = vertex_at[static_cast<size_t>(at.vertex)];
 }
 
-/// As far from the sheet as the first camera, and with its lens.
+/// Adds a camera as far from the sheet as the first one, with its lens.
 void add_camera(FitProblem& problem) {
   ObservationSet beside = problem.observations.front();
   CameraParameters& camera = *beside.camera;
@@ -295,7 +294,7 @@ std::vector<CandidateRecording> candidate_recordings(const FitProblem& problem) 
   if (problem.start == StartKind::released_flat && line && !may_touch(problem))
     add_attitudes(problem, *line, candidates);
   if (!problem.cloth.held.empty()) {
-    // The effect's shift is nothing at time 0, whenever the first frame is.
+    // The effect shifts nothing at time 0, whenever the first frame is.
     if (problem.frame_time_s.front() == 0) add_shaken(problem, line, candidates);
     if (problem.start != StartKind::unknown && problem.driving_markers.empty())
       add_turned(problem, candidates);
@@ -308,7 +307,7 @@ std::vector<CandidateRecording> candidate_recordings(const FitProblem& problem) 
 }
 
 bool observe(FitProblem& problem, const Eigen::VectorXd& values, const TimeSteps& steps) {
-  // Where a shutter rolls, the row of the picture says when a marker is seen, and that where.
+  // With a rolling shutter a marker's row says when it is seen, and that time says where.
   constexpr int kPasses = 3;
   size_t all = 0, seen = 0;
   for (ObservationSet& set : problem.observations) {

@@ -12,7 +12,8 @@
 namespace clothfit {
 namespace {
 
-/// How far a grid's value lies from the furthest of its neighbours; of a lone one, half of itself.
+/// Returns how far a grid's value lies from the furthest of its neighbours. For a lone value it is
+/// half of the value.
 double spacing(const std::vector<double>& values, double at) {
   double below = 0, above = 0;
   for (const double value : values) {
@@ -23,7 +24,7 @@ double spacing(const std::vector<double>& values, double at) {
   return wider > 0 ? wider : 0.5 * std::abs(at);
 }
 
-/// All combinations of the values that a law's shapes are tried at.
+/// Returns all combinations of the values that a mode's shapes are tried at.
 ShapeCandidates shapes_of(const EffectDescription& effect, const EffectMode& law,
                           double duration_s) {
   Hypothesis term{.effect = effect.name,
@@ -61,7 +62,7 @@ std::vector<EffectMode> laws_of(const EffectDescription& effect) {
   return {all};
 }
 
-/// Whether a recording has what an effect of motion acts on.
+/// Tells whether a recording has what an effect of motion acts on.
 bool acts_on(const Recording& recording, const std::string& effect) {
   const auto driven = std::ranges::count_if(
       recording.held, [](const HeldPoint& point) { return point.motion != HeldMotion::fixed; });
@@ -70,7 +71,7 @@ bool acts_on(const Recording& recording, const std::string& effect) {
   return true;
 }
 
-/// Effects that a model has anyway.
+/// Returns the effects that a model has anyway.
 std::vector<std::string> present_effects(const FitInput& input, const FitOptions& options) {
   std::vector<std::string> present = options.effects;
   for (const DeclaredEffect& effect : input.recording.declared) present.push_back(effect.name);

@@ -14,7 +14,7 @@
 namespace clothfit {
 namespace {
 
-/// The arrow of all recordings' information as one matrix.
+/// Writes the arrow of all recordings' information as one matrix.
 Eigen::MatrixXd dense(const PooledSpace& space, const PooledSpace::Expansion& expansion) {
   const auto shared = static_cast<Eigen::Index>(space.shared());
   Eigen::MatrixXd all = Eigen::MatrixXd::Zero(space.size(), space.size());
@@ -35,14 +35,15 @@ double spread_of(double correlation) {
   return (1 + rho) / (1 - rho);
 }
 
-/// By how much structure in the residuals makes variances larger than independent ones would be.
+/// Returns how much larger structure in the residuals makes variances than independent ones would
+/// be.
 double inflation(const Adequacy& structure) {
   const double along = spread_of(structure.neighbour_correlation);
   return std::max(1.0, structure.chi_square_per_dof) * spread_of(structure.time_correlation) *
          along * along;
 }
 
-/// Of the coordinates.
+/// Returns the covariance of the coordinates.
 Eigen::MatrixXd covariance(const PooledSpace& space, const std::vector<Quadratic>& quadratics) {
   Eigen::MatrixXd information = dense(space, space.gather(quadratics));
   information.diagonal().array() += 1e-12 * std::max(1.0, information.diagonal().maxCoeff());
@@ -50,7 +51,8 @@ Eigen::MatrixXd covariance(const PooledSpace& space, const std::vector<Quadratic
       .solve(Eigen::MatrixXd::Identity(information.rows(), information.cols()));
 }
 
-/// By the residuals' trend where derivatives are rough. Empty where a recording has none.
+/// Expands the cost of each recording, by the residuals' trend where derivatives are rough. Empty
+/// where a recording cannot be expanded.
 std::vector<Quadratic> quadratics_of(const FittedModel& model, double threshold) {
   std::vector<Quadratic> quadratics;
   for (size_t n = 0; n < model.parts.size(); ++n) {
@@ -64,13 +66,13 @@ std::vector<Quadratic> quadratics_of(const FittedModel& model, double threshold)
   return quadratics;
 }
 
-/// How far a law's amplitudes are from neutral.
+/// The distance of a hypothesis' amplitudes from neutral.
 struct FromNeutral {
-  double square = 0;  ///< of the distance, in standard deviations of independent residuals
+  double square = 0;  ///< squared, in standard deviations of independent residuals
   Eigen::Index amplitudes = 1;
 };
 
-/// Of the last term. Nothing where derivatives are missing.
+/// Measures the last hypothesis' distance. It is nothing where derivatives are missing.
 FromNeutral from_neutral(const FittedModel& model, double threshold) {
   const std::vector<const FitProblem*> problems = model.problem_pointers();
   const PooledSpace pooled(problems);

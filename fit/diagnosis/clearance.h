@@ -5,28 +5,28 @@
 
 namespace clothfit {
 
-/// How many standard deviations the last term's amplitudes of a fitted model stand from neutral,
-/// several together as one number that is as unlikely. `structure`: what the model's residuals are
-/// like. Where they depend on each other their sums scatter more than those of noise would: the
-/// variance is that of noise times chi-square per degree of freedom and, in time and both ways
-/// along the cloth, the (1 + rho) / (1 - rho) of a process that forgets geometrically, rho the
-/// correlation of neighbours. Where the cost is rough, as of cloth that folds and unfolds, and
-/// derivatives are far steeper than the residuals' trend over two per cent, the trend counts
-/// (`trend_of`, fit/uncertainty/uncertainty.h). `threshold` is Huber's.
+/// Returns how many standard deviations the last hypothesis' amplitudes stand from neutral. Several
+/// amplitudes count together as one number that is as unlikely. `structure` describes the model's
+/// residuals. Where they depend on each other, their sums scatter more than those of noise. The
+/// variance is then that of noise times chi-square per degree of freedom. In time and both ways
+/// along the cloth it grows by (1 + rho) / (1 - rho), rho the correlation of neighbours, as of a
+/// process that forgets geometrically. Where the cost is rough, as of cloth that folds and
+/// unfolds, derivatives are far steeper than the residuals' trend over two per cent. There the
+/// trend counts (`trend_of`, fit/uncertainty/uncertainty.h). `threshold` is Huber's.
 double clear_of_neutral(const FittedModel& model, const Adequacy& structure, double threshold);
 
-/// By how much chi-square is foreseen to rise where the last term is dropped and all else follows,
-/// to second order where the model stands.
+/// Predicts how much chi-square rises where the last hypothesis is dropped and all else follows.
+/// The prediction is of second order where the model stands.
 double rise_without_last(const FittedModel& model, double threshold);
 
-/// Standard deviations of each recording's parameters in their units, by name, with errors of that
-/// structure, by the trend where the cost is rough.
+/// Returns standard deviations of each recording's parameters, by name and in their units. Errors
+/// have the structure that is given. Where the cost is rough, the trend counts.
 std::vector<NamedValues> sigma_of(const FittedModel& model, const Adequacy& structure,
                                   double threshold);
 
-/// Roughness of a linearised model's derivatives (fit/uncertainty/uncertainty.h), the median over
-/// the physics' parameters: by so much the standard deviations of effects that are not in it, too,
-/// are larger than derivatives say. 1 where the cost is a valley.
+/// Returns the median roughness of a linearised model's derivatives over the physics' parameters
+/// (fit/uncertainty/uncertainty.h). The standard deviations of effects that the model lacks are
+/// larger than derivatives say by the same factor. It is 1 where the cost is a smooth basin.
 double typical_roughness(const FittedModel& model);
 
 }  // namespace clothfit

@@ -7,9 +7,9 @@ namespace {
 constexpr const char* kConvention = "convention";
 /// Set when its step was written, and not varied since.
 constexpr const char* kDesign = "set with its step, not varied since";
-/// Trials of `recover --undeclared`, which judge nothing since (docs/log.md).
+/// Trials of `recover --undeclared`, which have judged nothing since (docs/log.md).
 constexpr const char* kTrials = "trials of recover --undeclared, seeds 1 to 21";
-/// Recordings for which its step was written; it was set once and not varied on them.
+/// Recordings for which its step was written. It was set once and not varied on them.
 constexpr const char* kBundled = "set with its step, written for swing_breeze and tags_airdrag";
 constexpr const char* kRobot = "set with its step, written for the IRI sessions s0623 and s0705";
 

@@ -6,7 +6,7 @@
 namespace clothfit {
 
 /// Every threshold of a diagnosis. criteria.cpp says what each decides, what raising it costs, and
-/// where it was chosen; diagnosis.json repeats that (docs/theory/diagnosis.md has the stages).
+/// where it was chosen. diagnosis.json repeats that; docs/theory/diagnosis.md has the stages.
 struct DiagnosisCriteria {
   // Adequacy (adequacy.h)
   double structure_score = 5;
@@ -87,7 +87,7 @@ struct CriterionDescription {
   std::string chosen;   ///< on which data
 };
 
-/// All of them, in the order of the members.
+/// Describes all of them, in the order of the members.
 std::vector<CriterionDescription> describe(const DiagnosisCriteria& criteria);
 
 }  // namespace clothfit

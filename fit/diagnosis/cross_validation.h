@@ -7,35 +7,35 @@
 
 namespace clothfit {
 
-/// Errors on observations that a fit does not see, each block of them left out in turn: chi-square
-/// per observation there.
+/// Errors on observations that a fit does not see, each block of them left out in turn. They are
+/// chi-square per observation left out.
 struct CrossValidation {
   bool usable = false;
   std::vector<double> block;  ///< of each block that was left out
   double mean = 0;            ///< over all observations
-  /// The same where predictions are mended without physics: a constant offset per marker, from what
-  /// was seen; the residual of the nearest seen frame before the block (after it for the first),
-  /// held.
+  /// The same where predictions are corrected without physics. The constant offset of a marker
+  /// comes from the frames that were seen. The last residual is that of the nearest frame seen
+  /// before the block, held throughout it; for the first block, of the nearest one after it.
   double constant_offset = 0, last_residual = 0;
-  /// Or where forces without a law (FreeForces, two stretches to a block) are estimated along, the
-  /// last ones before a block (after it for the first) held throughout it; infinite where that was
-  /// not asked for.
+  /// The same where forces without a law are estimated along (FreeForces, two stretches to a
+  /// block). The last forces before a block are held throughout it; for the first block, the first
+  /// ones after it. Infinite where they were not asked for.
   double free_forces = std::numeric_limits<double>::infinity();
 };
 
-/// Leaves out each of `blocks` stretches of frames of equal length, of all recordings at once (not
-/// the first one where a start is unknown, for those frames show it); or,
-/// of several recordings, each whole one (`whole`), whose own parameters then follow the shared
-/// ones as its observations ask. Each time the model takes one Gauss-Newton step from its optimum
-/// to where the others' optimum lies, which is exact where the model is linear, and is run again;
-/// so do the amounts by which its discretisation errs. Squares beyond `threshold` sigmas count
-/// linearly (Huber).
+/// Leaves out each of `blocks` stretches of frames in turn, of all recordings at once. The
+/// stretches are of equal length. Where a start is unknown the first one stays, for its frames show
+/// the start. With `whole` each of several recordings is left out as a whole instead. Its own
+/// parameters then follow the shared ones as its observations ask. Each time the model takes one
+/// Gauss-Newton step from its optimum to that of the other observations, and is run again. The step
+/// is exact where the model is linear. It moves the amplitudes of the discretisation's errors too.
+/// Squares beyond `threshold` sigmas count linearly (Huber).
 ///
 /// Free forces are asked for by the mesh that their derivatives are taken from, the model's own or
-/// a coarser one. Together with all else they are what the same least squares makes of them to
-/// first order, each known to be of one size beforehand: of 0.01, 0.1, 1 and 10 m/s2 the one that
-/// foresees best. Forces are each recording's own, so that of one that is left out whole nothing
-/// can be known of them.
+/// a coarser one. The same least squares finds them to first order, together with all else. They
+/// are known to be of one size beforehand: of 0.01, 0.1, 1 and 10 m/s2 the one counts that predicts
+/// best. Forces are each recording's own, so nothing is known of those of a recording that is left
+/// out as a whole.
 CrossValidation cross_validate(const DiagnosisSetup& setup, const FittedModel& model, int blocks,
                                double threshold, bool whole = false,
                                const DiagnosisSetup* forces_mesh = nullptr);

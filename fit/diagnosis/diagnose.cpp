@@ -15,7 +15,7 @@
 namespace clothfit {
 namespace {
 
-/// Share of the frames, at least, that a residual force is taken from.
+/// The least share of the frames that a residual force is taken from.
 constexpr double kForceShare = 0.28;
 
 /// Runs one diagnosis, whose steps share what was given.
@@ -78,7 +78,7 @@ class Run {
     result_.message = declared.first.message;
     result_.columns = declared.setup.columns;
     result_.rows = declared.setup.rows;
-    // A fit of its own says more of how sure it is.
+    // A recording's own fit says more of how sure it is.
     if (fitted_.size() == 1 && declared.is_on_own_mesh() && !declared.base.is_unrefined())
       reports_.recordings.front().before = std::move(declared.first);
     else

@@ -11,12 +11,12 @@ struct DiagnoseOptions {
   FitOptions fit;
   /// Effects that are not tested.
   std::vector<std::string> without;
-  int beam_width = 3;  ///< entries of the search that are followed side by side
+  int beam_width = 3;  ///< beam entries that are followed side by side
   int refits = 6;      ///< hypotheses of each entry that are fitted in one round
   int most_effects = 4;
-  int law_terms = 4;  ///< of a law that is proposed for the residual, at most; 0: none is
-  /// Hypotheses whose detection limits are confirmed by planting them on twins of the recordings,
-  /// one of each effect, those first that are seen best.
+  int law_terms = 4;  ///< most terms of a law proposed for the residual; 0: none is proposed
+  /// Number of hypotheses whose detection limits are confirmed by planting them on twins. One of
+  /// each effect is planted, those first that are seen best.
   int plants = 0;
   bool reinject = false;  ///< whether what was found is simulated and searched again
   bool separate = true;   ///< whether recordings are sought that tell alike hypotheses apart

@@ -32,8 +32,9 @@ FittedModel lead_to_mesh(const DiagnosisSetup& other, const FittedModel& model, 
   stage.rounds = 1;
   stage.own_only = own_only;
   if (share < 1) stage.least_decrease = 0;
-  // Of a start in motion there are hundreds of directions: where parameters stand matters little,
-  // for what they change is fitted along, and updated derivatives lead near for some runs.
+  // A start in motion has hundreds of directions. Where its parameters stand matters little, for
+  // what they change is fitted along. So updated derivatives do, which lead near the optimum for
+  // some runs.
   stage.unrefined = std::ranges::any_of(
       fitted.problems, [](const auto& problem) { return problem->start == StartKind::unknown; });
   for (size_t n = 0; n < fitted.parts.size(); ++n) {
@@ -74,7 +75,7 @@ std::vector<DiscretisationError> discretisation_errors(const DiagnosisSetup& set
     directions.rightCols(1) = direction;
   };
   for (size_t n = 0; n < model.parts.size(); ++n) {
-    // What is left of an error of first order when the half of it is known.
+    // An expected error of first order is known to half of itself.
     constexpr double kKnownTo = 0.5;
     const PooledPart& part = model.parts[n];
     const TrajectoryObjective half(*model.problems[n], part.frames, part.steps.times(0.5));
@@ -90,7 +91,7 @@ std::vector<DiscretisationError> discretisation_errors(const DiagnosisSetup& set
     for (size_t n = 0; there.usable() && n < there.parts.size(); ++n) {
       const Eigen::VectorXd& own = model.parts[n].linear.residual;
       const Eigen::VectorXd& residual = there.parts[n].linear.residual;
-      // Of second order in the spacing: a coarser mesh errs four times as much.
+      // The error is of second order in the spacing: a coarser mesh errs four times as much.
       if (residual.size() == own.size()) add(n, (finer < 1 ? 1.0 / 3 : 4.0 / 3) * (residual - own));
     }
   }
@@ -124,7 +125,7 @@ void refine_with_discretisation(FittedModel& model, const DiagnosisSetup& setup,
         if (std::abs(part.amplitudes[k]) < kCriteria.believable_error) kept.push_back(k);
       if (std::ssize(kept) == part.amplitudes.size()) continue;
       believable = false;
-      // The first one is the step's, where an error of it is expected.
+      // The first direction is the step's, where an error of it is expected.
       if (kept.empty() || kept.front() > 0) part.correction.resize(0);
       part.directions = Eigen::MatrixXd(part.directions(Eigen::all, kept));
       part.amplitudes = Eigen::VectorXd(part.amplitudes(kept));

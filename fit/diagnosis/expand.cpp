@@ -16,7 +16,7 @@
 namespace clothfit {
 namespace {
 
-/// The best of a list that may pass.
+/// Returns the best scores of a list that may pass.
 std::vector<const Score*> worth_fitting(const SearchContext& search, const FittedModel& model,
                                         const Shortlist& list) {
   std::vector<const Score*> scores;
@@ -32,9 +32,10 @@ std::vector<const Score*> worth_fitting(const SearchContext& search, const Fitte
   return scores;
 }
 
-/// Models of the coarse mesh fitted on the analysed one, side by side: those that leave least, from
-/// where they stand, and where that leaves more than the model without the hypothesis does, or none
-/// works out, from where this one stands. Others are failed, and those that fall out.
+/// Fits models of the coarse mesh on the analysed one, side by side. Those that leave least are
+/// fitted from where they stand. Where that leaves more than the model without the hypothesis does,
+/// or none works out, the fit begins where that model stands. All others fail, and so do those that
+/// fall out.
 std::vector<FittedModel> on_analysed_mesh(const SearchContext& search, const FittedModel& without,
                                           std::vector<FittedModel> models) {
   const auto above = [&](const FittedModel& model) {
@@ -85,8 +86,8 @@ std::vector<Extended> fit_shortlist(const SearchContext& search, const FittedMod
   return extended;
 }
 
-/// Gives error directions of their own to the models that leave least, where they stand far from
-/// where the entry's directions were taken.
+/// Gives error directions of their own to the models that leave least. Those are meant that stand
+/// far from where the entry's directions were taken.
 void let_best_err(const SearchContext& search, std::vector<Extended>& extended,
                   const FittedModel& without) {
   const double from = without.chi_square(search.threshold);
@@ -102,8 +103,8 @@ void let_best_err(const SearchContext& search, std::vector<Extended>& extended,
   });
 }
 
-/// A trial of each. A model that was fitted with updated derivatives and is not refused is refined,
-/// and asked again.
+/// Tries each hypothesis. A model that was fitted with updated derivatives and is not refused is
+/// refined, and asked again.
 std::vector<Trial> try_all(const SearchContext& search, std::vector<Extended>& extended,
                            const FittedModel& without, const CrossValidation& without_left_out,
                            bool scored_elsewhere) {
@@ -123,7 +124,7 @@ std::vector<Trial> try_all(const SearchContext& search, std::vector<Extended>& e
   return trials;
 }
 
-/// The entry that a hypothesis leads to.
+/// Makes the entry that a hypothesis leads to.
 BeamEntry child_of(const SearchContext& search, const BeamEntry& entry, Extended& extended,
                    const Trial& trial, const CrossValidation& without_left_out) {
   BeamEntry child{
@@ -167,8 +168,8 @@ void fit_shapes(const SearchContext& search, std::vector<BeamEntry>& children) {
   std::ranges::stable_sort(children, {}, &BeamEntry::cost);
 }
 
-/// Hypotheses that this recording cannot tell from the one accepted last: fitted in its place they
-/// leave hardly more.
+/// Returns the hypotheses that this recording cannot tell from the one accepted last. Fitted in its
+/// place they leave hardly more.
 std::vector<Hypothesis> alike(const std::vector<BeamEntry>& children, const BeamEntry& best) {
   std::vector<Hypothesis> result;
   for (const BeamEntry& child : children)
@@ -186,8 +187,8 @@ std::vector<BeamEntry> expand(SearchContext& search, BeamEntry& entry, const Sho
   if (list.is_of_whole_run()) entry.last = list.scores;
   std::vector<Extended> extended = fit_shortlist(search, entry.model, list);
 
-  // What an unrefined model leaves above its optimum is nothing to a hypothesis that takes nearly
-  // all of it.
+  // The base is refined unless a hypothesis takes nearly all that it leaves. What it leaves above
+  // its optimum does not matter then.
   if (extended.empty() || leaves_good_part(search, best_of(search, extended), entry.model))
     converge(search, entry);
   if (extended.empty()) return {};
@@ -208,7 +209,7 @@ std::vector<BeamEntry> expand(SearchContext& search, BeamEntry& entry, const Sho
   for (size_t k = 0; k < extended.size(); ++k) {
     if (trials[k].passed() || trials[k].on_credit)
       children.push_back(child_of(search, entry, extended[k], trials[k], left_out));
-    // What is followed on credit stands among the refused of all others.
+    // A hypothesis on credit stands among the refused of all others.
     trials[k].on_credit = false;
     if (!trials[k].passed()) entry.refused.push_back(trials[k]);
   }

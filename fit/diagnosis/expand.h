@@ -9,10 +9,10 @@ namespace clothfit {
 struct SearchContext;
 struct Shortlist;
 
-/// Extends an entry by one hypothesis more: fits the model with each of the best on the list, asks
-/// what there is to ask of each (trial.h), and returns an entry for each that passed or is followed
-/// on credit, the cheapest first. The entry itself is finished; its model moves where the best
-/// hypothesis led to a basin in which it leaves less without it.
+/// Extends an entry by one hypothesis more. The model is fitted with each of the best on the list,
+/// and each is tried (trial.h). Returns an entry for each that passed or is followed on credit, the
+/// cheapest first. The entry itself is finished. Its model moves where the best hypothesis led to a
+/// basin in which the model leaves less without it.
 std::vector<BeamEntry> expand(SearchContext& search, BeamEntry& entry, const Shortlist& list);
 
 }  // namespace clothfit

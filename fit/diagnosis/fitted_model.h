@@ -16,7 +16,7 @@ namespace clothfit {
 /// Parameters of one recording's problem by name.
 using NamedValues = std::map<std::string, double>;
 
-/// What all fits of a diagnosis share: recordings of one cloth.
+/// The input that all fits of a diagnosis share: recordings of one cloth.
 struct DiagnosisSetup {
   std::span<const FitInput> inputs;
   const FitOptions& options;
@@ -31,8 +31,8 @@ enum class FitState {
   complete    ///< residuals and derivatives are those where it stands
 };
 
-/// Where a model of the recordings stands: plain data, from which restored() makes it again on any
-/// machine.
+/// The place where a model of the recordings stands, as plain data. restored() makes the model
+/// again from it, on any machine.
 struct ModelFit {
   struct OfRecording {
     NamedValues values;
@@ -43,8 +43,8 @@ struct ModelFit {
   std::vector<OfRecording> recordings;
 };
 
-/// A model of the recordings with some hypotheses, fitted to their first frames: where it stands,
-/// with its problems and derivatives.
+/// A model of the recordings with some hypotheses, fitted to their first frames. It holds its
+/// problems, and its values and derivatives where it stands.
 struct FittedModel {
   std::vector<Hypothesis> hypotheses;
   std::vector<std::shared_ptr<const FitProblem>> problems;  ///< of each recording
@@ -59,55 +59,57 @@ struct FittedModel {
   std::vector<NamedValues> values() const;
   ModelFit fit() const;
   Eigen::Index residual_count() const;
-  /// Residuals of all recordings, one after the other, less what the discretisation explains.
+  /// Returns residuals of all recordings in turn, less what the discretisation explains.
   Eigen::VectorXd residual() const;
-  /// Chi-square per residual of these.
+  /// Returns chi-square per residual, over the residuals of residual().
   double misfit() const;
-  /// Whether it leaves so much that any mesh shows what it lacks, and a finer one is not it. Its
-  /// time steps are often short, because far too much damping stands in for what is missing.
+  /// Tells whether it leaves so much that any mesh shows what it lacks. A finer mesh is not what it
+  /// lacks then. Its time steps are often short, because far too much damping stands in for what is
+  /// missing.
   bool misfits_grossly() const;
-  /// Twice the cost: the sum of squares, beyond `threshold` sigmas linear (Huber), and of priors.
+  /// Returns twice the cost: the sum of squares, linear beyond `threshold` sigmas (Huber), and of
+  /// priors.
   double chi_square(double threshold) const;
 };
 
-/// The model's problem of each recording, with all constants of its hypotheses.
+/// Makes each recording's problem, with all constants of the model's hypotheses.
 std::vector<std::shared_ptr<const FitProblem>> problems_of(
     const DiagnosisSetup& setup, const std::vector<Hypothesis>& hypotheses);
 
-/// Recording `recording`'s options with hypotheses, and priors of the shapes that these fit. Only
-/// the first recording's say what is known of shared parameters.
+/// Returns a recording's options with hypotheses, and priors of the shapes that these fit. Only the
+/// first recording's options say what is known of shared parameters.
 FitOptions options_with(const DiagnosisSetup& setup, const std::vector<Hypothesis>& hypotheses,
                         size_t recording);
 
-/// The same, on the mesh that is analysed, whatever a recording suggests.
+/// Returns the same options on the mesh that is analysed, whatever a recording suggests.
 FitOptions options_on_mesh(const DiagnosisSetup& setup, const std::vector<Hypothesis>& hypotheses,
                            size_t recording);
 
-/// A problem's parameters at values known by name. Of those that are not known, amplitudes of
-/// effects are neutral and others where a fit begins.
+/// Returns a problem's parameters at values known by name. Where a value is not known, an amplitude
+/// of an effect is neutral, and any other parameter is where a fit begins.
 Eigen::VectorXd values_of(const FitProblem& problem, const NamedValues& known);
 
-/// The model at values known by name, over all fitted frames. Not linearised.
+/// Makes the model at values known by name, over all fitted frames. It is not linearised.
 FittedModel model_at(const DiagnosisSetup& setup, const std::vector<Hypothesis>& hypotheses,
                      const std::vector<NamedValues>& values);
 
-/// The model where a fit stands. Not linearised.
+/// Makes the model where a fit stands. It is not linearised.
 FittedModel restored(const DiagnosisSetup& setup, const ModelFit& fit);
 
-/// Frames of a recording that are such a share of its fitted ones; a handful at least.
+/// Returns how many frames are such a share of a recording's fitted ones: a handful at least.
 int frames_of_share(const FitProblem& problem, double share);
 
-/// The same model over that share of the frames. It keeps what is known of the longer run, whose
-/// beginning it is.
+/// Returns the same model over that share of the frames. What is known of the longer run is kept,
+/// for the shorter run is its beginning.
 FittedModel shortened(const FittedModel& model, double share);
 
 struct StageOptions {
   int rounds = 2;
   int iterations = 12;
-  /// A step that promises less than this of half chi-square is the last one; the default moves no
+  /// A step that promises less than this of half chi-square is the last one. The default moves no
   /// parameter by a seventh of its sigma.
   double least_decrease = 0.01;
-  bool own_only = false;   ///< what is shared by recordings stays
+  bool own_only = false;   ///< what recordings share stays
   bool unrefined = false;  ///< with the derivatives that it has, updated (fit/refine/pooled_fit.h)
 };
 
@@ -115,19 +117,20 @@ struct StageOptions {
 void refine_model(FittedModel& model, const DiagnosisSetup& setup, const StageOptions& options,
                   const ProgressCallback& progress);
 
-/// Has exact derivatives where the model stands.
+/// Computes exact derivatives where the model stands.
 void linearise_model(FittedModel& model);
 
-/// A mesh of half the cells a side, for derivatives that only choose; not below 9 x 9 vertices or
-/// the nodes of a start in motion. The same mesh where natural lengths are those of one.
+/// Returns the setup with a mesh of half the cells a side, for derivatives that only choose. The
+/// mesh does not go below 9 x 9 vertices or the nodes of a start in motion. Where natural lengths
+/// are those of one mesh, it stays the same.
 DiagnosisSetup with_coarse_mesh(const DiagnosisSetup& setup);
 
-/// Whether a mesh has fewer vertices a side than another.
+/// Tells whether a mesh has fewer vertices a side than another.
 bool is_coarser(const DiagnosisSetup& mesh, const DiagnosisSetup& than);
 
-/// The model where it stands, with its residuals and the derivatives of another mesh. Their
-/// predictions hardly differ, and a mesh of half the cells a side costs a sixteenth. Failed where
-/// the other mesh does not run.
+/// Returns the model where it stands, with its residuals and the derivatives of another mesh. The
+/// meshes' predictions hardly differ, and a mesh of half the cells a side costs a sixteenth. The
+/// model has failed where the other mesh does not run.
 FittedModel with_derivatives_of(const DiagnosisSetup& other_mesh, const FittedModel& model);
 
 }  // namespace clothfit

@@ -15,7 +15,7 @@ namespace clothfit {
 namespace {
 
 /// A given force per unit of each parameter while it lasts. A diagnosis has hundreds of them in one
-/// run: out of its time it costs nothing, in its time a product for each vertex.
+/// run. Out of its time a force costs nothing, in its time a product for each vertex.
 class FreeForce final : public Effect {
  public:
   FreeForce(Eigen::VectorXd force_per_unit_kg, double from_s, double until_s)
@@ -56,7 +56,7 @@ class FreeForce final : public Effect {
   double from_s_, until_s_;
 };
 
-/// Of one recording.
+/// Differentiates one recording's residuals.
 Eigen::MatrixXd derivatives_in(FitProblem problem, const PooledPart& part, int frames,
                                int stretches) {
   constexpr double kUnbounded = std::numeric_limits<double>::infinity();
@@ -65,7 +65,7 @@ Eigen::MatrixXd derivatives_in(FitProblem problem, const PooledPart& part, int f
   double from_s = -kUnbounded;
   for (int stretch = 0, frame = 0; stretch < stretches; ++stretch) {
     while (frame < frames && FreeForces::stretch_of(frame, frames, stretches) <= stretch) ++frame;
-    // What acts on the way to a frame acts from the one before it on.
+    // A force that acts on the way to a frame acts from the frame before it on.
     const double until_s = stretch + 1 == stretches
                                ? kUnbounded
                                : problem.frame_time_s[static_cast<size_t>(frame - 1)];

@@ -4,11 +4,11 @@
 
 namespace clothfit {
 
-/// Of half chi-square per residual: a fit over a horizon that is not the last ends where a step
-/// promises less.
+/// Least decrease that a step must promise, of half chi-square per residual. A fit over a horizon
+/// that is not the last ends where a step promises less.
 inline constexpr double kRough = 1e-3;
 
-/// Growing shares of the frames from `first` on, the last one all.
+/// Returns growing shares of the frames from `first` on, the last one all.
 std::vector<double> shares_from(double first);
 
 }  // namespace clothfit

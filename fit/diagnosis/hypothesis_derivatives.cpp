@@ -19,7 +19,8 @@
 namespace clothfit {
 namespace {
 
-/// Laws differentiated in one run, each at its neutral values, so that the run stays as it is.
+/// Hypotheses differentiated in one run. Each is at its neutral values, so that the run stays as it
+/// is.
 struct Batch {
   FitProblem problem;
   Eigen::VectorXd values;
@@ -31,8 +32,8 @@ struct Batch {
   int amplitudes = 0;
 };
 
-/// Of a motion effect's parameter, in its typical change: small enough to be a derivative, large
-/// enough that rounding does not count.
+/// A change of a motion effect's parameter, as a share of its typical change. It is small enough to
+/// be a derivative, and large enough that rounding does not count.
 constexpr double kSmall = 1e-5;
 
 void add(Batch& batch, size_t index, const Hypothesis& law) {
@@ -83,18 +84,18 @@ void add(Batch& batch, size_t index, const Hypothesis& law) {
   batch.laws.push_back(std::move(added));
 }
 
-/// Amplitudes of motion effects that share a run: the simulation and what its effects are
+/// Amplitudes of motion effects that share a run. The simulation and what its effects are
 /// linearised for are paid once.
 constexpr int kMotionAmplitudes = 8 * kLanes;
 
-/// Of one recording.
+/// Differentiates one recording's residuals.
 std::vector<Eigen::MatrixXd> derivatives_in(const FitProblem& problem, const PooledPart& part,
                                             std::span<const Hypothesis> laws) {
   int measured = 0;
   for (const FitProblem::MeasurementTerm& term : problem.measurement)
     for (const Binding& binding : term.parameters) measured += binding.parameter >= 0 ? 1 : 0;
   std::vector<Batch> batches;
-  // Effects that only add forces cost least, those of the measurement no derivatives of runs.
+  // Effects that only add forces cost least. Those of the measurement need no derivatives of runs.
   enum class Kind { adds_forces, changes_runs, measures };
   const auto kind_of = [](const Hypothesis& law) {
     if (measurement_effect_named(law.effect) != nullptr) return Kind::measures;
@@ -141,7 +142,7 @@ std::vector<Eigen::MatrixXd> derivatives_in(const FitProblem& problem, const Poo
   return result;
 }
 
-/// Of each law by itself.
+/// Differentiates by each hypothesis by itself.
 std::vector<Columns> derivatives_of_each(const FittedModel& model,
                                          std::span<const Hypothesis> laws) {
   const size_t recordings = model.parts.size();
@@ -173,7 +174,7 @@ std::vector<Columns> derivatives_of_each(const FittedModel& model,
 
 std::vector<Columns> hypothesis_derivatives(const FittedModel& model,
                                             std::span<const Hypothesis> laws) {
-  // A harmonic's at any phase are combinations of those at two.
+  // Derivatives of a harmonic at any phase are combinations of those at two.
   constexpr size_t kPhases = 2;
   std::map<std::tuple<std::string, std::string, double>, std::vector<size_t>> harmonics;
   for (size_t k = 0; k < laws.size(); ++k)
@@ -213,7 +214,7 @@ std::vector<Columns> hypothesis_derivatives(const FittedModel& model,
 double squared_multiple_correlation(const Eigen::VectorXd& of, const Eigen::MatrixXd& columns) {
   const double all = of.squaredNorm();
   if (columns.cols() == 0 || all == 0) return 0;
-  // Scaled to one: laws come in units of their own.
+  // Columns are scaled to one, for hypotheses come in units of their own.
   Eigen::MatrixXd scaled = columns;
   for (Eigen::Index k = 0; k < scaled.cols(); ++k)
     if (const double norm = scaled.col(k).norm(); norm > 0) scaled.col(k) /= norm;

@@ -15,7 +15,8 @@ const EffectParameter& parameter_named(const EffectDescription& effect, const st
   return *std::ranges::find(effect.parameters, name, &EffectParameter::name);
 }
 
-/// `least`: standard deviations from which on an amplitude would be accepted.
+/// Returns the limits of a hypothesis. From `least` standard deviations on an amplitude would be
+/// accepted.
 DetectionLimit limit_of(const Score& score, double least) {
   DetectionLimit limit{.hypothesis = score.hypothesis,
                        .parameter = score.hypothesis.amplitudes,

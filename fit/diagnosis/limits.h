@@ -20,14 +20,14 @@ struct DetectionLimit {
   double decrease = 0;    ///< of chi-square, predicted
 };
 
-/// Limits of hypotheses that a model does not have. `worth`: the decrease of chi-square from which
-/// one is worth a name. An amplitude that each recording has for itself has the limit of the
-/// recording that sees it best.
+/// Returns limits of hypotheses that a model does not have. `worth` is the decrease of chi-square
+/// from which a hypothesis is worth a name. Where each recording has an amplitude of its own, the
+/// limit is that of the recording that sees it best.
 std::vector<DetectionLimit> detection_limits(const FittedModel& model, const Adequacy& structure,
                                              const std::vector<Score>& scores, double worth);
 
-/// One amplitude of each effect, a little above its limit, those first that are seen best for their
-/// size.
+/// Chooses one amplitude of each effect, a little above its limit. Those come first that are seen
+/// best for their size.
 std::vector<Plant> plants_of(const std::vector<DetectionLimit>& limits);
 
 }  // namespace clothfit

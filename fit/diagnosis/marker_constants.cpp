@@ -16,7 +16,7 @@ CrossValidation blocks_left_out(const Analysis& analysis) {
                         static_cast<int>(kCriteria.time_blocks), analysis.search.threshold);
 }
 
-/// Takes the model that `from` has found for the base, refined under other options.
+/// Takes the model that `from` has found for the base, and refines it under other options.
 bool continue_from(const Analysis& from, Analysis& analysis, const ProgressCallback& progress) {
   analysis.setup.columns = from.setup.columns;
   analysis.setup.rows = from.setup.rows;
@@ -53,7 +53,7 @@ std::optional<SeenElsewhere> constants_to_try(const Analysis& analysis, Recordin
     return std::nullopt;
   RecordingReports::Which report = &DiagnosedRecording::before;
   if (!model.hypotheses.empty()) {
-    // The report of the last model takes this one's place.
+    // The last model's report takes this one's place.
     report = &DiagnosedRecording::after;
     reports.add_fitted(analysis.setup, model, report);
   }

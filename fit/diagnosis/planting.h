@@ -22,13 +22,13 @@ struct PlantOutcome {
   bool ran = false;
   std::vector<Hypothesis> found;  ///< the first accepted, then those that cannot be told from it
   std::string why_not;            ///< where it did not run
-  /// Whether the planted effect, or one that cannot be told from it, was the first to be found.
+  /// Tells whether the first effect found is the planted one, or one that cannot be told from it.
   bool named() const;
 };
 
-/// Simulates the recordings with a fitted model and the planted amplitude, noise of their own on
-/// top (fit/diagnosis/twin.h), and asks the search what the model lacks. Without a plant (an empty
-/// hypothesis) nothing should be found: the check by re-injection.
+/// Simulates twins of the recordings and asks the search what the model lacks. The twins have the
+/// fitted model and the planted amplitude, with noise of their own on top (fit/diagnosis/twin.h).
+/// Without a plant (an empty hypothesis) nothing should be found: the check by re-injection.
 PlantOutcome search_twins(const DiagnosisSetup& setup, const FittedModel& model, const Plant& plant,
                           const SearchOptions& options, std::uint64_t seed,
                           const ProgressCallback& progress);

@@ -12,7 +12,7 @@
 namespace clothfit {
 namespace {
 
-/// Of a column's own square, that it may lose and still count as something.
+/// The share of its own square that a column must keep to count as something.
 constexpr double kLeastLeft = 1e-9;
 
 }  // namespace

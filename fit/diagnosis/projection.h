@@ -8,28 +8,29 @@
 
 namespace clothfit {
 
-/// Residuals near an optimum with everything taken out of them that the model may still move: its
+/// Takes out of residuals near an optimum everything that the model may still move. That is its
 /// parameters J under their priors P, and directions E of unit variance in which the model's own
-/// discretisation errs. What is left of a vector v under the weights W,
+/// discretisation errs. Of a vector v under the weights W there remains
 ///
-///   v - [J E] H^-1 [J E]' W v,   H = [J E]' W [J E] + diag(P, I),
+///   v - [J E] H^-1 [J E]' W v,   H = [J E]' W [J E] + diag(P, I).
 ///
-/// is what generalised least squares with the covariance W^-1 + E E' cannot explain by J. Behind
-/// the residuals come rows of the priors and of E, one for each of their numbers: with these it is
-/// an orthogonal projection, and products of projected vectors are those of that least squares.
+/// Generalised least squares with the covariance W^-1 + E E' cannot explain this by J. Behind the
+/// residuals come rows of the priors and of E, one for each of their numbers. With these it is an
+/// orthogonal projection, and products of projected vectors are those of that least squares.
 class Projection {
  public:
-  /// `weight`: Huber's, of each residual. `prior_gradient`: of half the sum of the priors' squares.
+  /// `weight` is Huber's, of each residual. `prior_gradient` is that of half the sum of the priors'
+  /// squares.
   Projection(const Eigen::MatrixXd& jacobian, const Eigen::MatrixXd& prior_information,
              const Eigen::VectorXd& prior_gradient, const Eigen::MatrixXd& unit_directions,
              const Eigen::VectorXd& weight, const Eigen::VectorXd& residual);
 
-  /// What is left of the residual, and of columns; times the square roots of the weights. Rows of
-  /// the residuals first.
+  /// The projected residual and projected columns, times the square roots of the weights. Rows of
+  /// the residuals come first.
   const Eigen::VectorXd& residual() const { return residual_; }
   Eigen::MatrixXd columns(const Eigen::MatrixXd& of) const;
 
-  /// Numbers that the residual loses by it, of its weights' sum.
+  /// Numbers that the projection takes from the residual, and the sum of its weights.
   double taken() const { return taken_; }
   double weights() const { return root_weight_.squaredNorm(); }
 
@@ -41,18 +42,18 @@ class Projection {
   double taken_ = 0;
 };
 
-/// The projection of a model of several recordings: what is each recording's own goes first, then
-/// the shared parameters. Residuals beyond three robust scales, or three sigmas where that is more,
-/// weigh less if the loss says so.
+/// The projection of a model of several recordings. What is each recording's own is taken out
+/// first, then the shared parameters. Residuals beyond three robust scales, or three sigmas where
+/// that is more, weigh less if the loss says so.
 class ModelProjection {
  public:
-  /// With the directions of the parts, or without any.
+  /// Projects with the directions of the parts, or without any.
   ModelProjection(const FittedModel& model, Loss loss, bool with_directions = true);
 
   const Eigen::VectorXd& residual() const { return shared_.front().residual(); }
-  /// Of columns that belong to all recordings: residuals x columns of each.
+  /// Projects columns that belong to all recordings: residuals x columns of each.
   Eigen::MatrixXd columns(const std::vector<Eigen::MatrixXd>& of) const;
-  /// Where a recording's residuals lie in the projected vectors.
+  /// Returns where a recording's residuals begin in the projected vectors.
   Eigen::Index first_row(size_t recording) const { return first_row_[recording]; }
 
   double taken() const;
@@ -66,14 +67,14 @@ class ModelProjection {
   std::vector<Eigen::Index> first_row_;
 };
 
-/// How well columns explain what is left of a residual: of least squares with both projected.
+/// The least squares of a residual by columns, with both projected.
 struct Explained {
   Eigen::VectorXd amplitude;    ///< of each column
-  Eigen::MatrixXd information;  ///< of the amounts
+  Eigen::MatrixXd information;  ///< of the amplitudes
   double decrease = 0;          ///< of the sum of squares
 };
 
-/// Amounts stay within their ends.
+/// Explains a residual by columns, with amplitudes from `lower` to `upper`.
 Explained explain(const Eigen::VectorXd& residual, const Eigen::MatrixXd& columns,
                   const Eigen::VectorXd& lower, const Eigen::VectorXd& upper);
 

@@ -1,6 +1,7 @@
 #include "fit/diagnosis/proposed_law.h"
 
 #include <fmt/format.h>
+
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
@@ -19,12 +20,13 @@
 namespace clothfit {
 namespace {
 
-/// Horizons at which terms are scored, as shares of the model's frames: from the shortest on at
-/// which something is missing, for over all frames what is missing biases the model.
+/// Horizons at which terms are scored, as shares of the model's frames. Scores begin with the
+/// shortest one at which something is missing, for over all frames that biases the model.
 constexpr double kShares[] = {0.3, 0.5, 0.75, 1.0};
 constexpr size_t kHorizons = 2;
 
-/// Whether frames left out are predicted better, on the whole and in most of the blocks of time.
+/// Tells whether frames left out are predicted better, on the whole and in most of the blocks of
+/// time.
 bool predicts_better(const CrossValidation& one, const CrossValidation& other) {
   if (!one.usable || other.mean - one.mean <= std::max(kCriteria.term_gain_of_noise,
                                                        kCriteria.term_gain * (other.mean - 1)))
@@ -34,7 +36,7 @@ bool predicts_better(const CrossValidation& one, const CrossValidation& other) {
   return 2 * blocks > one.block.size();
 }
 
-/// A value to the second digit of its sigma.
+/// Writes a value to the second digit of its sigma.
 std::string number_text(double value, double sigma) {
   const double size = sigma > 0 ? sigma : std::abs(value);
   const int place = size > 0 ? static_cast<int>(std::floor(std::log10(size))) - 1 : 0;
@@ -45,7 +47,7 @@ std::string number_text(double value, double sigma) {
   return fmt::format("{:.{}f}", value, -place);
 }
 
-/// The left side of the formula that a coefficient stands in.
+/// Returns the left side of the formula that a coefficient stands in.
 std::string side_of(const LawCoefficient& one) {
   if (one.effect == "tension_law") return "T / (k l0)";
   return force_law::acts_on_area(one.parameter) ? "p" : "a";
@@ -99,8 +101,8 @@ class Pursuit {
   }
   int terms_of_law() const { return static_cast<int>(law_.model.hypotheses.size() - own_terms_); }
 
-  /// What is foreseen of each term, the most telling first; the shortest horizon where something is
-  /// missing, and the model fitted over that.
+  /// Returns the scores of all terms, the most telling first. `first_share` becomes the shortest
+  /// horizon where something is missing, and `early` the model fitted over it.
   std::vector<Score> shortlist(double& first_share, FittedModel& early) {
     const std::vector<ShapeCandidates> terms = terms_to_test();
     std::vector<Score> list;
@@ -135,8 +137,8 @@ class Pursuit {
     return list;
   }
 
-  /// Those of a shortlist that are worth a fit, with the columns over all frames that it starts
-  /// with.
+  /// Returns the scores of a shortlist that are worth a fit. They have the columns over all frames
+  /// that a fit starts with.
   std::vector<Score> worth_a_fit(const std::vector<Score>& list, double first_share) const {
     std::vector<Score> worth;
     std::vector<ShapeCandidates> terms;
@@ -245,7 +247,7 @@ class Pursuit {
     const FittedModel& model = law_.model;
     const Eigen::VectorXd& values = model.parts.front().values;
     const ParameterSpace& space = model.problems.front()->space;
-    // A force is shared; what one recording says of it stands for all.
+    // A force is shared, so what one recording says of it stands for all.
     const Uncertainty uncertainty =
         estimate_uncertainty(model.objective(0), values, {.loss = setup_.options.loss});
     for (size_t k = own_terms_; k < model.hypotheses.size(); ++k) {

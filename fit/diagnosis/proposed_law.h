@@ -11,8 +11,8 @@ namespace clothfit {
 
 struct ProposalOptions {
   int most_terms = 4;
-  int fits = 3;    ///< of terms, in one round: those that are foreseen to explain most
-  int blocks = 5;  ///< of time, of the cross-validation
+  int fits = 3;                      ///< terms in one round: those predicted to explain most
+  int blocks = 5;                    ///< of time, for the cross-validation
   std::vector<std::string> without;  ///< effects whose terms are not asked for
   /// Residuals beyond it count less (Huber), in sigmas; infinite for squares.
   double threshold = 1e300;
@@ -36,13 +36,13 @@ struct LawCoefficient {
   bool at_bound = false;  ///< at an end of its range: more of it would do better
 };
 
-/// An empirical law for what a model leaves: a force per mass, a pressure, or a tension, that is a
-/// sum of few terms (model/effects/force_law.h, tension_law.h).
+/// An empirical law for the residual of a model. It is a force per mass, a pressure, or a tension,
+/// and a sum of few terms (model/effects/force_law.h, tension_law.h).
 struct ProposedLaw {
-  std::vector<LawCoefficient> coefficients;  ///< none: no term foresees frames that were left out
+  std::vector<LawCoefficient> coefficients;  ///< none: no term predicts frames left out
   std::string formula;  ///< a line for each of force per mass a, pressure p, tension T
-  /// The model with the law: its terms stand behind those the model had. Fitted, so that
-  /// describe_model() and with_terms() make of it what simulations and fits take.
+  /// The model with the law, whose terms stand behind those that the model had. It is fitted, so
+  /// that describe_model() makes of it what simulations take.
   FittedModel model;
   CrossValidation before, after;
   std::vector<Score> scores;      ///< of each term by itself, in the first round, the best first
@@ -50,17 +50,17 @@ struct ProposedLaw {
   bool found() const { return !coefficients.empty(); }
 };
 
-/// Proposes a law by sparse regression: orthogonal matching pursuit [pati1993] over the terms of
-/// the empirical effects, with refits. What is regressed is not a force that is read off
-/// accelerations, whose noise would drown it, but what each term does to everything observed, by
-/// the derivatives of the trajectory, against the residual, with all that the model may still move
-/// taken out of both (fit/diagnosis/projection.h).
+/// Proposes a law by sparse regression over the terms of the empirical effects. The method is
+/// orthogonal matching pursuit [pati1993] with refits. No force is read off accelerations, whose
+/// noise would drown it. Instead the residual is regressed on what each term does to everything
+/// observed, by the derivatives of the trajectory. All that the model may still move is taken out
+/// of both (fit/diagnosis/projection.h).
 ///
-/// Each round fits the model again with each of the terms that are foreseen to explain most, from
-/// short horizons on, and keeps the one that predicts frames left out best, where it does so better
-/// than without it: by a tenth of what is above the noise, two per cent of the noise at least, and
-/// in most of the blocks of time. In the end each term is dropped without which frames left out are
-/// predicted no worse.
+/// Each round fits the model again with each of the terms that are predicted to explain most, from
+/// short horizons on. It keeps the term that predicts frames left out best, where it does so better
+/// than the model without it. The gain must be a tenth of what is above the noise, two per cent of
+/// the noise at least, and there must be one in most of the blocks of time. In the end each term is
+/// dropped without which frames left out are predicted no worse.
 ProposedLaw propose_law(const DiagnosisSetup& setup, const FittedModel& model,
                         const ProposalOptions& options, const ProgressCallback& progress);
 

@@ -13,7 +13,7 @@
 namespace clothfit {
 namespace {
 
-/// The model without its hypothesis `k`, whose shape others of the same effect keep.
+/// Fits the model without its hypothesis `k`. Others of the same effect keep its shape.
 FittedModel without(const SearchContext& search, const FittedModel& model, size_t k) {
   std::vector<Hypothesis> hypotheses = model.hypotheses;
   const Hypothesis dropped = hypotheses[k];

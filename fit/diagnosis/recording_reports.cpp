@@ -20,8 +20,8 @@ namespace {
 /// Frames that a recording must have among those fitted.
 constexpr int kLeastFitted = 2;
 
-/// Gives observations that state no sigma the one that a problem has found for them; not those of
-/// markers that drive held points.
+/// Gives observations that state no sigma the one that a problem has found for them. Those of
+/// markers that drive held points are left alone.
 void state_noise(const FitProblem& problem, FitInput& input) {
   for (const ObservationSet& set : problem.observations) {
     std::set<int> observed;
@@ -36,7 +36,7 @@ void state_noise(const FitProblem& problem, FitInput& input) {
   }
 }
 
-/// The values of the parameters that all recordings share.
+/// Returns the values of the parameters that all recordings share.
 NamedValues shared_values(const FittedModel& model) {
   NamedValues shared;
   const ParameterSpace& space = model.problems.front()->space;
@@ -95,7 +95,7 @@ FitReport RecordingReports::unseen(const DiagnosisSetup& setup, const FittedMode
   std::vector<MarkerOffset> offsets;
   FittedModel own = model_at(alone, model.hypotheses, {values});
   if (PooledSpace(own.problem_pointers()).own_of(0).empty()) {
-    // Nothing is fitted: all frames but those that a recording must have are held out.
+    // Nothing is fitted, so all frames but those that a recording must have are held out.
     state_noise(*own.problems.front(), input);
     input.recording.held_out_from_frame = kLeastFitted;
     if (!input.held_tracks.empty()) input.held_tracks = held_tracks_from_pixels(input);
@@ -132,7 +132,7 @@ double RecordingReports::mean_residual_rms_m(Which which) const {
   return std::sqrt(squares / static_cast<double>(std::max<Eigen::Index>(1, count)));
 }
 
-/// The mean over the fitted recordings, whose world is that of those held out.
+/// Averages over the fitted recordings, whose world is that of those held out.
 std::vector<MarkerOffset> RecordingReports::mean_offsets(Which which) const {
   std::map<std::string, std::vector<Eigen::Vector3d>> seen;
   for (size_t n = 0; n < fitted_.size(); ++n)

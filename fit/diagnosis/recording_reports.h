@@ -8,8 +8,8 @@
 
 namespace clothfit {
 
-/// One recording with the model as declared, with what was accepted, and with the proposed law
-/// where there is one.
+/// Reports of one recording. They are of the declared model, of the accepted one, and of the
+/// proposed law where there is one.
 struct DiagnosedRecording {
   bool held_out = false;  ///< as a whole: it took part in no fit and no decision
   FitReport before, after, with_law;
@@ -20,17 +20,18 @@ class RecordingReports {
  public:
   using Which = FitReport DiagnosedRecording::*;
 
-  /// The inputs must outlive it.
+  /// Refers to the inputs, which must outlive it.
   RecordingReports(std::span<const FitInput> fitted, std::span<const FitInput> held_out,
                    ProgressCallback progress);
 
-  /// Residuals of a model in all recordings. Of those held out, only what is their own is fitted.
-  /// Throws GivenUp where the model does not run.
+  /// Adds reports of a model in all recordings. Of those held out, only what is their own is
+  /// fitted. Throws GivenUp where the model does not run.
   void add(const DiagnosisSetup& setup, const FittedModel& model, Which which);
   void add_fitted(const DiagnosisSetup& setup, const FittedModel& model, Which which);
   void add_held_out(const DiagnosisSetup& setup, const FittedModel& model, Which which);
 
-  /// The root mean square of the markers' mean residuals in the fitted frames, per coordinate.
+  /// Returns the root mean square of the markers' mean residuals in the fitted frames, per
+  /// coordinate.
   double mean_residual_rms_m(Which which) const;
 
   std::vector<DiagnosedRecording> recordings;

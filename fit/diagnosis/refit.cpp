@@ -19,8 +19,8 @@ namespace {
 /// A share of the frames over which most of what is missing has shown, and little has grown.
 constexpr double kShortHorizon = 0.4;
 
-/// The model with a hypothesis at a share of its predicted amplitude, not linearised. A start at
-/// half of it is on the right side, and not too far.
+/// Returns the model with a hypothesis at a share of its predicted amplitude, not linearised. A
+/// start at half of it is on the right side, and not too far.
 FittedModel cautious_start(const DiagnosisSetup& setup, const FittedModel& model,
                            const Score& score) {
   std::vector<Hypothesis> hypotheses = model.hypotheses;
@@ -40,8 +40,8 @@ FittedModel cautious_start(const DiagnosisSetup& setup, const FittedModel& model
   return model_at(setup, hypotheses, start);
 }
 
-/// Moves a model over all frames to its optimum over a share of them, and returns the model over
-/// that. Over all of them its discretisation may err as that of `from` does.
+/// Moves a model over all frames to its optimum over a share of them. Returns the model over that
+/// share. Over all frames its discretisation may err as that of `from` does.
 FittedModel refined_over(const DiagnosisSetup& setup, FittedModel& whole, const FittedModel& from,
                          double share, const ProgressCallback& progress) {
   FittedModel fitted = share < 1 ? shortened(whole, share) : whole;
@@ -66,7 +66,7 @@ FittedModel refined_over(const DiagnosisSetup& setup, FittedModel& whole, const 
   return fitted;
 }
 
-/// The fit from where the model stands, over all frames.
+/// Fits the model with a hypothesis from where it stands, over all frames.
 FittedModel fit_from_here(const DiagnosisSetup& setup, const FittedModel& model, const Score& score,
                           const StageOptions& stage, const ProgressCallback& progress) {
   std::vector<Hypothesis> hypotheses = model.hypotheses;
@@ -79,8 +79,8 @@ FittedModel fit_from_here(const DiagnosisSetup& setup, const FittedModel& model,
 /// A model fitted over a share of the frames, after the fit over the shorter one.
 using FitOver = std::function<FittedModel(size_t model, double share, const FittedModel& shorter)>;
 
-/// Models fitted side by side over growing horizons. Those that leave far more than the best one
-/// fall out, and are not usable.
+/// Fits models side by side over growing horizons. Those that leave far more than the best one fall
+/// out, and are not usable.
 std::vector<FittedModel> race(size_t models, double first_share, double threshold,
                               const FitOver& fit_over) {
   std::vector<FittedModel> fitted(models);
@@ -108,7 +108,7 @@ std::vector<FittedModel> race(size_t models, double first_share, double threshol
   return fitted;
 }
 
-/// Hypotheses beside a model, from where `early` stands.
+/// Fits hypotheses beside a model, from where `early` stands.
 std::vector<FittedModel> race_hypotheses(const DiagnosisSetup& setup, const FittedModel& model,
                                          const FittedModel& early,
                                          const std::vector<const Score*>& scores,
@@ -122,8 +122,8 @@ std::vector<FittedModel> race_hypotheses(const DiagnosisSetup& setup, const Fitt
               });
 }
 
-/// Refines an unrefined fit. Where that does not gain what was predicted, it is tried over growing
-/// horizons.
+/// Refines an unrefined fit. Where that does not gain what was predicted, growing horizons are
+/// tried.
 FittedModel fit_from_unrefined(const DiagnosisSetup& setup, const FittedModel& model,
                                const Score& score, FittedModel near, double threshold,
                                const ProgressCallback& progress) {
@@ -245,8 +245,8 @@ std::vector<FittedModel> race_on_mesh(const DiagnosisSetup& other,
 FittedModel identified_from_scratch(const DiagnosisSetup& setup,
                                     const std::vector<Hypothesis>& hypotheses,
                                     const ProgressCallback& progress) {
-  // Of a start in motion there are hundreds of numbers more: minutes, where a fit from a known
-  // model takes seconds.
+  // A start in motion has hundreds of numbers more. A fit of it from scratch takes minutes, where
+  // one from a known model takes seconds.
   if (std::ranges::any_of(setup.inputs, [](const FitInput& input) {
         return input.recording.start == StartKind::unknown;
       }))

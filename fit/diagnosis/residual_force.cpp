@@ -13,10 +13,10 @@
 namespace clothfit {
 namespace {
 
-constexpr size_t kFewestFramesOfMarker = 10;  ///< of a marker
-constexpr size_t kEnds = 2;                   ///< frames left out at each of its ends
+constexpr size_t kFewestFramesOfMarker = 10;
+constexpr size_t kEnds = 2;  ///< frames left out at each of its ends
 
-/// A marker in one frame: the residual acceleration, and how the model has it move there.
+/// A marker in one frame: the residual acceleration, and the model's motion there.
 struct Sample {
   int marker = 0, frame = 0;
   Eigen::Vector3d residual_m_per_s2;
@@ -27,7 +27,7 @@ struct Sample {
   double height_m = 0, time_s = 0, s = 0, t = 0;
 };
 
-/// How the model's markers move: 3 x markers in each frame.
+/// The motion of the model's markers: 3 x markers in each frame.
 struct Motion {
   std::vector<Eigen::Matrix3Xd> position_m, velocity_m_per_s, by_s, by_t, rate_by_s, rate_by_t;
 };
@@ -55,8 +55,8 @@ Motion motion_of(const FitProblem& problem, const PooledPart& part) {
   return motion;
 }
 
-/// Takes a path's least-squares parabola out of it, whose acceleration it returns: a natural
-/// spline, straight at its ends, would bend a constant acceleration down to nothing there.
+/// Takes a path's least-squares parabola out of it, and returns that parabola's acceleration. A
+/// natural spline, straight at its ends, would bend a constant acceleration down to nothing there.
 Eigen::Vector3d take_out_parabola(const std::vector<double>& time_s, Eigen::MatrixXd& path_m) {
   const Eigen::Index count = path_m.cols();
   const Eigen::Map<const Eigen::VectorXd> time(time_s.data(), count);
@@ -69,7 +69,7 @@ Eigen::Vector3d take_out_parabola(const std::vector<double>& time_s, Eigen::Matr
   return coefficients.row(2).transpose();
 }
 
-/// Samples of all markers whose residuals can be differentiated twice.
+/// Returns samples of all markers whose residuals can be differentiated twice.
 std::vector<Sample> samples_of(const FitProblem& problem, const PooledPart& part, int set,
                                const Motion& motion) {
   const Mesh& mesh = problem.cloth.mesh;
@@ -125,8 +125,8 @@ std::vector<Sample> samples_of(const FitProblem& problem, const PooledPart& part
   return samples;
 }
 
-/// Standard deviation of a slope whose residuals may depend on each other within a marker:
-/// `pull` is x (y - slope x) of each sample, `square` the sum of x^2.
+/// Returns the standard deviation of a slope whose residuals may depend on each other within a
+/// marker. `pull` is x (y - slope x) of each sample, `square` the sum of x^2.
 double clustered_sigma(const std::vector<Sample>& samples, const Eigen::VectorXd& pull,
                        double square) {
   std::map<int, double> of_marker;
@@ -139,7 +139,7 @@ double clustered_sigma(const std::vector<Sample>& samples, const Eigen::VectorXd
                    : std::numeric_limits<double>::infinity();
 }
 
-/// On a vector: `of` gives it for a sample.
+/// Regresses on a vector, which `of` gives for a sample.
 template <class Of>
 void regress_on_vector(const std::vector<Sample>& samples, const std::string& on,
                        const std::string& unit, const Of& of, ResidualForce& result) {
@@ -164,7 +164,7 @@ void regress_on_vector(const std::vector<Sample>& samples, const std::string& on
                                 .sigma = clustered_sigma(samples, pull, square)});
 }
 
-/// On a number: `of` gives it for a sample.
+/// Regresses on a number, which `of` gives for a sample.
 template <class Of>
 void regress_on_number(const std::vector<Sample>& samples, const std::string& on,
                        const std::string& unit, const Of& of, ResidualForce& result) {

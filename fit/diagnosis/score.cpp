@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
-/// Laws that are differentiated at once: as many as keep all cores at work.
+/// Hypotheses that are differentiated at once: as many as keep all cores at work.
 constexpr size_t kAtOnce = 64;
 
 Score judge(const Hypothesis& term, const ModelProjection& projection, Columns columns) {
@@ -69,7 +69,7 @@ std::vector<Score> score_hypotheses(const FittedModel& model, const ModelProject
     }
   }
   const double free = std::max(1.0, projection.weights() - projection.taken());
-  // Less than chi-square's own standard deviation is not known to be there.
+  // An excess below chi-square's own standard deviation is not known to be there.
   const double above = std::max(projection.residual().squaredNorm() - free, std::sqrt(2 * free));
   std::vector<Score> best;
   size_t law_of_best = 0;

@@ -19,7 +19,7 @@ BeamEntry first_entry(SearchContext& search, FittedModel base) {
   return entry;
 }
 
-/// Of the base model, which is refined first unless the coarse mesh does for the round.
+/// Makes the shortlist of the base model, which is refined first unless the coarse mesh does.
 Shortlist first_shortlist(SearchContext& search, BeamEntry& entry) {
   Shortlist list = make_shortlist(search, entry.model);
   if (!entry.model.is_unrefined() || list.coarse.usable()) return list;
@@ -27,7 +27,7 @@ Shortlist first_shortlist(SearchContext& search, BeamEntry& entry) {
   return make_shortlist(search, entry.model);
 }
 
-/// Refines an entry's model before it is extended. False where that does not work out.
+/// Refines an entry's model before it is extended. Returns false where that does not work out.
 bool refine(const SearchContext& search, bool is_best, BeamEntry& entry) {
   FittedModel refined = entry.model;
   refine_with_discretisation(refined, search.setup, search.progress);
@@ -41,8 +41,9 @@ bool refine(const SearchContext& search, bool is_best, BeamEntry& entry) {
   return true;
 }
 
-/// Extends an entry; once more where it turns out to stand elsewhere, or was scored on the coarse
-/// mesh, and nothing was found: other hypotheses may show in its own basin, and on its own mesh.
+/// Extends an entry, and once more where nothing was found but other hypotheses may show. They may
+/// where the entry turns out to stand in another basin, or was scored on the coarse mesh: they may
+/// show in its own basin, and on its own mesh.
 std::vector<BeamEntry> extend(SearchContext& search, BeamEntry& entry, const Shortlist& list) {
   std::vector<BeamEntry> children = expand(search, entry, list);
   const bool changed = entry.basin == BasinOrigin::changed;
@@ -51,7 +52,7 @@ std::vector<BeamEntry> extend(SearchContext& search, BeamEntry& entry, const Sho
   return expand(search, entry, make_shortlist(search, entry.model, changed));
 }
 
-/// The search's last word.
+/// Makes the result of the best entry, which is converged and pruned first.
 SearchResult conclude(SearchContext& search, BeamEntry best, SearchResult result) {
   converge(search, best);
   const bool found = !best.accepted.empty();

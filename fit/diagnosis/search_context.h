@@ -18,7 +18,7 @@ struct SearchOptions {
   double threshold = 1e300;
 };
 
-/// What the steps of one search share.
+/// The state that the steps of one search share.
 struct SearchContext {
   SearchContext(const DiagnosisSetup& analysed, const SearchOptions& asked,
                 const ProgressCallback& reported);
@@ -32,25 +32,25 @@ struct SearchContext {
   double threshold;  ///< SearchOptions::threshold, in the basin where the base stands
   /// Chi-square and cost of the model that has found nothing.
   double base_chi_square = 0, base_cost = 0;
-  /// That model, where it was refined or changed its basin; else not run.
+  /// The same model, where it was refined or changed its basin; else not run.
   FittedModel base;
 
-  /// Chi-square; infinite of a model that is not usable.
+  /// Returns chi-square, which is infinite for a model that is not usable.
   double left_by(const FittedModel& model) const;
-  /// Chi-square and the price of a model's amplitudes.
+  /// Returns chi-square and the price of a model's amplitudes, added up.
   double cost(const FittedModel& model) const;
-  /// The decrease from which a hypothesis more is worth a name beside a model.
+  /// Returns the decrease from which one hypothesis more is worth a name beside a model.
   double worth(const FittedModel& model) const;
-  /// Whether it leaves so much that its basin may be the wrong one, and that sigmas are those of
-  /// all it lacks.
+  /// Tells whether it leaves so much that its basin may be the wrong one. Its sigmas are then those
+  /// of all that it lacks.
   bool is_far_off(const FittedModel& model) const;
-  /// Hypotheses that a model does not have, at the shapes that it has for their effects.
+  /// Returns hypotheses that a model does not have, at the shapes that it has for their effects.
   std::vector<ShapeCandidates> untested(const FittedModel& model) const;
 
   /// Takes an entry that has found nothing for the base of all others.
   void begin_at(BeamEntry& entry);
-  /// Moves an entry to another model of the same hypotheses. What was scored where it stood says
-  /// nothing of it there.
+  /// Moves an entry to another model of the same hypotheses. Its scores are dropped, for they say
+  /// nothing of the entry there.
   void stand_at(BeamEntry& entry, FittedModel there);
 };
 

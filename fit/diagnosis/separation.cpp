@@ -29,10 +29,10 @@ namespace {
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 constexpr size_t kKept = 3;  ///< recordings that are named
 
-/// Laws whose amplitudes together are one that a refit may turn to.
+/// Hypotheses whose amplitudes together are those of one refit.
 using Refit = std::vector<Hypothesis>;
 
-/// The law at its shape and beside it; a harmonic at any phase.
+/// Returns the hypothesis at its shape and beside it, and a harmonic at any phase.
 std::vector<Refit> refits_of(const Hypothesis& law) {
   constexpr double kPart = 0.5;
   ShapeCandidates shapes = shapes_around(law, kPart);
@@ -56,7 +56,8 @@ std::vector<Refit> refits_of(const Hypothesis& law) {
   return refits;
 }
 
-/// The parameters of a term in a problem's space: amplitudes, and shapes where they are fitted.
+/// Returns the parameters of a hypothesis in a problem's space: amplitudes, and shapes where they
+/// are fitted.
 std::vector<int> parameters_of(const Hypothesis& term, const ParameterSpace& space) {
   std::vector<std::string> names = term.parameters();
   if (term.fits_shape)
@@ -67,7 +68,7 @@ std::vector<int> parameters_of(const Hypothesis& term, const ParameterSpace& spa
   return parameters;
 }
 
-/// The model as if it did not have a law, near where it stands with it.
+/// Returns the model as if it did not have a hypothesis, near where it stands with it.
 FittedModel without(FittedModel model, const Hypothesis& law) {
   for (size_t n = 0; n < model.parts.size(); ++n)
     for (const int p : parameters_of(law, model.problems[n]->space))
@@ -75,7 +76,8 @@ FittedModel without(FittedModel model, const Hypothesis& law) {
   return model;
 }
 
-/// What a law's amplitudes do to the residuals, D_a a: a column of each recording.
+/// Returns the change of the residuals by a hypothesis' amplitudes, D_a a: a column of each
+/// recording.
 Columns change_by(const FittedModel& model, const Hypothesis& law) {
   const EffectDescription effect = describe_effect(law.effect);
   Columns change;
@@ -96,7 +98,7 @@ Columns change_by(const FittedModel& model, const Hypothesis& law) {
   return change;
 }
 
-/// A law of the model, and one that may do the same.
+/// A hypothesis of the model, and one that may do the same.
 struct Pair {
   size_t accepted = 0;
   Hypothesis law, other;
@@ -105,10 +107,10 @@ struct Pair {
 
 struct Distance {
   double sigmas = kNone;
-  Refit nearest;  ///< of the other law; none where it cannot act
+  Refit nearest;  ///< of the other hypothesis; none where it cannot act
 };
 
-/// Of each pair: hypothesis_distance().
+/// Computes hypothesis_distance() of each pair.
 std::vector<Distance> distances(const FittedModel& model, const std::vector<Pair>& pairs) {
   std::vector<Hypothesis> laws;
   for (const Pair& pair : pairs)
@@ -120,7 +122,8 @@ std::vector<Distance> distances(const FittedModel& model, const std::vector<Pair
   size_t next = 0;
   for (size_t k = 0; k < pairs.size(); ++k) {
     if (k == 0 || pairs[k].accepted != pairs[k - 1].accepted) {
-      // Noise is as it is stated: the number is one of the recording and not of its residuals.
+      // Noise is taken as stated, for the distance is one of the recording and not of its
+      // residuals.
       projection.emplace(without(model, pairs[k].law), Loss::squared);
       change = projection->columns(change_by(model, pairs[k].law));
     }
@@ -142,15 +145,15 @@ std::vector<Distance> distances(const FittedModel& model, const std::vector<Pair
   return result;
 }
 
-/// The pairs with the refits that have been found nearest, where any was.
+/// Returns the pairs with the refits that have been found nearest, where any was.
 std::vector<Pair> narrowed(std::vector<Pair> pairs, const std::vector<Distance>& known) {
   for (size_t k = 0; k < known.size(); ++k)
     if (!known[k].nearest.empty()) pairs[k].refits = {known[k].nearest};
   return pairs;
 }
 
-/// How a recording errs on another mesh, as discretisation_errors() has it: fitted there to what is
-/// seen here, with updated derivatives. Nothing where that does not run.
+/// Returns how a recording errs on another mesh, as discretisation_errors() has it. The model is
+/// fitted there to what is seen here, with updated derivatives. Nothing where that does not run.
 std::optional<Eigen::VectorXd> mesh_direction(FitProblem other, const FittedModel& own) {
   const PooledPart& here = own.parts.front();
   const int cells = own.problems.front()->cloth.mesh.columns - 1;
@@ -183,8 +186,8 @@ std::optional<Eigen::VectorXd> mesh_direction(FitProblem other, const FittedMode
   return factor * fitted.parts.front().linear.residual;
 }
 
-/// The model found in a candidate recording. Not usable where it does not run. `other`: the first
-/// recording on the other mesh; null where that is not asked.
+/// Returns the model found in a candidate recording. It is not usable where it does not run.
+/// `other` is the first recording on the other mesh, or null where that is not asked.
 FittedModel in_candidate(const CandidateRecording& candidate, const FittedModel& model,
                          const FitProblem* other) {
   const PooledPart& found = model.parts.front();
@@ -203,7 +206,7 @@ FittedModel in_candidate(const CandidateRecording& candidate, const FittedModel&
   PooledPart& part = result.parts.front();
   const Eigen::VectorXd& residual = part.linear.residual;
   std::vector<Eigen::VectorXd> directions;
-  // The step's, half of what it is expected to be off by; as far as the model itself has it.
+  // The step's direction is half of its expected error, where the model itself expects one.
   if (found.correction.size() > 0) {
     const TrajectoryObjective half(*result.problems.front(), part.frames, part.steps.times(0.5));
     const Eigen::VectorXd there = half.residuals({part.values}).front();
@@ -221,7 +224,7 @@ FittedModel in_candidate(const CandidateRecording& candidate, const FittedModel&
   return result;
 }
 
-/// The model where it stands on a mesh of half the cells a side, where that is another one.
+/// Returns the model where it stands on a mesh of half the cells a side, where that is another one.
 std::optional<FittedModel> on_coarse_mesh(const DiagnosisSetup& setup, const FittedModel& model) {
   DiagnosisSetup coarse = with_coarse_mesh(setup);
   coarse.inputs = setup.inputs.first(1);
@@ -229,8 +232,8 @@ std::optional<FittedModel> on_coarse_mesh(const DiagnosisSetup& setup, const Fit
   return model_at(coarse, model.hypotheses, {model.values().front()});
 }
 
-/// The first recording on the mesh that the model's directions are taken from; none where it has no
-/// direction of a mesh.
+/// Returns the first recording on the mesh that the model's directions are taken from. There is
+/// none where it has no direction of a mesh.
 std::optional<FitProblem> on_other_mesh(const DiagnosisSetup& setup, const FittedModel& model) {
   const PooledPart& first = model.parts.front();
   const Eigen::Index of_step = first.correction.size() > 0 ? 1 : 0;
@@ -240,14 +243,15 @@ std::optional<FitProblem> on_other_mesh(const DiagnosisSetup& setup, const Fitte
   return *problems_of(other, model.hypotheses).front();
 }
 
-/// Of one candidate, how far the laws of each pair are apart; empty where it does not run.
+/// A candidate, and how far the hypotheses of each pair are apart in it. There are no distances
+/// where it does not run.
 struct Recorded {
   const CandidateRecording* candidate = nullptr;
   std::vector<Distance> distances;
 };
 
-/// Of those that ran, by how far apart a pair is: the best of each kind, so that who cannot do one
-/// thing is told of another; as many as are kept.
+/// Returns the candidates that tell a pair apart best, at most kKept. Only the best of each kind is
+/// among them, so that who cannot do one thing is told of another.
 std::vector<const Recorded*> best_of(const std::vector<Recorded>& all, size_t pair) {
   std::vector<const Recorded*> sorted, best;
   for (const Recorded& one : all)
@@ -263,7 +267,7 @@ std::vector<const Recorded*> best_of(const std::vector<Recorded>& all, size_t pa
   return best;
 }
 
-/// The pairs of an accepted effect and a hypothesis that is alike and not in the model.
+/// Returns the pairs of an accepted effect and a hypothesis that is alike and not in the model.
 std::vector<Pair> pairs_of(const FittedModel& model, const std::vector<AcceptedEffect>& accepted) {
   std::vector<Pair> pairs;
   for (size_t k = 0; k < accepted.size(); ++k)
@@ -277,7 +281,7 @@ std::vector<Pair> pairs_of(const FittedModel& model, const std::vector<AcceptedE
   return pairs;
 }
 
-/// Measures each candidate: how far the hypotheses of each pair are apart in it.
+/// Measures how far the hypotheses of each pair are apart in each candidate.
 void record(const FittedModel& model, const FitProblem* other, const std::vector<Pair>& pairs,
             const ProgressCallback& progress, std::vector<Recorded>& recorded) {
   std::atomic<size_t> begun = 0;
@@ -294,7 +298,7 @@ void record(const FittedModel& model, const FitProblem* other, const std::vector
   });
 }
 
-/// The best candidates of each pair.
+/// Returns the best candidates of each pair.
 std::vector<Recorded> chosen_of(const std::vector<Recorded>& recorded, size_t pairs) {
   std::set<const Recorded*> best;
   for (size_t k = 0; k < pairs; ++k)
@@ -334,7 +338,7 @@ std::vector<std::vector<Separation>> separating_recordings(
   for (const CandidateRecording& candidate : candidates)
     recorded.push_back({.candidate = &candidate, .distances = {}});
   const ProgressCallback reported = stop_token(progress);
-  // Nothing is fitted on another mesh before it is chosen.
+  // Candidates are chosen before anything is fitted on another mesh.
   const std::optional<FitProblem> other = on_other_mesh(setup, model);
   if (coarse || other) {
     record(coarse ? *coarse : model, nullptr, pairs, reported, recorded);

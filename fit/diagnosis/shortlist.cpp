@@ -17,7 +17,7 @@ namespace {
 
 /// Horizons at which hypotheses are scored, as shares of the fitted frames.
 constexpr double kScoreShares[] = {0.28, 0.4, 0.56, 0.75, 1.0};
-constexpr size_t kScoreHorizons = 3;  ///< of these, from the first that shows something on
+constexpr size_t kScoreHorizons = 3;  ///< of these, from the first on that shows something
 
 /// Parts of the grid's spacing at which shapes beside the best one are scored, in turn.
 constexpr double kShapeParts[] = {0.5, 0.25};
@@ -31,8 +31,8 @@ void sort_by_share(std::vector<Score>& scores) {
   std::ranges::stable_sort(scores, std::greater<>(), &Score::share);
 }
 
-/// Scores at the shapes given, and then beside the best; a hypothesis that comes with one shape
-/// keeps it. A mode may explain several times as much between the grid's points.
+/// Scores hypotheses at the shapes given, and then beside the best ones. A hypothesis that comes
+/// with one shape keeps it. A mode may explain several times as much between the grid's points.
 std::vector<Score> at_best_shapes(const SearchContext& search, const FittedModel& model,
                                   const ModelProjection& projection,
                                   const std::vector<ShapeCandidates>& hypotheses) {
@@ -58,7 +58,7 @@ std::vector<Score> at_best_shapes(const SearchContext& search, const FittedModel
   return scores;
 }
 
-/// Values of the effects' parameters alone.
+/// Returns the values of the effects' parameters alone.
 std::vector<NamedValues> values_of_effects(const FittedModel& model) {
   std::vector<NamedValues> values = model.values();
   for (size_t n = 0; n < values.size(); ++n)
@@ -68,9 +68,9 @@ std::vector<NamedValues> values_of_effects(const FittedModel& model) {
   return values;
 }
 
-/// Leads a model on the coarse mesh from `start` over growing shares, and takes that for `fitted`
-/// where it leaves less. Springs and place of a model that misfits grossly make up for what is
-/// missing, so that its optimum over few frames is not near the one over all. A start in motion
+/// Leads a model on the coarse mesh from `start` over growing shares. The result takes the place of
+/// `fitted` where it leaves less. Springs and place of a model that misfits grossly make up for
+/// what is missing, so its optimum over few frames is not near the one over all. A start in motion
 /// has hundreds of numbers, and is left out.
 void leave_bias(const SearchContext& search, FittedModel& fitted,
                 std::initializer_list<double> shares, std::vector<NamedValues> start) {
@@ -89,7 +89,7 @@ void leave_bias(const SearchContext& search, FittedModel& fitted,
   if (search.left_by(other) < search.left_by(fitted)) fitted = std::move(other);
 }
 
-/// A model fitted over one horizon, after the one fitted over the horizon before.
+/// Fits a model over one horizon, after the one fitted over the horizon before.
 FittedModel over_horizon(const SearchContext& search, const DiagnosisSetup& setup,
                          const FittedModel& model, double share, const FittedModel* before) {
   if (share == 1) return model;
@@ -106,8 +106,8 @@ FittedModel over_horizon(const SearchContext& search, const DiagnosisSetup& setu
   return fitted;
 }
 
-/// The model over horizons from share `first` on: from the one at which chi-square per residual is
-/// `visible`, or all frames, on. `share`: the first one's.
+/// Fits the model over horizons from share `first` on. They begin with the one at which chi-square
+/// per residual is `visible`, or with all frames. `share_of_first` becomes that one's share.
 std::vector<FittedModel> over_horizons(const SearchContext& search, const DiagnosisSetup& setup,
                                        const FittedModel& model, double first, double visible,
                                        double& share_of_first) {
@@ -127,7 +127,7 @@ std::vector<FittedModel> over_horizons(const SearchContext& search, const Diagno
   return shorter;
 }
 
-/// Adds the scores over a further horizon, of the hypotheses that are best so far.
+/// Adds the scores over a further horizon, for the hypotheses that are best so far.
 void add_horizon(const SearchContext& search, const FittedModel& at, double horizons,
                  std::vector<Score>& best) {
   std::vector<ShapeCandidates> hypotheses;
@@ -169,8 +169,8 @@ Shortlist over_shares(const SearchContext& search, const DiagnosisSetup& setup,
   return list;
 }
 
-/// Whether one hypothesis is predicted to take a good part of what is missing, or nothing is. What
-/// other parameters have taken up of a missing effect shows least over all frames.
+/// Tells whether one hypothesis is predicted to take a good part of what is missing, or nothing is.
+/// Over all frames a missing effect shows least, for other parameters have taken up much of it.
 bool says_enough(const SearchContext& search, const FittedModel& model, const Shortlist& list) {
   const double above = sure_excess(model, search.threshold);
   double predicted = 0;
@@ -202,7 +202,7 @@ std::vector<Score> score_at_best_shapes(const SearchContext& search, const Diagn
   if (!is_coarser(search.coarse, setup))
     return at_best_shapes(search, model, projection, hypotheses);
   // A coarser mesh chooses frequencies and other shapes, which are many. It may get a place on the
-  // cloth wrong altogether, so that these are all scored here while nothing has been found yet.
+  // cloth wrong altogether. So places are all scored here while nothing has been found yet.
   std::vector<ShapeCandidates> elsewhere;
   for (const ShapeCandidates& shapes : hypotheses)
     if (shapes.size() > 1 && (!model.hypotheses.empty() || !is_over_cloth(shapes.front())))

@@ -11,32 +11,33 @@ struct SearchContext;
 
 /// The hypotheses that an entry may be extended by.
 struct Shortlist {
-  /// The entry's model on the coarse mesh, which does for the round where it misfits grossly;
-  /// otherwise not run.
+  /// The entry's model on the coarse mesh, where that mesh does for the round; otherwise not run.
+  /// It does where the model misfits grossly.
   FittedModel coarse;
   double share = 1;           ///< the shortest horizon, as a share of the fitted frames
   FittedModel early;          ///< the model fitted over that
   std::vector<Score> scores;  ///< of all hypotheses there
-  /// Scores of the best of them, averaged over horizons; with columns where all frames are one.
+  /// Scores of the best of them, averaged over horizons. They have columns where the only horizon
+  /// is all frames.
   std::vector<Score> best;
 
-  /// Whether scores are of all frames on the analysed mesh.
+  /// Tells whether scores are of all frames on the analysed mesh.
   bool is_of_whole_run() const { return share == 1 && !coarse.usable(); }
-  /// All scores, averaged ones where there are any.
+  /// Returns all scores, averaged ones where there are any.
   std::vector<Score> merged() const;
 };
 
-/// Scores of all hypotheses, without their columns.
+/// Returns the scores without their columns.
 std::vector<Score> without_columns(std::vector<Score> scores);
 
 /// Scores every hypothesis that a model does not have. A fit over all frames of a model that lacks
 /// much is biased, and its scores with it. So such a model is fitted over a few frames too, and
-/// scored from the shortest horizon on at which something is missing. A model that misfits grossly
-/// is scored on the coarse mesh, where `may_be_coarse`.
+/// scored from the shortest horizon on at which something is missing. Where `may_be_coarse`, a
+/// model that misfits grossly is scored on the coarse mesh.
 Shortlist make_shortlist(const SearchContext& search, const FittedModel& model,
                          bool may_be_coarse = true);
 
-/// Scores of hypotheses, each at its best shape, over the frames and on the mesh of `model`.
+/// Scores hypotheses, each at its best shape, over the frames and on the mesh of `model`.
 std::vector<Score> score_at_best_shapes(const SearchContext& search, const DiagnosisSetup& setup,
                                         const FittedModel& model,
                                         std::vector<ShapeCandidates> hypotheses);

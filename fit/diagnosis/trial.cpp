@@ -91,14 +91,14 @@ class Asked {
             "a correction without physics does as well"};
   }
 
-  /// Whether it takes much of what the model leaves of blocks left out, above the noise.
+  /// Tells whether it takes much of what the model leaves of blocks left out, above the noise.
   bool takes_good_part() const {
     const double without = models_.without_left_out.mean;
     return without - left_out_.mean > kCriteria.good_part * (without - 1);
   }
 
-  /// Sigmas say little where a model is far off, for they are those of all that it lacks. A
-  /// hypothesis that predicts no block left out worse is sure without them.
+  /// Tells whether a hypothesis is sure without sigmas, because it predicts no block left out
+  /// worse. Sigmas say little where a model is far off, for they are those of all that it lacks.
   bool is_sure_by_blocks() const {
     const auto count = static_cast<double>(models_.without.residual_count());
     return models_.without.chi_square(search_.threshold) > kCriteria.far_off * count &&
@@ -107,8 +107,8 @@ class Asked {
            std::ranges::equal(left_out_.block, models_.without_left_out.block, std::less_equal<>());
   }
 
-  /// Whether it takes something from what free forces leave. These take much of all that is
-  /// missing, and each of several causes alone leaves more than they do.
+  /// Tells whether it takes something from what free forces leave. Free forces take much of all
+  /// that is missing, and each of several causes alone leaves more than they do.
   bool helps_free_forces() const {
     const double without = models_.without_left_out.free_forces;
     const double gain = without - left_out_of(search_, models_.with, &search_.coarse).free_forces;

@@ -12,16 +12,16 @@ namespace clothfit {
 
 struct SearchContext;
 
-/// One thing that was asked of a hypothesis.
+/// One condition that was asked of a hypothesis.
 struct Criterion {
   std::string name;
   double measured = 0, threshold = 0;  ///< NaN where it is no number
   bool passed = false;
-  std::string refusal;  ///< what is said where it did not pass
+  std::string refusal;  ///< said where it did not pass
 };
 
-/// What is said of a hypothesis with which a model was fitted again; NaN where it was refused
-/// before that was asked.
+/// The findings on a hypothesis with which a model was fitted again. A number is NaN where the
+/// hypothesis was refused before it was asked.
 struct Trial {
   static constexpr double kNotAsked = std::numeric_limits<double>::quiet_NaN();
   Hypothesis hypothesis;
@@ -31,8 +31,9 @@ struct Trial {
   double best_trivial = kNotAsked;      ///< the same of the model without it, corrected
   double clear_of_neutral = kNotAsked;  ///< standard deviations, clustered
   std::vector<Criterion> criteria;      ///< in the order in which they were asked
-  /// Corrections without physics did as well as it alone. It is followed all the same, for what it
-  /// does together with hypotheses accepted after it, with which it must beat them.
+  /// Corrections without physics did as well as the hypothesis alone. It is followed all the same,
+  /// for what it does together with hypotheses accepted after it. With these it must beat the
+  /// corrections.
   bool on_credit = false;
 
   bool passed() const;          ///< every criterion
@@ -52,18 +53,18 @@ struct Compared {
   const CrossValidation& without_left_out;  ///< with free forces
   const Score& score;
   const FittedModel& with;
-  /// The score is that of another basin or mesh than the one where the model without it stands.
+  /// The score is that of another basin or mesh than those of the model without the hypothesis.
   bool scored_elsewhere = false;
 };
 
 /// Asks one criterion after the other, the cheap ones first, until one is not passed.
 Trial try_hypothesis(const SearchContext& search, const Compared& models);
 
-/// Blocks left out of a model. `forces_mesh`: of free forces, where these are asked for.
+/// Cross-validates a model. `forces_mesh` is that of free forces, where these are asked for.
 CrossValidation left_out_of(const SearchContext& search, const FittedModel& model,
                             const DiagnosisSetup* forces_mesh = nullptr);
 
-/// Chi-square per number left out of a model that is corrected without physics.
+/// Returns chi-square per number left out of a model that is corrected without physics.
 double without_physics(const CrossValidation& of);
 
 }  // namespace clothfit

@@ -11,7 +11,7 @@ namespace {
 
 using Place = std::pair<int, int>;  ///< frame, marker
 
-/// Replaces a kind's rows by what a model and the noise make of them.
+/// Replaces a kind's rows by a model's predictions with noise.
 template <class Tracks, class SetPlace>
 void reseed(Tracks& tracks, const FitReport::Residuals& truth, Draws& noise,
             const SetPlace& set_place) {

@@ -7,9 +7,10 @@
 
 namespace clothfit {
 
-/// A recording as it would be if a model were the truth: the same frames, markers, gaps, cameras
-/// and drive, every observation where the model has it (`truth`: a report of that model on this
-/// recording) with normal noise of its own sigma. What the model puts behind a camera is left out.
+/// Makes a recording as it would be if a model were the truth. Frames, markers, gaps, cameras and
+/// drive stay the same. Every observation lies where the model has it, with normal noise of its own
+/// sigma. `truth` is a report of that model on this recording. What the model puts behind a camera
+/// is left out.
 FitInput twin_of(FitInput recording, const FitReport& truth, std::uint64_t seed);
 
 }  // namespace clothfit

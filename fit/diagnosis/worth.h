@@ -4,23 +4,23 @@
 
 namespace clothfit {
 
-/// The least decrease of chi-square that counts: the square of a standard normal number, or of
-/// several, that is as unlikely as five sigma.
+/// Returns the least decrease of chi-square that counts. It is the square of a standard normal
+/// number, or of several, that is as unlikely as five sigma.
 double least_decrease(Eigen::Index amplitudes);
 
-/// Chi-square above what noise makes, twice its standard deviation taken off; 0 at least.
+/// Returns chi-square above what noise makes, less twice its standard deviation; 0 at least.
 double sure_excess(const FittedModel& model, double threshold);
 
-/// The decrease of chi-square from which a hypothesis is worth a name, however sure it is. Four
-/// things bound it. Noise is known to three tenths of a per cent at best. A model whose numerics
-/// err leaves structure that many hypotheses follow a little, so that a third of the sure excess is
-/// asked. Where much is missing that no single hypothesis explains, a twentieth of chi-square and
-/// a quarter of the noise are enough. The form of an accepted effect is known to a per cent, so
-/// that little more is worth a name beside hypotheses that explain much (`explained`, of
-/// chi-square).
+/// Returns the decrease of chi-square from which a hypothesis is worth a name, however sure it is.
+/// Four things bound it. Noise is known to three tenths of a per cent at best. A model whose
+/// numerics err leaves structure that many hypotheses follow a little, so a third of the sure
+/// excess is asked. Where much is missing that no single hypothesis explains, a twentieth of
+/// chi-square and a quarter of the noise are enough. The form of an accepted effect is known to a
+/// per cent, so what its error may leave is worth no name beside hypotheses that explain much
+/// (`explained`, of chi-square).
 double worth_naming(const FittedModel& model, double threshold, double explained = 0);
 
-/// The price of a model's amplitudes and fitted shapes (Bayesian information criterion).
+/// Returns the price of a model's amplitudes and fitted shapes (Bayesian information criterion).
 double price_of_amplitudes(const FittedModel& model);
 
 }  // namespace clothfit
