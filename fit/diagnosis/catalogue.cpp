@@ -25,15 +25,15 @@ double spacing(const std::vector<double>& values, double at) {
 }
 
 /// Returns all combinations of the values that a mode's shapes are tried at.
-ShapeCandidates shapes_of(const EffectDescription& effect, const EffectMode& law,
+ShapeCandidates shapes_of(const EffectDescription& effect, const EffectMode& mode,
                           double duration_s) {
-  Hypothesis term{.effect = effect.name,
-                  .mode = law.name,
-                  .amplitudes = law.amplitudes,
-                  .shape = {},
-                  .shape_sigma = {}};
-  ShapeCandidates result{term};
-  for (const ShapeGrid& grid : law.shapes) {
+  Hypothesis hypothesis{.effect = effect.name,
+                        .mode = mode.name,
+                        .amplitudes = mode.amplitudes,
+                        .shape = {},
+                        .shape_sigma = {}};
+  ShapeCandidates result{hypothesis};
+  for (const ShapeGrid& grid : mode.shapes) {
     const auto parameter =
         std::ranges::find(effect.parameters, grid.parameter, &EffectParameter::name);
     const double in_unit_per_value = grid.per_duration  ? 1 / duration_s
@@ -54,7 +54,7 @@ ShapeCandidates shapes_of(const EffectDescription& effect, const EffectMode& law
   return result;
 }
 
-std::vector<EffectMode> laws_of(const EffectDescription& effect) {
+std::vector<EffectMode> modes_of(const EffectDescription& effect) {
   if (!effect.modes.empty()) return effect.modes;
   EffectMode all{.name = "", .amplitudes = {}, .shapes = {}};
   for (const EffectParameter& parameter : effect.parameters)
@@ -80,12 +80,12 @@ std::vector<std::string> present_effects(const FitInput& input, const FitOptions
 
 }  // namespace
 
-ShapeCandidates at_shapes_of(const std::vector<Hypothesis>& terms,
+ShapeCandidates at_shapes_of(const std::vector<Hypothesis>& hypotheses,
                              const std::map<std::string, double>& values,
-                             const ShapeCandidates& law) {
+                             const ShapeCandidates& shapes) {
   ShapeCandidates result;
-  for (Hypothesis one : law) {
-    for (const Hypothesis& own : terms) {
+  for (Hypothesis one : shapes) {
+    for (const Hypothesis& own : hypotheses) {
       if (own.effect != one.effect) continue;
       for (const auto& [parameter, value] : own.shape) {
         if (!one.shape.contains(parameter)) continue;
@@ -99,28 +99,28 @@ ShapeCandidates at_shapes_of(const std::vector<Hypothesis>& terms,
   return result;
 }
 
-bool is_harmonic(const Hypothesis& law) {
-  const EffectDescription effect = describe_effect(law.effect);
-  const auto own = std::ranges::find(effect.modes, law.mode, &EffectMode::name);
+bool is_harmonic(const Hypothesis& hypothesis) {
+  const EffectDescription effect = describe_effect(hypothesis.effect);
+  const auto own = std::ranges::find(effect.modes, hypothesis.mode, &EffectMode::name);
   return own != effect.modes.end() && Harmonic::is_followed_by(*own);
 }
 
-bool is_over_cloth(const Hypothesis& law) {
-  const EffectDescription effect = describe_effect(law.effect);
-  const auto own = std::ranges::find(effect.modes, law.mode, &EffectMode::name);
+bool is_over_cloth(const Hypothesis& hypothesis) {
+  const EffectDescription effect = describe_effect(hypothesis.effect);
+  const auto own = std::ranges::find(effect.modes, hypothesis.mode, &EffectMode::name);
   return own != effect.modes.end() && std::ranges::any_of(own->shapes, &ShapeGrid::over_cloth);
 }
 
-ShapeCandidates shapes_around(const Hypothesis& term, double part) {
-  const EffectDescription effect = describe_effect(term.effect);
+ShapeCandidates shapes_around(const Hypothesis& hypothesis, double part) {
+  const EffectDescription effect = describe_effect(hypothesis.effect);
   ShapeCandidates around;
-  for (const auto& [name, value] : term.shape) {
+  for (const auto& [name, value] : hypothesis.shape) {
     const EffectParameter& parameter =
         *std::ranges::find(effect.parameters, name, &EffectParameter::name);
     for (const double way : {-part, part}) {
-      const double moved = value + way * term.shape_sigma.at(name);
+      const double moved = value + way * hypothesis.shape_sigma.at(name);
       if (moved < parameter.lower || moved > parameter.upper) continue;
-      around.push_back(term);
+      around.push_back(hypothesis);
       around.back().shape[name] = moved;
     }
   }
@@ -138,10 +138,10 @@ std::vector<Hypothesis> empirical_hypotheses(const FitInput& input, const FitOpt
     if (!is_empirical(entry.name) || std::ranges::find(present, entry.name) != present.end())
       continue;
     const EffectDescription effect = entry.describe();
-    for (const EffectMode& law : laws_of(effect))
+    for (const EffectMode& mode : modes_of(effect))
       result.push_back({.effect = effect.name,
-                        .mode = law.name,
-                        .amplitudes = law.amplitudes,
+                        .mode = mode.name,
+                        .amplitudes = mode.amplitudes,
                         .shape = {},
                         .shape_sigma = {}});
   }
@@ -164,8 +164,8 @@ std::vector<ShapeCandidates> hypotheses_to_test(const FitInput& input, const Fit
     if (std::ranges::find(present, name) != present.end()) continue;
     const EffectDescription effect = describe_effect(name);
     if (effect.test == EffectTest::finite && effect.modes.empty()) continue;
-    for (const EffectMode& law : laws_of(effect)) {
-      ShapeCandidates shapes = shapes_of(effect, law, duration_s);
+    for (const EffectMode& mode : modes_of(effect)) {
+      ShapeCandidates shapes = shapes_of(effect, mode, duration_s);
       if (!shapes.empty()) result.push_back(std::move(shapes));
     }
   }

@@ -15,19 +15,19 @@ using ShapeCandidates = std::vector<Hypothesis>;
 
 /// Returns a mode's shapes beside a model's hypotheses. Where the model has the effect by another
 /// mode, the mode takes the shape there, at `values` (EFFECT.PARAMETER) where that is fitted.
-ShapeCandidates at_shapes_of(const std::vector<Hypothesis>& terms,
+ShapeCandidates at_shapes_of(const std::vector<Hypothesis>& hypotheses,
                              const std::map<std::string, double>& values,
-                             const ShapeCandidates& law);
+                             const ShapeCandidates& shapes);
 
 /// Tells whether a hypothesis is a sine of time, at any phase (Harmonic).
-bool is_harmonic(const Hypothesis& law);
+bool is_harmonic(const Hypothesis& hypothesis);
 
 /// Tells whether a hypothesis' shape says where on the cloth it acts.
-bool is_over_cloth(const Hypothesis& law);
+bool is_over_cloth(const Hypothesis& hypothesis);
 
 /// Returns the hypothesis at shapes around its own. Each number of the shape moves either way by a
 /// part of the grid's spacing, as far as its range allows.
-ShapeCandidates shapes_around(const Hypothesis& term, double part);
+ShapeCandidates shapes_around(const Hypothesis& hypothesis, double part);
 
 /// Tells whether an effect describes a force and names no cause for it. A proposed law is made of
 /// such effects (fit/diagnosis/proposed_law.h), and none is tested as a cause.

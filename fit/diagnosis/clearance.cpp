@@ -76,8 +76,8 @@ struct FromNeutral {
 FromNeutral from_neutral(const FittedModel& model, double threshold) {
   const std::vector<const FitProblem*> problems = model.problem_pointers();
   const PooledSpace pooled(problems);
-  const Hypothesis& term = model.hypotheses.back();
-  const EffectDescription effect = describe_effect(term.effect);
+  const Hypothesis& hypothesis = model.hypotheses.back();
+  const EffectDescription effect = describe_effect(hypothesis.effect);
   std::vector<Eigen::Index> indices;
   std::vector<double> away;
   const std::vector<Quadratic> quadratics = quadratics_of(model, threshold);
@@ -85,8 +85,8 @@ FromNeutral from_neutral(const FittedModel& model, double threshold) {
   for (size_t n = 0; n < problems.size(); ++n) {
     const ParameterSpace& space = problems[n]->space;
     const Eigen::VectorXd slope = space.value_by_coordinate(model.parts[n].values);
-    for (const std::string& name : term.amplitudes) {
-      const int p = space.index(term.effect + "." + name);
+    for (const std::string& name : hypothesis.amplitudes) {
+      const int p = space.index(hypothesis.effect + "." + name);
       const std::vector<int>& own = pooled.own_of(n);
       if (const auto found = std::ranges::find(own, p); found != own.end()) {
         indices.push_back(pooled.first_own(n) + (found - own.begin()));

@@ -24,11 +24,11 @@ namespace {
 struct Batch {
   FitProblem problem;
   Eigen::VectorXd values;
-  struct Law {
+  struct Member {
     size_t index = 0;
     std::vector<int> coordinates;
   };
-  std::vector<Law> laws;
+  std::vector<Member> members;
   int amplitudes = 0;
 };
 
@@ -36,21 +36,21 @@ struct Batch {
 /// be a derivative, and large enough that rounding does not count.
 constexpr double kSmall = 1e-5;
 
-void add(Batch& batch, size_t index, const Hypothesis& law) {
-  const EffectDescription effect = describe_effect(law.effect);
-  const MeasurementEffectEntry* entry = measurement_effect_named(law.effect);
-  Batch::Law added{.index = index, .coordinates = {}};
+void add(Batch& batch, size_t index, const Hypothesis& hypothesis) {
+  const EffectDescription effect = describe_effect(hypothesis.effect);
+  const MeasurementEffectEntry* entry = measurement_effect_named(hypothesis.effect);
+  Batch::Member added{.index = index, .coordinates = {}};
   std::vector<Binding> bindings;
   std::vector<double> neutral;
   for (const EffectParameter& parameter : effect.parameters) {
     Binding binding{.parameter = -1, .constant = parameter.neutral};
-    if (const auto shape = law.shape.find(parameter.name); shape != law.shape.end())
+    if (const auto shape = hypothesis.shape.find(parameter.name); shape != hypothesis.shape.end())
       binding.constant = shape->second;
-    if (std::ranges::find(law.amplitudes, parameter.name) != law.amplitudes.end()) {
+    if (std::ranges::find(hypothesis.amplitudes, parameter.name) != hypothesis.amplitudes.end()) {
       binding.parameter = batch.problem.space.size();
       added.coordinates.push_back(binding.parameter);
       batch.problem.space.parameters.push_back(
-          {.name = law.effect + "." + parameter.name + " " + std::to_string(index),
+          {.name = hypothesis.effect + "." + parameter.name + " " + std::to_string(index),
            .unit = parameter.unit,
            .role = entry ? ParameterRole::measurement : ParameterRole::effect,
            .scale = parameter.scale,
@@ -69,7 +69,8 @@ void add(Batch& batch, size_t index, const Hypothesis& law) {
         {.effect = entry->make(), .description = effect, .parameters = std::move(bindings)});
     add_derivative_weights(batch.problem);
   } else {
-    const std::shared_ptr<const Effect> made = find_effect(law.effect, law.effect).make();
+    const std::shared_ptr<const Effect> made =
+        find_effect(hypothesis.effect, hypothesis.effect).make();
     for (size_t k = 0; k < bindings.size(); ++k) {
       if (bindings[k].parameter < 0) continue;
       FitProblem::EmergingTerm term{.parameter = bindings[k].parameter,
@@ -81,7 +82,7 @@ void add(Batch& batch, size_t index, const Hypothesis& law) {
     }
   }
   batch.amplitudes += static_cast<int>(added.coordinates.size());
-  batch.laws.push_back(std::move(added));
+  batch.members.push_back(std::move(added));
 }
 
 /// Amplitudes of motion effects that share a run. The simulation and what its effects are
@@ -90,52 +91,52 @@ constexpr int kMotionAmplitudes = 8 * kLanes;
 
 /// Differentiates one recording's residuals.
 std::vector<Eigen::MatrixXd> derivatives_in(const FitProblem& problem, const PooledPart& part,
-                                            std::span<const Hypothesis> laws) {
+                                            std::span<const Hypothesis> hypotheses) {
   int measured = 0;
   for (const FitProblem::MeasurementTerm& term : problem.measurement)
     for (const Binding& binding : term.parameters) measured += binding.parameter >= 0 ? 1 : 0;
   std::vector<Batch> batches;
   // Effects that only add forces cost least. Those of the measurement need no derivatives of runs.
   enum class Kind { adds_forces, changes_runs, measures };
-  const auto kind_of = [](const Hypothesis& law) {
-    if (measurement_effect_named(law.effect) != nullptr) return Kind::measures;
-    const std::unique_ptr<Effect> effect = find_effect(law.effect, law.effect).make();
+  const auto kind_of = [](const Hypothesis& hypothesis) {
+    if (measurement_effect_named(hypothesis.effect) != nullptr) return Kind::measures;
+    const std::unique_ptr<Effect> effect = find_effect(hypothesis.effect, hypothesis.effect).make();
     return effect->changes_force() || effect->shifts_supports() ? Kind::changes_runs
                                                                 : Kind::adds_forces;
   };
   std::vector<Kind> kinds;
-  for (const Hypothesis& law : laws) kinds.push_back(kind_of(law));
+  for (const Hypothesis& hypothesis : hypotheses) kinds.push_back(kind_of(hypothesis));
   for (const Kind kind : {Kind::adds_forces, Kind::changes_runs, Kind::measures}) {
     const int most = kind == Kind::measures ? kMeasurementParameters - measured : kMotionAmplitudes;
     bool begun = false;
-    for (size_t n = 0; n < laws.size(); ++n) {
+    for (size_t n = 0; n < hypotheses.size(); ++n) {
       if (kinds[n] != kind) continue;
-      const MeasurementEffectEntry* entry = measurement_effect_named(laws[n].effect);
+      const MeasurementEffectEntry* entry = measurement_effect_named(hypotheses[n].effect);
       if (entry && why_inapplicable(*entry->make(), measurement_setting(problem))) continue;
-      const auto more = static_cast<int>(laws[n].amplitudes.size());
+      const auto more = static_cast<int>(hypotheses[n].amplitudes.size());
       if (more > most) continue;
       if (!begun || batches.back().amplitudes + more > most)
-        batches.push_back({.problem = problem, .values = part.values, .laws = {}});
+        batches.push_back({.problem = problem, .values = part.values, .members = {}});
       begun = true;
-      add(batches.back(), n, laws[n]);
+      add(batches.back(), n, hypotheses[n]);
     }
   }
 
-  std::vector<Eigen::MatrixXd> result(laws.size());
+  std::vector<Eigen::MatrixXd> result(hypotheses.size());
   tbb::parallel_for(size_t{0}, batches.size(), [&](size_t b) {
     const Batch& batch = batches[b];
     std::vector<int> all;
-    for (const Batch::Law& law : batch.laws)
-      all.insert(all.end(), law.coordinates.begin(), law.coordinates.end());
+    for (const Batch::Member& member : batch.members)
+      all.insert(all.end(), member.coordinates.begin(), member.coordinates.end());
     const TrajectoryObjective objective(batch.problem, part.frames, part.steps);
     const Linearisation linear = objective.linearise_by(batch.values, all);
     if (!linear.usable) return;
     const Eigen::VectorXd slope = batch.problem.space.value_by_coordinate(batch.values);
     Eigen::Index first = 0;
-    for (const Batch::Law& law : batch.laws) {
-      const auto count = static_cast<Eigen::Index>(law.coordinates.size());
-      result[law.index] = linear.residual_by_coordinate.middleCols(first, count) *
-                          slope(law.coordinates).cwiseInverse().asDiagonal();
+    for (const Batch::Member& member : batch.members) {
+      const auto count = static_cast<Eigen::Index>(member.coordinates.size());
+      result[member.index] = linear.residual_by_coordinate.middleCols(first, count) *
+                             slope(member.coordinates).cwiseInverse().asDiagonal();
       first += count;
     }
   });
@@ -144,17 +145,17 @@ std::vector<Eigen::MatrixXd> derivatives_in(const FitProblem& problem, const Poo
 
 /// Differentiates by each hypothesis by itself.
 std::vector<Columns> derivatives_of_each(const FittedModel& model,
-                                         std::span<const Hypothesis> laws) {
+                                         std::span<const Hypothesis> hypotheses) {
   const size_t recordings = model.parts.size();
   std::vector<std::vector<Eigen::MatrixXd>> of_recording(recordings);
   tbb::parallel_for(size_t{0}, recordings, [&](size_t n) {
-    of_recording[n] = derivatives_in(*model.problems[n], model.parts[n], laws);
+    of_recording[n] = derivatives_in(*model.problems[n], model.parts[n], hypotheses);
   });
-  std::vector<Columns> result(laws.size());
-  for (size_t k = 0; k < laws.size(); ++k) {
+  std::vector<Columns> result(hypotheses.size());
+  for (size_t k = 0; k < hypotheses.size(); ++k) {
     if (std::ranges::any_of(of_recording, [&](const auto& of) { return of[k].cols() == 0; }))
       continue;
-    const bool own = measurement_effect_named(laws[k].effect) != nullptr;
+    const bool own = measurement_effect_named(hypotheses[k].effect) != nullptr;
     const Eigen::Index each = of_recording.front()[k].cols();
     for (size_t n = 0; n < recordings; ++n) {
       Eigen::MatrixXd& of = of_recording[n][k];
@@ -173,40 +174,41 @@ std::vector<Columns> derivatives_of_each(const FittedModel& model,
 }  // namespace
 
 std::vector<Columns> hypothesis_derivatives(const FittedModel& model,
-                                            std::span<const Hypothesis> laws) {
+                                            std::span<const Hypothesis> hypotheses) {
   // Derivatives of a harmonic at any phase are combinations of those at two.
   constexpr size_t kPhases = 2;
   std::map<std::tuple<std::string, std::string, double>, std::vector<size_t>> harmonics;
-  for (size_t k = 0; k < laws.size(); ++k)
-    if (is_harmonic(laws[k]))
-      harmonics[{laws[k].effect, laws[k].mode, laws[k].shape.at("frequency")}].push_back(k);
+  for (size_t k = 0; k < hypotheses.size(); ++k)
+    if (is_harmonic(hypotheses[k]))
+      harmonics[{hypotheses[k].effect, hypotheses[k].mode, hypotheses[k].shape.at("frequency")}]
+          .push_back(k);
   std::erase_if(harmonics, [](const auto& known) { return known.second.size() <= kPhases; });
 
-  std::vector<bool> combined(laws.size(), false);
+  std::vector<bool> combined(hypotheses.size(), false);
   std::vector<Hypothesis> each;
   for (const auto& [key, phases] : harmonics) {
     for (const size_t k : phases) combined[k] = true;
     for (const double phase : {0.0, 0.25}) {
-      each.push_back(laws[phases.front()]);
+      each.push_back(hypotheses[phases.front()]);
       each.back().shape["phase"] = phase;
     }
   }
-  for (size_t k = 0; k < laws.size(); ++k)
-    if (!combined[k]) each.push_back(laws[k]);
+  for (size_t k = 0; k < hypotheses.size(); ++k)
+    if (!combined[k]) each.push_back(hypotheses[k]);
 
-  std::vector<Columns> found = derivatives_of_each(model, each), result(laws.size());
+  std::vector<Columns> found = derivatives_of_each(model, each), result(hypotheses.size());
   size_t next = 0;
   for (const auto& [key, phases] : harmonics) {
     const Columns &in_phase = found[next], &quarter_on = found[next + 1];
     next += kPhases;
     if (in_phase.empty() || quarter_on.empty()) continue;
     for (const size_t k : phases) {
-      const double angle = 2 * std::numbers::pi * laws[k].shape.at("phase");
+      const double angle = 2 * std::numbers::pi * hypotheses[k].shape.at("phase");
       for (size_t n = 0; n < in_phase.size(); ++n)
         result[k].push_back(std::cos(angle) * in_phase[n] + std::sin(angle) * quarter_on[n]);
     }
   }
-  for (size_t k = 0; k < laws.size(); ++k)
+  for (size_t k = 0; k < hypotheses.size(); ++k)
     if (!combined[k]) result[k] = std::move(found[next++]);
   return result;
 }

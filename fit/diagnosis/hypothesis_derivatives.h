@@ -18,7 +18,7 @@ using Columns = std::vector<Eigen::MatrixXd>;
 /// has none either where a predictor has no room for it beside the model's own effects of the
 /// measurement.
 std::vector<Columns> hypothesis_derivatives(const FittedModel& model,
-                                            std::span<const Hypothesis> laws);
+                                            std::span<const Hypothesis> hypotheses);
 
 /// Returns the share of a vector's square that columns explain. It is their squared multiple
 /// correlation, under whatever projection both have gone through. It is 0 for no columns.

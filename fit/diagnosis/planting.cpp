@@ -19,8 +19,9 @@ PlantOutcome failed(PlantOutcome outcome, const std::string& why) {
 }  // namespace
 
 bool PlantOutcome::named() const {
-  return std::ranges::any_of(
-      found, [&](const Hypothesis& term) { return term.effect == plant.hypothesis.effect; });
+  return std::ranges::any_of(found, [&](const Hypothesis& hypothesis) {
+    return hypothesis.effect == plant.hypothesis.effect;
+  });
 }
 
 PlantOutcome search_twins(const DiagnosisSetup& setup, const FittedModel& model, const Plant& plant,

@@ -161,14 +161,14 @@ class Pursuit {
   }
 
   std::vector<ShapeCandidates> terms_to_test() const {
-    std::vector<ShapeCandidates> laws;
+    std::vector<ShapeCandidates> terms;
     for (const Hypothesis& term : empirical_hypotheses(setup_.inputs.front(), setup_.options)) {
       const auto is_term = [&](const Hypothesis& own) { return own.same_mode(term); };
       if (std::ranges::find(options_.without, term.effect) == options_.without.end() &&
           std::ranges::none_of(law_.model.hypotheses, is_term))
-        laws.push_back({term});
+        terms.push_back({term});
     }
-    return laws;
+    return terms;
   }
 
   bool add_term() {

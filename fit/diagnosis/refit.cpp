@@ -79,8 +79,8 @@ FittedModel fit_from_here(const DiagnosisSetup& setup, const FittedModel& model,
 /// A model fitted over a share of the frames, after the fit over the shorter one.
 using FitOver = std::function<FittedModel(size_t model, double share, const FittedModel& shorter)>;
 
-/// Fits models side by side over growing horizons. Those that leave far more than the best one fall
-/// out, and are not usable.
+/// Fits models side by side over growing horizons. Those that leave far more than the best one
+/// fall out, and are not usable.
 std::vector<FittedModel> race(size_t models, double first_share, double threshold,
                               const FitOver& fit_over) {
   std::vector<FittedModel> fitted(models);
@@ -130,8 +130,8 @@ FittedModel fit_from_unrefined(const DiagnosisSetup& setup, const FittedModel& m
   refine_model(near, setup, {}, progress);
   if (near.usable()) {
     const double left = near.chi_square(threshold);
-    const double fall = model.chi_square(threshold) - left;
-    if (fall > kCriteria.kept_promise * score.decrease ||
+    const double decrease = model.chi_square(threshold) - left;
+    if (decrease > kCriteria.kept_promise * score.decrease ||
         left < kCriteria.hardly_above_noise * static_cast<double>(near.residual_count()))
       return near;
   }
@@ -148,15 +148,15 @@ std::vector<FittedModel> fit_near(const DiagnosisSetup& setup, const FittedModel
                                   const ProgressCallback& progress) {
   const double without = model.chi_square(threshold);
   std::vector<FittedModel> fitted(scores.size());
-  std::vector<double> fall(scores.size(), 0);
+  std::vector<double> decrease(scores.size(), 0);
   for_each_index(scores.size(), [&](size_t k) {
     fitted[k] = fit_from_here(setup, model, *scores[k], {.rounds = 1, .unrefined = true}, progress);
-    if (fitted[k].usable()) fall[k] = without - fitted[k].chi_square(threshold);
+    if (fitted[k].usable()) decrease[k] = without - fitted[k].chi_square(threshold);
   });
   if (fitted.empty()) return fitted;
-  const double enough = kCriteria.exact_fit_of_best * *std::ranges::max_element(fall);
+  const double enough = kCriteria.exact_fit_of_best * *std::ranges::max_element(decrease);
   for_each_index(scores.size(), [&](size_t k) {
-    if (fall[k] < enough && fall[k] > kCriteria.kept_promise * scores[k]->decrease) return;
+    if (decrease[k] < enough && decrease[k] > kCriteria.kept_promise * scores[k]->decrease) return;
     fitted[k] =
         fit_from_unrefined(setup, model, *scores[k], std::move(fitted[k]), threshold, progress);
   });

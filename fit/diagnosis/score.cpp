@@ -16,19 +16,20 @@ constexpr double kInfinite = std::numeric_limits<double>::infinity();
 /// Hypotheses that are differentiated at once: as many as keep all cores at work.
 constexpr size_t kAtOnce = 64;
 
-Score judge(const Hypothesis& term, const ModelProjection& projection, Columns columns) {
-  const EffectDescription effect = describe_effect(term.effect);
+Score judge(const Hypothesis& hypothesis, const ModelProjection& projection, Columns columns) {
+  const EffectDescription effect = describe_effect(hypothesis.effect);
   const Eigen::Index count = columns.front().cols();
-  const auto each = static_cast<Eigen::Index>(term.amplitudes.size());
+  const auto each = static_cast<Eigen::Index>(hypothesis.amplitudes.size());
   Eigen::VectorXd down(count), up(count);
   for (Eigen::Index k = 0; k < count; ++k) {
-    const auto parameter = std::ranges::find(
-        effect.parameters, term.amplitudes[static_cast<size_t>(k % each)], &EffectParameter::name);
+    const auto parameter =
+        std::ranges::find(effect.parameters, hypothesis.amplitudes[static_cast<size_t>(k % each)],
+                          &EffectParameter::name);
     down[k] = parameter->lower - parameter->neutral;
     up[k] = parameter->upper - parameter->neutral;
   }
   const Explained explained = explain(projection.residual(), projection.columns(columns), down, up);
-  Score result{.hypothesis = term,
+  Score result{.hypothesis = hypothesis,
                .amplitude = explained.amplitude,
                .sigma = Eigen::VectorXd::Constant(count, kInfinite),
                .decrease = explained.decrease,
@@ -58,21 +59,21 @@ std::string Score::amplitude_name(Eigen::Index k) const {
 }
 
 std::vector<Score> score_hypotheses(const FittedModel& model, const ModelProjection& projection,
-                                    const std::vector<ShapeCandidates>& laws,
+                                    const std::vector<ShapeCandidates>& hypotheses,
                                     const ProgressCallback& progress) {
   std::vector<Hypothesis> tests;
-  std::vector<size_t> law_of_test;
-  for (size_t law = 0; law < laws.size(); ++law) {
-    for (const Hypothesis& term : laws[law]) {
-      tests.push_back(term);
-      law_of_test.push_back(law);
+  std::vector<size_t> mode_of_test;
+  for (size_t mode = 0; mode < hypotheses.size(); ++mode) {
+    for (const Hypothesis& hypothesis : hypotheses[mode]) {
+      tests.push_back(hypothesis);
+      mode_of_test.push_back(mode);
     }
   }
   const double free = std::max(1.0, projection.weights() - projection.taken());
   // An excess below chi-square's own standard deviation is not known to be there.
   const double above = std::max(projection.residual().squaredNorm() - free, std::sqrt(2 * free));
   std::vector<Score> best;
-  size_t law_of_best = 0;
+  size_t mode_of_best = 0;
   for (size_t first = 0; first < tests.size(); first += kAtOnce) {
     report_progress(progress, {.stage = "scoring laws",
                                .done = static_cast<double>(first),
@@ -86,12 +87,12 @@ std::vector<Score> score_hypotheses(const FittedModel& model, const ModelProject
       if (columns[k].empty()) continue;
       Score score = judge(some[k], projection, std::move(columns[k]));
       score.share = score.decrease / above;
-      const size_t law = law_of_test[first + k];
-      if (best.empty() || law_of_best != law)
+      const size_t mode = mode_of_test[first + k];
+      if (best.empty() || mode_of_best != mode)
         best.push_back(std::move(score));
       else if (score.decrease > best.back().decrease)
         best.back() = std::move(score);
-      law_of_best = law;
+      mode_of_best = mode;
     }
   }
   return best;

@@ -33,11 +33,11 @@ constexpr size_t kKept = 3;  ///< recordings that are named
 using Refit = std::vector<Hypothesis>;
 
 /// Returns the hypothesis at its shape and beside it, and a harmonic at any phase.
-std::vector<Refit> refits_of(const Hypothesis& law) {
+std::vector<Refit> refits_of(const Hypothesis& hypothesis) {
   constexpr double kPart = 0.5;
-  ShapeCandidates shapes = shapes_around(law, kPart);
-  shapes.insert(shapes.begin(), law);
-  if (!is_harmonic(law)) {
+  ShapeCandidates shapes = shapes_around(hypothesis, kPart);
+  shapes.insert(shapes.begin(), hypothesis);
+  if (!is_harmonic(hypothesis)) {
     std::vector<Refit> refits;
     for (const Hypothesis& shape : shapes) refits.push_back({shape});
     return refits;
@@ -58,10 +58,11 @@ std::vector<Refit> refits_of(const Hypothesis& law) {
 
 /// Returns the parameters of a hypothesis in a problem's space: amplitudes, and shapes where they
 /// are fitted.
-std::vector<int> parameters_of(const Hypothesis& term, const ParameterSpace& space) {
-  std::vector<std::string> names = term.parameters();
-  if (term.fits_shape)
-    for (const auto& [name, value] : term.shape) names.push_back(term.effect + "." + name);
+std::vector<int> parameters_of(const Hypothesis& hypothesis, const ParameterSpace& space) {
+  std::vector<std::string> names = hypothesis.parameters();
+  if (hypothesis.fits_shape)
+    for (const auto& [name, value] : hypothesis.shape)
+      names.push_back(hypothesis.effect + "." + name);
   std::vector<int> parameters;
   for (const std::string& name : names)
     if (const int p = space.index(name); p >= 0) parameters.push_back(p);
@@ -69,25 +70,25 @@ std::vector<int> parameters_of(const Hypothesis& term, const ParameterSpace& spa
 }
 
 /// Returns the model as if it did not have a hypothesis, near where it stands with it.
-FittedModel without(FittedModel model, const Hypothesis& law) {
+FittedModel without(FittedModel model, const Hypothesis& hypothesis) {
   for (size_t n = 0; n < model.parts.size(); ++n)
-    for (const int p : parameters_of(law, model.problems[n]->space))
+    for (const int p : parameters_of(hypothesis, model.problems[n]->space))
       model.parts[n].linear.residual_by_coordinate.col(p).setZero();
   return model;
 }
 
 /// Returns the change of the residuals by a hypothesis' amplitudes, D_a a: a column of each
 /// recording.
-Columns change_by(const FittedModel& model, const Hypothesis& law) {
-  const EffectDescription effect = describe_effect(law.effect);
+Columns change_by(const FittedModel& model, const Hypothesis& hypothesis) {
+  const EffectDescription effect = describe_effect(hypothesis.effect);
   Columns change;
   for (size_t n = 0; n < model.parts.size(); ++n) {
     const PooledPart& part = model.parts[n];
     const ParameterSpace& space = model.problems[n]->space;
     const Eigen::VectorXd slope = space.value_by_coordinate(part.values);
     change.emplace_back(Eigen::MatrixXd::Zero(part.linear.residual.size(), 1));
-    for (const std::string& name : law.amplitudes) {
-      const int p = space.index(law.effect + "." + name);
+    for (const std::string& name : hypothesis.amplitudes) {
+      const int p = space.index(hypothesis.effect + "." + name);
       if (p < 0) continue;
       const double neutral =
           std::ranges::find(effect.parameters, name, &EffectParameter::name)->neutral;
@@ -101,7 +102,7 @@ Columns change_by(const FittedModel& model, const Hypothesis& law) {
 /// A hypothesis of the model, and one that may do the same.
 struct Pair {
   size_t accepted = 0;
-  Hypothesis law, other;
+  Hypothesis hypothesis, other;
   std::vector<Refit> refits;  ///< of the other one
 };
 
@@ -112,10 +113,11 @@ struct Distance {
 
 /// Computes hypothesis_distance() of each pair.
 std::vector<Distance> distances(const FittedModel& model, const std::vector<Pair>& pairs) {
-  std::vector<Hypothesis> laws;
+  std::vector<Hypothesis> hypotheses;
   for (const Pair& pair : pairs)
-    for (const Refit& refit : pair.refits) laws.insert(laws.end(), refit.begin(), refit.end());
-  const std::vector<Columns> columns = hypothesis_derivatives(model, laws);
+    for (const Refit& refit : pair.refits)
+      hypotheses.insert(hypotheses.end(), refit.begin(), refit.end());
+  const std::vector<Columns> columns = hypothesis_derivatives(model, hypotheses);
   std::vector<Distance> result;
   std::optional<ModelProjection> projection;
   Eigen::VectorXd change;
@@ -124,8 +126,8 @@ std::vector<Distance> distances(const FittedModel& model, const std::vector<Pair
     if (k == 0 || pairs[k].accepted != pairs[k - 1].accepted) {
       // Noise is taken as stated, for the distance is one of the recording and not of its
       // residuals.
-      projection.emplace(without(model, pairs[k].law), Loss::squared);
-      change = projection->columns(change_by(model, pairs[k].law));
+      projection.emplace(without(model, pairs[k].hypothesis), Loss::squared);
+      change = projection->columns(change_by(model, pairs[k].hypothesis));
     }
     Distance& distance = result.emplace_back();
     for (const Refit& refit : pairs[k].refits) {
@@ -275,7 +277,7 @@ std::vector<Pair> pairs_of(const FittedModel& model, const std::vector<AcceptedE
       if (std::ranges::none_of(model.hypotheses,
                                [&](const Hypothesis& own) { return own.same_mode(other); }))
         pairs.push_back({.accepted = k,
-                         .law = accepted[k].trial.hypothesis,
+                         .hypothesis = accepted[k].trial.hypothesis,
                          .other = other,
                          .refits = refits_of(other)});
   return pairs;
@@ -311,9 +313,9 @@ std::vector<Recorded> chosen_of(const std::vector<Recorded>& recorded, size_t pa
 
 }  // namespace
 
-double hypothesis_distance(const FittedModel& model, const Hypothesis& law,
+double hypothesis_distance(const FittedModel& model, const Hypothesis& hypothesis,
                            const Hypothesis& other) {
-  return distances(model, {{.law = law, .other = other, .refits = refits_of(other)}})
+  return distances(model, {{.hypothesis = hypothesis, .other = other, .refits = refits_of(other)}})
       .front()
       .sigmas;
 }

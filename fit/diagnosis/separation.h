@@ -31,7 +31,7 @@ struct Separation {
 ///
 /// in standard deviations of the noise. The other hypothesis may take its shape, or one half of its
 /// grid's spacing beside it, and a harmonic any phase. NaN where it cannot act.
-double hypothesis_distance(const FittedModel& model, const Hypothesis& law,
+double hypothesis_distance(const FittedModel& model, const Hypothesis& hypothesis,
                            const Hypothesis& other);
 
 /// Finds the recordings that would tell each accepted effect from each hypothesis that is alike.
