@@ -19,7 +19,7 @@ namespace {
 constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();
 constexpr int kLeastReplicates = 19;
 
-/// The inverse where it exists.
+/// Returns the inverse where it exists.
 std::optional<Eigen::MatrixXd> inverse_if_any(const Eigen::MatrixXd& information) {
   const Eigen::VectorXd unit = information.diagonal().cwiseSqrt().cwiseInverse();
   if (!unit.allFinite()) return std::nullopt;
@@ -31,7 +31,7 @@ std::optional<Eigen::MatrixXd> inverse_if_any(const Eigen::MatrixXd& information
          unit.asDiagonal();
 }
 
-/// The value below which `share` of the sorted numbers lie, linear between them.
+/// Returns the value below which `share` of the sorted numbers lie, linear between them.
 double quantile(const std::vector<double>& sorted, double share) {
   const double place = std::clamp(share * (static_cast<double>(sorted.size()) + 1) - 1, 0.0,
                                   static_cast<double>(sorted.size() - 1));

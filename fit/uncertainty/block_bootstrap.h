@@ -6,14 +6,14 @@
 
 namespace clothfit {
 
-/// How a replicate differs from the recording.
+/// The way in which a replicate differs from the recording.
 enum class BlockWeights {
-  /// Each block counts as often as it is drawn, of as many draws with replacement as there are
+  /// Each block counts as often as it is drawn. As many are drawn with replacement as there are
   /// blocks [cameron2008].
   resampled,
-  /// The residuals of a block are multiplied by one of six numbers of mean 0 and variance 1,
-  /// +- sqrt(1/2), +- 1, +- sqrt(3/2), equally likely [webb2014]; the Jacobian stays. For few
-  /// blocks, of which some drawings would leave out too many.
+  /// The residuals of a block are multiplied by one of six numbers of mean 0 and variance 1:
+  /// +- sqrt(1/2), +- 1, +- sqrt(3/2), equally likely [webb2014]. The Jacobian stays. These are for
+  /// few blocks, of which some drawings would leave out too many.
   wild
 };
 
@@ -25,12 +25,12 @@ struct BootstrapOptions {
   void validate() const;  ///< throws InputError
 };
 
-/// The numbers of the blocks in one replicate: they depend on (seed, replicate) and the number of
-/// blocks alone, so that no order of work changes them.
+/// Returns the numbers of the blocks in one replicate. They depend on (seed, replicate) and the
+/// number of blocks alone, so that no order of work changes them.
 Eigen::VectorXd block_weights(const BootstrapOptions& options, int blocks, int replicate);
 
 struct Bootstrap {
-  /// Estimate of each replicate less that of the recording, coordinates x replicates; NaN where a
+  /// Estimate of each replicate less that of the recording, coordinates x replicates. NaN where a
   /// replicate has no estimate.
   Eigen::MatrixXd change;
   /// The change divided by the replicate's own standard deviation.
@@ -40,8 +40,8 @@ struct Bootstrap {
   int failed = 0;  ///< replicates without an estimate
 };
 
-/// One Gauss-Newton step per replicate from the optimum at hand. `block` as for sum_over_blocks().
-/// Throws InputError as that does, and for options that make no sense.
+/// Takes one Gauss-Newton step per replicate from the optimum at hand. `block` is as for
+/// sum_over_blocks(). Throws InputError as that does, and for options that make no sense.
 Bootstrap bootstrap_linearised(const LinearisedFit& fit, const Eigen::VectorXi& block,
                                const BootstrapOptions& options);
 
@@ -50,10 +50,11 @@ struct ChangeIntervals {
   Eigen::VectorXd lower, upper;  ///< NaN where fewer than 19 replicates have an estimate
 };
 
-/// From quantiles of the change.
+/// Takes the ends from quantiles of the change.
 ChangeIntervals percentile_intervals(const Bootstrap& bootstrap, double level);
 
-/// From quantiles of the studentised change: wider where few blocks make sigma itself uncertain.
+/// Takes the ends from quantiles of the studentised change. They are wider where few blocks make
+/// sigma itself uncertain.
 ChangeIntervals studentised_intervals(const Bootstrap& bootstrap, double level);
 
 }  // namespace clothfit

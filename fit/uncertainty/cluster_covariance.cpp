@@ -13,8 +13,8 @@ namespace clothfit {
 
 namespace {
 
-/// T with J_b' A_b r_b = T J_b' r_b. A_b differs from the identity only in the column space of J_b,
-/// so a p x p matrix holds it: with S = J_b' J_b = V e^2 V' and U = J_b V e^-1 orthonormal,
+/// Returns T with J_b' A_b r_b = T J_b' r_b. A_b differs from the identity only in the column space
+/// of J_b, so a p x p matrix holds it. With S = J_b' J_b = V e^2 V' and U = J_b V e^-1 orthonormal,
 /// A_b = I + U (f(e V' H^-1 V e) - I) U' for the correction's function f of the block's leverage.
 Eigen::MatrixXd score_correction(const Eigen::MatrixXd& block_information,
                                  const Eigen::MatrixXd& inverse, ClusterCorrection correction) {
@@ -22,7 +22,7 @@ Eigen::MatrixXd score_correction(const Eigen::MatrixXd& block_information,
   if (correction != ClusterCorrection::bias_reduced && correction != ClusterCorrection::jackknife)
     return Eigen::MatrixXd::Identity(p, p);
   const double power = correction == ClusterCorrection::bias_reduced ? -0.5 : -1.0;
-  // Information that no other block has gives a leverage of 1; the fit leaves nothing of such
+  // Information that no other block has gives a leverage of 1. The fit leaves nothing of such
   // residuals to be enlarged, so the exact bound does not matter.
   constexpr double kLeastFreedom = 1e-6;
 
@@ -64,7 +64,7 @@ ClusterCovariance cluster_covariance(const LinearisedFit& fit, const Eigen::Vect
     return result;
   }
 
-  // In units of each coordinate's own information, so that conditions can be judged.
+  // Units are those of each coordinate's own information, so that conditions can be judged.
   const auto p = static_cast<Eigen::Index>(known.size());
   const Eigen::VectorXd unit =
       Eigen::VectorXd(all.total_information.diagonal())(known).cwiseSqrt().cwiseInverse();
@@ -101,8 +101,8 @@ ClusterCovariance cluster_covariance(const LinearisedFit& fit, const Eigen::Vect
       result.covariance(known[static_cast<size_t>(i)], known[static_cast<size_t>(j)]) =
           unit[i] * covariance(i, j) * unit[j];
 
-    // The blocks' shares in this coordinate's change, were residuals white, have the covariance
-    // a_b' (I - J H^-1 J') a_c; their sum of squares is the estimate.
+    // Were residuals white, the blocks' shares in this coordinate's change have the covariance a_b'
+    // (I - J H^-1 J') a_c. Their sum of squares is the estimate.
     const Eigen::VectorXd row = inverse.col(i);
     Eigen::MatrixXd share(all.blocks(), p);
     Eigen::VectorXd own(all.blocks());

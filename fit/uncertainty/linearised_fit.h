@@ -5,8 +5,8 @@
 
 namespace clothfit {
 
-/// A fit near its optimum as plain numbers, whatever its cost: what statistics need of it. n
-/// residuals, p coordinates.
+/// A fit near its optimum as plain numbers, whatever its cost. Statistics need no more of it. It
+/// has n residuals and p coordinates.
 struct LinearisedFit {
   Eigen::VectorXd residual;           ///< whitened, n
   Eigen::MatrixXd jacobian;           ///< d residual / d coordinate, n x p
@@ -20,8 +20,8 @@ struct LinearisedFit {
   void validate() const;
 };
 
-/// What the blocks of a partition contribute to the normal equations: all that linear statistics
-/// over blocks need to know of the residuals.
+/// The parts of the normal equations that the blocks of a partition contribute. Linear statistics
+/// over blocks need to know no more of the residuals.
 struct BlockSums {
   std::vector<Eigen::MatrixXd> information;  ///< of each block, J' W J over its rows, p x p
   Eigen::MatrixXd gradient;                  ///< J' W r of each block, p x blocks
@@ -32,8 +32,9 @@ struct BlockSums {
   int coordinates() const { return static_cast<int>(gradient.rows()); }
 };
 
-/// `block` gives each residual the index of its block, 0 ... largest, each in use. Throws
-/// InputError otherwise, for fewer than two blocks, and for a fit that does not validate.
+/// Sums each block's part of the normal equations. `block` gives each residual the index of its
+/// block, 0 ... largest, each in use. Throws InputError otherwise, for fewer than two blocks, and
+/// for a fit that does not validate.
 BlockSums sum_over_blocks(const LinearisedFit& fit, const Eigen::VectorXi& block);
 
 }  // namespace clothfit

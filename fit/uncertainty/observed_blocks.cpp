@@ -24,7 +24,7 @@ ObservationPlaces places_of(const TrajectoryObjective& objective) {
   return places;
 }
 
-/// The residuals of one set of observations.
+/// Returns the residuals of one set of observations.
 std::vector<Eigen::Index> rows_of(const TrajectoryObjective& objective, int set) {
   std::vector<Eigen::Index> rows;
   for (const Objective::Block& block : objective.blocks())

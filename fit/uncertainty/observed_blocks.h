@@ -11,8 +11,8 @@ struct ObservedBlocks {
   SpaceTimeBlocks blocks;  ///< of each residual; fewer than two: they tell of no scatter
 };
 
-/// Cut as the residuals ask for (choose_block_counts), each kind of observation for itself; of
-/// several kinds the coarsest cut counts, for all observe one cloth. Markers lie at their places
+/// Cuts blocks as the residuals ask for (choose_block_counts), each kind of observation for itself.
+/// Of several kinds the coarsest cut counts, for all observe one cloth. Markers lie at their places
 /// on the cloth, s and t; frames at their times.
 ObservedBlocks observed_blocks(const TrajectoryObjective& objective,
                                const Eigen::VectorXd& residual);

@@ -9,11 +9,11 @@
 namespace clothfit {
 namespace {
 
-/// A linear parameter is undetermined when its sigma is that of a uniform draw from its range,
-/// 1 / sqrt(12), about.
+/// A linear parameter is undetermined when its sigma is about that of a uniform draw from its
+/// range, 1 / sqrt(12).
 constexpr double kUndeterminedRangeShare = 0.25;
 
-/// Parameters more strongly correlated than this do the same to the motion, about.
+/// Parameters more strongly correlated than this do about the same to the motion.
 constexpr double kAlike = 0.95;
 
 ParameterEstimate estimate(const FitParameter& parameter, const std::string& name, double value,
@@ -61,7 +61,7 @@ ParameterEstimate constant(const std::string& name, const std::string& unit, dou
           .reason = reason};
 }
 
-/// The parameter that is hardest to tell from the p-th, and their correlation.
+/// Returns the parameter that is hardest to tell from the p-th, and their correlation.
 std::pair<int, double> nearest_parameter(const Eigen::MatrixXd& correlation, int p) {
   std::pair<int, double> nearest{-1, 0};
   for (int other = 0; other < static_cast<int>(correlation.cols()); ++other)
@@ -70,7 +70,7 @@ std::pair<int, double> nearest_parameter(const Eigen::MatrixXd& correlation, int
   return nearest;
 }
 
-/// In brackets, of what is not the cloth's.
+/// Says in brackets what a parameter is that is not the cloth's.
 const char* what_it_is(ParameterRole role) {
   switch (role) {
     case ParameterRole::placement:
@@ -88,8 +88,8 @@ const char* what_it_is(ParameterRole role) {
   return "";
 }
 
-/// Says so where a parameter is undetermined because another one does the same: where the cloth or
-/// the camera was placed, say, or the scale of gravity.
+/// Says so where a parameter is undetermined because another one does the same. That may be the
+/// place of the cloth or the camera, or the scale of gravity.
 void explain_by_correlation(const ParameterSpace& space, const Uncertainty& uncertainty, int p,
                             ParameterEstimate& parameter) {
   if (parameter.state != ParameterState::undetermined) return;
@@ -100,7 +100,7 @@ void explain_by_correlation(const ParameterSpace& space, const Uncertainty& unce
                                   alike.name, what_it_is(alike.role), correlation);
 }
 
-/// The intervals of the p-th parameter.
+/// Adds the intervals of the p-th parameter.
 void add_intervals(int p, const Uncertainty& uncertainty, const FurtherLooks& looks,
                    ParameterEstimate& parameter) {
   if (looks.other_mesh.usable) parameter.mesh_shift = looks.other_mesh.shift[p];

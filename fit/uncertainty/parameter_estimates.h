@@ -17,20 +17,20 @@ namespace clothfit {
 /// A log-parameter less certain than this (a factor of e^0.7 = 2 either way) is undetermined.
 inline constexpr double kUndeterminedLogSigma = 0.7;
 
-/// What is asked for beside sigma.
+/// The estimates that were asked for beside sigma.
 struct FurtherLooks {
   std::vector<ParameterProfile> profiles;
   OtherMesh other_mesh;
 };
 
-/// The parameter tables of the result from the fitted values: value, sigma and intervals, or why a
-/// parameter is undetermined.
+/// Fills the parameter tables of the result from the fitted values. They have value, sigma and
+/// intervals, or say why a parameter is undetermined.
 void fill_parameters(const FitProblem& problem, const FitOptions& options,
                      const Eigen::VectorXd& values, const Uncertainty& uncertainty,
                      const FurtherLooks& looks, FitResult& result);
 
-/// A spring that sits on its strain limit is as long as that allows, however stiff it is: stiffness
-/// of which most springs do is undetermined.
+/// Says that a stiffness is undetermined where most of its springs sit on their strain limit. Such
+/// a spring is as long as the limit allows, however stiff it is.
 void explain_by_strain_limit(const FitProblem& problem, const Eigen::VectorXd& values,
                              const SpringsOnLimit& count,
                              std::vector<ParameterEstimate>& parameters);

@@ -11,7 +11,7 @@ namespace clothfit {
 
 namespace {
 
-/// Root of the rise: for a parabola it is a straight line, which a secant finds the end of at once.
+/// Root of the rise. For a parabola it is a straight line, whose end a secant finds at once.
 class RootOfRise {
  public:
   RootOfRise(const ProfilePoint& best, const ProfiledCost& cost, const ProfileOptions& options)
@@ -53,7 +53,7 @@ struct FoundEnd {
   double distance = 0;
 };
 
-/// The distance from `best` in `direction` (-1 or 1), up to `room`, at which the root reaches
+/// Finds the distance from `best` in `direction` (-1 or 1), up to `room`, at which the root reaches
 /// `target`.
 FoundEnd find_end(RootOfRise& rise, double best, int direction, double room, double target,
                   const ProfileOptions& options) {
@@ -64,7 +64,7 @@ FoundEnd find_end(RootOfRise& rise, double best, int direction, double room, dou
   Mark inner;                  // below the target
   Mark outer{.distance = -1};  // above it; none yet
   double wall = room;          // no cost from here on, or the end of the range
-  bool walled = false;         // the former
+  bool walled = false;         // no cost from the wall on
   double step = std::min(room, target * options.sigma);
   int same_side = 0;  // times in a row that one mark stayed
   bool moved_inner = false;
@@ -93,8 +93,8 @@ FoundEnd find_end(RootOfRise& rise, double best, int direction, double room, dou
         step = 0.5 * (inner.distance + wall);
         continue;
       }
-      // Outward: as far as the slope says and a little more, at least half as far again, at most
-      // three times.
+      // A step outward goes as far as the slope says and a little more. It goes at least half as
+      // far again, at most three times.
       const double guess = inner.root > 0 ? 1.1 * target * inner.distance / inner.root : wall;
       step = std::min(room, std::clamp(guess, 1.5 * inner.distance, 3 * inner.distance));
       continue;
@@ -103,7 +103,7 @@ FoundEnd find_end(RootOfRise& rise, double best, int direction, double room, dou
     const double slope = (outer.root - inner.root) / width;
     const double secant = inner.distance + (target - inner.root) / slope;
     if (width < options.tolerance * outer.distance) return {ProfileEnd::found, secant};
-    // A mark that stays put makes the secant creep: then halve.
+    // A mark that stays put makes the secant creep, so the bracket is halved then.
     step = same_side >= 2
                ? 0.5 * (inner.distance + outer.distance)
                : std::clamp(secant, inner.distance + 0.01 * width, outer.distance - 0.01 * width);
@@ -137,7 +137,7 @@ ProfileInterval profile_interval(const ProfilePoint& best, const ProfiledCost& c
   options.validate(best.value);
   const double target =
       std::sqrt(boost::math::quantile(boost::math::chi_squared(1), options.level));
-  // Sigma as the Hessian gives it is for a variance of 1.
+  // Sigma is for a variance of 1, as the Hessian gives it.
   const double expected = target * options.sigma * std::sqrt(options.residual_variance);
 
   RootOfRise rise(best, cost, options);

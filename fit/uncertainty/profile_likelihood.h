@@ -14,7 +14,7 @@ struct ProfilePoint {
   Eigen::VectorXd others;  ///< where the least is, as a start for neighbours; any length
 };
 
-/// Minimises over the other parameters with this one held at `value`, from `start`: the `others` of
+/// Minimises over the other parameters with this one held at `value`. `start` is the `others` of
 /// the nearest point that is known.
 using ProfiledCost = std::function<ProfilePoint(double value, const Eigen::VectorXd& start)>;
 
@@ -22,7 +22,7 @@ struct ProfileOptions {
   double level = 0.9;           ///< of the interval, above 0 and below 1
   double lower = 0, upper = 0;  ///< the parameter's range, around the optimum
   double sigma = 0;             ///< from the Hessian, > 0: how far the first step goes
-  /// Variance of the whitened residuals, >= 1 where their stated sigma is too small: the cost must
+  /// Variance of the whitened residuals, >= 1 where their stated sigma is too small. The cost must
   /// rise by this times half the quantile of chi-square.
   double residual_variance = 1;
   double tolerance = 1e-3;    ///< of an end, as a share of its distance
@@ -41,23 +41,23 @@ enum class ProfileEnd {
 struct ProfileInterval {
   double lower = 0, upper = 0;
   ProfileEnd lower_end = ProfileEnd::open, upper_end = ProfileEnd::open;
-  /// Lower costs than the optimum's were met: it was none. The lowest is among `points`.
+  /// Lower costs than the optimum's were met, so it was none. The lowest is among `points`.
   bool optimum_was_none = false;
-  /// The distance of each end from the optimum over what sigma says, less 1: 0 where the cost is a
-  /// parabola. Of an end that is not found, a bound from below.
+  /// The distance of each end from the optimum over what sigma says, less 1. It is 0 where the cost
+  /// is a parabola. Of an end that is not found it is a bound from below.
   double lower_excess = 0, upper_excess = 0;
   std::vector<ProfilePoint> points;  ///< all that were evaluated, in the order of their values
 
-  /// Whether the symmetric interval says something else: an end that is not found, or that lies off
-  /// by more than a tenth of its distance.
+  /// Tells whether the symmetric interval says something else. It does where an end is not found,
+  /// or lies off by more than a tenth of its distance.
   bool preferable() const;
 };
 
-/// Both ends of the interval in which the profiled cost is below the optimum's by less than
-/// residual_variance times half the quantile of chi-square with one degree of freedom: the
-/// likelihood-ratio interval [bates1988]. On each side the nearest end from the optimum outward
-/// that the steps meet; a profile with several valleys may go on beyond it. Throws InputError for
-/// options that make no sense and a best point that is not usable.
+/// Finds both ends of the likelihood-ratio interval [bates1988]. In it the profiled cost is below
+/// the optimum's by less than residual_variance times half the quantile of chi-square with one
+/// degree of freedom. On each side the end is the nearest one that the steps meet from the optimum
+/// outward. A profile with several basins may go on beyond it. Throws InputError for options that
+/// make no sense and a best point that is not usable.
 ProfileInterval profile_interval(const ProfilePoint& best, const ProfiledCost& cost,
                                  const ProfileOptions& options);
 

@@ -18,7 +18,7 @@ struct Extent {
   static Extent of(const Eigen::VectorXd& places) {
     return {places.minCoeff(), places.maxCoeff() - places.minCoeff()};
   }
-  /// Which of `count` parts a place lies in; the last includes its end.
+  /// Returns which of `count` parts a place lies in; the last includes its end.
   int part(double place, int count) const {
     if (length <= 0) return 0;
     return std::min(count - 1, static_cast<int>((place - least) / length * count));
@@ -41,7 +41,8 @@ struct CellMeans {
   }
 };
 
-/// The separation in cells from which on, along `direction`, cells tell nothing of each other.
+/// Returns the separation in cells from which on, along `direction`, cells tell nothing of each
+/// other.
 int range_in_cells(const std::vector<CellMeans>& components, size_t direction) {
   double variance = 0;
   int known = 0;
@@ -73,7 +74,7 @@ int range_in_cells(const std::vector<CellMeans>& components, size_t direction) {
         }
       }
     }
-    // No pair at this separation: sparse markers; the next one decides.
+    // With sparse markers no pair may have this separation; the next one decides then.
     if (pairs > 0 && product / pairs <= 2 * variance / std::sqrt(pairs)) return lag;
   }
   return cells[direction];

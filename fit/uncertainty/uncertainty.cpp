@@ -18,7 +18,7 @@ namespace {
 
 constexpr double kLeastInformation = 1e-12;
 
-/// Inverse of an information matrix. Directions that the data say nothing about get a standard
+/// Inverts an information matrix. Directions that the data say nothing about get a standard
 /// deviation of a million instead of spoiling the inverse for all.
 Eigen::MatrixXd invert(const Eigen::MatrixXd& information) {
   const SymmetricEigen eigen = symmetric_eigen(information);
@@ -26,8 +26,8 @@ Eigen::MatrixXd invert(const Eigen::MatrixXd& information) {
   return eigen.vectors * variance.asDiagonal() * eigen.vectors.transpose();
 }
 
-/// The sandwich's variance of each coordinate and its degrees of freedom; where there is none, 0
-/// and why. The blocks, for others.
+/// Adds the sandwich's variance of each coordinate and its degrees of freedom. Where there is none,
+/// the variance is 0, and why is said. Returns the blocks.
 Eigen::VectorXi add_robust_part(const TrajectoryObjective& objective, const LinearisedFit& fit,
                                 Uncertainty& result, Eigen::VectorXd& variance) {
   variance = Eigen::VectorXd::Zero(fit.coordinates());
@@ -50,7 +50,7 @@ Eigen::VectorXi add_robust_part(const TrajectoryObjective& objective, const Line
   return cut.blocks.block;
 }
 
-/// Ends in coordinates, within the ranges.
+/// Sets ends given in coordinates, within the ranges.
 void set_ends(const ParameterSpace& space, const Eigen::VectorXd& lower_coordinates,
               const Eigen::VectorXd& upper_coordinates, Eigen::VectorXd& lower,
               Eigen::VectorXd& upper) {
@@ -75,7 +75,7 @@ void add_bootstrap(const ParameterSpace& space, const Eigen::VectorXd& values,
              result.bootstrap_upper);
 }
 
-/// From standard deviations and the shift of coordinates.
+/// Adds intervals from standard deviations and the shift of coordinates.
 void add_interval(const ParameterSpace& space, const Eigen::VectorXd& values,
                   const Eigen::VectorXd& noise, const Eigen::VectorXd& robust,
                   const Eigen::VectorXd& shift, Uncertainty& result) {
