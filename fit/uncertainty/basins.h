@@ -16,8 +16,8 @@ struct Candidate {
 };
 
 /// Puts candidates together that ended in the same place, best first. Two are in one place unless
-/// some determined parameter of the physics differs: by more than 5 %, and by more than three of the
-/// sigmas at the optimum `values`.
+/// some determined parameter of the physics differs: by more than 5 %, and by more than three of
+/// the sigmas at the optimum `values`.
 std::vector<Basin> basins_of(const ParameterSpace& space, std::vector<Candidate> candidates,
                              const Eigen::VectorXd& values, const Uncertainty& uncertainty);
 

@@ -1,5 +1,5 @@
-// The search's loop, on costs alone. Its steps: shortlist_test.cpp, trial_test.cpp, prune_test.cpp;
-// whole searches: search_test.cpp.
+// Checks the search's loop, on costs alone. Its steps are checked in shortlist_test.cpp,
+// trial_test.cpp and prune_test.cpp, whole searches in search_test.cpp.
 #include "fit/diagnosis/beam.h"
 
 #include <gtest/gtest.h>
@@ -30,7 +30,7 @@ std::string effects_of(const BeamEntry& entry) {
   return names;
 }
 
-/// Finishes the next entry and adds children; its effects.
+/// Finishes the next entry, adds children, and returns its effects.
 std::string extend(Beam& beam, std::vector<BeamEntry> children) {
   BeamEntry* next = beam.next();
   if (next == nullptr) return "none";
@@ -86,7 +86,7 @@ TEST(Beam, FollowsNoMoreEntriesThanItIsWide) {
 
 TEST(Beam, FallsBackOnTheCheapestSoundEntryWhereTheBestIsNone) {
   Beam beam(entry_of(kBase, {}), 1, 4);
-  // On credit; what is dropped beside it is sound.
+  // The first entry is on credit; what is dropped beside it is sound.
   extend(beam, {entry_of(20, {"a"}, 2), entry_of(60, {"b"}), entry_of(70, {"c"})});
   EXPECT_EQ(extend(beam, {}), "a");
   EXPECT_EQ(extend(beam, {}), "b");

@@ -1,5 +1,5 @@
-// Effects by one of their laws, as additions to a recording. Not checked here: that every law names
-// parameters of its effect (tests/model/effects/registry_test.cpp).
+// Checks effects by one of their modes, as additions to a recording. Not checked here: that every
+// mode names parameters of its effect (tests/model/effects/registry_test.cpp).
 #include "fit/diagnosis/catalogue.h"
 
 #include <gmock/gmock.h>
@@ -41,8 +41,8 @@ std::vector<std::string> fitted_names(const FitInput& input,
 
 std::vector<std::string> tested(const FitInput& input, const FitOptions& options = {}) {
   std::vector<std::string> titles;
-  for (const ShapeCandidates& law : hypotheses_to_test(input, options, 0.5))
-    titles.push_back(law.front().title());
+  for (const ShapeCandidates& mode : hypotheses_to_test(input, options, 0.5))
+    titles.push_back(mode.front().title());
   return titles;
 }
 
@@ -71,7 +71,7 @@ TEST(Hypothesis, FitsItsShapeOnlyWhereItSaysSo) {
   EXPECT_THAT(fitted_names(synthetic_input({}), {hem}), Contains("nonuniform_mass.hem_width"));
 }
 
-TEST(Hypothesis, FitsAShapeThatItsEffectsOtherLawFits) {
+TEST(Hypothesis, FitsAShapeThatItsEffectsOtherModeFits) {
   Hypothesis edges = kHem, hem = kHem;
   edges.mode = "edges";
   edges.amplitudes = {"hem_left", "hem_right", "hem_top", "hem_bottom"};
@@ -82,25 +82,25 @@ TEST(Hypothesis, FitsAShapeThatItsEffectsOtherLawFits) {
   const DiagnosisSetup setup{.inputs = inputs, .options = options, .columns = 9, .rows = 9};
   for (const bool both : {false, true}) {
     hem.fits_shape = both;
-    for (const std::vector<Hypothesis>& terms :
+    for (const std::vector<Hypothesis>& hypotheses :
          {std::vector{edges, hem}, std::vector{hem, edges}}) {
-      const auto problems = problems_of(setup, terms);
+      const auto problems = problems_of(setup, hypotheses);
 
       EXPECT_GE(problems.front()->space.index("nonuniform_mass.hem_width"), 0);
-      EXPECT_EQ(options_with(setup, terms, 0).priors.size(), 1);
+      EXPECT_EQ(options_with(setup, hypotheses, 0).priors.size(), 1);
     }
   }
 }
 
-TEST(AtShapesOf, AreThoseOfTheEffectsOtherLaw) {
+TEST(AtShapesOf, AreThoseOfTheEffectsOtherMode) {
   ShapeCandidates hem(3, kHem);
   for (size_t k = 0; k < hem.size(); ++k) hem[k].shape["hem_width"] = 0.01 * static_cast<double>(k);
   Hypothesis edges = kHem;
   edges.mode = "edges";
-  const auto widths = [&](const std::vector<Hypothesis>& terms,
+  const auto widths = [&](const std::vector<Hypothesis>& hypotheses,
                           const std::map<std::string, double>& values) {
     std::vector<double> result;
-    for (const Hypothesis& shape : at_shapes_of(terms, values, hem))
+    for (const Hypothesis& shape : at_shapes_of(hypotheses, values, hem))
       result.push_back(shape.shape.at("hem_width"));
     return result;
   };
@@ -112,7 +112,7 @@ TEST(AtShapesOf, AreThoseOfTheEffectsOtherLaw) {
   EXPECT_THAT(widths({edges}, {{"nonuniform_mass.hem_width", 0.003}}), ElementsAre(0.003));
 }
 
-TEST(LawsToTest, AreThoseOfEffectsThatAreNotThereAlready) {
+TEST(HypothesesToTest, AreThoseOfEffectsThatAreNotThereAlready) {
   FitInput input = synthetic_input({});
   EXPECT_THAT(tested(input), Contains("wind (pressure)"));
   EXPECT_THAT(tested(input), Contains("scale"));
@@ -123,14 +123,15 @@ TEST(LawsToTest, AreThoseOfEffectsThatAreNotThereAlready) {
   EXPECT_THAT(tested(input, {.effects = {"gravity_tilt"}}), Not(Contains("gravity_tilt")));
 }
 
-TEST(LawsToTest, AreNoneOfThoseThatNameNoCause) {
+TEST(HypothesesToTest, AreNoneOfThoseThatNameNoCause) {
   FitInput input = synthetic_input({});
-  for (const ShapeCandidates& law : hypotheses_to_test(input, {}, 0.5))
-    EXPECT_FALSE(is_empirical(law.front().effect)) << law.front().title();
+  for (const ShapeCandidates& mode : hypotheses_to_test(input, {}, 0.5))
+    EXPECT_FALSE(is_empirical(mode.front().effect)) << mode.front().title();
 
   const auto proposed = [&] {
     std::vector<std::string> titles;
-    for (const Hypothesis& term : empirical_hypotheses(input, {})) titles.push_back(term.title());
+    for (const Hypothesis& hypothesis : empirical_hypotheses(input, {}))
+      titles.push_back(hypothesis.title());
     return titles;
   };
   EXPECT_THAT(proposed(), Contains("force_law (drag)"));
@@ -140,21 +141,21 @@ TEST(LawsToTest, AreNoneOfThoseThatNameNoCause) {
   EXPECT_THAT(proposed(), Not(Contains("force_law (drag)")));
 }
 
-TEST(LawsToTest, TryEachCombinationOfShapesWithFrequenciesInTheDuration) {
-  for (const ShapeCandidates& law : hypotheses_to_test(synthetic_input({}), {}, 0.5)) {
-    if (law.front().effect == "nonuniform_mass" && law.front().mode == "patch") {
-      EXPECT_EQ(law.size(), 18u);
+TEST(HypothesesToTest, TryEachCombinationOfShapesWithFrequenciesInTheDuration) {
+  for (const ShapeCandidates& mode : hypotheses_to_test(synthetic_input({}), {}, 0.5)) {
+    if (mode.front().effect == "nonuniform_mass" && mode.front().mode == "patch") {
+      EXPECT_EQ(mode.size(), 18u);
     }
-    if (law.front().effect == "nonuniform_mass" && law.front().mode == "edges") {
-      EXPECT_EQ(law.size(), 4u);  // widths of the hem, of all four edges at once
-      EXPECT_EQ(law.front().amplitudes.size(), 4u);
+    if (mode.front().effect == "nonuniform_mass" && mode.front().mode == "edges") {
+      EXPECT_EQ(mode.size(), 4u);  // widths of the hem, of all four edges at once
+      EXPECT_EQ(mode.front().amplitudes.size(), 4u);
     }
-    if (law.front().effect == "gust") {
-      EXPECT_EQ(law.size(), 48u);                       // 12 frequencies, 4 phases
-      EXPECT_EQ(law.front().shape.at("frequency"), 1);  // half a turn in half a second
+    if (mode.front().effect == "gust") {
+      EXPECT_EQ(mode.size(), 48u);                       // 12 frequencies, 4 phases
+      EXPECT_EQ(mode.front().shape.at("frequency"), 1);  // half a turn in half a second
     }
-    if (law.front().effect == "relaxation") {
-      EXPECT_GT(law.front().shape_sigma.at("time"), 0);
+    if (mode.front().effect == "relaxation") {
+      EXPECT_GT(mode.front().shape_sigma.at("time"), 0);
     }
   }
 }

@@ -1,4 +1,4 @@
-// How sure it is that a law is there. Not checked here: what residuals' structure is
+// Checks how sure it is that a hypothesis is true. Not checked here: the structure of residuals
 // (score_test.cpp, Adequacy).
 #include "fit/diagnosis/clearance.h"
 
@@ -23,11 +23,11 @@ constexpr double kNoThreshold = std::numeric_limits<double>::infinity();
 const FitOptions kClearanceOptions{.loss = Loss::squared};
 constexpr Adequacy kWhite{.chi_square_per_dof = 1};
 
-/// The true model of a recording with `term` as its last one, linearised.
-FittedModel model_with(const Hypothesis& term, const SyntheticCloth& cloth) {
+/// Returns the true model of a recording with `hypothesis` as its last one, linearised.
+FittedModel model_with(const Hypothesis& hypothesis, const SyntheticCloth& cloth) {
   const FitInput input = synthetic_input(cloth);
   return true_model({.inputs = {&input, 1}, .options = kClearanceOptions, .columns = 9, .rows = 9},
-                    cloth, {term});
+                    cloth, {hypothesis});
 }
 
 const FittedModel& of_drag() {
@@ -35,7 +35,7 @@ const FittedModel& of_drag() {
   return model;
 }
 
-/// Where the last term's amplitudes stand in the first recording's space.
+/// Returns where the last hypothesis' amplitudes stand in the first recording's space.
 std::vector<int> places_of(const FittedModel& model) {
   std::vector<int> places;
   for (const std::string& name : model.hypotheses.back().parameters())
@@ -43,8 +43,8 @@ std::vector<int> places_of(const FittedModel& model) {
   return places;
 }
 
-/// Fisher's information of the amplitudes of a model of one recording, all else free, in their
-/// units: the square of their derivatives with all else projected out.
+/// Computes Fisher's information of the amplitudes of a model of one recording, all else free, in
+/// their units. It is the square of their derivatives with all else projected out.
 Eigen::MatrixXd information_of_amplitudes(const FittedModel& model) {
   const std::vector<int> amplitudes = places_of(model);
   const FitProblem& problem = *model.problems.front();
@@ -66,7 +66,7 @@ Eigen::MatrixXd information_of_amplitudes(const FittedModel& model) {
   return left.transpose() * left;
 }
 
-/// The model as if there were another recording that shows just the same.
+/// Returns the model as if there were another recording that shows just the same.
 FittedModel twice(const FittedModel& model) {
   FittedModel both = model;
   both.problems.push_back(model.problems.front());
@@ -81,7 +81,7 @@ TEST(ClearOfNeutral, OfOneAmplitudeInWhiteNoiseIsItsNumberOfSigmas) {
 
   const double clear = clear_of_neutral(model, kWhite, kNoThreshold);
 
-  EXPECT_NEAR(clear, 0.5 / sigma, 1e-4 * clear);  // what keeps the inverse finite takes a little
+  EXPECT_NEAR(clear, 0.5 / sigma, 1e-4 * clear);  // to how far the inverse is regularised
   EXPECT_GT(clear, 5);
 }
 
@@ -98,8 +98,8 @@ TEST(ClearOfNeutral, IsLessByWhatSumsOfDependentResidualsScatterMore) {
            white;
   };
 
-  // The variance is (1 + rho) / (1 - rho) in time, the same each way along the cloth, and the
-  // residuals' own.
+  // The variance grows by (1 + rho) / (1 - rho) in time, by as much each way along the cloth, and
+  // by the residuals' own.
   EXPECT_NEAR(share(1, 0.6, 0), std::sqrt(0.4 / 1.6), 1e-12);
   EXPECT_NEAR(share(1, 0, 0.5), 0.5 / 1.5, 1e-12);
   EXPECT_NEAR(share(4, 0, 0), 0.5, 1e-12);
@@ -139,7 +139,7 @@ TEST(ClearOfNeutral, CountsSeveralAmplitudesAsOneNumberThatIsAsUnlikely) {
   EXPECT_NEAR(clear_of_neutral(model, kWhite, kNoThreshold), 5, 1e-3);
 }
 
-// Derivatives of cloth that folds and unfolds are steeper than what the residuals do over any
+// Derivatives of cloth that folds and unfolds are steeper than the residuals' change over any
 // distance.
 TEST(ClearOfNeutral, GoesByTheTrendWhereDerivativesExplode) {
   const FittedModel& model = of_drag();
@@ -170,7 +170,7 @@ TEST(ClearOfNeutral, GrowsWithTheRecordingsThatShareAnAmplitude) {
               1e-4 * one);
 }
 
-// Two clocks that are off alike: their squares add, and count as those of two amplitudes.
+// Two clocks are off alike. Their squares add, and count as those of two amplitudes.
 TEST(ClearOfNeutral, CountsTheAmplitudesThatEachRecordingHasOfItsOwn) {
   FittedModel model =
       model_with({.effect = "clock_offset", .mode = "", .amplitudes = {"time"}}, {});
@@ -189,7 +189,7 @@ TEST(RiseWithoutLast, IsThatOfAFitWithout) {
   const DiagnosisSetup setup{
       .inputs = {&input, 1}, .options = kClearanceOptions, .columns = 9, .rows = 9};
   FittedModel with = true_model(setup, cloth, {drag_term()});
-  with.parts.front().linear = {};  // at time steps as those of the other fit
+  with.parts.front().linear = {};  // so that time steps are as those of the other fit
   refine_model(with, setup, {}, {});
   FittedModel without = with_hypotheses(setup, with, {}, {});
   refine_model(without, setup, {}, {});

@@ -1,4 +1,5 @@
-// That all criteria are told. Whether they are right is no matter of numbers: docs/results.md.
+// Checks that all criteria are told. Whether they are right is no matter of numbers:
+// docs/results.md.
 #include "fit/diagnosis/criteria.h"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// Whole diagnoses of simulated recordings whose truth is known. Rates over many are a study
+// Checks whole diagnoses of simulated recordings whose truth is known. Rates over many are a study
 // (clothfit recover --undeclared), bundled recordings are tests/fit/recordings_test.cpp.
 #include "fit/diagnosis/diagnose.h"
 
@@ -21,18 +21,18 @@ namespace {
 const SyntheticCloth kSmallWithDrag{
     .drag_rate_per_s = 1.2, .mesh = 5, .markers = 4, .frames = 30, .held_out_from = 24};
 
-/// Every effect of the catalogue but those that compete for what these tests hide.
+/// Returns every effect of the catalogue but those that compete for what these tests hide.
 std::vector<std::string> without_all_but_competitors() {
   const std::vector<std::string> tested{"viscous_damping", "quadratic_drag", "wind",
                                         "gravity_tilt",    "scale",          "marker_placement"};
   std::vector<std::string> without;
-  for (const ShapeCandidates& law : hypotheses_to_test(synthetic_input(kSmallWithDrag), {}, 0.5))
-    if (std::ranges::find(tested, law.front().effect) == tested.end())
-      without.push_back(law.front().effect);
+  for (const ShapeCandidates& mode : hypotheses_to_test(synthetic_input(kSmallWithDrag), {}, 0.5))
+    if (std::ranges::find(tested, mode.front().effect) == tested.end())
+      without.push_back(mode.front().effect);
   return without;
 }
 
-/// A short diagnosis on that cloth's mesh, which tests the drag and what competes with it.
+/// Returns a short diagnosis on that cloth's mesh, which tests the drag and what competes with it.
 DiagnoseOptions diagnosis_of_small_cloth() {
   DiagnoseOptions options;
   options.fit.mesh_columns = options.fit.mesh_rows = 5;
@@ -47,7 +47,7 @@ DiagnoseOptions diagnosis_of_small_cloth() {
   return options;
 }
 
-TEST(Diagnose, NamesAHiddenDragAndItsAmount) {
+TEST(Diagnose, NamesAHiddenDragAndItsAmplitude) {
   DiagnoseOptions options = diagnosis_of_small_cloth();
   options.without.clear();  // the whole catalogue competes
   const Diagnosis diagnosis = diagnose(synthetic_input(kSmallWithDrag), options, {});
@@ -85,7 +85,7 @@ TEST(Diagnose, FindsNothingWhereNothingIsHiddenAndSaysWhatItWouldHaveSeen) {
     }
 }
 
-TEST(Diagnose, SaysThatMarkersAreSeenElsewhereWhereNoLawPutsThemThere) {
+TEST(Diagnose, SaysThatMarkersAreSeenElsewhereWhereNoHypothesisPutsThemThere) {
   constexpr double kOff_m = 4e-3;  // a standard deviation, of each coordinate of each marker
   SyntheticCloth cloth = kSmallWithDrag;
   cloth.drag_rate_per_s = 0;
@@ -112,8 +112,8 @@ TEST(Diagnose, SaysThatMarkersAreSeenElsewhereWhereNoLawPutsThemThere) {
 
 constexpr double kTurn_rad = 0.06, kTooLarge = 0.02;
 
-/// A pattern that is turned on the cloth, in a world that is measured too large: constants of the
-/// markers do most of either.
+/// Makes a pattern that is turned on the cloth, in a world that is measured too large. Constants of
+/// the markers do most of either.
 FitInput with_two_causes() {
   SyntheticCloth cloth{.mesh = 5,
                        .markers = 4,
@@ -199,12 +199,13 @@ TEST(Diagnose, FitsTwoRecordingsTogetherAndJudgesAThird) {
     const ObservationErrors& after = recording.after.result.errors.front();
     EXPECT_GT(before.held_out.rms, 2 * before.noise) << recording.before.result.recording;
     EXPECT_LT(after.held_out.rms, 1.1 * after.noise) << recording.before.result.recording;
-    // Stated, or as all of the recording's frames tell, though none of the third is fitted.
+    // Noise is stated, or is as all of the recording's frames tell, though none of the third is
+    // fitted.
     EXPECT_NEAR(after.noise, cloth.noise_m, 0.1 * cloth.noise_m);
   }
 }
 
-/// The drag is left: it is not to be tested, and no cause is to be named.
+/// Leaves the drag: it is not to be tested, and no cause is to be named.
 DiagnoseOptions diagnosis_without_a_cause() {
   DiagnoseOptions options = diagnosis_of_small_cloth();
   options.without.push_back("viscous_damping");

@@ -1,4 +1,4 @@
-// A model as plain data, and what it leaves. Its fits: refit_test.cpp.
+// Checks a model as plain data, and what it leaves. Its fits are checked in refit_test.cpp.
 #include "fit/diagnosis/fitted_model.h"
 
 #include <gtest/gtest.h>
@@ -40,7 +40,7 @@ TEST(FittedModel, CountsResidualsBeyondTheThresholdLinearly) {
   residual.setConstant(2);
 
   EXPECT_DOUBLE_EQ(model.misfit(), 4);
-  // Huber's, of lengths sqrt(12) in space.
+  // The loss is Huber's, of lengths sqrt(12) in space.
   const double length = std::sqrt(12.0);
   EXPECT_NEAR(model.chi_square(10) - prior, 4 * count, 1e-9 * count);
   EXPECT_NEAR(model.chi_square(1) - prior, count / 3 * (2 * length - 1), 1e-9 * count);

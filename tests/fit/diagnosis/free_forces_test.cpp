@@ -1,4 +1,4 @@
-// Forces without a law: their derivatives, and what they foresee of frames that are left out. Not
+// Checks forces without a law: their derivatives, and what they predict of frames left out. Not
 // checked here: the other corrections without physics (score_test.cpp).
 #include "fit/diagnosis/free_forces.h"
 
@@ -36,8 +36,8 @@ DiagnosisSetup setup_of(std::span<const FitInput> inputs, int mesh = 9) {
   return {.inputs = inputs, .options = kFreeForcesOptions, .columns = mesh, .rows = mesh};
 }
 
-/// A push that is the same everywhere and always: gravity out of the vertical, a hundredth of it
-/// and more.
+/// Makes a push that is the same everywhere and always: gravity out of the vertical, a hundredth of
+/// it and more.
 DeclaredEffect hidden_tilt(double about_x_rad) {
   DeclaredEffect tilt{.name = "gravity_tilt", .parameters = {}};
   tilt.parameters = {{"about_x", {about_x_rad}}, {"about_y", {0.01}}};
@@ -46,7 +46,7 @@ DeclaredEffect hidden_tilt(double about_x_rad) {
 
 const Hypothesis kTilt{.effect = "gravity_tilt", .mode = "", .amplitudes = {"about_x", "about_y"}};
 
-/// The model without what is hidden at its own optimum.
+/// Fits the model without what is hidden to its own optimum.
 FittedModel fitted(const DiagnosisSetup& setup) {
   FittedModel model = model_at(
       setup, {}, std::vector<NamedValues>(setup.inputs.size(), named(SyntheticCloth{}.fabric)));
@@ -59,8 +59,8 @@ CrossValidation with_forces(const DiagnosisSetup& setup, const FittedModel& mode
   return cross_validate(setup, model, kBlocks, kFreeForcesSquares, false, &setup);
 }
 
-/// Derivative of a model's residuals by a push that is there in its runs, along one of the world's
-/// axes: central differences.
+/// Differentiates a model's residuals by a push that is there in its runs, along one of the world's
+/// axes. Differences are central.
 Eigen::VectorXd by_push(const FittedModel& model, int waves_along_s, int waves_along_t,
                         double from_s, double until_s, size_t axis) {
   const PooledPart& part = model.parts.front();
@@ -78,7 +78,7 @@ Eigen::VectorXd by_push(const FittedModel& model, int waves_along_s, int waves_a
   return (residual_at(kStep) - residual_at(-kStep)) / (2 * kStep);
 }
 
-/// The products in their order.
+/// The products of waves, in their order.
 struct Product {
   int waves_along_s = 0, waves_along_t = 0;
 };
@@ -120,13 +120,13 @@ TEST(FreeForces, HaveTheDerivativesOfASimulationThatIsPushedLikeThat) {
         ASSERT_GT(expected.norm(), 0.1);
         EXPECT_LT((found - expected).norm(), within * expected.norm());
       };
-      // Where it begins and ends an emerging force is known to a millisecond (kEmergingInterval_s),
-      // of the 43 that a stretch lasts.
-      constexpr double kRough = 0.03;
-      expect_near(column(0, product, axis), -kFreeForcesSquares, begin_s(1), kRough);
-      expect_near(column(5, product, axis), begin_s(5), begin_s(6), kRough);
-      expect_near(column(9, product, axis), begin_s(9), kFreeForcesSquares, kRough);
-      // All of them together are a push that never begins nor ends. Differences err by the square
+      // The beginning and end of an emerging force are known to a millisecond
+      // (kEmergingInterval_s), of the 43 that a stretch lasts.
+      constexpr double kNearEnds = 0.03;
+      expect_near(column(0, product, axis), -kFreeForcesSquares, begin_s(1), kNearEnds);
+      expect_near(column(5, product, axis), begin_s(5), begin_s(6), kNearEnds);
+      expect_near(column(9, product, axis), begin_s(9), kFreeForcesSquares, kNearEnds);
+      // All stretches together are a push that never begins nor ends. Differences err by the square
       // of the step.
       Eigen::VectorXd sum = Eigen::VectorXd::Zero(columns.rows());
       for (int stretch = 0; stretch < kStretches; ++stretch) sum += column(stretch, product, axis);
@@ -135,8 +135,8 @@ TEST(FreeForces, HaveTheDerivativesOfASimulationThatIsPushedLikeThat) {
   }
 }
 
-// What is left is exactly what a force does that never changes: held, it is foreseen everywhere.
-TEST(FreeForces, ForeseeAForceThatStaysAsItIs) {
+// The residual is exactly what a force does that never changes. Held, it is predicted everywhere.
+TEST(FreeForces, PredictAForceThatStaysAsItIs) {
   const FitInput input = synthetic_input({});
   const DiagnosisSetup setup = setup_of({&input, 1});
   FittedModel model = true_model(setup, {});
@@ -154,8 +154,8 @@ TEST(FreeForces, ForeseeAForceThatStaysAsItIs) {
   EXPECT_LT(validated.free_forces, 1e-3 * validated.mean);
 }
 
-// A force that begins only where the last block does: what came before it says nothing of it, so
-// that nothing of what it does there is foreseen. Where the other blocks are left out it is seen.
+// A force begins only where the last block does. What came before says nothing of it, so nothing of
+// what it does there is predicted. Where the other blocks are left out it is seen.
 TEST(FreeForces, HoldTheLastValueBeforeABlockThroughoutIt) {
   const FitInput input = synthetic_input({});
   const DiagnosisSetup setup = setup_of({&input, 1});
@@ -175,15 +175,15 @@ TEST(FreeForces, HoldTheLastValueBeforeABlockThroughoutIt) {
   EXPECT_NEAR(validated.free_forces, in_all, 1e-3 * in_all);
 }
 
-TEST(FreeForces, ForeseeAPushThatTheModelLacksAndTheLawForeseesItBetter) {
+TEST(FreeForces, PredictAPushThatTheModelLacksAndItsEffectPredictsItBetter) {
   const FitInput input = moved_by(hidden_tilt(0.02), synthetic_input({}));
   const DiagnosisSetup setup = setup_of({&input, 1});
   const FittedModel without = fitted(setup);
-  FittedModel with_law = with_hypotheses(setup, without, {kTilt}, {});
-  refine_model(with_law, setup, {}, {});
-  ASSERT_TRUE(with_law.usable());
+  FittedModel with_tilt = with_hypotheses(setup, without, {kTilt}, {});
+  refine_model(with_tilt, setup, {}, {});
+  ASSERT_TRUE(with_tilt.usable());
 
-  const CrossValidation before = with_forces(setup, without), after = with_forces(setup, with_law);
+  const CrossValidation before = with_forces(setup, without), after = with_forces(setup, with_tilt);
 
   EXPECT_LT(before.free_forces, 0.5 * before.mean);
   EXPECT_LT(before.free_forces, std::min(before.constant_offset, before.last_residual));
@@ -191,7 +191,7 @@ TEST(FreeForces, ForeseeAPushThatTheModelLacksAndTheLawForeseesItBetter) {
   EXPECT_LT(after.mean, 1.1);
 }
 
-// The best of their sizes gains by chance at most what a few of some thousand numbers are.
+// By chance the best of their sizes gains at most what a few of some thousand numbers are.
 TEST(FreeForces, AreNoBetterThanNothingWhereNothingIsHidden) {
   for (const unsigned seed : {1U, 2U, 3U}) {
     SCOPED_TRACE(seed);
@@ -212,13 +212,13 @@ TEST(FreeForces, AreFoundWithTheDerivativesOfACoarserMesh) {
   const FittedModel model = fitted(setup);
 
   const double fine = with_forces(setup, model).free_forces,
-               rough = cross_validate(setup, model, kBlocks, kFreeForcesSquares, false, &coarse)
-                           .free_forces;
+               by_coarse = cross_validate(setup, model, kBlocks, kFreeForcesSquares, false, &coarse)
+                               .free_forces;
 
-  EXPECT_NEAR(rough, fine, 0.2 * fine);
+  EXPECT_NEAR(by_coarse, fine, 0.2 * fine);
 }
 
-// Pushed in opposite ways the two recordings cannot be mended by one force.
+// Pushed in opposite ways the two recordings cannot be corrected by one force.
 TEST(FreeForces, AreEachRecordingsOwn) {
   const std::vector<FitInput> inputs{moved_by(hidden_tilt(0.02), synthetic_input({})),
                                      moved_by(hidden_tilt(-0.02), synthetic_input({}))};
@@ -241,9 +241,9 @@ TEST(FreeForces, OfARecordingThatIsLeftOutAreNotKnown) {
             kFreeForcesSquares);
 }
 
-// Of two laws that are hidden each one alone leaves more than free forces do, which take much of
-// both; beside these it still helps.
-TEST(FreeForces, DoNotKeepASearchFromTheFirstOfTwoLaws) {
+// Either of two hidden effects alone leaves more than free forces do, which take much of both.
+// Beside free forces it still helps.
+TEST(FreeForces, DoNotKeepASearchFromTheFirstOfTwoHiddenEffects) {
   const SyntheticCloth cloth{.drag_rate_per_s = 0.15, .mesh = 5, .clock_offset_s = 2e-3};
   const FitInput input = synthetic_input(cloth);
   const DiagnosisSetup setup = setup_of({&input, 1}, 5);

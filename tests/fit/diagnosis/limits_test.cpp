@@ -1,5 +1,5 @@
-// Detection limits and what is planted to confirm them, on numbers. Planting itself:
-// planting_test.cpp.
+// Checks detection limits and what is planted to confirm them, on numbers. Planting itself is
+// checked in planting_test.cpp.
 #include "fit/diagnosis/limits.h"
 
 #include <gtest/gtest.h>
@@ -47,7 +47,7 @@ TEST(DetectionLimits, AreFiveSigmasOrWhatIsWorthAName) {
 TEST(DetectionLimits, AreThoseOfTheRecordingThatSeesBest) {
   const FitInput input =
       synthetic_input({.mesh = 5, .markers = 3, .frames = 8, .held_out_from = 6});
-  // Two recordings, each with amplitudes of its own.
+  // The two recordings have amplitudes of their own.
   const Score score{.hypothesis = kTwoTilts,
                     .amplitude = Eigen::Vector4d(1, 2, 3, 4),
                     .sigma = Eigen::Vector4d(4, 1, 2, 8),

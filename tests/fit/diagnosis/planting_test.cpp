@@ -1,4 +1,4 @@
-// Searches of twins, on which a law is planted or none.
+// Checks searches of twins, on which an effect is planted or none.
 #include "fit/diagnosis/planting.h"
 
 #include <gtest/gtest.h>
@@ -19,17 +19,17 @@ const FitOptions kPlantingOptions = [] {
 /// A cloth that is searched soon.
 const SyntheticCloth kTwinCloth{.mesh = 5, .markers = 4, .frames = 26, .held_out_from = 20};
 
-/// A few laws of the air and of gravity.
-SearchOptions few_laws(const FitInput& input) {
+/// Returns a few hypotheses on the air and on gravity.
+SearchOptions few_hypotheses(const FitInput& input) {
   SearchOptions options{.hypotheses = {},
                         .beam_width = 1,
                         .refits = 2,
                         .most_effects = 2,
                         .threshold = std::numeric_limits<double>::infinity()};
-  for (const ShapeCandidates& law : hypotheses_to_test(input, kPlantingOptions, 0.5)) {
-    const std::string& effect = law.front().effect;
+  for (const ShapeCandidates& mode : hypotheses_to_test(input, kPlantingOptions, 0.5)) {
+    const std::string& effect = mode.front().effect;
     if (effect == "viscous_damping" || effect == "gravity_tilt" || effect == "wind")
-      options.hypotheses.push_back(law);
+      options.hypotheses.push_back(mode);
   }
   return options;
 }
@@ -42,16 +42,16 @@ TEST(Planting, FindsThePlantedDragOnATwinAndNothingOnATwinWithoutIt) {
   const FittedModel model = true_model(setup, cloth);
   const Plant drag{.hypothesis = drag_term(), .parameter = "rate", .beyond_neutral = 0.8};
 
-  const PlantOutcome planted = search_twins(setup, model, drag, few_laws(input), 5, {});
+  const PlantOutcome planted = search_twins(setup, model, drag, few_hypotheses(input), 5, {});
   ASSERT_TRUE(planted.ran) << planted.why_not;
   EXPECT_TRUE(planted.named());
 
-  const PlantOutcome nothing = search_twins(setup, model, {}, few_laws(input), 6, {});
+  const PlantOutcome nothing = search_twins(setup, model, {}, few_hypotheses(input), 6, {});
   ASSERT_TRUE(nothing.ran) << nothing.why_not;
   EXPECT_TRUE(nothing.found.empty()) << nothing.found.front().title();
 }
 
-// A model that has the drag itself is the truth of a twin with drag: nothing is missing there.
+// A model that has the drag itself is the truth of a twin with drag, so nothing is missing there.
 TEST(Planting, FindsNothingOnATwinOfWhatTheModelHas) {
   SyntheticCloth cloth = kTwinCloth;
   cloth.drag_rate_per_s = 1;
@@ -60,9 +60,10 @@ TEST(Planting, FindsNothingOnATwinOfWhatTheModelHas) {
       .inputs = {&input, 1}, .options = kPlantingOptions, .columns = 5, .rows = 5};
   const FittedModel model = true_model(setup, cloth, {drag_term()});
 
-  SearchOptions options = few_laws(input);
-  std::erase_if(options.hypotheses,
-                [](const ShapeCandidates& law) { return law.front().effect == "viscous_damping"; });
+  SearchOptions options = few_hypotheses(input);
+  std::erase_if(options.hypotheses, [](const ShapeCandidates& mode) {
+    return mode.front().effect == "viscous_damping";
+  });
   const PlantOutcome outcome = search_twins(setup, model, {}, options, 7, {});
   ASSERT_TRUE(outcome.ran) << outcome.why_not;
   EXPECT_TRUE(outcome.found.empty()) << outcome.found.front().title();

@@ -1,4 +1,4 @@
-// Taking out of residuals what a model may still move, and what columns explain of the rest.
+// Checks the projection of residuals, and what columns explain of the rest.
 #include "fit/diagnosis/projection.h"
 
 #include <gtest/gtest.h>
@@ -68,7 +68,7 @@ TEST(Projection, TakesOutDirectionsWhereNothingElseIsFitted) {
               1e-9 * residual.squaredNorm());
 }
 
-// Directions of unit variance are a covariance I + E E': amounts found with them are those of
+// Directions of unit variance are a covariance I + E E'. Amplitudes found with them are those of
 // generalised least squares.
 TEST(Projection, CountsUnitDirectionsAsACovariance) {
   const Eigen::MatrixXd jacobian = random_matrix(30, 3, 4), errs = 3 * random_matrix(30, 2, 5);
@@ -87,10 +87,10 @@ TEST(Projection, CountsUnitDirectionsAsACovariance) {
       -(all.transpose() * inverse * all).ldlt().solve(all.transpose() * inverse * residual);
 
   EXPECT_LT((explained.amplitude - expected.tail(2)).norm(), 1e-8 * expected.tail(2).norm());
-  const double fall = residual.dot(inverse * residual) -
-                      (residual + all * expected).dot(inverse * (residual + all * expected)) -
-                      (residual.dot(inverse * residual) - projection.residual().squaredNorm());
-  EXPECT_NEAR(explained.decrease, fall, 1e-8 * projection.residual().squaredNorm());
+  const double decrease = residual.dot(inverse * residual) -
+                          (residual + all * expected).dot(inverse * (residual + all * expected)) -
+                          (residual.dot(inverse * residual) - projection.residual().squaredNorm());
+  EXPECT_NEAR(explained.decrease, decrease, 1e-8 * projection.residual().squaredNorm());
 }
 
 TEST(Projection, LeavesNothingOfWhatTheModelCanDoItself) {
@@ -102,7 +102,7 @@ TEST(Projection, LeavesNothingOfWhatTheModelCanDoItself) {
   EXPECT_EQ(projection.columns(jacobian * random_matrix(4, 2, 10)).norm(), 0);
 }
 
-/// Two small recordings of one cloth, with random numbers for what runs would have left: the
+/// Makes two small recordings of one cloth, with random numbers for the residuals of runs. The
 /// second one has a vertical that is known by a prior.
 FittedModel model_of_noise(int directions) {
   const SyntheticCloth tiny{.mesh = 5, .markers = 5, .frames = 20, .held_out_from = 20};
@@ -127,7 +127,7 @@ FittedModel model_of_noise(int directions) {
     part.linear.usable = true;
     part.directions = 2 * random_matrix(rows, directions, 40 + seed);
     part.amplitudes = Eigen::VectorXd::Zero(directions);
-    // Off the prior's mean by less than its sigma, so that it pulls.
+    // The values are off the prior's mean by less than its sigma, so that it pulls.
     for (const GaussianPrior& prior : problem.priors)
       for (const int p : prior.indices) part.values[p] += 7e-4;
   }
@@ -135,7 +135,7 @@ FittedModel model_of_noise(int directions) {
   return model;
 }
 
-/// The same as one matrix: shared parameters first, then each recording's own.
+/// Returns the same as one matrix: shared parameters first, then each recording's own.
 Projection projection_at_once(const FittedModel& model, bool with_directions) {
   const std::vector<const FitProblem*> problems = model.problem_pointers();
   const PooledSpace space(problems);
@@ -174,7 +174,7 @@ Projection projection_at_once(const FittedModel& model, bool with_directions) {
   return {jacobian, priors, pull, errs, Eigen::VectorXd::Ones(rows), residual};
 }
 
-// What is each recording's own is eliminated before what they share: products of projected vectors
+// What is each recording's own is eliminated before what they share. Products of projected vectors
 // are the same.
 TEST(ModelProjection, IsThatOfAllRecordingsAtOnce) {
   const FittedModel model = model_of_noise(2);
@@ -216,19 +216,19 @@ TEST(ModelProjection, TakesANumberForEachParameter) {
   EXPECT_NEAR(ModelProjection(model, Loss::squared).taken(), PooledSpace(problems).size(), 1e-8);
 }
 
-TEST(Explain, FindsTheAmountsAndTheFall) {
+TEST(Explain, FindsTheAmplitudesAndTheDecrease) {
   const Eigen::MatrixXd columns = random_matrix(50, 3, 11);
-  const Eigen::Vector3d amounts(0.5, -2, 1);
-  const Eigen::VectorXd residual = -columns * amounts;
+  const Eigen::Vector3d amplitudes(0.5, -2, 1);
+  const Eigen::VectorXd residual = -columns * amplitudes;
   const Explained explained = explain(residual, columns, ends(3, -kInfinite), ends(3, kInfinite));
 
-  EXPECT_LT((explained.amplitude - amounts).norm(), 1e-4);
+  EXPECT_LT((explained.amplitude - amplitudes).norm(), 1e-4);
   EXPECT_NEAR(explained.decrease, residual.squaredNorm(), 1e-8 * residual.squaredNorm());
 }
 
-// Drag cannot be negative: what asks for that is explained by nothing, and others do not lean on
-// it.
-TEST(Explain, KeepsAmountsWithinTheirEnds) {
+// Drag cannot be negative. A residual that asks for that is explained by nothing, and others do not
+// lean on it.
+TEST(Explain, KeepsAmplitudesWithinTheirEnds) {
   const Eigen::MatrixXd columns = random_matrix(50, 2, 12);
   const Eigen::VectorXd residual = -columns * Eigen::Vector2d(-1, 3);
   const Explained explained = explain(residual, columns, ends(2, 0), ends(2, kInfinite));

@@ -1,5 +1,5 @@
-// Laws that are proposed for simulated recordings whose missing force is known. Not checked here:
-// what the terms do (tests/model/effects/force_law_test.cpp, tension_law_test.cpp).
+// Checks laws that are proposed for simulated recordings whose missing force is known. Not checked
+// here: what the terms do (tests/model/effects/force_law_test.cpp, tension_law_test.cpp).
 #include "fit/diagnosis/proposed_law.h"
 
 #include <gmock/gmock.h>
@@ -27,14 +27,14 @@ const FitOptions kProposedLawOptions{.loss = Loss::squared};
 /// A cloth with few vertices, which is fitted soon.
 const SyntheticCloth kProposalCloth{.mesh = 5, .markers = 5};
 
-/// What a hidden effect moves, on the mesh of moved_by().
+/// Makes a recording that a hidden effect moves, on the mesh of moved_by().
 FitInput with_hidden(const DeclaredEffect& hidden, int held_out_from = 20) {
   return moved_by(
       hidden,
       synthetic_input({.markers = 5, .frames = held_out_from + 6, .held_out_from = held_out_from}));
 }
 
-/// What a diagnosis ends with that has found nothing, and the law that is proposed for the rest.
+/// The end of a diagnosis that has found nothing, and the law that is proposed for the residual.
 struct Proposal {
   FitInput input;
   DiagnosisSetup setup{.inputs = {&input, 1},
@@ -45,7 +45,7 @@ struct Proposal {
   ProposedLaw law;
 
   Proposal(FitInput recorded, int most_terms) : input(std::move(recorded)) {
-    // From the true fabric on, which spares a search; first over ten frames.
+    // Fits begin at the true fabric, which spares a search; first over ten frames.
     std::vector<NamedValues> start{named(SyntheticCloth{}.fabric)};
     for (const double share : {0.4, 1.0}) {
       model = shortened(model_at(setup, {}, start), share);
@@ -59,7 +59,7 @@ struct Proposal {
     law = propose_law(setup, model, {.most_terms = most_terms}, {});
   }
 
-  /// Of a model's residuals on the frames that no fit has seen, in sigmas.
+  /// Returns the rms of a model's residuals on the frames that no fit has seen, in sigmas.
   static double held_out_rms(const FittedModel& model) {
     const FitProblem& problem = *model.problems.front();
     const PooledPart& part = model.parts.front();
@@ -75,7 +75,7 @@ struct Proposal {
     return std::sqrt(sum / count);
   }
 
-  /// A coefficient of the law; 0 +- 0 where it has none.
+  /// Returns a coefficient of the law; 0 +- 0 where it has none.
   LawCoefficient coefficient(const std::string& parameter) const {
     const auto found = std::ranges::find(law.coefficients, parameter, &LawCoefficient::parameter);
     return found != law.coefficients.end() ? *found : LawCoefficient{};
@@ -161,7 +161,7 @@ TEST(ProposedLaw, TakesNoTermWhereNothingIsHidden) {
   }
 }
 
-// The model that comes with a law is one that simulations take, and does there what it did here.
+// The model that comes with a law is one that simulations take. It does there what it did here.
 TEST(ProposedLaw, CanBeSimulatedAsItStands) {
   const Proposal& proposal = of_hidden_drag();
   const FitProblem& problem = *proposal.law.model.problems.front();
@@ -174,7 +174,7 @@ TEST(ProposedLaw, CanBeSimulatedAsItStands) {
   const SimulateResult here =
       run_model(problem, {found.values}, problem.frames(), found.steps).front();
   ASSERT_TRUE(result.usable());
-  // The same step but for how it divides the frames' intervals; drag is 15 sigmas of 0.5 mm.
+  // Steps differ only in how they divide the frames' intervals; drag is 15 sigmas of 0.5 mm.
   for (size_t f = 0; f < here.position_m.size(); ++f)
     EXPECT_LT((result.position_m[f] - here.position_m[f]).cwiseAbs().maxCoeff(), 1e-6);
 }

@@ -1,4 +1,4 @@
-// Hypotheses that later ones make needless. Whole searches: search_test.cpp.
+// Checks the removal of hypotheses that later ones make needless. Whole searches: search_test.cpp.
 #include "fit/diagnosis/prune.h"
 
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
-// Models that are fitted again in a diagnosis. How well laws race each other: search_test.cpp,
-// tests/fit/diagnosis/diagnose_test.cpp.
+// Checks models that are fitted again in a diagnosis. How well hypotheses race each other is
+// checked in search_test.cpp and tests/fit/diagnosis/diagnose_test.cpp.
 #include "fit/diagnosis/refit.h"
 
 #include <gtest/gtest.h>
@@ -22,48 +22,48 @@ const FitOptions kRefitOptions = [] {
   return options;
 }();
 
-/// Whether it leaves no more than what a fit with drag from the truth ends at.
-void expect_optimum(const FittedModel& anew, const DiagnosisSetup& setup,
+/// Expects a model to leave no more than a fit with drag that begins at the truth.
+void expect_optimum(const FittedModel& found, const DiagnosisSetup& setup,
                     const SyntheticCloth& cloth) {
-  ASSERT_TRUE(anew.usable());
+  ASSERT_TRUE(found.usable());
   FittedModel near = true_model(setup, cloth, {drag_term()});
   refine_model(near, setup, {}, {});
   ASSERT_TRUE(near.usable());
-  // Time steps are chosen anew, and change chi-square by a little of its scatter.
+  // Time steps are chosen again, and change chi-square by a little of its scatter.
   const auto count = static_cast<double>(near.residual_count());
-  EXPECT_LT(anew.residual().squaredNorm(),
+  EXPECT_LT(found.residual().squaredNorm(),
             near.residual().squaredNorm() + 0.2 * std::sqrt(2 * count));
 }
 
-TEST(FittedAnew, IsTheOptimumWhateverIsKnown) {
+TEST(IdentifiedFromScratch, IsTheOptimumWhateverIsKnown) {
   const SyntheticCloth cloth{.drag_rate_per_s = 1.2};
   const FitInput input = synthetic_input(cloth);
   const DiagnosisSetup setup{
       .inputs = {&input, 1}, .options = kRefitOptions, .columns = 9, .rows = 9};
 
-  const FittedModel anew = identified_from_scratch(setup, {drag_term()}, {});
+  const FittedModel identified = identified_from_scratch(setup, {drag_term()}, {});
 
-  ASSERT_NO_FATAL_FAILURE(expect_optimum(anew, setup, cloth));
-  ASSERT_EQ(anew.hypotheses.size(), 1u);
-  EXPECT_NEAR(anew.values().front().at("viscous_damping.rate"), 1.2, 0.05);
+  ASSERT_NO_FATAL_FAILURE(expect_optimum(identified, setup, cloth));
+  ASSERT_EQ(identified.hypotheses.size(), 1u);
+  EXPECT_NEAR(identified.values().front().at("viscous_damping.rate"), 1.2, 0.05);
 }
 
-TEST(FittedAnew, IsOfAllRecordings) {
+TEST(IdentifiedFromScratch, IsOfAllRecordings) {
   SyntheticCloth cloth{.drag_rate_per_s = 1.2};
   std::vector<FitInput> inputs{synthetic_input(cloth)};
   cloth.seed = 2;
   inputs.push_back(synthetic_input(cloth));
   const DiagnosisSetup setup{.inputs = inputs, .options = kRefitOptions, .columns = 9, .rows = 9};
 
-  const FittedModel anew = identified_from_scratch(setup, {drag_term()}, {});
+  const FittedModel identified = identified_from_scratch(setup, {drag_term()}, {});
 
-  ASSERT_NO_FATAL_FAILURE(expect_optimum(anew, setup, cloth));
-  const std::vector<NamedValues> values = anew.values();
+  ASSERT_NO_FATAL_FAILURE(expect_optimum(identified, setup, cloth));
+  const std::vector<NamedValues> values = identified.values();
   EXPECT_NEAR(values[0].at("viscous_damping.rate"), 1.2, 0.04);
   EXPECT_EQ(values[0].at("viscous_damping.rate"), values[1].at("viscous_damping.rate"));
 }
 
-TEST(FittedAnew, IsOfAKnownStart) {
+TEST(IdentifiedFromScratch, IsOfAKnownStart) {
   FitInput input = synthetic_input({});
   input.recording.start = StartKind::unknown;
   const DiagnosisSetup setup{
@@ -95,7 +95,7 @@ TEST(RaceOnMesh, LeavesWhatIsNotFarBehindAndRuns) {
   ASSERT_NO_FATAL_FAILURE(expect_optimum(fitted[2], setup, cloth));
 }
 
-TEST(WithTerms, HandsOnWhatTheModelIsExpectedToErrBy) {
+TEST(WithHypotheses, HandsOnWhatTheModelIsExpectedToErrBy) {
   const SyntheticCloth cloth;
   const FitInput input = synthetic_input(cloth);
   const DiagnosisSetup setup{
@@ -106,7 +106,7 @@ TEST(WithTerms, HandsOnWhatTheModelIsExpectedToErrBy) {
 
   const FittedModel with_drag = with_hypotheses(setup, model, {drag_term()}, {});
   EXPECT_EQ(with_drag.parts.front().correction, part.correction);
-  // A neutral law changes nothing.
+  // A hypothesis at neutral changes nothing.
   EXPECT_LT((with_drag.residual() - model.residual()).norm(), 1e-9 * model.residual().norm());
 
   const FittedModel early = shortened(model, 0.5);
@@ -115,7 +115,7 @@ TEST(WithTerms, HandsOnWhatTheModelIsExpectedToErrBy) {
   EXPECT_EQ(early.residual(), model.residual().head(rows));
 }
 
-TEST(WithTerms, WithoutTheOnlyLawIsTheModelBeforeIt) {
+TEST(WithHypotheses, WithoutTheOnlyOneIsTheModelBeforeIt) {
   const SyntheticCloth cloth{.drag_rate_per_s = 0.1};
   const FitInput input = synthetic_input(cloth);
   const DiagnosisSetup setup{
@@ -132,7 +132,7 @@ TEST(WithTerms, WithoutTheOnlyLawIsTheModelBeforeIt) {
   ASSERT_TRUE(without.usable() && base.usable());
   const auto count = static_cast<double>(base.residual_count());
   const double scatter = std::sqrt(2 * count);
-  // Time steps are chosen anew.
+  // Time steps are chosen again.
   EXPECT_NEAR(without.residual().squaredNorm(), base.residual().squaredNorm(), 0.05 * count);
   EXPECT_GT(without.residual().squaredNorm(), with_drag.residual().squaredNorm() + 5 * scatter);
 }

@@ -1,4 +1,4 @@
-// The force per mass that simulated tracks ask for beyond a model that lacks a known one.
+// Checks the force per mass that simulated tracks ask for beyond a model that lacks a known one.
 #include "fit/diagnosis/residual_force.h"
 
 #include <gtest/gtest.h>
@@ -70,7 +70,7 @@ TEST(ResidualForce, OfAHiddenDragGoesAgainstTheVelocityAndIsLessThanIt) {
   EXPECT_GT(velocity.slope, -1.2 - 3 * velocity.sigma);  // the springs' answer is in it
   EXPECT_GT(std::abs(velocity.correlation),
             std::abs(regression(force, "strain rate along the warp").correlation));
-  // Drag acts on what moves: the free edge, and more while it falls than at first.
+  // Drag acts on what moves: on the free edge, and more while it falls than at first.
   const auto rms = [&](int marker) {
     return std::ranges::find(force.markers, marker, &ResidualForce::OfMarker::marker)
         ->rms_m_per_s2.norm();

@@ -1,4 +1,4 @@
-// The score test of laws on simulated recordings, the derivatives it is made of, and the judgement
+// Checks the score test of hypotheses on simulated recordings, its derivatives, and the judgement
 // of what a fit leaves. Not checked here: derivatives of runs along effects that a cloth does not
 // have, one by one (tests/model/integrate/tangents_test.cpp).
 #include "fit/diagnosis/score.h"
@@ -33,7 +33,7 @@ DiagnosisSetup setup_of(std::span<const FitInput> inputs) {
 /// A cloth that is simulated soon.
 const SyntheticCloth kFewVertices{.mesh = 5};
 
-TEST(Score, ForeseesASmallDragAndItsSigma) {
+TEST(Score, PredictsASmallDragAndItsSigma) {
   const SyntheticCloth cloth{.drag_rate_per_s = 0.05, .noise_m = 1e-4};
   const FitInput input = synthetic_input(cloth);
   const DiagnosisSetup setup = setup_of({&input, 1});
@@ -46,7 +46,7 @@ TEST(Score, ForeseesASmallDragAndItsSigma) {
   ASSERT_EQ(scores.size(), 1u);
   EXPECT_NEAR(scores[0].amplitude[0], 0.05, 4 * scores[0].sigma[0]);
   EXPECT_LT(scores[0].sigma[0], 0.01);
-  // What a normal estimate so far from neutral takes from chi-square.
+  // A normal estimate so far from neutral takes this from chi-square.
   const double z = scores[0].amplitude[0] / scores[0].sigma[0];
   EXPECT_NEAR(scores[0].decrease, z * z, 1e-6 * z * z);
 }
@@ -57,20 +57,20 @@ TEST(Score, IsThatOfNoiseWhereNothingIsHidden) {
   const DiagnosisSetup setup = setup_of({&input, 1});
   const FittedModel model = that_may_err(setup, true_model(setup, cloth));
   ASSERT_TRUE(model.usable());
-  std::vector<ShapeCandidates> laws = hypotheses_to_test(input, kScoreOptions, 0.4);
-  std::erase_if(laws, [](const ShapeCandidates& law) { return law.size() > 1; });
+  std::vector<ShapeCandidates> hypotheses = hypotheses_to_test(input, kScoreOptions, 0.4);
+  std::erase_if(hypotheses, [](const ShapeCandidates& shapes) { return shapes.size() > 1; });
 
   const std::vector<Score> scores =
-      score_hypotheses(model, ModelProjection(model, kScoreOptions.loss), laws, {});
+      score_hypotheses(model, ModelProjection(model, kScoreOptions.loss), hypotheses, {});
 
   EXPECT_GT(scores.size(), 5u);
   for (const Score& score : scores)
-    // Beyond 20 one law in 100 000 has its chi-square with one degree of freedom.
+    // Beyond 20 lies the chi-square of one hypothesis in 100 000, with one degree of freedom.
     EXPECT_LT(score.decrease, 20 + 4 * static_cast<double>(score.amplitude.size() - 1))
         << score.hypothesis.title();
 }
 
-// Two recordings of one motion have the same derivatives, but for where noise has put the sheet: of
+// Two recordings of one motion have the same derivatives, but for where noise has put the sheet. Of
 // what is the cloth's they say twice as much as one.
 TEST(Score, SharesThePhysicsOfTwoRecordingsAndNotTheirClocks) {
   const std::vector<FitInput> inputs{synthetic_input({.noise_m = 1e-4, .seed = 1}),
@@ -90,7 +90,7 @@ TEST(Score, SharesThePhysicsOfTwoRecordingsAndNotTheirClocks) {
   ASSERT_EQ(two[0].amplitude.size(), 1);
   EXPECT_NEAR(two[0].sigma[0], one[0].sigma[0] / std::sqrt(2.0), 0.02 * one[0].sigma[0]);
   ASSERT_EQ(two[1].amplitude.size(), 2);
-  // What both clocks do alike is known as one of them alone is; what they do in opposite ways no
+  // What both clocks do alike is known as one of them alone is. What they do in opposite ways no
   // parameter of the cloth can do, so that it is known better.
   for (const double sigma_s : two[1].sigma) {
     EXPECT_LT(sigma_s, 1.01 * one[1].sigma[0]);
@@ -98,13 +98,13 @@ TEST(Score, SharesThePhysicsOfTwoRecordingsAndNotTheirClocks) {
   }
 }
 
-// Two ways to one number: effects that the cloth does not have, and a fit that has them at their
-// neutral values.
-TEST(LawDerivatives, AreThoseOfAModelThatHasTheLawAtItsNeutralValue) {
+// Two ways lead to one number: effects that the cloth does not have, and a fit that has them at
+// their neutral values.
+TEST(HypothesisDerivatives, AreThoseOfAModelThatHasTheEffectAtItsNeutralValue) {
   const SyntheticCloth cloth;
   const FitInput input = synthetic_input(cloth);
   const DiagnosisSetup setup = setup_of({&input, 1});
-  std::vector<Hypothesis> laws{
+  std::vector<Hypothesis> hypotheses{
       drag_term(),
       {.effect = "wind", .mode = "pressure", .amplitudes = {"q_x", "q_y", "q_z"}},
       {.effect = "nonuniform_mass",
@@ -113,30 +113,30 @@ TEST(LawDerivatives, AreThoseOfAModelThatHasTheLawAtItsNeutralValue) {
        .shape = {{"hem_width", 0.02}},
        .shape_sigma = {{"hem_width", 0.01}}},
       {.effect = "scale", .mode = "", .amplitudes = {"factor"}}};
-  // Several phases of one frequency, which need not be differentiated one by one.
+  // Several phases of one frequency need not be differentiated one by one.
   for (const double phase : {-0.2, 0.05, 0.3}) {
     const std::map<std::string, double> shape{{"frequency", 3}, {"phase", phase}};
-    laws.push_back({.effect = "gust", .mode = "", .amplitudes = {"q_x", "q_y", "q_z"}});
-    laws.push_back({.effect = "support_motion",
-                    .mode = "",
-                    .amplitudes = {"amplitude_x", "amplitude_y", "amplitude_z"}});
-    laws.push_back({.effect = "camera_shake",
-                    .mode = "shift",
-                    .amplitudes = {"shift_x", "shift_y", "shift_z"}});
-    for (size_t k = laws.size() - 3; k < laws.size(); ++k) laws[k].shape = shape;
+    hypotheses.push_back({.effect = "gust", .mode = "", .amplitudes = {"q_x", "q_y", "q_z"}});
+    hypotheses.push_back({.effect = "support_motion",
+                          .mode = "",
+                          .amplitudes = {"amplitude_x", "amplitude_y", "amplitude_z"}});
+    hypotheses.push_back({.effect = "camera_shake",
+                          .mode = "shift",
+                          .amplitudes = {"shift_x", "shift_y", "shift_z"}});
+    for (size_t k = hypotheses.size() - 3; k < hypotheses.size(); ++k) hypotheses[k].shape = shape;
   }
 
-  const std::vector<Columns> columns = hypothesis_derivatives(true_model(setup, cloth), laws);
+  const std::vector<Columns> columns = hypothesis_derivatives(true_model(setup, cloth), hypotheses);
 
-  ASSERT_EQ(columns.size(), laws.size());
-  for (size_t k = 0; k < laws.size(); ++k) {
-    SCOPED_TRACE(laws[k].title());
+  ASSERT_EQ(columns.size(), hypotheses.size());
+  for (size_t k = 0; k < hypotheses.size(); ++k) {
+    SCOPED_TRACE(hypotheses[k].title());
     ASSERT_EQ(columns[k].size(), 1u);  // recordings
-    const FittedModel with = true_model(setup, cloth, {laws[k]});
+    const FittedModel with = true_model(setup, cloth, {hypotheses[k]});
     const PooledPart& part = with.parts.front();
     const ParameterSpace& space = with.problems.front()->space;
     const Eigen::VectorXd slope = space.value_by_coordinate(part.values);
-    const std::vector<std::string> names = laws[k].parameters();
+    const std::vector<std::string> names = hypotheses[k].parameters();
     ASSERT_EQ(columns[k].front().cols(), static_cast<Eigen::Index>(names.size()));
     for (size_t a = 0; a < names.size(); ++a) {
       const int p = space.index(names[a]);
@@ -144,8 +144,8 @@ TEST(LawDerivatives, AreThoseOfAModelThatHasTheLawAtItsNeutralValue) {
       const Eigen::VectorXd expected = part.linear.residual_by_coordinate.col(p) / slope[p];
       const Eigen::VectorXd found = columns[k].front().col(static_cast<Eigen::Index>(a));
       EXPECT_GT(expected.norm(), 0) << names[a];
-      // A law is a difference over 1e-5 of a typical change, and a force is carried on between
-      // steps.
+      // The derivative by a hypothesis is a difference over 1e-5 of a typical change, and a force
+      // is carried on between steps.
       EXPECT_LT((found - expected).norm(), 1e-3 * expected.norm()) << names[a];
     }
   }
@@ -175,7 +175,7 @@ TEST(Adequacy, HoldsForATrueModelAndNotForOneThatLacksDrag) {
   }
 }
 
-// The same structure is none where mesh and time step are thought to err by far more.
+// The same structure does not count where mesh and time step are thought to err by far more.
 TEST(Adequacy, TakesLittleBesideTheDiscretisationsErrorForNoStructure) {
   const SyntheticCloth cloth{.drag_rate_per_s = 0.06};
   const FitInput input = synthetic_input(cloth);
@@ -184,7 +184,7 @@ TEST(Adequacy, TakesLittleBesideTheDiscretisationsErrorForNoStructure) {
   ASSERT_TRUE(model.usable());
   ASSERT_FALSE(judge_adequacy(model, kScoreOptions.loss).adequate);
 
-  // A direction that looks like nothing else: of mean square 40, its sign alternating.
+  // The direction looks like nothing else: of mean square 40, its sign alternating.
   Eigen::MatrixXd& directions = model.parts.front().directions;
   directions = Eigen::MatrixXd::Constant(model.residual_count(), 1, std::sqrt(40.0));
   for (Eigen::Index n = 0; n < directions.rows(); n += 2) directions(n, 0) *= -1;
@@ -195,8 +195,8 @@ TEST(Adequacy, TakesLittleBesideTheDiscretisationsErrorForNoStructure) {
   EXPECT_TRUE(adequacy.adequate);
 }
 
-// A model that is true foresees left-out frames to the noise; constants of markers, which nothing
-// asks for, and a last residual, which is noise, do worse.
+// A true model predicts frames left out to the noise. Constants of markers, which nothing asks for,
+// and a last residual, which is noise, do worse.
 TEST(CrossValidation, OfATrueModelIsTheNoiseAndBeatsCorrectionsWithoutPhysics) {
   const SyntheticCloth cloth = kFewVertices;
   const FitInput input = synthetic_input(cloth);
@@ -213,9 +213,9 @@ TEST(CrossValidation, OfATrueModelIsTheNoiseAndBeatsCorrectionsWithoutPhysics) {
   EXPECT_NEAR(validated.last_residual, 2 * validated.mean, 0.3);
 }
 
-// The same of a whole recording that took no part in finding the cloth's parameters: only where its
-// sheet lay is its own.
-TEST(CrossValidation, OfATrueModelForeseesAnotherRecordingToTheNoise) {
+// The same holds of a whole recording that took no part in finding the cloth's parameters. Only
+// where its sheet lay is its own.
+TEST(CrossValidation, OfATrueModelPredictsAnotherRecordingToTheNoise) {
   const SyntheticCloth cloth = kFewVertices;
   const std::vector<FitInput> inputs{synthetic_input({.seed = 1}), synthetic_input({.seed = 2})};
   const DiagnosisSetup setup = setup_of(inputs);
@@ -230,8 +230,8 @@ TEST(CrossValidation, OfATrueModelForeseesAnotherRecordingToTheNoise) {
   EXPECT_NEAR(validated.mean, 1, 0.07);  // 7644 residuals: 4 of its sigmas
 }
 
-// The first frames are what shows a start in motion: without them it would be told, through 54
-// numbers, from what became of it.
+// The first frames show a start in motion. Without them it would be told, through 54 numbers, from
+// what became of it.
 TEST(CrossValidation, KeepsTheFramesThatShowAStartInMotion) {
   FitInput input = synthetic_input({.frames = 46, .held_out_from = 40});
   input.recording.start = StartKind::unknown;
@@ -263,7 +263,7 @@ TEST(Discretisation, ShowsWhatTheStepAndTheMeshAreWorth) {
   const Eigen::MatrixXd& directions = errors.front().directions;
   ASSERT_EQ(directions.rows(), model.residual_count());
   ASSERT_EQ(directions.cols(), 2);
-  // The truth was simulated on this mesh at about this step: its own errors are far below the
+  // The truth was simulated on this mesh at about this step. Its own errors are far below the
   // noise, but not nothing.
   for (int k = 0; k < 2; ++k) {
     const double rms = directions.col(k).norm() / std::sqrt(static_cast<double>(directions.rows()));
@@ -272,7 +272,7 @@ TEST(Discretisation, ShowsWhatTheStepAndTheMeshAreWorth) {
   }
 }
 
-// The scheme is of first order: at an eighth of the step an eighth of the error is left.
+// The scheme is of first order: an eighth of the step leaves an eighth of the error.
 TEST(Discretisation, ExpectsOfTheStepWhatAFinerOneShows) {
   const SyntheticCloth cloth = kFewVertices;
   const FitInput input = synthetic_input(cloth);
@@ -286,12 +286,12 @@ TEST(Discretisation, ExpectsOfTheStepWhatAFinerOneShows) {
   const Eigen::VectorXd change = fine.residuals({part.values}).front() - part.linear.residual;
   ASSERT_EQ(error.expected.size(), change.size());
   EXPECT_LT((change - 0.875 * error.expected).norm(), 0.05 * error.expected.norm());
-  // Half of it is what the direction allows for.
+  // The direction allows for half of it.
   EXPECT_LT((2 * error.directions.col(0) - error.expected).norm(), 1e-9 * error.expected.norm());
 }
 
-// Of a start in motion the other mesh's fit goes by derivatives that are only updated. What it may
-// stop short of is a change of parameters, which are fitted along with the direction it gives.
+// With a start in motion the other mesh's fit goes by derivatives that are only updated. It may
+// stop short of a change of parameters, which are fitted along with the direction it gives.
 TEST(Discretisation, OfAStartInMotionStopsShortOnlyAlongTheParameters) {
   FitInput input = synthetic_input({.frames = 28, .held_out_from = 20});
   input.recording.start = StartKind::unknown;
@@ -321,7 +321,7 @@ TEST(Discretisation, OfAStartInMotionStopsShortOnlyAlongTheParameters) {
   EXPECT_LT(there.residual().squaredNorm(), 1.5 * optimum.residual().squaredNorm());
 }
 
-// Where nothing is missing the amounts are those of noise, and a fit keeps its directions.
+// Where nothing is missing, amplitudes are those of noise, and a fit keeps its directions.
 TEST(Discretisation, OfATrueModelIsBelieved) {
   const SyntheticCloth cloth = kFewVertices;
   const FitInput input = synthetic_input(cloth);

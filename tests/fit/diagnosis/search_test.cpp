@@ -1,5 +1,5 @@
-// Searches on a coarser mesh and in another basin. The steps have files of their own, from
-// beam_test.cpp to worth_test.cpp; whole searches: planting_test.cpp, diagnose_test.cpp.
+// Checks searches on a coarser mesh and in another basin. The steps have files of their own, from
+// beam_test.cpp to worth_test.cpp. Whole searches: planting_test.cpp, diagnose_test.cpp.
 #include "fit/diagnosis/search.h"
 
 #include <gtest/gtest.h>
@@ -28,7 +28,7 @@ FitOptions short_search() {
   return options;
 }
 
-/// The model without laws in that basin.
+/// Returns the model without hypotheses in that basin.
 FittedModel stiffer(const DiagnosisSetup& setup, SyntheticCloth cloth) {
   constexpr double kStiffer = 6;
   for (double* stiffness : {&cloth.fabric.tension_warp_n_per_m, &cloth.fabric.tension_weft_n_per_m,
@@ -40,11 +40,11 @@ FittedModel stiffer(const DiagnosisSetup& setup, SyntheticCloth cloth) {
   return model;
 }
 
-SearchOptions only(const Hypothesis& law) {
-  return {.hypotheses = {{law}}, .beam_width = 1, .most_effects = 1, .threshold = kSquares};
+SearchOptions only(const Hypothesis& hypothesis) {
+  return {.hypotheses = {{hypothesis}}, .beam_width = 1, .most_effects = 1, .threshold = kSquares};
 }
 
-TEST(SearchLaws, LeavesABasinRatherThanNameALawForIt) {
+TEST(SearchHypotheses, LeavesABasinRatherThanNameAnEffectForIt) {
   CLOTHFIT_ONLY_IN_WHOLE_RUNS();
   const FitInput input = synthetic_input(kBouncing);
   const FitOptions options = short_search();
@@ -63,13 +63,13 @@ TEST(SearchLaws, LeavesABasinRatherThanNameALawForIt) {
   EXPECT_LT(found.model.chi_square(kSquares), 1.2 * count);
 }
 
-/// A cloth in thick air.
+/// Returns a cloth in thick air.
 SyntheticCloth in_thick_air(int mesh, int markers) {
   return {
       .drag_rate_per_s = 3, .mesh = mesh, .markers = markers, .frames = 20, .held_out_from = 16};
 }
 
-/// What a coarser mesh finds that knows nothing of the air.
+/// Returns the values that a coarser mesh finds which knows nothing of the air.
 std::vector<NamedValues> found_without_air(const DiagnosisSetup& setup,
                                            const SyntheticCloth& cloth) {
   FittedModel coarse = true_model(with_coarse_mesh(setup), cloth);
@@ -88,7 +88,7 @@ FittedModel grossly_misfitting(const DiagnosisSetup& setup,
 }
 
 // The mesh of half the cells, on which this one's errors are estimated, has few vertices.
-TEST(SearchLaws, ChoosesALawForAGrosslyMisfittingModelOnACoarserMesh) {
+TEST(SearchHypotheses, ChoosesAHypothesisForAGrosslyMisfittingModelOnACoarserMesh) {
   const SyntheticCloth cloth = in_thick_air(13, 4);
   const FitInput input = synthetic_input(cloth);
   const FitOptions options = short_search();
@@ -101,14 +101,14 @@ TEST(SearchLaws, ChoosesALawForAGrosslyMisfittingModelOnACoarserMesh) {
   EXPECT_NEAR(found.model.values().front().at("viscous_damping.rate"), 3, 0.1);
   EXPECT_LT(found.model.chi_square(kSquares),
             1.2 * static_cast<double>(found.model.residual_count()));
-  // Held against the model without it as it is reported.
+  // The trial's decrease is from the model without the hypothesis, as that is reported.
   const FittedModel& without = found.base.usable() ? found.base : base;
   EXPECT_NEAR(found.accepted.front().trial.decrease,
               without.chi_square(kSquares) - found.model.chi_square(kSquares),
               0.01 * without.chi_square(kSquares));
 }
 
-TEST(SearchLaws, RefinesAGrosslyMisfittingModelOnItsOwnMeshWhereNoLawIsFound) {
+TEST(SearchHypotheses, RefinesAGrosslyMisfittingModelOnItsOwnMeshWhereNoHypothesisIsFound) {
   const SyntheticCloth cloth = in_thick_air(11, 5);
   const FitInput input = synthetic_input(cloth);
   const FitOptions options = short_search();
@@ -125,7 +125,7 @@ TEST(SearchLaws, RefinesAGrosslyMisfittingModelOnItsOwnMeshWhereNoLawIsFound) {
   EXPECT_LT(refined.base.chi_square(kSquares), off.chi_square(kSquares));
 }
 
-TEST(SearchLaws, CreditsALawWithWhatItExplainsAndNotWithTheBasin) {
+TEST(SearchHypotheses, CreditsAHypothesisWithWhatItExplainsAndNotWithTheBasin) {
   SyntheticCloth cloth = kBouncing;
   cloth.drag_rate_per_s = 1.5;
   cloth.markers = 4;

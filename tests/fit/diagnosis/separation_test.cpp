@@ -1,6 +1,6 @@
-// How far two laws are apart in a recording, and in others that could be made. Not checked here:
-// the projection it is made of (projection_test.cpp), derivatives of laws (score_test.cpp), and
-// which laws a search says are alike (search_test.cpp).
+// Checks how far two hypotheses are apart in a recording, and in others that could be made. Not
+// checked here: the projection (projection_test.cpp), derivatives (score_test.cpp), and which
+// hypotheses a search says are alike (search_test.cpp).
 #include "fit/diagnosis/separation.h"
 
 #include <gtest/gtest.h>
@@ -67,17 +67,17 @@ const NamedValues kFound{{"gravity_tilt.about_x", 0.02},
                          {"wind.q_y", 0.01},
                          {"viscous_damping.rate", 0.2}};
 
-/// A model that has a law, with the true fabric; linearised.
-FittedModel model_with(const DiagnosisSetup& setup, const std::vector<Hypothesis>& terms) {
+/// Returns a model that has hypotheses, with the true fabric; linearised.
+FittedModel model_with(const DiagnosisSetup& setup, const std::vector<Hypothesis>& hypotheses) {
   NamedValues values = named(SyntheticCloth().fabric);
   values.insert(kFound.begin(), kFound.end());
-  FittedModel model = model_at(setup, terms, {values});
+  FittedModel model = model_at(setup, hypotheses, {values});
   linearise_model(model);
   EXPECT_TRUE(model.usable());
   return model;
 }
 
-/// The model in a candidate, linearised; not usable where that does not run.
+/// Returns the model in a candidate, linearised. It is not usable where that does not run.
 FittedModel in(const CandidateRecording& candidate, const FittedModel& model) {
   FitProblem problem = *model.problems.front();
   candidate.change(problem);
@@ -93,8 +93,9 @@ FittedModel in(const CandidateRecording& candidate, const FittedModel& model) {
   return there;
 }
 
-/// How far apart two laws are in each candidate of some kinds.
-std::multimap<CandidateKind, double> distances(const FittedModel& model, const Hypothesis& law,
+/// Returns how far apart two hypotheses are in each candidate of some kinds.
+std::multimap<CandidateKind, double> distances(const FittedModel& model,
+                                               const Hypothesis& hypothesis,
                                                const Hypothesis& other,
                                                const std::set<CandidateKind>& kinds) {
   std::multimap<CandidateKind, double> result;
@@ -102,7 +103,8 @@ std::multimap<CandidateKind, double> distances(const FittedModel& model, const H
     if (!kinds.contains(candidate.kind)) continue;
     const FittedModel there = in(candidate, model);
     EXPECT_TRUE(there.usable()) << candidate.what;
-    if (there.usable()) result.emplace(candidate.kind, hypothesis_distance(there, law, other));
+    if (there.usable())
+      result.emplace(candidate.kind, hypothesis_distance(there, hypothesis, other));
   }
   return result;
 }
@@ -114,8 +116,9 @@ double best(const std::multimap<CandidateKind, double>& distances, CandidateKind
   return most;
 }
 
-// By another route: all that is fitted, and a law that the model has too, at its neutral value.
-TEST(LawDistance, IsWhatLeastSquaresLeave) {
+// The other route fits all parameters, and those of a hypothesis that the model has too, at its
+// neutral value.
+TEST(HypothesisDistance, IsWhatLeastSquaresLeave) {
   SCOPED_TRACE(kSeed);
   const FitInput input = synthetic_input({});
   const DiagnosisSetup setup = setup_of(input, kInSpace);
@@ -137,17 +140,17 @@ TEST(LawDistance, IsWhatLeastSquaresLeave) {
       others.rightCols(1) = own.normalized();
     }
   }
-  const Eigen::VectorXd amount = others.colPivHouseholderQr().solve(change);
-  const double expected = (change - others * amount).norm();
+  const Eigen::VectorXd coefficients = others.colPivHouseholderQr().solve(change);
+  const double expected = (change - others * coefficients).norm();
 
   const double found = hypothesis_distance(model_with(setup, {kWind}), kWind, drag_term());
 
   EXPECT_GT(expected, 1);
-  // Time steps are those of either model's own stability, and a law's derivative is a difference.
+  // Time steps are those of either model's own stability, and the derivative is a difference.
   EXPECT_NEAR(found, expected, 0.01 * expected);
 }
 
-TEST(LawDistance, IsNoneAlongWhatTheDiscretisationMayErrBy) {
+TEST(HypothesisDistance, IsNoneAlongWhatTheDiscretisationMayErrBy) {
   SCOPED_TRACE(kSeed);
   const FitInput input = synthetic_input({});
   FittedModel model = model_with(setup_of(input, kInSpace), {kWind});
@@ -162,11 +165,11 @@ TEST(LawDistance, IsNoneAlongWhatTheDiscretisationMayErrBy) {
     part.directions += part.values[p] / slope[p] * part.linear.residual_by_coordinate.col(p);
   }
 
-  // Of a length v along a direction of standard deviation v are left v / sqrt(1 + v^2).
+  // A length v along a direction of standard deviation v leaves v / sqrt(1 + v^2).
   EXPECT_LT(hypothesis_distance(model, kWind, drag_term()), 1);
 }
 
-TEST(LawDistance, IsOfNoLawThatCannotAct) {
+TEST(HypothesisDistance, IsOfNoHypothesisThatCannotAct) {
   SCOPED_TRACE(kSeed);
   const FitInput input = synthetic_input({});
   const Hypothesis focal{.effect = "focal_error", .mode = "", .amplitudes = {"excess"}};
@@ -175,27 +178,28 @@ TEST(LawDistance, IsOfNoLawThatCannotAct) {
   EXPECT_TRUE(std::isnan(hypothesis_distance(model, kWind, focal)));
 }
 
-// A turn of gravity is one of all that is measured, and a wrong frame rate another gravity, where
-// the fabric is free: in whatever is let go from supports that stand still.
+// A turn of gravity is one of all that is measured. A wrong frame rate is another gravity, where
+// the fabric is free. Both hold in whatever is let go from supports that stand still.
 TEST(Candidates, TellWhatIsTheSameByConstructionOnlyWhereSupportsMove) {
   SCOPED_TRACE(kSeed);
   const FitInput input = synthetic_input({});
   struct Case {
-    Hypothesis law, other;
-    double same;  ///< sigmas: the scheme's own error of first order is another one
+    Hypothesis hypothesis, other;
+    double same;  ///< sigmas: the scheme's own error of first order differs
   };
   for (const Case& of :
        {Case{kGravityTilt, kWorldTilt, 1e-3}, Case{kGravityScale, kFrameRate, 1}}) {
-    SCOPED_TRACE(of.law.title());
-    const FittedModel model = model_with(setup_of(input, kInSpace), {of.law});
-    EXPECT_GT(hypothesis_distance(model, of.law, drag_term()), 5);
-    EXPECT_LT(hypothesis_distance(model, of.law, of.other), of.same);
+    SCOPED_TRACE(of.hypothesis.title());
+    const FittedModel model = model_with(setup_of(input, kInSpace), {of.hypothesis});
+    EXPECT_GT(hypothesis_distance(model, of.hypothesis, drag_term()), 5);
+    EXPECT_LT(hypothesis_distance(model, of.hypothesis, of.other), of.same);
 
     const std::set<CandidateKind> still{CandidateKind::duration, CandidateKind::frame_rate,
                                         CandidateKind::attitude, CandidateKind::turned};
     std::set<CandidateKind> all = still;
     all.insert(CandidateKind::shaken);
-    const std::multimap<CandidateKind, double> then = distances(model, of.law, of.other, all);
+    const std::multimap<CandidateKind, double> then =
+        distances(model, of.hypothesis, of.other, all);
 
     for (const CandidateKind kind : still) {
       ASSERT_TRUE(then.contains(kind));
@@ -211,19 +215,19 @@ TEST(Candidates, OfMoreFramesOrCamerasTellNoWorse) {
   const FitInput input = synthetic_input({});
   for (const FitOptions* options : {&kInSpace, &kInPixels}) {
     const bool in_pixels = options == &kInPixels;
-    for (const auto& [law, other] : {std::pair(kWind, kGust), std::pair(kWind, kWindDrag),
-                                     std::pair(drag_term(), kWindDrag)}) {
-      SCOPED_TRACE(law.title() + " and " + other.title() + (in_pixels ? ", pixels" : ""));
-      const FittedModel model = model_with(setup_of(input, *options), {law});
-      const double now = hypothesis_distance(model, law, other);
+    for (const auto& [hypothesis, other] : {std::pair(kWind, kGust), std::pair(kWind, kWindDrag),
+                                            std::pair(drag_term(), kWindDrag)}) {
+      SCOPED_TRACE(hypothesis.title() + " and " + other.title() + (in_pixels ? ", pixels" : ""));
+      const FittedModel model = model_with(setup_of(input, *options), {hypothesis});
+      const double now = hypothesis_distance(model, hypothesis, other);
 
       const std::multimap<CandidateKind, double> then =
-          distances(model, law, other,
+          distances(model, hypothesis, other,
                     {CandidateKind::duration, CandidateKind::frame_rate, CandidateKind::camera});
 
       constexpr double kRounding = 1 - 1e-6;
       EXPECT_GT(best(then, CandidateKind::duration), kRounding * now);
-      // Frames between cut time anew.
+      // Frames between others cut time in another way.
       EXPECT_GT(best(then, CandidateKind::frame_rate), 0.99 * now);
       EXPECT_EQ(then.contains(CandidateKind::camera), in_pixels);
       if (in_pixels) {
@@ -231,101 +235,6 @@ TEST(Candidates, OfMoreFramesOrCamerasTellNoWorse) {
       }
     }
   }
-}
-
-TEST(Candidates, AreSeenWhereTheModelHasThem) {
-  SCOPED_TRACE(kSeed);
-  const FitInput input = synthetic_input({});
-  const FittedModel model = model_with(setup_of(input, kInPixels), {kWind});
-  const auto rows = [](const FittedModel& of) { return of.parts.front().linear.residual.size(); };
-  for (const CandidateRecording& candidate : candidate_recordings(*model.problems.front())) {
-    SCOPED_TRACE(candidate.what);
-    const FittedModel there = in(candidate, model);
-    ASSERT_TRUE(there.usable());
-    // Sums of a simulation with derivatives have other roundings than those of one without.
-    EXPECT_LT(there.parts.front().linear.residual.lpNorm<Eigen::Infinity>(), 1e-6);
-    const int frames = there.parts.front().frames, now = model.parts.front().frames;
-    switch (candidate.kind) {
-      case CandidateKind::duration:
-        EXPECT_EQ(frames, 2 * now);
-        EXPECT_EQ(rows(there), 2 * rows(model));
-        break;
-      case CandidateKind::frame_rate:
-        EXPECT_EQ(frames, 2 * now - 1);
-        break;
-      case CandidateKind::camera:
-        EXPECT_EQ(rows(there), 2 * rows(model));
-        break;
-      default:
-        EXPECT_EQ(frames, now);
-    }
-  }
-}
-
-// The supports stay where they are, and the sheet is the sheet.
-TEST(Candidates, HoldTheClothWhereItWasHeld) {
-  SCOPED_TRACE(kSeed);
-  const FitInput input = synthetic_input({});
-  const FittedModel model = model_with(setup_of(input, kInSpace), {});
-  const FitProblem& now = *model.problems.front();
-  const auto held_at = [](const FitProblem& problem, size_t h) {
-    Eigen::Vector3d place = Eigen::Vector3d::Zero();
-    for (const HeldVertexWeights::Weight& at : problem.cloth.held[h].weights)
-      place += at.weight * problem.placed_sheet_m.col(at.vertex);
-    return place;
-  };
-  std::set<CandidateKind> kinds;
-  for (const CandidateRecording& candidate : candidate_recordings(now)) {
-    SCOPED_TRACE(candidate.what);
-    kinds.insert(candidate.kind);
-    FitProblem then = now;
-    candidate.change(then);
-
-    ASSERT_EQ(then.cloth.held.size(), now.cloth.held.size());
-    for (size_t h = 0; h < now.cloth.held.size(); ++h)
-      EXPECT_LT((held_at(then, h) - held_at(now, h)).norm(), 1e-9);
-    for (const auto& [a, b] : {std::pair(0, 8), std::pair(0, 72), std::pair(8, 72)})
-      EXPECT_NEAR((then.placed_sheet_m.col(a) - then.placed_sheet_m.col(b)).norm(),
-                  (now.placed_sheet_m.col(a) - now.placed_sheet_m.col(b)).norm(), 1e-9);
-  }
-  EXPECT_EQ(kinds.size(), 5u);  // all but a camera
-}
-
-// Held by one point, by none, by its corners; and what may touch something is not turned.
-TEST(Candidates, AreThoseThatCanBeMade) {
-  SCOPED_TRACE(kSeed);
-  const auto kinds_of = [](const FitInput& input, const auto& change) {
-    FitProblem problem = make_problem(input, kInSpace, 9, 9);
-    change(problem);
-    std::set<CandidateKind> kinds;
-    for (const CandidateRecording& candidate : candidate_recordings(problem)) {
-      kinds.insert(candidate.kind);
-      FitProblem changed = problem;
-      candidate.change(changed);
-      EXPECT_TRUE(changed.placed_sheet_m.allFinite()) << candidate.what;
-    }
-    return kinds;
-  };
-  FitInput input = synthetic_input({});
-  const auto nothing = [](FitProblem&) {};
-
-  EXPECT_FALSE(kinds_of(input, [](FitProblem& problem) {
-                 add_effect(problem.cloth, "contact_plane", "test");
-                 problem.effects.emplace_back(
-                     problem.cloth.effect_descriptions.back().parameters.size());
-               }).contains(CandidateKind::attitude));
-  input.recording.start = StartKind::at_rest;
-  EXPECT_EQ(kinds_of(input, nothing).count(CandidateKind::attitude), 0u);
-  EXPECT_EQ(kinds_of(input, nothing).count(CandidateKind::shaken), 1u);
-  input.recording.start = StartKind::released_flat;
-  input.recording.held.resize(1);
-  EXPECT_TRUE(kinds_of(input, nothing).contains(CandidateKind::attitude));
-  EXPECT_TRUE(kinds_of(input, nothing).contains(CandidateKind::shaken));
-  input.recording.held = {{.at_m = {0, 0}}, {.at_m = {0.4, 0}}, {.at_m = {0.2, 0.4}}};
-  EXPECT_FALSE(kinds_of(input, nothing).contains(CandidateKind::attitude));
-  input.recording.held.clear();
-  EXPECT_EQ(kinds_of(input, nothing),
-            (std::set{CandidateKind::duration, CandidateKind::frame_rate}));
 }
 
 TEST(SeparatingRecordings, AreTheBestOfEachKindBesideTheNumberOfThePresentOne) {
@@ -342,7 +251,7 @@ TEST(SeparatingRecordings, AreTheBestOfEachKindBesideTheNumberOfThePresentOne) {
 
   ASSERT_EQ(found.size(), 2u);
   for (size_t n = 0; n < 2; ++n) {
-    // Drag is in the model: nothing is to be told from it.
+    // Drag is in the model, so nothing is to be told from it.
     ASSERT_EQ(found[n].size(), 1u);
     const Separation& one = found[n].front();
     EXPECT_TRUE(one.from.same_mode(accepted[n].alike.front()));
@@ -382,8 +291,8 @@ TEST(SeparatingRecordings, ErrAsTheModelDoes) {
   EXPECT_GT(with, 0.3 * without);
 }
 
-// From the tracks on: what is found cannot be told from another law, and would be if the supports
-// had moved.
+// A diagnosis from tracks finds an effect that cannot be told from another one. It could be if the
+// supports had moved.
 TEST(SeparatingRecordings, AreNamedByADiagnosis) {
   SCOPED_TRACE(kSeed);
   DiagnoseOptions options;
@@ -393,7 +302,7 @@ TEST(SeparatingRecordings, AreNamedByADiagnosis) {
   options.refits = 3;
   options.most_effects = 1;
   options.law_terms = 0;
-  // Few laws are asked, for time's sake.
+  // Few hypotheses are asked, for time's sake.
   for (const EffectEntry& entry : effect_registry())
     if (entry.name != kGravityTilt.effect && entry.name != kWind.effect)
       options.without.push_back(entry.name);

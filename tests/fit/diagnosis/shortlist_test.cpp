@@ -1,5 +1,5 @@
-// Scores over horizons. The score of one hypothesis: score_test.cpp; the coarse mesh:
-// search_test.cpp.
+// Checks scores over horizons. The score of one hypothesis is checked in score_test.cpp, the coarse
+// mesh in search_test.cpp.
 #include "fit/diagnosis/shortlist.h"
 
 #include <gtest/gtest.h>
@@ -24,7 +24,7 @@ SyntheticCloth listed_cloth(double drag_rate_per_s) {
           .held_out_from = 36};
 }
 
-/// The shortlist of a fitted model that does not know of the drag.
+/// Returns the shortlist of a fitted model that does not know of the drag.
 Shortlist list_of(double drag_rate_per_s) {
   const SyntheticCloth cloth = listed_cloth(drag_rate_per_s);
   const FitInput input = synthetic_input(cloth);

@@ -1,5 +1,5 @@
-// What a hypothesis is asked, one criterion after the other. Corrections without physics and free
-// forces in whole searches: diagnose_test.cpp, free_forces_test.cpp.
+// Checks the criteria that a hypothesis is asked, one after the other. Corrections without physics
+// and free forces in whole searches: diagnose_test.cpp, free_forces_test.cpp.
 #include "fit/diagnosis/trial.h"
 
 #include <gtest/gtest.h>
@@ -28,7 +28,7 @@ struct Scene {
   FittedModel without = true_model(setup, kDragged);
 
   Scene() {
-    // The truth's parameters, without its drag.
+    // The truth's parameters are a start, without its drag.
     refine_model(without, setup, {}, {});
     search.base_chi_square = without.chi_square(search.threshold);
   }

@@ -12,19 +12,20 @@
 
 namespace clothfit {
 
-/// The air's drag, which a synthetic cloth may have and its recording does not declare.
+/// Returns the air's drag, which a synthetic cloth may have and its recording does not declare.
 inline Hypothesis drag_term() {
   return {.effect = "viscous_damping", .mode = "", .amplitudes = {"rate"}};
 }
 
-/// The model of synthetic recordings of a cloth where the truth is, linearised over their fitted
-/// frames. What it knows of drag, `terms` say; what else they name is neutral.
+/// Returns the model of synthetic recordings of a cloth where the truth is, linearised over their
+/// fitted frames. `hypotheses` say what it knows of drag; what else they name is neutral.
 inline FittedModel true_model(const DiagnosisSetup& setup, const SyntheticCloth& cloth,
-                              const std::vector<Hypothesis>& terms = {}) {
+                              const std::vector<Hypothesis>& hypotheses = {}) {
   constexpr double kTimeStep_s = 1.0 / 60 / 150;
   NamedValues truth = named(cloth.fabric);
   truth["viscous_damping.rate"] = cloth.drag_rate_per_s;
-  FittedModel model = model_at(setup, terms, std::vector<NamedValues>(setup.inputs.size(), truth));
+  FittedModel model =
+      model_at(setup, hypotheses, std::vector<NamedValues>(setup.inputs.size(), truth));
   for (size_t n = 0; n < model.parts.size(); ++n) {
     const FitProblem& problem = *model.problems[n];
     PooledPart& part = model.parts[n];
@@ -35,8 +36,8 @@ inline FittedModel true_model(const DiagnosisSetup& setup, const SyntheticCloth&
   return model;
 }
 
-/// The same model where it stands, that may err as its discretisation does; the truth has the same
-/// steps, so that nothing is expected.
+/// Returns the same model where it stands, which may err as its discretisation does. The truth has
+/// the same steps, so nothing is expected.
 inline FittedModel that_may_err(const DiagnosisSetup& setup, FittedModel model) {
   std::vector<DiscretisationError> errors = discretisation_errors(setup, model);
   for (size_t n = 0; n < model.parts.size(); ++n) {

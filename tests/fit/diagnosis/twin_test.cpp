@@ -1,4 +1,4 @@
-// Twins of recordings: what is observed there is a model's, and their noise is normal.
+// Checks twins of recordings: what is observed there is a model's, and their noise is normal.
 #include "fit/diagnosis/twin.h"
 
 #include <gtest/gtest.h>
@@ -20,7 +20,7 @@ FitOptions on_pixels_or_not(ObservationKind kind) {
   return options;
 }
 
-/// What the true model leaves of a recording, in sigmas.
+/// Returns the chi-square that the true model leaves of a recording.
 double chi_square(const FitReport& report) {
   double sum = 0;
   for (const FitReport::Residuals& kind : report.residuals)

@@ -1,5 +1,5 @@
-// What a hypothesis must gain to be tried and to be named, on numbers. How trials ask for it:
-// trial_test.cpp.
+// Checks what a hypothesis must gain to be tried and to be named, on numbers. How trials ask for it
+// is checked in trial_test.cpp.
 #include "fit/diagnosis/worth.h"
 
 #include <gtest/gtest.h>
@@ -14,7 +14,8 @@ namespace {
 
 constexpr double kSquaresOnly = std::numeric_limits<double>::infinity();
 
-/// The chance that the sum of so many squared standard normal numbers exceeds `square`; up to four.
+/// Returns the chance that the sum of so many squared standard normal numbers exceeds `square`.
+/// There may be up to four.
 double chance_beyond(int numbers, double square) {
   const double half = 0.5 * square;
   if (numbers % 2 == 0) return std::exp(-half) * (numbers == 2 ? 1 : 1 + half);
@@ -32,7 +33,7 @@ TEST(LeastDecrease, IsAsUnlikelyAsFiveSigmas) {
   }
 }
 
-/// A model that leaves so much: chi-square per residual.
+/// Returns a model that leaves so much chi-square per residual.
 FittedModel that_leaves(const DiagnosisSetup& setup, double chi_square_per_residual) {
   FittedModel model = true_model(setup, {});
   Eigen::VectorXd& residual = model.parts.front().linear.residual;
@@ -55,7 +56,7 @@ TEST(WorthNaming, IsOfTheNoiseOrOfWhatIsAboveItOrOfAll) {
   // Noise alone, and less than noise
   EXPECT_NEAR(worth(1), 0.003 * count, 1e-9 * count);
   EXPECT_NEAR(worth(0.5), 0.003 * count, 1e-9 * count);
-  // A little above: a third of what two standard deviations do not explain
+  // A little above noise: a third of what two standard deviations do not explain
   const double little = 1.15;
   EXPECT_NEAR(worth(little), (0.15 * count - scatter + prior) / 3, 1e-9 * count);
   EXPECT_GT(worth(little), 0.003 * count);
@@ -84,7 +85,7 @@ TEST(WorthNaming, CountsLargeResidualsAsTheFitDoes) {
   const FittedModel model = that_leaves(setup, 400);
   const double prior = that_leaves(setup, 0).chi_square(kSquaresOnly);
 
-  // Huber's: 3D residuals of length sqrt(3) 20, linear beyond 2.
+  // Huber's loss is linear beyond 2; 3D residuals have lengths sqrt(3) 20.
   const double length = std::sqrt(3) * 20, threshold = 2;
   const double blocks = static_cast<double>(model.residual_count()) / 3;
   EXPECT_NEAR(worth_naming(model, threshold),

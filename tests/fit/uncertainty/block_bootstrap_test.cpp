@@ -1,4 +1,5 @@
-// The bootstrap over blocks. Not checked here: how blocks are chosen (space_time_blocks_test.cpp).
+// Checks the bootstrap over blocks. Not checked here: how blocks are chosen
+// (space_time_blocks_test.cpp).
 
 #include "fit/uncertainty/block_bootstrap.h"
 
@@ -51,8 +52,8 @@ TEST(BlockBootstrap, DrawsNumbersOfTheRightMeanAndVariance) {
       sum += weights.sum() / (9.0 * kReplicates);
       squares += weights.squaredNorm() / (9.0 * kReplicates);
     }
-    // Of 36 000 numbers of variance 1: the mean scatters by 0.005, the mean square by less than
-    // 0.01.
+    // There are 36 000 numbers of variance 1. The mean scatters by 0.005, the mean square by less
+    // than 0.01.
     EXPECT_NEAR(sum, wild ? 0 : 1, 0.025);
     EXPECT_NEAR(squares, wild ? 1 : 2 - 1.0 / 9, 0.05);
   }
@@ -130,7 +131,7 @@ TEST(BlockBootstrap, TakesQuantilesOfTheReplicatesThatHaveAnEstimate) {
   for (int k = 0; k < 199; ++k)
     bootstrap.change(0, k) = k % 2 == 0 ? std::numeric_limits<double>::quiet_NaN() : k;
 
-  // The odd numbers 1 ... 197.
+  // They are the odd numbers 1 ... 197.
   const ChangeIntervals ends = percentile_intervals(bootstrap, 0.9);
   EXPECT_NEAR(ends.lower[0], 0.05 * 198, 2);
   EXPECT_NEAR(ends.upper[0], 0.95 * 198, 2);

@@ -1,5 +1,5 @@
-// The sandwich over blocks: closed forms, and coverage where the model is wrong in a smooth way.
-// Not checked here: how blocks are chosen (space_time_blocks_test.cpp), and a cloth's own
+// Checks the sandwich over blocks: closed forms, and coverage where the model is wrong in a smooth
+// way. Not checked here: how blocks are chosen (space_time_blocks_test.cpp), and a cloth's own
 // residuals, whose coverage docs/theory/identification.md states.
 
 #include "fit/uncertainty/cluster_covariance.h"

@@ -1,5 +1,5 @@
-// Which parameters of a cloth are profiled and what that says of them. How ends are found is the
-// matter of profile_likelihood_test.cpp.
+// Checks which parameters of a cloth are profiled and what that says of them. How ends are found is
+// checked in profile_likelihood_test.cpp.
 #include "fit/uncertainty/parameter_profiles.h"
 
 #include <gtest/gtest.h>
@@ -18,7 +18,7 @@ struct Profiled {
   std::vector<ParameterProfile> profiles;
 };
 
-/// A 5 x 5 cloth over 20 frames of 3D tracks, fitted under the squared loss.
+/// Fits a 5 x 5 cloth over 20 frames of 3D tracks under the squared loss, and profiles it.
 Profiled profiled(double noise_m) {
   Profiled result{.problem = make_problem(synthetic_input({.mesh = 5,
                                                            .markers = 5,

@@ -1,4 +1,5 @@
-// Profile likelihood on costs given by formulas. Not checked here: profiles over a cloth's fits.
+// Checks profile likelihood on costs given by formulas. Not checked here: profiles over a cloth's
+// fits.
 
 #include "fit/uncertainty/profile_likelihood.h"
 
@@ -62,7 +63,7 @@ TEST(ProfileLikelihood, WidensWithTheResidualsVariance) {
 }
 
 TEST(ProfileLikelihood, FindsTheEndsOfASkewedCostFromAPoorSigma) {
-  // cosh-like to the right, flat to the left: ends known in closed form
+  // The cost is cosh-like to the right and flat to the left, with ends known in closed form.
   const auto height = [](double x) { return std::exp(x) - 1 - x; };
   const ProfiledCost cost = [&](double value, const Eigen::VectorXd&) {
     return point(value, height(value));
@@ -84,7 +85,7 @@ TEST(ProfileLikelihood, FindsTheEndsOfASkewedCostFromAPoorSigma) {
 }
 
 TEST(ProfileLikelihood, SaysWhereItIsOpen) {
-  // Saturates at 1 to the right, below the rise of 1.35 that 90 % needs
+  // The cost saturates at 1 to the right, below the rise of 1.35 that 90 % needs.
   const ProfiledCost cost = [](double value, const Eigen::VectorXd&) {
     return point(value, value < 0 ? 0.5 * value * value : 1 - std::exp(-0.5 * value * value));
   };
@@ -125,8 +126,8 @@ TEST(ProfileLikelihood, NoticesThatTheOptimumWasNone) {
   EXPECT_TRUE(found.optimum_was_none);
 }
 
-/// Observations exp(-rate t) + noise at four times: a model that is far from linear over the width
-/// of its interval.
+/// Observations exp(-rate t) + noise at four times. The model is far from linear over the width of
+/// its interval.
 struct Decay {
   std::array<double, 4> times{0.5, 1, 2, 4};
   double rate = 1.2, noise = 0.4;
@@ -157,7 +158,7 @@ TEST(ProfileLikelihood, CoversWhereTheSymmetricIntervalDoesNot) {
     for (int i = 0; i < 4; ++i)
       observed[i] = std::exp(-decay.rate * decay.times[static_cast<size_t>(i)]) +
                     decay.noise * draws.normal();
-    // The optimum over rates 0 ... 40, by a fine grid and a golden section.
+    // A fine grid and a golden section find the optimum over rates 0 ... 40.
     double best = 0;
     for (double rate = 0; rate <= 40; rate += rate < 5 ? 0.02 : 0.5)
       if (decay.cost(observed, rate) < decay.cost(observed, best)) best = rate;

@@ -1,4 +1,4 @@
-// Partitions over the cloth and time, and ranges of correlation. Not checked here: whether a
+// Checks partitions over the cloth and time, and ranges of correlation. Not checked here: whether a
 // covariance over such blocks covers (cluster_covariance_test.cpp).
 
 #include "fit/uncertainty/space_time_blocks.h"
@@ -24,7 +24,7 @@ TEST(SpaceTimeBlocks, CutTheExtentIntoEqualParts) {
   ASSERT_EQ(blocks.count, 24);
   Eigen::VectorXi size = Eigen::VectorXi::Zero(24);
   for (const int block : blocks.block) ++size[block];
-  // 6 x 6 markers and 20 frames: 3 x 2 markers and 5 frames each.
+  // A block of the 6 x 6 markers and 20 frames has 3 x 2 markers and 5 frames.
   EXPECT_EQ(size.minCoeff(), 30);
   EXPECT_EQ(size.maxCoeff(), 30);
   for (Eigen::Index i = 0; i < blocks.block.size(); ++i) {
@@ -54,7 +54,7 @@ TEST(CorrelationRanges, OfWhiteResidualsAreACellWide) {
 
   const CorrelationRanges ranges = correlation_ranges(places, residual);
 
-  // One cell, or two where a lag happens to lie beyond two standard errors.
+  // The range is one cell, or two where a lag happens to lie beyond two standard errors.
   EXPECT_LE(ranges.s_m, 2 * 0.4 / 8 + 1e-12);
   EXPECT_LE(ranges.t_m, 2 * 0.4 / 8 + 1e-12);
   EXPECT_LE(ranges.time_s, 2 * 1.0 / 32 + 1e-12);

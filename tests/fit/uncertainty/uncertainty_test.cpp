@@ -1,4 +1,4 @@
-// How a fit says how sure it is: from which residuals, and with which factor its intervals are
+// Checks how sure a fit says it is: from which residuals, and with which factor its intervals are
 // made. Not checked here: the sandwich itself (cluster_covariance_test.cpp), the scatter over noise
 // (refine_test.cpp), coverage over releases (tests/apps/study/trials/planted_drag_test.cpp).
 #include "fit/uncertainty/uncertainty.h"
@@ -14,7 +14,7 @@
 namespace clothfit {
 namespace {
 
-/// A 7 x 7 cloth over 20 frames, whose drag the fit does not know.
+/// Makes a 7 x 7 cloth over 20 frames, whose drag the fit does not know.
 FitProblem dragged_problem(double drag_rate_per_s) {
   return make_problem(synthetic_input({.drag_rate_per_s = drag_rate_per_s,
                                        .mesh = 7,
@@ -29,7 +29,7 @@ struct Fitted {
   Uncertainty uncertainty;
 };
 
-/// Refined from the truth.
+/// Refines from the truth.
 Fitted fitted(const FitProblem& problem) {
   const Fabric fabric = SyntheticCloth{}.fabric;
   Eigen::VectorXd start = problem.space.start();
@@ -110,8 +110,8 @@ TEST(Uncertainty, BootstrapsIntervalsLikeThoseOverBlocks) {
     const double student = student_factor(0.9, uncertainty.degrees_of_freedom[p]) *
                            uncertainty.robust_sigma[p] / slope[p];
     const double bootstrapped = 0.5 * std::log(asked.bootstrap_upper[p] / asked.bootstrap_lower[p]);
-    // Both are uncertain by the few blocks: of nine, sigma by a quarter. (Of the four that a smooth
-    // misfit leaves, the bootstrap's are far too narrow: docs/theory/identification.md.)
+    // Both are uncertain by the few blocks: of nine, sigma by a quarter. Of the four that a smooth
+    // misfit leaves, the bootstrap's are far too narrow (docs/theory/identification.md).
     EXPECT_GT(bootstrapped, 0.4 * student);
     EXPECT_LT(bootstrapped, 2.5 * student);
   }
@@ -127,8 +127,8 @@ TEST(Uncertainty, TakesNoPullOfABoundForScatter) {
   const auto [at, uncertainty] = fitted(problem);
 
   // Then the others' sigmas grow with the misfit that this leaves (chi-square 3.3 times the
-  // noise's), but not with the residuals' common pull towards the bound, which alone would make
-  // them 40 times as large
+  // noise's). They do not grow with the residuals' common pull towards the bound, which alone would
+  // make them 40 times as large
   ASSERT_TRUE(uncertainty.usable);
   ASSERT_GT(best.values[2] - at.values[2], 20 * honest.sigma[2]);
   for (int p = 0; p < 2; ++p) {
