@@ -46,7 +46,7 @@ std::vector<std::pair<int, int>> neighbours(const Eigen::Matrix2Xd& place_m) {
 
 Correlation correlation(double products, double squares, double count) {
   if (count == 0 || squares == 0) return {};
-  // Of white residuals each product has variance sigma^4.
+  // Each product of white residuals has variance sigma^4.
   return {products / squares, products / (squares / count * std::sqrt(count))};
 }
 

@@ -17,8 +17,8 @@ struct Adequacy {
   /// several sets of functions the most telling one counts.
   double smooth_share = 0;  ///< of chi-square
   double smooth_score = 0;
-  /// Mean square of the error that mesh and time step are thought to make, in units of the noise's
-  /// square. Structure that cannot be told from this error does not count.
+  /// Mean square of the error that mesh and time step are thought to make, over the noise's square.
+  /// Structure that cannot be told from this error does not count.
   double discretisation_square = 0;
   bool adequate = false;
 };

@@ -37,8 +37,8 @@ struct FreeForces {
 std::shared_ptr<const Effect> make_free_force(const Cloth& cloth, int waves_along_s,
                                               int waves_along_t, double from_s, double until_s);
 
-/// Computes the derivatives where the model stands, at no force, on a mesh that may be coarser than
-/// its own. The beginning and end of a stretch are known to kEmergingInterval_s.
+/// Computes the derivatives where the model stands, at no force. Their mesh may be coarser than the
+/// model's own. The beginning and end of a stretch are known to kEmergingInterval_s.
 FreeForces free_forces(const DiagnosisSetup& mesh, const FittedModel& model, int stretches);
 
 }  // namespace clothfit

@@ -26,7 +26,7 @@ struct ResidualForce {
   struct Regression {
     std::string on;
     std::string unit;  ///< of the slope
-    /// From -1 to 1 for a vector. For a number it is the multiple one, from 0 to 1.
+    /// Correlation with a vector, from -1 to 1. For a number it is the multiple one, from 0 to 1.
     double correlation = 0;
     double slope = 0;  ///< for a number, the length of the vector
     double sigma = 0;  ///< with residuals that may depend on each other over a marker's frames

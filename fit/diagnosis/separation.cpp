@@ -226,7 +226,8 @@ FittedModel in_candidate(const CandidateRecording& candidate, const FittedModel&
   return result;
 }
 
-/// Returns the model where it stands on a mesh of half the cells a side, where that is another one.
+/// Returns the model where it stands on a mesh of half the cells a side. None where that is the
+/// same mesh.
 std::optional<FittedModel> on_coarse_mesh(const DiagnosisSetup& setup, const FittedModel& model) {
   DiagnosisSetup coarse = with_coarse_mesh(setup);
   coarse.inputs = setup.inputs.first(1);

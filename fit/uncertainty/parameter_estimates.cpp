@@ -9,8 +9,8 @@
 namespace clothfit {
 namespace {
 
-/// A linear parameter is undetermined when its sigma is about that of a uniform draw from its
-/// range, 1 / sqrt(12).
+/// A linear parameter is undetermined when its sigma nears that of a uniform draw from its range.
+/// That is 1 / sqrt(12) of the range.
 constexpr double kUndeterminedRangeShare = 0.25;
 
 /// Parameters more strongly correlated than this do about the same to the motion.

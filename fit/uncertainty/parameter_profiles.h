@@ -9,8 +9,9 @@ namespace clothfit {
 /// One parameter's cost, least over all others, around its optimum.
 struct ParameterProfile {
   int parameter = -1;
-  /// The cost's rise at the ends of the stated interval over the parabola's, others moved along as
-  /// the Hessian has them. 1 where the cost is a parabola; infinite where there is none.
+  /// The cost's rise at the ends of the stated interval over the parabola's. Other parameters are
+  /// moved along as the Hessian has them. 1 where the cost is a parabola; infinite where there is
+  /// none.
   double rise_below = 1, rise_above = 1;
   bool profiled = false;        ///< one of the rises is off by more than a fifth
   ProfileInterval profile;      ///< in coordinates; where profiled

@@ -74,7 +74,7 @@ int range_in_cells(const std::vector<CellMeans>& components, size_t direction) {
         }
       }
     }
-    // With sparse markers no pair may have this separation; the next one decides then.
+    // Sparse markers may give no pair at this separation; the next one decides then.
     if (pairs > 0 && product / pairs <= 2 * variance / std::sqrt(pairs)) return lag;
   }
   return cells[direction];

@@ -98,8 +98,8 @@ TEST(ClearOfNeutral, IsLessByWhatSumsOfDependentResidualsScatterMore) {
            white;
   };
 
-  // The variance grows by (1 + rho) / (1 - rho) in time, by as much each way along the cloth, and
-  // by the residuals' own.
+  // The variance grows by (1 + rho) / (1 - rho) in time and each way along the cloth. It grows by
+  // the residuals' own, too.
   EXPECT_NEAR(share(1, 0.6, 0), std::sqrt(0.4 / 1.6), 1e-12);
   EXPECT_NEAR(share(1, 0, 0.5), 0.5 / 1.5, 1e-12);
   EXPECT_NEAR(share(4, 0, 0), 0.5, 1e-12);

@@ -120,8 +120,8 @@ TEST(FreeForces, HaveTheDerivativesOfASimulationThatIsPushedLikeThat) {
         ASSERT_GT(expected.norm(), 0.1);
         EXPECT_LT((found - expected).norm(), within * expected.norm());
       };
-      // The beginning and end of an emerging force are known to a millisecond
-      // (kEmergingInterval_s), of the 43 that a stretch lasts.
+      // An emerging force's beginning and end are known to a millisecond (kEmergingInterval_s). A
+      // stretch lasts 43.
       constexpr double kNearEnds = 0.03;
       expect_near(column(0, product, axis), -kFreeForcesSquares, begin_s(1), kNearEnds);
       expect_near(column(5, product, axis), begin_s(5), begin_s(6), kNearEnds);
@@ -191,7 +191,7 @@ TEST(FreeForces, PredictAPushThatTheModelLacksAndItsEffectPredictsItBetter) {
   EXPECT_LT(after.mean, 1.1);
 }
 
-// By chance the best of their sizes gains at most what a few of some thousand numbers are.
+// The best of their sizes gains by chance at most what a few of some thousand numbers are.
 TEST(FreeForces, AreNoBetterThanNothingWhereNothingIsHidden) {
   for (const unsigned seed : {1U, 2U, 3U}) {
     SCOPED_TRACE(seed);

@@ -51,7 +51,7 @@ TEST(Planting, FindsThePlantedDragOnATwinAndNothingOnATwinWithoutIt) {
   EXPECT_TRUE(nothing.found.empty()) << nothing.found.front().title();
 }
 
-// A model that has the drag itself is the truth of a twin with drag, so nothing is missing there.
+// A model that has the drag is the truth of a twin with drag, so nothing is missing there.
 TEST(Planting, FindsNothingOnATwinOfWhatTheModelHas) {
   SyntheticCloth cloth = kTwinCloth;
   cloth.drag_rate_per_s = 1;

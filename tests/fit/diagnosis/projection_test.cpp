@@ -174,8 +174,8 @@ Projection projection_at_once(const FittedModel& model, bool with_directions) {
   return {jacobian, priors, pull, errs, Eigen::VectorXd::Ones(rows), residual};
 }
 
-// What is each recording's own is eliminated before what they share. Products of projected vectors
-// are the same.
+// Each recording's own parameters are eliminated before those that they share. Products of
+// projected vectors are the same.
 TEST(ModelProjection, IsThatOfAllRecordingsAtOnce) {
   const FittedModel model = model_of_noise(2);
   const Eigen::MatrixXd effect = random_matrix(model.residual_count(), 3, 50);

@@ -17,7 +17,7 @@ namespace {
 
 constexpr double kSquares = std::numeric_limits<double>::infinity();
 
-/// A cloth that bounces a few times, so that a stiffer one fits it in a basin of its own.
+/// A cloth that bounces a few times, so that a stiffer one fits it in another basin.
 const SyntheticCloth kBouncing{.mesh = 7, .markers = 5, .frames = 60, .held_out_from = 48};
 
 FitOptions short_search() {

@@ -116,8 +116,7 @@ double best(const std::multimap<CandidateKind, double>& distances, CandidateKind
   return most;
 }
 
-// The other route fits all parameters, and those of a hypothesis that the model has too, at its
-// neutral value.
+// The other route fits all parameters, and those of a hypothesis that the model has at neutral.
 TEST(HypothesisDistance, IsWhatLeastSquaresLeave) {
   SCOPED_TRACE(kSeed);
   const FitInput input = synthetic_input({});
