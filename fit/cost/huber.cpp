@@ -33,7 +33,7 @@ double huber_cost(const Objective& objective, const Eigen::VectorXd& residual, d
   double sum = 0;
   for (const Objective::Block& block : objective.blocks()) {
     const double length = residual.segment(block.offset, block.dimension).norm();
-    sum += length <= threshold ? length * length : threshold * (2 * length - threshold);
+    sum += huber_square(length, threshold);
   }
   return 0.5 * sum;
 }

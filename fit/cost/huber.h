@@ -16,6 +16,11 @@ double robust_scale(const Eigen::VectorXd& residual);
 Eigen::VectorXd huber_weights(const Objective& objective, const Eigen::VectorXd& residual,
                               double threshold);
 
+/// Returns Huber's square of a residual's length: twice its cost.
+inline double huber_square(double length, double threshold) {
+  return length <= threshold ? length * length : threshold * (2 * length - threshold);
+}
+
 /// Returns half of Huber's sum of squares, observation by observation.
 double huber_cost(const Objective& objective, const Eigen::VectorXd& residual, double threshold);
 

@@ -10,6 +10,7 @@
 
 #include "data/algebra/dense_factors.h"
 #include "data/input_error.h"
+#include "fit/cost/huber.h"
 #include "fit/observe/node_weights.h"
 #include "fit/problem/parameterised_model.h"
 #include "fit/problem/prior_cost.h"
@@ -421,9 +422,7 @@ double ShootingObjective::cost(const Eigen::VectorXd& residual, double huber_thr
   double sum = 0;
   for (const Block& block : blocks()) {
     const double length = residual.segment(block.offset, block.dimension).norm();
-    sum += block.set < 0 || length <= huber_threshold
-               ? 0.5 * length * length
-               : huber_threshold * (length - 0.5 * huber_threshold);
+    sum += 0.5 * (block.set < 0 ? length * length : huber_square(length, huber_threshold));
   }
   return sum;
 }

@@ -13,16 +13,12 @@
 #include "data/algebra/dense_factors.h"
 #include "fit/cost/huber.h"
 #include "fit/diagnosis/free_forces.h"
+#include "fit/problem/box.h"
 #include "fit/problem/prior_cost.h"
 #include "fit/uncertainty/uncertainty.h"
 
 namespace clothfit {
 namespace {
-
-/// Twice Huber's cost of a residual's length.
-double huber_square(double length, double threshold) {
-  return length <= threshold ? length * length : threshold * (2 * length - threshold);
-}
 
 /// Stretches of free forces in each block of time that is left out.
 constexpr int kStretchesInBlock = 2;
@@ -251,13 +247,8 @@ class Folds {
   /// A recording's parameters after that way, within their ranges.
   Eigen::VectorXd values_after(size_t n, const Eigen::VectorXd& way) const {
     const ParameterSpace& space = problems_[n]->space;
-    Eigen::VectorXd lower(space.size()), upper(space.size());
-    for (int p = 0; p < space.size(); ++p) {
-      lower[p] = space.parameters[static_cast<size_t>(p)].lower;
-      upper[p] = space.parameters[static_cast<size_t>(p)].upper;
-    }
     const Eigen::VectorXd next = space.coordinates(model_.parts[n].values) + way.head(space.size());
-    return space.values(next.cwiseMax(space.coordinates(lower)).cwiseMin(space.coordinates(upper)));
+    return space.values(box_of(space).clamped(next));
   }
 
   const FittedModel& model_;

@@ -7,6 +7,7 @@
 #include <set>
 #include <tuple>
 
+#include "fit/cost/huber.h"
 #include "fit/diagnosis/criteria.h"
 #include "fit/identify.h"
 #include "fit/measurement_effects/measurement_effect.h"
@@ -115,7 +116,7 @@ double FittedModel::chi_square(double threshold) const {
     const TrajectoryObjective of = objective(n);
     for (const Objective::Block& block : of.blocks()) {
       const double length = residual.segment(block.offset, block.dimension).norm();
-      sum += length <= threshold ? length * length : threshold * (2 * length - threshold);
+      sum += huber_square(length, threshold);
     }
   }
   return sum;

@@ -12,6 +12,8 @@
 #include "fit/jobs/stop_token.h"
 #include "fit/problem/parameterised_model.h"
 #include "fit/problem/prior_cost.h"
+#include "fit/refine/derivative_reuse.h"
+#include "fit/refine/least_squares.h"
 #include "fit/refine/refine.h"
 #include "model/cloth/stability.h"
 
@@ -24,9 +26,9 @@ TrajectoryObjective objective_of(const FitProblem& problem, const PooledPart& pa
   return {problem, part.frames, part.steps};
 }
 
-/// Amounts of the directions that leave least of a residual under weights.
-Eigen::VectorXd amounts_of(const Eigen::MatrixXd& directions, const Eigen::VectorXd& weight,
-                           const Eigen::VectorXd& residual) {
+/// Returns the amplitudes of directions that leave least of a residual under weights.
+Eigen::VectorXd amplitudes_of(const Eigen::MatrixXd& directions, const Eigen::VectorXd& weight,
+                              const Eigen::VectorXd& residual) {
   if (directions.cols() == 0) return {};
   const Eigen::MatrixXd weighted = weight.asDiagonal() * directions;
   Eigen::MatrixXd information = weighted.transpose() * directions;
@@ -34,37 +36,29 @@ Eigen::VectorXd amounts_of(const Eigen::MatrixXd& directions, const Eigen::Vecto
   return -SymmetricFactors(information).solve(weighted.transpose() * residual);
 }
 
-/// Fits the amounts of a part's directions to its residual; its cost then, priors included.
-double settle(const FitProblem& problem, PooledPart& part, double threshold) {
+/// Fits the amplitudes of a part's directions to its residual. Returns its cost, priors included.
+double fit_directions(const FitProblem& problem, PooledPart& part, double threshold) {
   const TrajectoryObjective objective = objective_of(problem, part);
   if (part.amplitudes.size() != part.directions.cols())
     part.amplitudes = Eigen::VectorXd::Zero(part.directions.cols());
   if (part.directions.cols() > 0)
     part.amplitudes =
-        amounts_of(part.directions, huber_weights(objective, residual_of(part), threshold),
-                   corrected_residual(part));
+        amplitudes_of(part.directions, huber_weights(objective, residual_of(part), threshold),
+                      corrected_residual(part));
   return huber_cost(objective, residual_of(part), threshold) + 0.5 * part.amplitudes.squaredNorm() +
          prior_cost(problem, part.values).cost;
 }
 
-/// A coordinate that a step must not change: at a bound that keeps it from a lower cost.
-std::vector<bool> held_at(const Eigen::VectorXd& x, const Eigen::VectorXd& lower,
-                          const Eigen::VectorXd& upper, const Eigen::VectorXd& gradient) {
-  std::vector<bool> held(static_cast<size_t>(x.size()));
-  for (Eigen::Index p = 0; p < x.size(); ++p) {
-    const double edge = 1e-12 * (upper[p] - lower[p]);
-    held[static_cast<size_t>(p)] =
-        gradient[p] > 0 ? x[p] - lower[p] <= edge : upper[p] - x[p] <= edge;
-  }
-  return held;
-}
-
 /// The recordings where they stand, and what is known of the derivatives there.
-class Pool {
+class Pool final : public LeastSquares {
  public:
-  Pool(std::span<const FitProblem* const> problems, const PooledOptions& options,
-       std::vector<PooledPart> parts)
-      : problems_(problems), options_(options), parts_(std::move(parts)), exact_(parts_.size()) {}
+  Pool(std::span<const FitProblem* const> problems, const PooledSpace& space,
+       const PooledOptions& options, std::vector<PooledPart> parts)
+      : problems_(problems),
+        space_(space),
+        options_(options),
+        parts_(std::move(parts)),
+        exact_(parts_.size()) {}
 
   const std::vector<PooledPart>& parts() const { return parts_; }
   std::vector<PooledPart> release() { return std::move(parts_); }
@@ -73,25 +67,47 @@ class Pool {
     for (const PooledPart& part : parts_) all.push_back(part.values);
     return all;
   }
-  double cost() const { return cost_; }
-  /// Chi-square per residual, where it is more than one.
-  double scatter() const {
-    Eigen::Index count = 0;
-    for (const PooledPart& part : parts_) count += part.linear.residual.size();
-    return std::max(1.0, 2 * cost_ / static_cast<double>(count));
+  double cost() const override { return cost_; }
+  const Eigen::VectorXd* gradient() override {
+    std::vector<Quadratic> quadratics(parts_.size());
+    tbb::parallel_for(size_t{0}, parts_.size(), [&](size_t n) {
+      quadratics[n] = quadratic_of(*problems_[n], parts_[n], threshold_);
+    });
+    here_ = space_.gather(quadratics);
+    return here_.usable ? &here_.gradient : nullptr;
   }
+  Eigen::VectorXd step(double damping, const std::vector<bool>& held) override {
+    return space_.step(here_, damping, held);
+  }
+  double predicted_decrease(const Eigen::VectorXd& way) const override {
+    return space_.predicted_decrease(here_, way);
+  }
+  void hold(std::vector<bool>& held) const override {
+    if (options_.own_only) std::fill_n(held.begin(), space_.shared(), true);
+  }
+  double moved(const Eigen::VectorXd& way) const override {
+    const int first = options_.own_only ? space_.shared() : 0;
+    const int count = options_.own_only ? space_.size() - first : space_.shared();
+    return count > 0 ? way.segment(first, count).cwiseAbs().maxCoeff() : 0.0;
+  }
+  double least_decrease() const override { return options_.least_decrease * scatter(); }
+  bool is_out_of_work() const override { return spring_steps_ >= options_.most_spring_steps; }
+
+  /// Derivatives are kept, updated, or computed there.
+  bool move_to(const Eigen::VectorXd& next) override { return try_to_move(space_.values(next)); }
+
+  Renewal renew_derivatives() override {
+    if (is_exact() || options_.unrefined) return Renewal::not_needed;
+    for (size_t n = 0; n < parts_.size(); ++n)
+      if (!exact_[n]) parts_[n].linear.usable = false;
+    return linearise() ? Renewal::done : Renewal::failed;
+  }
+
   bool is_linearised() const {
     return std::ranges::all_of(parts_, [](const PooledPart& part) { return part.linear.usable; });
   }
-  bool is_exact() const {
-    return std::ranges::all_of(exact_, [](bool exact) { return exact; });
-  }
-
-  /// Springs times time steps of all runs with derivatives so far.
-  double spring_steps() const { return spring_steps_; }
-
-  /// Time steps and Huber's threshold anew, and exact derivatives where there are none. False where
-  /// a recording cannot be simulated.
+  /// Chooses time steps and Huber's threshold where the recordings stand, and computes derivatives
+  /// where there are none. False where a recording cannot be simulated.
   bool begin_round(bool first) {
     for (size_t n = 0; n < parts_.size(); ++n) {
       PooledPart& part = parts_[n];
@@ -125,24 +141,27 @@ class Pool {
     return threshold_ == kInfinite || kHuberScales * scale() > kSameScale * threshold_;
   }
 
-  PooledSpace::Expansion expand(const PooledSpace& space) const {
-    std::vector<Quadratic> quadratics(parts_.size());
-    tbb::parallel_for(size_t{0}, parts_.size(), [&](size_t n) {
-      quadratics[n] = quadratic_of(*problems_[n], parts_[n], threshold_);
-    });
-    return space.gather(quadratics);
+ private:
+  bool is_exact() const {
+    return std::ranges::all_of(exact_, [](bool exact) { return exact; });
   }
 
-  /// Goes to `values` if that lowers the cost. Derivatives are kept, updated, or had anew there.
+  /// Chi-square per residual, where it is more than one.
+  double scatter() const {
+    Eigen::Index count = 0;
+    for (const PooledPart& part : parts_) count += part.linear.residual.size();
+    return std::max(1.0, 2 * cost_ / static_cast<double>(count));
+  }
+
   bool try_to_move(const std::vector<Eigen::VectorXd>& values) {
     std::vector<PooledPart> there = parts_;
     std::vector<char> usable(parts_.size(), 0);
-    const bool dear = options_.updated_within > 0;
+    const bool expensive = options_.updated_within > 0;
     tbb::parallel_for(size_t{0}, parts_.size(), [&](size_t n) {
       PooledPart& part = there[n];
       const TrajectoryObjective objective = objective_of(*problems_[n], part);
       part.values = values[n];
-      if (dear) {
+      if (expensive) {
         part.linear.residual = objective.residuals({values[n]}).front();
         usable[n] = part.linear.residual.size() == objective.residual_count();
       } else {
@@ -154,7 +173,7 @@ class Pool {
     const double cost = total_cost(there);
     if (!(cost <= cost_)) return false;
     const std::vector<char> were_exact = exact_;
-    if (dear) carry_derivatives(there);
+    if (expensive) carry_derivatives(there);
     std::swap(parts_, there);
     if (!linearise()) {
       std::swap(parts_, there);
@@ -165,14 +184,6 @@ class Pool {
     return true;
   }
 
-  /// Exact derivatives where they were kept or updated.
-  bool make_exact() {
-    for (size_t n = 0; n < parts_.size(); ++n)
-      if (!exact_[n]) parts_[n].linear.usable = false;
-    return linearise();
-  }
-
- private:
   double scale() const {
     double largest = 1;
     for (const PooledPart& part : parts_)
@@ -182,38 +193,33 @@ class Pool {
 
   double total_cost(std::vector<PooledPart>& parts) const {
     std::vector<double> costs(parts.size());
-    tbb::parallel_for(size_t{0}, parts.size(),
-                      [&](size_t n) { costs[n] = settle(*problems_[n], parts[n], threshold_); });
+    tbb::parallel_for(size_t{0}, parts.size(), [&](size_t n) {
+      costs[n] = fit_directions(*problems_[n], parts[n], threshold_);
+    });
     double sum = 0;
     for (const double cost : costs) sum += cost;
     return sum;
   }
 
-  /// The smallest change of each Jacobian that would have foretold the residuals `there`
-  /// [broyden1965], coordinates weighed by what they change; none where it foretold them well, and
-  /// no derivatives where it was far off, unless a rough fit goes on with them.
+  /// Takes derivatives along to where the recordings stand `there`. An unrefined fit never computes
+  /// new ones.
   void carry_derivatives(std::vector<PooledPart>& there) {
+    const ReuseLimits limits{
+        .kept_within = options_.kept_within,
+        .updated_within = options_.unrefined ? kInfinite : options_.updated_within};
     for (size_t n = 0; n < parts_.size(); ++n) {
       const ParameterSpace& space = problems_[n]->space;
-      Eigen::MatrixXd& jacobian = there[n].linear.residual_by_coordinate;
-      const Eigen::VectorXd way =
-          space.coordinates(there[n].values) - space.coordinates(parts_[n].values);
-      const Eigen::VectorXd change = jacobian * way;
-      const Eigen::VectorXd missed = there[n].linear.residual - parts_[n].linear.residual - change;
-      const double off = missed.norm() / std::max(change.norm(), 1e-300);
-      if (off <= options_.kept_within) continue;
-      if (off > options_.updated_within && !options_.unrefined) {
-        there[n].linear.usable = false;
-        continue;
-      }
-      const Eigen::VectorXd weighed =
-          jacobian.colwise().squaredNorm().transpose().cwiseProduct(way);
-      jacobian += missed * weighed.transpose() / way.dot(weighed);
-      exact_[n] = false;
+      Linearisation& linear = there[n].linear;
+      const DerivativeReuse reuse = reuse_derivatives(
+          linear.residual_by_coordinate,
+          space.coordinates(there[n].values) - space.coordinates(parts_[n].values),
+          linear.residual - parts_[n].linear.residual, limits);
+      if (reuse == DerivativeReuse::spent) linear.usable = false;
+      if (reuse == DerivativeReuse::updated) exact_[n] = false;
     }
   }
 
-  /// Where there are no derivatives. Residuals are the same.
+  /// Computes derivatives where there are none. Residuals stay the same.
   bool linearise() {
     std::vector<char> usable(parts_.size(), 1);
     std::vector<double> spring_steps(parts_.size(), 0);
@@ -231,12 +237,26 @@ class Pool {
   }
 
   std::span<const FitProblem* const> problems_;
+  const PooledSpace& space_;
   const PooledOptions& options_;
   std::vector<PooledPart> parts_;
+  PooledSpace::Expansion here_;
   std::vector<char> exact_;  ///< whether the derivatives are those of where the recording stands
   double threshold_ = kInfinite, cost_ = 0;
   double spring_steps_ = 0;
 };
+
+/// Moves parts into their ranges. Derivatives of those that move are none of where they stand.
+void move_into(const Box& box, const PooledSpace& space, std::vector<PooledPart>& parts) {
+  std::vector<Eigen::VectorXd> values;
+  for (const PooledPart& part : parts) values.push_back(part.values);
+  values = space.values(box.clamped(space.coordinates(values)));
+  for (size_t n = 0; n < parts.size(); ++n) {
+    if (values[n].isApprox(parts[n].values, 1e-12)) continue;
+    parts[n].values = values[n];
+    parts[n].linear = {};
+  }
+}
 
 }  // namespace
 
@@ -280,86 +300,36 @@ Quadratic quadratic_of(const FitProblem& problem, const PooledPart& part, double
 
 PooledFit fit_pooled(std::span<const FitProblem* const> problems, std::vector<PooledPart> start,
                      const PooledOptions& options, const ProgressCallback& progress) {
-  constexpr double kLeastDamping = 1e-9, kMostDamping = 1e6;
-  constexpr int kRoughRefusals = 3;
+  // A step that is refused costs a run, one that is taken ten of them.
+  constexpr int kRefusals = 4, kUnrefinedRefusals = 3;
   const PooledSpace space(problems);
-  const Eigen::VectorXd lower = space.lower(), upper = space.upper();
-  /// How far the coordinates have moved by which it is judged whether a fit still moves.
-  const auto looked_at = [&](const Eigen::VectorXd& way) {
-    const int first = options.own_only ? space.shared() : 0;
-    const int count = options.own_only ? space.size() - first : space.shared();
-    return count > 0 ? way.segment(first, count).cwiseAbs().maxCoeff() : 0.0;
-  };
+  const Box box{.lower = space.lower(), .upper = space.upper()};
+  move_into(box, space, start);
   PooledFit result;
-  {
-    std::vector<Eigen::VectorXd> values;
-    for (const PooledPart& part : start) values.push_back(part.values);
-    const Eigen::VectorXd x = space.coordinates(values);
-    const Eigen::VectorXd inside = x.cwiseMax(lower).cwiseMin(upper);
-    values = space.values(inside);
-    for (size_t n = 0; n < start.size(); ++n) {
-      if (values[n].isApprox(start[n].values, 1e-12)) continue;
-      start[n].values = values[n];
-      start[n].linear = {};
-    }
-  }
-  Pool pool(problems, options, std::move(start));
+  Pool pool(problems, space, options, std::move(start));
   int refusals = 0;
   for (int round = 0; round < options.rounds; ++round) {
     if (!pool.begin_round(round == 0)) {
-      result.usable = false;
       result.message = "a recording cannot be simulated from the starting values";
       return result;
     }
-    Eigen::VectorXd x = space.coordinates(pool.values());
-    const Eigen::VectorXd began = x;
-    double damping = 1e-3;
-    bool settled = false;
-    // A step that is refused costs a run, one that is taken ten of them.
-    constexpr int kRefusals = 4;
-    const auto out_of_work = [&] { return pool.spring_steps() >= options.most_spring_steps; };
-    while (!settled && !out_of_work() && result.iterations < options.iterations &&
-           refusals < kRefusals * options.iterations) {
-      report_progress(progress, {.stage = "pooled fit",
-                                 .done = static_cast<double>(result.iterations),
-                                 .total = static_cast<double>(options.iterations),
-                                 .unit = "iterations",
-                                 .note = "cost " + std::to_string(pool.cost())});
-      const PooledSpace::Expansion here = pool.expand(space);
-      if (!here.usable) break;
-      std::vector<bool> held = held_at(x, lower, upper, here.gradient);
-      if (options.own_only) std::fill_n(held.begin(), space.shared(), true);
-      const Eigen::VectorXd step = space.step(here, damping, held);
-      const Eigen::VectorXd next = (x + step).cwiseMax(lower).cwiseMin(upper);
-      const Eigen::VectorXd way = next - x;
-      const double foreseen = space.predicted_decrease(here, way);
-      const double moved = looked_at(way);
-      if (step.allFinite() && foreseen < options.least_decrease * pool.scatter()) {
-        settled = true;
-        break;
-      }
-      const double before = pool.cost();
-      if (!step.allFinite() || !pool.try_to_move(space.values(next))) {
-        ++refusals;
-        // A step this short that rises is the cost's rounding.
-        settled = moved < options.least_step;
-        if (options.unrefined && refusals == kRoughRefusals) break;
-        if (!settled && !pool.is_exact() && !options.unrefined) {
-          if (!pool.make_exact()) break;
-          continue;
-        }
-        damping *= 10;
-        if (damping > kMostDamping) break;
-        continue;
-      }
-      ++result.iterations;
-      settled = moved < options.least_step;
-      x = next;
-      const double gained = before - pool.cost();
-      // A step that keeps a quarter of its promise was too long to be trusted so soon again.
-      damping = gained < 0.25 * foreseen ? std::min(10 * damping, 1.0)
-                                         : std::max(kLeastDamping, 0.1 * damping);
-    }
+    const Eigen::VectorXd began = space.coordinates(pool.values());
+    const int most_refusals =
+        options.unrefined ? kUnrefinedRefusals : kRefusals * options.iterations - refusals;
+    const Minimised found =
+        minimise(pool, box, began,
+                 {.most_iterations = options.iterations - result.iterations,
+                  .most_refusals = most_refusals,
+                  .least_step = options.least_step,
+                  .report = [&, before = result.iterations](int iterations) {
+                    report_progress(progress, {.stage = "pooled fit",
+                                               .done = static_cast<double>(before + iterations),
+                                               .total = static_cast<double>(options.iterations),
+                                               .unit = "iterations",
+                                               .note = "cost " + std::to_string(pool.cost())});
+                  }});
+    result.iterations += found.iterations;
+    refusals += found.refusals;
     result.cost = pool.cost();
     result.usable = pool.is_linearised();
     if (!result.usable) {
@@ -368,10 +338,11 @@ PooledFit fit_pooled(std::span<const FitProblem* const> problems, std::vector<Po
     }
     // A round that hardly moved had the time steps of where it ended.
     constexpr double kStill = 1e-4;
-    const bool still = looked_at(x - began) < kStill;
-    result.converged = settled && (still || (options.least_decrease > 0 && pool.is_settled()));
+    const bool still = pool.moved(found.x - began) < kStill;
+    result.converged = found.end == MinimiseEnd::converged &&
+                       (still || (options.least_decrease > 0 && pool.is_settled()));
     if (result.converged || options.unrefined || result.iterations >= options.iterations ||
-        out_of_work())
+        pool.is_out_of_work())
       break;
   }
   result.message = result.converged ? "converged" : "not converged";

@@ -10,7 +10,9 @@
 #include "data/median.h"
 #include "fit/cost/huber.h"
 #include "fit/jobs/stop_token.h"
+#include "fit/problem/box.h"
 #include "fit/problem/parameterised_model.h"
+#include "fit/refine/derivative_reuse.h"
 #include "model/cloth/stability.h"
 
 namespace clothfit {
@@ -20,25 +22,6 @@ namespace {
 constexpr double kRoom = 1.05;
 
 constexpr const char* kOutOfWork = "not converged at the limit of work";
-
-/// The ranges in coordinates.
-struct Box {
-  Eigen::VectorXd lower, upper;
-
-  explicit Box(const ParameterSpace& space) : lower(space.size()), upper(space.size()) {
-    for (int p = 0; p < space.size(); ++p) {
-      lower[p] = space.parameters[static_cast<size_t>(p)].lower;
-      upper[p] = space.parameters[static_cast<size_t>(p)].upper;
-    }
-    lower = space.coordinates(lower);
-    upper = space.coordinates(upper);
-  }
-  /// Whether a fall of the cost along coordinate `p`, against its `gradient`, would leave the box.
-  bool blocks(int p, double coordinate, double gradient) const {
-    const double edge = 1e-12 * (upper[p] - lower[p]);
-    return gradient > 0 ? coordinate - lower[p] <= edge : upper[p] - coordinate <= edge;
-  }
-};
 
 /// The residuals and, when it asks for it, their Jacobian at the point that Ceres looks at,
 /// simulated once for all blocks.
@@ -151,17 +134,13 @@ class SharedEvaluation final : public ceres::EvaluationCallback {
     if (!dear || !now_.usable || linearised_at_.size() != coordinates_.size()) return false;
     if (ran_at_.size() != coordinates_.size() || ran_at_ != coordinates_) run(values);
     if (!now_.usable) return false;
-    Eigen::MatrixXd& jacobian = now_.residual_by_coordinate;
-    const Eigen::VectorXd way = coordinates_ - linearised_at_;
-    const Eigen::VectorXd change = jacobian * way;
-    const Eigen::VectorXd missed = now_.residual - residual_there_ - change;
-    if (missed.norm() <= options_.kept_within * change.norm()) return true;
-    if (updates_ == kMostUpdates || missed.norm() > options_.updated_within * change.norm())
-      return false;
-    // The smallest change of the Jacobian that would have foretold it, coordinates weighed by what
-    // they change.
-    const Eigen::VectorXd weighed = jacobian.colwise().squaredNorm().transpose().cwiseProduct(way);
-    jacobian += missed * weighed.transpose() / way.dot(weighed);
+    const ReuseLimits limits{
+        .kept_within = options_.kept_within,
+        .updated_within = updates_ == kMostUpdates ? -1 : options_.updated_within};
+    const DerivativeReuse reuse =
+        reuse_derivatives(now_.residual_by_coordinate, coordinates_ - linearised_at_,
+                          now_.residual - residual_there_, limits);
+    if (reuse != DerivativeReuse::updated) return reuse == DerivativeReuse::kept;
     linearised_at_ = coordinates_;
     residual_there_ = now_.residual;
     ++updates_;
@@ -345,8 +324,8 @@ Round solve(const ObjectiveMaker& make_objective, std::unique_ptr<Objective>& ob
   const FitProblem& problem = objective->problem();
   const ParameterSpace& space = problem.space;
   Eigen::VectorXd coordinates = space.coordinates(start);
-  const Box box(space);
-  coordinates = coordinates.cwiseMax(box.lower).cwiseMin(box.upper);
+  const Box box = box_of(space);
+  coordinates = box.clamped(coordinates);
   SharedEvaluation shared(make_objective, objective, refine_options, box, coordinates);
   Round round;
   round.simulations = shared.simulations();

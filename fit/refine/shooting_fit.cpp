@@ -8,37 +8,15 @@
 #include "fit/cost/huber.h"
 #include "fit/cost/track_states.h"
 #include "fit/jobs/stop_token.h"
+#include "fit/problem/box.h"
 #include "fit/problem/parameterised_model.h"
 #include "fit/problem/prior_cost.h"
+#include "fit/refine/least_squares.h"
 #include "fit/refine/refine.h"
 #include "model/cloth/stability.h"
 
 namespace clothfit {
 namespace {
-
-/// Ends of the ranges, in coordinates.
-struct Ranges {
-  Eigen::VectorXd lower, upper;
-
-  explicit Ranges(const ParameterSpace& space) : lower(space.size()), upper(space.size()) {
-    for (int p = 0; p < space.size(); ++p) {
-      lower[p] = space.parameters[static_cast<size_t>(p)].lower;
-      upper[p] = space.parameters[static_cast<size_t>(p)].upper;
-    }
-    lower = space.coordinates(lower);
-    upper = space.coordinates(upper);
-  }
-  /// Coordinates at an end that keeps them from a lower cost.
-  std::vector<bool> blocked(const Eigen::VectorXd& x, const Eigen::VectorXd& downhill) const {
-    std::vector<bool> held(static_cast<size_t>(x.size()));
-    for (Eigen::Index p = 0; p < x.size(); ++p) {
-      const double edge = 1e-12 * (upper[p] - lower[p]);
-      held[static_cast<size_t>(p)] =
-          downhill[p] < 0 ? x[p] - lower[p] <= edge : upper[p] - x[p] <= edge;
-    }
-    return held;
-  }
-};
 
 /// First frames of windows of about equal length.
 std::vector<int> first_frames(int frames, int window_frames) {
@@ -59,6 +37,7 @@ struct ShootingRound {
   const ShootingWindows& windows;
   Continuity continuity;
   double stability_margin;
+  double least_gain;
   double huber_threshold = std::numeric_limits<double>::infinity();
 
   std::unique_ptr<ShootingObjective> objective_at(
@@ -90,49 +69,79 @@ struct ShootingRound {
   }
 };
 
-/// A point of the fit, with the equations there.
-struct Point {
-  Eigen::VectorXd coordinates;
-  std::unique_ptr<ShootingObjective> objective;  ///< with the corrections there
-  ShootingObjective::Equations equations;
-};
+/// The cost of a round, where the fit stands. Equations are had where derivatives are asked for,
+/// with time steps that follow the parameters: all trials from one place have the same.
+class ShootingCost final : public LeastSquares {
+ public:
+  ShootingCost(const ShootingRound& round, Eigen::VectorXd values, double most_spring_steps)
+      : round_(round),
+        values_(std::move(values)),
+        most_spring_steps_(most_spring_steps),
+        objective_(round.objective_at(steps_now(), {})) {}
 
-/// What one step did.
-struct Step {
-  bool taken = false;
-  double gain = 0;   ///< of the cost
-  double moved = 0;  ///< most, of a coordinate of the parameters
-  int trials = 0;    ///< plain runs
-};
+  const ShootingObjective& objective() const { return *objective_; }
+  const Eigen::VectorXd& values() const { return values_; }
+  double runs() const { return runs_; }
 
-/// Shorter and shorter steps until one lowers the cost. `at` moves there, but for its equations,
-/// which keep all but the cost.
-Step take_step(const ShootingRound& round, const Ranges& ranges, double& damping, Point& at) {
-  constexpr double kLeastDamping = 1e-9, kMostDamping = 1e8;
-  Step result;
-  const std::vector<bool> held = ranges.blocked(at.coordinates, at.equations.chain.border_right);
-  for (; damping <= kMostDamping; damping *= 10) {
-    const BorderedChainSolution step = damped_step(at.equations.chain, damping, held);
-    const Eigen::VectorXd next =
-        (at.coordinates + step.border).cwiseMax(ranges.lower).cwiseMin(ranges.upper);
-    if (!next.allFinite()) continue;
-    ShootingObjective::Corrections corrections = at.objective->corrections();
-    for (size_t w = 0; w < corrections.size(); ++w) corrections[w] += step.blocks[w];
-    ++result.trials;
-    const double cost =
-        round.cost_of_trial(*at.objective, round.problem.space.values(next), corrections);
-    if (!(cost <= at.equations.cost)) continue;
-    result.taken = true;
-    result.gain = at.equations.cost - cost;
-    result.moved = (next - at.coordinates).cwiseAbs().maxCoeff();
-    at.coordinates = next;
-    at.objective->set_corrections(std::move(corrections));
-    at.equations.cost = cost;
-    damping = std::max(kLeastDamping, 0.1 * damping);
-    break;
+  double cost() const override { return equations_.cost; }
+  const Eigen::VectorXd* gradient() override {
+    if (!is_current_) {
+      if (runs_ > 0) objective_ = round_.objective_at(steps_now(), objective_->corrections());
+      equations_ = objective_->equations(values_, round_.huber_threshold);
+      runs_ += equations_.runs;
+      gradient_ = -equations_.chain.border_right;
+      is_current_ = true;
+    }
+    return equations_.usable ? &gradient_ : nullptr;
   }
-  return result;
-}
+  Eigen::VectorXd step(double damping, const std::vector<bool>& held) override {
+    step_ = damped_step(equations_.chain, damping, held);
+    damping_ = damping;
+    return step_.border;
+  }
+  /// Of the step as it is. Where the box has cut it short, it promises a little less.
+  double predicted_decrease(const Eigen::VectorXd&) const override {
+    const BorderedChain& chain = equations_.chain;
+    const auto part = [&](const Eigen::VectorXd& right, const Eigen::MatrixXd& information,
+                          const Eigen::VectorXd& step) {
+      return right.dot(step) + damping_ * information.diagonal().dot(step.cwiseAbs2());
+    };
+    double sum = part(chain.border_right, chain.border, step_.border);
+    for (size_t w = 0; w < step_.blocks.size(); ++w)
+      sum += part(chain.right[w], chain.diagonal[w], step_.blocks[w]);
+    return 0.5 * sum;
+  }
+  bool move_to(const Eigen::VectorXd& next) override {
+    ShootingObjective::Corrections corrections = objective_->corrections();
+    for (size_t w = 0; w < corrections.size(); ++w) corrections[w] += step_.blocks[w];
+    const Eigen::VectorXd values = round_.problem.space.values(next);
+    ++runs_;
+    const double cost = round_.cost_of_trial(*objective_, values, corrections);
+    if (!(cost <= equations_.cost)) return false;
+    values_ = values;
+    objective_->set_corrections(std::move(corrections));
+    equations_.cost = cost;
+    is_current_ = false;
+    return true;
+  }
+  double least_decrease() const override { return round_.least_gain * equations_.cost; }
+  bool is_out_of_work() const override {
+    return runs_ * objective_->spring_steps_per_run() > most_spring_steps_;
+  }
+
+ private:
+  TimeSteps steps_now() const { return steps_at(round_.problem, values_, round_.stability_margin); }
+
+  const ShootingRound& round_;
+  Eigen::VectorXd values_;
+  double most_spring_steps_;
+  std::unique_ptr<ShootingObjective> objective_;  ///< with the corrections where the fit stands
+  ShootingObjective::Equations equations_;
+  Eigen::VectorXd gradient_;
+  bool is_current_ = false;  ///< the equations, but for their cost
+  BorderedChainSolution step_;
+  double damping_ = 0, runs_ = 0;
+};
 
 }  // namespace
 
@@ -204,11 +213,8 @@ ShootingFit fit_by_shooting(const FitProblem& problem, int frames, const Eigen::
   constexpr double kStill = 1e-6;  // of a coordinate: a step that is not worth a linearisation
   ShootingFit result;
   const ParameterSpace& space = problem.space;
-  const Ranges ranges(space);
-  Point at{.coordinates = space.coordinates(start).cwiseMax(ranges.lower).cwiseMin(ranges.upper),
-           .objective = {},
-           .equations = {}};
-  result.values = space.values(at.coordinates);
+  const Box box = box_of(space);
+  result.values = space.values(box.clamped(space.coordinates(start)));
   std::optional<ShootingWindows> windows = make_windows(problem, frames, result.values, options);
   if (!windows) {
     result.message = "the simulation that was to guess the windows' states diverged";
@@ -217,7 +223,6 @@ ShootingFit fit_by_shooting(const FitProblem& problem, int frames, const Eigen::
   const double window_s =
       (problem.frame_time_s[static_cast<size_t>(frames - 1)] - problem.frame_time_s.front()) /
       windows->count();
-  const auto steps_now = [&] { return steps_at(problem, result.values, options.stability_margin); };
   bool out_of_work = false;
   for (int n = 0; n < options.rounds && windows && !out_of_work; ++n) {
     const double share = options.rounds > 1 ? n / (options.rounds - 1.0) : 1;
@@ -227,48 +232,44 @@ ShootingFit fit_by_shooting(const FitProblem& problem, int frames, const Eigen::
                         .frames = frames,
                         .windows = *windows,
                         .continuity = {gap_m, gap_m / window_s},
-                        .stability_margin = options.stability_margin};
-    at.objective = round.objective_at(steps_now(), {});
-    const Eigen::VectorXd before = at.objective->residuals({result.values}).front();
+                        .stability_margin = options.stability_margin,
+                        .least_gain = options.least_gain};
+    ShootingCost cost(round, result.values, options.most_spring_steps - result.runs);
+    const Eigen::VectorXd before = cost.objective().residuals({result.values}).front();
     ++result.runs;
     if (options.loss == Loss::huber) round.huber_threshold = kHuberScales * robust_scale(before);
-    at.equations = at.objective->equations(result.values, round.huber_threshold);
-    result.runs += at.equations.runs;
-    if (before.size() == 0 || !at.equations.usable) {
+    if (before.size() == 0 || cost.gradient() == nullptr) {
       result.message = "a window cannot be simulated from the starting values";
       return result;
     }
-    double damping = 1e-3;
-    bool settled = false;
-    for (int i = 1;; ++i) {
-      report_progress(progress, {.stage = "shooting " + at.objective->name(),
-                                 .done = static_cast<double>(result.iterations),
-                                 .total = static_cast<double>(options.rounds * options.iterations),
-                                 .unit = "iterations",
-                                 .note = "cost " + std::to_string(at.equations.cost)});
-      ++result.iterations;
-      const Step step = take_step(round, ranges, damping, at);
-      result.values = space.values(at.coordinates);
-      result.runs += step.trials;
-      result.cost = at.equations.cost;
-      settled =
-          !step.taken || step.gain <= options.least_gain * at.equations.cost || step.moved < kStill;
-      out_of_work = result.runs * at.objective->spring_steps_per_run() > options.most_spring_steps;
-      if (settled || out_of_work || i >= options.iterations) break;
-      // Time steps follow the parameters; all trials of one iteration have the same.
-      at.objective = round.objective_at(steps_now(), at.objective->corrections());
-      at.equations = at.objective->equations(result.values, round.huber_threshold);
-      result.runs += at.equations.runs;
-      if (!at.equations.usable) break;
-    }
-    result.time_step_s = at.objective->time_step_s();
-    result.corrections = at.objective->corrections();
-    result.windows = at.objective->windows();
+    const Minimised found = minimise(
+        cost, box, space.coordinates(result.values),
+        {.most_iterations = options.iterations,
+         .least_step = kStill,
+         .most_damping = 1e8,
+         .report = [&](int iterations) {
+           report_progress(progress,
+                           {.stage = "shooting " + cost.objective().name(),
+                            .done = static_cast<double>(result.iterations + iterations),
+                            .total = static_cast<double>(options.rounds * options.iterations),
+                            .unit = "iterations",
+                            .note = "cost " + std::to_string(cost.cost())});
+         }});
+    result.iterations += found.iterations;
+    result.runs += cost.runs();
+    result.values = cost.values();
+    result.cost = cost.cost();
+    result.time_step_s = cost.objective().time_step_s();
+    result.corrections = cost.objective().corrections();
+    result.windows = cost.objective().windows();
     result.usable = true;
+    out_of_work = cost.is_out_of_work();
+    const bool converged =
+        found.end == MinimiseEnd::converged || found.end == MinimiseEnd::no_descent;
     result.message = out_of_work ? "not converged at the limit of work"
-                     : settled   ? "converged"
+                     : converged ? "converged"
                                  : "still falling";
-    if (n + 1 < options.rounds) windows = at.objective->recentred(result.values);
+    if (n + 1 < options.rounds) windows = cost.objective().recentred(result.values);
   }
   return result;
 }

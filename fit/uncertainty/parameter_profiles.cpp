@@ -7,7 +7,9 @@
 #include "data/algebra/dense_factors.h"
 #include "fit/cost/huber.h"
 #include "fit/jobs/stop_token.h"
+#include "fit/problem/box.h"
 #include "fit/problem/prior_cost.h"
+#include "fit/refine/least_squares.h"
 #include "fit/uncertainty/cluster_covariance.h"
 
 namespace clothfit {
@@ -19,31 +21,22 @@ constexpr double kInfinite = std::numeric_limits<double>::infinity();
 class FixedCost {
  public:
   FixedCost(const TrajectoryObjective& objective, double huber_threshold)
-      : objective_(objective), huber_threshold_(huber_threshold) {
-    const ParameterSpace& space = objective.problem().space;
-    lower_.resize(space.size());
-    upper_.resize(space.size());
-    for (int p = 0; p < space.size(); ++p) {
-      lower_[p] = space.parameters[static_cast<size_t>(p)].lower;
-      upper_[p] = space.parameters[static_cast<size_t>(p)].upper;
-    }
-    lower_ = space.coordinates(lower_);
-    upper_ = space.coordinates(upper_);
-  }
+      : objective_(objective),
+        huber_threshold_(huber_threshold),
+        box_(box_of(objective.problem().space)) {}
 
-  const Eigen::VectorXd& lower() const { return lower_; }
-  const Eigen::VectorXd& upper() const { return upper_; }
+  const TrajectoryObjective& objective() const { return objective_; }
+  double huber_threshold() const { return huber_threshold_; }
+  const Box& box() const { return box_; }
+  Eigen::VectorXd values(const Eigen::VectorXd& coordinates) const {
+    return objective_.problem().space.values(coordinates);
+  }
 
   /// Infinite where the residuals are missing.
   double of(const Eigen::VectorXd& residual, const Eigen::VectorXd& coordinates) const {
     if (residual.size() != objective_.residual_count()) return kInfinite;
-    double cost = prior_cost(objective_.problem(), values(coordinates)).cost;
-    for (const Objective::Block& block : objective_.blocks()) {
-      const double length = residual.segment(block.offset, block.dimension).norm();
-      cost += length <= huber_threshold_ ? 0.5 * length * length
-                                         : huber_threshold_ * (length - 0.5 * huber_threshold_);
-    }
-    return cost;
+    return huber_cost(objective_, residual, huber_threshold_) +
+           prior_cost(objective_.problem(), values(coordinates)).cost;
   }
 
   /// Costs of several points at once.
@@ -56,60 +49,83 @@ class FixedCost {
     return costs;
   }
 
-  /// The least over all coordinates but `held`, from `start`; its `others` are all coordinates.
-  ProfilePoint least(Eigen::VectorXd x, int held) const {
-    constexpr int kMostSteps = 12;
-    constexpr double kSmallFall = 1e-3;  // of the cost, whose unit is noise; an end needs 1.35
-    ProfilePoint point{.value = x[held]};
-    Linearisation here = objective_.linearise(values(x));
-    if (!here.usable) return point;
-    double cost = of(here.residual, x);
-    double damping = 1e-6;
-    for (int step = 0; step < kMostSteps; ++step) {
-      const Eigen::VectorXd weight = huber_weights(objective_, here.residual, huber_threshold_);
-      const PriorCost prior = prior_cost(objective_.problem(), values(x));
-      const Eigen::MatrixXd weighted = weight.asDiagonal() * here.residual_by_coordinate;
-      Eigen::MatrixXd information =
-          weighted.transpose() * here.residual_by_coordinate + prior.information;
-      Eigen::VectorXd gradient = weighted.transpose() * here.residual + prior.gradient;
-      for (int p = 0; p < x.size(); ++p) {
-        const bool at_bound = gradient[p] > 0 ? x[p] <= lower_[p] : x[p] >= upper_[p];
-        if (p != held && !at_bound && information(p, p) > 0) continue;
-        information.row(p).setZero();
-        information.col(p).setZero();
-        information(p, p) = 1;
-        gradient[p] = 0;
-      }
-      information.diagonal() *= 1 + damping;
-      const Eigen::VectorXd move = SymmetricFactors(information).solve(-gradient);
-      if (!move.allFinite()) return point;
-      point = {.usable = true, .value = x[held], .cost = cost, .others = x};
-      if (-0.5 * gradient.dot(move) < kSmallFall) return point;
-      const Eigen::VectorXd next = (x + move).cwiseMax(lower_).cwiseMin(upper_);
-      Linearisation there = objective_.linearise(values(next));
-      const double cost_there = there.usable ? of(there.residual, next) : kInfinite;
-      if (!(cost_there < cost)) {
-        damping = std::max(1e-3, 10 * damping);
-        continue;
-      }
-      x = next;
-      cost = cost_there;
-      here = std::move(there);
-      damping *= 0.1;
-    }
-    point.usable = false;  // still falling
-    return point;
-  }
-
  private:
-  Eigen::VectorXd values(const Eigen::VectorXd& coordinates) const {
-    return objective_.problem().space.values(coordinates);
-  }
-
   const TrajectoryObjective& objective_;
   double huber_threshold_;
-  Eigen::VectorXd lower_, upper_;
+  Box box_;
 };
+
+/// That cost with one coordinate held, where the others stand.
+class ProfiledLeastSquares final : public LeastSquares {
+ public:
+  ProfiledLeastSquares(const FixedCost& fixed, const Eigen::VectorXd& x, int held)
+      : fixed_(fixed), held_(held) {
+    linear_ = fixed.objective().linearise(fixed.values(x));
+    if (linear_.usable) stand_at(x, fixed.of(linear_.residual, x));
+  }
+
+  double cost() const override { return cost_; }
+  const Eigen::VectorXd* gradient() override { return linear_.usable ? &gradient_ : nullptr; }
+  void hold(std::vector<bool>& held) const override { held[static_cast<size_t>(held_)] = true; }
+  Eigen::VectorXd step(double damping, const std::vector<bool>& held) override {
+    Eigen::MatrixXd information = information_;
+    Eigen::VectorXd right = -gradient_;
+    for (Eigen::Index p = 0; p < right.size(); ++p) {
+      if (!held[static_cast<size_t>(p)] && information(p, p) > 0) continue;
+      information.row(p).setZero();
+      information.col(p).setZero();
+      information(p, p) = 1;
+      right[p] = 0;
+    }
+    information.diagonal() *= 1 + damping;
+    return SymmetricFactors(information).solve(right);
+  }
+  double predicted_decrease(const Eigen::VectorXd& way) const override {
+    return -gradient_.dot(way) - 0.5 * way.dot(information_ * way);
+  }
+  bool move_to(const Eigen::VectorXd& next) override {
+    Linearisation there = fixed_.objective().linearise(fixed_.values(next));
+    const double cost = there.usable ? fixed_.of(there.residual, next) : kInfinite;
+    if (!(cost < cost_)) return false;
+    linear_ = std::move(there);
+    stand_at(next, cost);
+    return true;
+  }
+  /// A thousandth of the cost's unit, which is noise; an end of an interval needs 1.35.
+  double least_decrease() const override { return 1e-3; }
+
+ private:
+  void stand_at(const Eigen::VectorXd& x, double cost) {
+    cost_ = cost;
+    const TrajectoryObjective& objective = fixed_.objective();
+    const Eigen::VectorXd weight =
+        huber_weights(objective, linear_.residual, fixed_.huber_threshold());
+    const PriorCost prior = prior_cost(objective.problem(), fixed_.values(x));
+    const Eigen::MatrixXd weighted = weight.asDiagonal() * linear_.residual_by_coordinate;
+    information_ = weighted.transpose() * linear_.residual_by_coordinate + prior.information;
+    gradient_ = weighted.transpose() * linear_.residual + prior.gradient;
+  }
+
+  const FixedCost& fixed_;
+  int held_;
+  Linearisation linear_;
+  double cost_ = kInfinite;
+  Eigen::MatrixXd information_;
+  Eigen::VectorXd gradient_;
+};
+
+/// The least cost over all coordinates but `held`, from `start`; its `others` are all coordinates.
+/// Not usable where it was still falling in the end.
+ProfilePoint least_over_others(const FixedCost& fixed, const Eigen::VectorXd& start, int held) {
+  constexpr int kMostSteps = 12;
+  ProfiledLeastSquares problem(fixed, start, held);
+  const Minimised found = minimise(problem, fixed.box(), start,
+                                   {.most_iterations = kMostSteps, .most_refusals = kMostSteps});
+  return {.usable = found.end == MinimiseEnd::converged,
+          .value = start[held],
+          .cost = problem.cost(),
+          .others = found.x};
+}
 
 }  // namespace
 
@@ -131,7 +147,7 @@ std::vector<ParameterProfile> parameter_profiles(const TrajectoryObjective& obje
   const auto along = [&](int p, double distance) {
     const Eigen::VectorXd path =
         uncertainty.inverse_hessian.col(p) / uncertainty.inverse_hessian(p, p);
-    return Eigen::VectorXd((best + distance * path).cwiseMax(cost.lower()).cwiseMin(cost.upper()));
+    return cost.box().clamped(best + distance * path);
   };
   std::vector<Eigen::VectorXd> points;
   for (int p = 0; p < space.size(); ++p) {
@@ -166,12 +182,12 @@ std::vector<ParameterProfile> parameter_profiles(const TrajectoryObjective& obje
       // From the nearest point that is known, on along the path.
       Eigen::VectorXd from = start + along(p, value - best[p]) - along(p, start[p] - best[p]);
       from[p] = value;
-      return cost.least(from.cwiseMax(cost.lower()).cwiseMin(cost.upper()), p);
+      return least_over_others(cost, cost.box().clamped(from), p);
     };
     profile.profile = profile_interval(optimum, least,
                                        {.level = kIntervalLevel,
-                                        .lower = cost.lower()[p],
-                                        .upper = cost.upper()[p],
+                                        .lower = cost.box().lower[p],
+                                        .upper = cost.box().upper[p],
                                         .sigma = sigma,
                                         .residual_variance = variance,
                                         .tolerance = 0.01,
@@ -182,8 +198,8 @@ std::vector<ParameterProfile> parameter_profiles(const TrajectoryObjective& obje
       at[p] = end == ProfileEnd::no_cost ? range_end : place;
       return space.values(at)[p];
     };
-    profile.lower = value_at(profile.profile.lower_end, profile.profile.lower, cost.lower()[p]);
-    profile.upper = value_at(profile.profile.upper_end, profile.profile.upper, cost.upper()[p]);
+    profile.lower = value_at(profile.profile.lower_end, profile.profile.lower, cost.box().lower[p]);
+    profile.upper = value_at(profile.profile.upper_end, profile.profile.upper, cost.box().upper[p]);
   }
   return result;
 }

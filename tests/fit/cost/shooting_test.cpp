@@ -69,7 +69,7 @@ struct ExactWindows {
   }
 };
 
-FitProblem tiny_problem(unsigned seed) {
+FitProblem shot_problem(unsigned seed) {
   return make_problem(synthetic_input(tiny(seed)), {}, 5, 5);
 }
 
@@ -100,7 +100,7 @@ ShootingObjective::Corrections some_corrections(const ShootingObjective& objecti
 }
 
 TEST(ShootingObjective, WithOneWindowIsTheTrajectoryCost) {
-  for (const FitProblem& problem : {tiny_problem(1), pixels_at_rest(1)}) {
+  for (const FitProblem& problem : {shot_problem(1), pixels_at_rest(1)}) {
     const Eigen::VectorXd values = true_values_of(problem);
     const TimeSteps steps =
         stable_time_steps(problem.cloth, parameter_set(problem, values)).times(1 / 1.5);
@@ -120,7 +120,7 @@ TEST(ShootingObjective, WithOneWindowIsTheTrajectoryCost) {
 }
 
 TEST(ShootingObjective, VanishesAtTheTruthWithTheTrueStates) {
-  for (FitProblem problem : {tiny_problem(1), pixels_at_rest(1), driven_by_a_track(1)}) {
+  for (FitProblem problem : {shot_problem(1), pixels_at_rest(1), driven_by_a_track(1)}) {
     const ExactWindows exact(std::move(problem), 5, 5);
     const ShootingObjective objective = exact.objective({1e-3, 1e-2});
 
@@ -134,7 +134,7 @@ TEST(ShootingObjective, VanishesAtTheTruthWithTheTrueStates) {
 }
 
 TEST(ShootingObjective, DerivativesByTheParametersAgreeWithDifferences) {
-  for (FitProblem problem : {tiny_problem(2), pixels_at_rest(2), driven_by_a_track(2)}) {
+  for (FitProblem problem : {shot_problem(2), pixels_at_rest(2), driven_by_a_track(2)}) {
     const ExactWindows exact(std::move(problem), 5, 3);
     ShootingObjective objective = exact.objective({1e-3, 1e-2});
     objective.set_corrections(some_corrections(objective, 7));
@@ -167,7 +167,7 @@ double whole_cost(const ShootingObjective& objective, const Eigen::VectorXd& coo
 TEST(ShootingObjective, HasTheGradientThatDifferencesOfTheCostShow) {
   // Given a start that is fitted along (released flat, or a tilt with its prior), off the optimum,
   // with the squared loss and with one that weighs most observations down
-  for (FitProblem problem : {tiny_problem(3), pixels_at_rest(3)}) {
+  for (FitProblem problem : {shot_problem(3), pixels_at_rest(3)}) {
     const ExactWindows exact(std::move(problem), 6, 3);
     ShootingObjective objective = exact.objective({2e-3, 2e-2});
     const ShootingObjective::Corrections corrections = some_corrections(objective, 5);
@@ -211,7 +211,7 @@ TEST(ShootingObjective, HasTheGradientThatDifferencesOfTheCostShow) {
 
 TEST(ShootingObjective, HoldsFixedPointsWhereTheRecordingBeginsWithThem) {
   // Given guesses that lie two centimetres beside the cloth, held corners included
-  ExactWindows exact(tiny_problem(4), 5, 5);
+  ExactWindows exact(shot_problem(4), 5, 5);
   for (Eigen::Matrix3Xd& guess : exact.windows.position_m)
     if (guess.cols() > 0) guess.row(1).array() += 0.02;
   const ShootingObjective objective = exact.objective({1e-3, 1e-2});
@@ -228,7 +228,7 @@ TEST(ShootingObjective, HoldsFixedPointsWhereTheRecordingBeginsWithThem) {
 }
 
 TEST(ShootingFit, StepsAsTheDenseEquationsSay) {
-  const ExactWindows exact(tiny_problem(5), 6, 3);
+  const ExactWindows exact(shot_problem(5), 6, 3);
   ShootingObjective objective = exact.objective({2e-3, 2e-2});
   objective.set_corrections(some_corrections(objective, 5));
   const ShootingObjective::Equations equations = objective.equations(exact.truth, kNoHuber);
@@ -331,7 +331,7 @@ Eigen::VectorXd to_the_trajectorys_optimum(const FitProblem& problem, const Shoo
 
 TEST(ShootingFit, TendsToTheTrajectorysOptimumAsItsGapsClose) {
   // Given nodes as fine as the mesh, so that every gap is seen
-  const FitProblem problem = tiny_problem(6);
+  const FitProblem problem = shot_problem(6);
   ShootingOptions options{.window_frames = 6,
                           .nodes = 5,
                           .rounds = 1,
@@ -355,7 +355,7 @@ TEST(ShootingFit, TendsToTheTrajectorysOptimumAsItsGapsClose) {
 }
 
 TEST(ShootingFit, GivesTheSameBitsForAnyNumberOfThreads) {
-  const FitProblem problem = tiny_problem(7);
+  const FitProblem problem = shot_problem(7);
   ShootingOptions options{.window_frames = 5, .iterations = 3};
   std::vector<ShootingFit> fits;
   for (const size_t threads : {1, 4}) {
@@ -370,7 +370,7 @@ TEST(ShootingFit, GivesTheSameBitsForAnyNumberOfThreads) {
 }
 
 TEST(ShootingFit, EndsSoonWhenItIsCancelled) {
-  const FitProblem problem = tiny_problem(4);
+  const FitProblem problem = shot_problem(4);
   int calls = 0;
 
   EXPECT_THROW(fit_by_shooting(problem, problem.frames(), problem.space.start(), {},
@@ -381,7 +381,7 @@ TEST(ShootingFit, EndsSoonWhenItIsCancelled) {
 }
 
 TEST(ShootingObjective, RefusesWindowsThatDoNotFit) {
-  const ExactWindows exact(tiny_problem(1), 5, 3);
+  const ExactWindows exact(shot_problem(1), 5, 3);
   const auto make = [&](const ShootingWindows& windows, const Continuity& continuity) {
     return ShootingObjective(exact.problem, exact.problem.frames(), exact.steps, windows,
                              continuity);
