@@ -23,8 +23,9 @@ namespace {
 /// Stretches of free forces in each block of time that is left out.
 constexpr int kStretchesInBlock = 2;
 
-/// One recording's normal equations over its parameters, then the amounts of its directions, then
-/// free forces, in all and of each block of time. Without what is known of the forces beforehand.
+/// One recording's normal equations, in all and of each block of time. The unknowns are its
+/// parameters, then the amplitudes of its directions, then free forces. What is known of the forces
+/// beforehand is not in them.
 struct Normal {
   Eigen::MatrixXd information;
   Eigen::VectorXd gradient;
@@ -50,8 +51,8 @@ class Folds {
   }
 
   int blocks() const { return blocks_; }
-  /// A start in motion is what the first frames show. Without them it would have to be told from
-  /// what became of it, through hundreds of numbers.
+  /// Returns the first block that is left out. The first frames show a start in motion. Without
+  /// them it would have to be told from what became of it, through hundreds of numbers.
   int first_left_out() const {
     const bool starts_unknown = std::ranges::any_of(
         problems_, [](const FitProblem* problem) { return problem->start == StartKind::unknown; });
@@ -64,35 +65,35 @@ class Folds {
   const TrajectoryObjective& objective(size_t recording) const { return objectives_[recording]; }
   bool has_forces() const { return forces_.usable(); }
 
-  /// Residuals of all recordings where block `b` took no part.
+  /// Returns residuals of all recordings where block `b` took no part.
   std::vector<Eigen::VectorXd> residuals_without(int b) const {
     const std::vector<Eigen::VectorXd> ways = ways_without(b, 0);
     std::vector<Eigen::VectorXd> result(model_.parts.size());
     for (size_t n = 0; n < model_.parts.size(); ++n) {
       const PooledPart& part = model_.parts[n];
       result[n] = objectives_[n].residuals({values_after(n, ways[n])}).front();
-      // Such a step led out of what is stable.
+      // Where the step leads out of what is stable, the model stays.
       if (result[n].size() != objectives_[n].residual_count()) result[n] = part.linear.residual;
       if (part.correction.size() > 0) result[n] += part.correction;
-      const Eigen::Index amounts = part.amplitudes.size();
-      if (amounts > 0)
+      const Eigen::Index amplitudes = part.amplitudes.size();
+      if (amplitudes > 0)
         result[n] +=
-            part.directions * (part.amplitudes + ways[n].segment(part.values.size(), amounts));
+            part.directions * (part.amplitudes + ways[n].segment(part.values.size(), amplitudes));
     }
     return result;
   }
 
-  /// The same to first order and with free forces, of which it is known that they are about
+  /// Returns the same to first order and with free forces, which are known to be about
   /// `sigma_m_per_s2`.
   std::vector<Eigen::VectorXd> residuals_with_forces_without(int b, double sigma_m_per_s2) const {
     const std::vector<Eigen::VectorXd> ways = ways_without(b, sigma_m_per_s2);
     std::vector<Eigen::VectorXd> result(model_.parts.size());
     for (size_t n = 0; n < model_.parts.size(); ++n) {
       const PooledPart& part = model_.parts[n];
-      const Eigen::Index fitted = part.values.size(), amounts = part.directions.cols();
+      const Eigen::Index fitted = part.values.size(), amplitudes = part.directions.cols();
       result[n] = residual_of(part);
       result[n] += part.linear.residual_by_coordinate * ways[n].head(fitted);
-      if (amounts > 0) result[n] += part.directions * ways[n].segment(fitted, amounts);
+      if (amplitudes > 0) result[n] += part.directions * ways[n].segment(fitted, amplitudes);
       result[n] += forces_.columns[n] * ways[n].tail(forces_.columns[n].cols());
     }
     return result;
@@ -149,20 +150,21 @@ class Folds {
     return normal;
   }
 
-  /// The stretch of forces whose value is held in block `b`: the last one before it, or the first
+  /// Returns the stretch whose forces are held in block `b`: the last one before it, or the first
   /// after it.
   static int held_in(int b) { return b > 0 ? kStretchesInBlock * b - 1 : kStretchesInBlock; }
 
-  /// Where the normal equations have a stretch's forces.
+  /// Returns where the normal equations have a stretch's forces.
   Eigen::Index first_force(size_t n, int stretch) const {
     const PooledPart& part = model_.parts[n];
     return part.values.size() + part.directions.cols() +
            static_cast<Eigen::Index>(FreeForces::kInStretch) * stretch;
   }
 
-  /// How far each recording's unknowns move: the arrow of all recordings' equations. Own unknowns
-  /// go first, then the shared ones. A whole recording that is left out says nothing of the shared
-  /// ones, and its own ones follow them. `sigma_m_per_s2`: of free forces; 0: there are none.
+  /// Returns how far each recording's unknowns move, by the arrow of all recordings' equations. Own
+  /// unknowns are eliminated first, then the shared ones are found. A whole recording that is left
+  /// out says nothing of the shared ones, and its own ones follow them. `sigma_m_per_s2` is the
+  /// size of free forces; at 0 there are none.
   std::vector<Eigen::VectorXd> ways_without(int b, double sigma_m_per_s2) const {
     const auto shared = static_cast<Eigen::Index>(space_.shared());
     Eigen::MatrixXd reduced = Eigen::MatrixXd::Zero(shared, shared);
@@ -224,8 +226,8 @@ class Folds {
     return ways;
   }
 
-  /// Has a recording's forces among its own unknowns. In the block that is left out they are those
-  /// of another stretch: what asks for the former asks for the latter.
+  /// Adds a recording's forces to its own unknowns. In the block that is left out they are those of
+  /// another stretch, so equations for the former count for the latter.
   void add_forces(size_t n, int b, double sigma_m_per_s2, Eigen::MatrixXd& information,
                   Eigen::VectorXd& gradient, std::vector<int>& places) const {
     constexpr Eigen::Index kEach = FreeForces::kInStretch;
@@ -244,7 +246,7 @@ class Folds {
         1 / (sigma_m_per_s2 * sigma_m_per_s2);
   }
 
-  /// A recording's parameters after that way, within their ranges.
+  /// Returns a recording's parameters moved by `way`, within their ranges.
   Eigen::VectorXd values_after(size_t n, const Eigen::VectorXd& way) const {
     const ParameterSpace& space = problems_[n]->space;
     const Eigen::VectorXd next = space.coordinates(model_.parts[n].values) + way.head(space.size());
@@ -270,7 +272,7 @@ struct Sums {
 
 void add_block(const Folds& folds, size_t recording, int b, const Eigen::VectorXd& residual,
                double threshold, Sums& sums) {
-  // What was seen outside the block says of each marker, in sigmas (which hardly vary).
+  // The residuals of each marker outside the block predict it, in sigmas, which hardly vary.
   std::map<std::pair<int, int>, std::pair<Eigen::VectorXd, int>> seen;
   std::map<std::pair<int, int>, const Objective::Block*> nearest;
   for (const Objective::Block& row : folds.objective(recording).blocks()) {
@@ -305,7 +307,7 @@ void add_block(const Folds& folds, size_t recording, int b, const Eigen::VectorX
   }
 }
 
-/// Squares of one block alone.
+/// Returns the squares of one block alone.
 double squares_in(const Folds& folds, size_t recording, int b, const Eigen::VectorXd& residual,
                   double threshold) {
   double sum = 0;
@@ -315,7 +317,7 @@ double squares_in(const Folds& folds, size_t recording, int b, const Eigen::Vect
   return sum;
 }
 
-/// Of all blocks, with free forces of the size that serves best.
+/// Returns the squares of all blocks, with free forces of the size that serves best.
 double squares_with_forces(const Folds& folds, double threshold) {
   constexpr double kSigmas_m_per_s2[] = {0.01, 0.1, 1, 10};
   constexpr int kSizes = std::size(kSigmas_m_per_s2);

@@ -31,7 +31,7 @@ void set_neutral(const EffectDescription& effect, const std::vector<Binding>& bi
     if (bindings[k].parameter >= 0) values[bindings[k].parameter] = effect.parameters[k].neutral;
 }
 
-/// Whether a parameter's name is that of an effect of the measurement.
+/// Tells whether a parameter's name is that of an effect of the measurement.
 bool is_of_measurement(const std::string& name) {
   const size_t dot = name.find('.');
   return dot != std::string::npos && measurement_effect_named(name.substr(0, dot)) != nullptr;
@@ -220,7 +220,8 @@ FittedModel shortened(const FittedModel& model, double share) {
 
 void refine_model(FittedModel& model, const DiagnosisSetup& setup, const StageOptions& options,
                   const ProgressCallback& progress) {
-  // A fit that cannot follow the cloth goes on and on, at ever shorter time steps.
+  // A fit that cannot follow the cloth goes on and on, at ever shorter time steps. So its work is
+  // bounded.
   double most_spring_steps = 0;
   for (const auto& problem : model.problems)
     most_spring_steps += final_refinement(*problem, setup.options).most_spring_steps;

@@ -32,14 +32,14 @@ class FixedCost {
     return objective_.problem().space.values(coordinates);
   }
 
-  /// Infinite where the residuals are missing.
+  /// Returns the cost, which is infinite where the residuals are missing.
   double of(const Eigen::VectorXd& residual, const Eigen::VectorXd& coordinates) const {
     if (residual.size() != objective_.residual_count()) return kInfinite;
     return huber_cost(objective_, residual, huber_threshold_) +
            prior_cost(objective_.problem(), values(coordinates)).cost;
   }
 
-  /// Costs of several points at once.
+  /// Returns costs of several points at once.
   std::vector<double> at(const std::vector<Eigen::VectorXd>& points) const {
     std::vector<Eigen::VectorXd> values_of;
     for (const Eigen::VectorXd& point : points) values_of.push_back(values(point));
@@ -55,7 +55,7 @@ class FixedCost {
   Box box_;
 };
 
-/// That cost with one coordinate held, where the others stand.
+/// The fixed cost with one coordinate held, where the others stand.
 class ProfiledLeastSquares final : public LeastSquares {
  public:
   ProfiledLeastSquares(const FixedCost& fixed, const Eigen::VectorXd& x, int held)
@@ -91,7 +91,7 @@ class ProfiledLeastSquares final : public LeastSquares {
     stand_at(next, cost);
     return true;
   }
-  /// A thousandth of the cost's unit, which is noise; an end of an interval needs 1.35.
+  /// Returns a thousandth of the cost's unit, which is noise; an end of an interval needs 1.35.
   double least_decrease() const override { return 1e-3; }
 
  private:
@@ -114,8 +114,8 @@ class ProfiledLeastSquares final : public LeastSquares {
   Eigen::VectorXd gradient_;
 };
 
-/// The least cost over all coordinates but `held`, from `start`; its `others` are all coordinates.
-/// Not usable where it was still falling in the end.
+/// Minimises the cost over all coordinates but `held`, from `start`. The point's `others` are all
+/// coordinates. It is not usable where the cost still decreased in the end.
 ProfilePoint least_over_others(const FixedCost& fixed, const Eigen::VectorXd& start, int held) {
   constexpr int kMostSteps = 12;
   ProfiledLeastSquares problem(fixed, start, held);
@@ -143,7 +143,7 @@ std::vector<ParameterProfile> parameter_profiles(const TrajectoryObjective& obje
                        loss == Loss::huber ? kHuberScales * robust_scale(residual) : kInfinite);
   const double cost_there = cost.of(residual, best);
 
-  // The path along which the others are least, were the cost a parabola.
+  // Along this path the others are least, were the cost a parabola.
   const auto along = [&](int p, double distance) {
     const Eigen::VectorXd path =
         uncertainty.inverse_hessian.col(p) / uncertainty.inverse_hessian(p, p);
@@ -179,7 +179,7 @@ std::vector<ParameterProfile> parameter_profiles(const TrajectoryObjective& obje
     const ProfilePoint optimum{
         .usable = true, .value = best[p], .cost = cost_there, .others = best};
     const ProfiledCost least = [&](double value, const Eigen::VectorXd& start) {
-      // From the nearest point that is known, on along the path.
+      // The start is the nearest point that is known, moved on along the path.
       Eigen::VectorXd from = start + along(p, value - best[p]) - along(p, start[p] - best[p]);
       from[p] = value;
       return least_over_others(cost, cost.box().clamped(from), p);
