@@ -1,5 +1,5 @@
 // Checks how sure it is that a hypothesis is true. Not checked here: the structure of residuals
-// (score_test.cpp, Adequacy).
+// (adequacy_test.cpp).
 #include "fit/diagnosis/clearance.h"
 
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // Checks forces without a law: their derivatives, and what they predict of frames left out. Not
-// checked here: the other corrections without physics (score_test.cpp).
+// checked here: the other corrections without physics (cross_validation_test.cpp).
 #include "fit/diagnosis/free_forces.h"
 
 #include <gtest/gtest.h>

@@ -1,6 +1,7 @@
 // Checks how far two hypotheses are apart in a recording, and in others that could be made. Not
-// checked here: the projection (projection_test.cpp), derivatives (score_test.cpp), and which
-// hypotheses a search says are alike (search_test.cpp).
+// checked here: the projection (projection_test.cpp), derivatives
+// (hypothesis_derivatives_test.cpp), what other recordings change (candidate_recording_test.cpp),
+// and which hypotheses a search says are alike (search_test.cpp).
 #include "fit/diagnosis/separation.h"
 
 #include <gtest/gtest.h>
