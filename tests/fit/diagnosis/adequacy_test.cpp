@@ -218,8 +218,8 @@ TEST(Adequacy, IsDeniedToASmoothFunctionOfTheStatedSize) {
       found.value[draw] = adequacy.smooth_share * adequacy.chi_square_per_dof;
       adequate += adequacy.adequate ? 1 : 0;
     }
-    // Either size lies two and a half standard deviations from the criterion, those of the square
-    // that twelve functions explain.
+    // Either size lies two and a half standard deviations from the criterion. They are those of the
+    // square that twelve functions explain.
     if (times < 1) {
       EXPECT_GE(adequate, kDraws - 1);
     } else {
@@ -359,8 +359,8 @@ TEST(Adequacy, LeavesOutWhatTheDiscretisationMayErrBy) {
   EXPECT_NEAR(chi_square.mean(), 1, 4 * std::sqrt(2.0 / kWatchedFrames / kNumbersOfFrame / kDraws));
 }
 
-// A smooth function beside such a direction does not count below a hundredth of the direction's
-// mean square, and an excess does not below a tenth.
+// Beside such a direction a smooth function counts from a hundredth of the direction's mean square
+// on. An excess counts from a tenth of it on.
 TEST(Adequacy, HoldsForLittleBesideWhatTheDiscretisationErrsBy) {
   constexpr unsigned kSeed = 21;
   SCOPED_TRACE("seed " + std::to_string(kSeed));

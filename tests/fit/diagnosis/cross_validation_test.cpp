@@ -167,8 +167,8 @@ TEST(CrossValidation, RunsTheModelWhereTheOtherBlocksAndThePriorsLeadIt) {
   }
 }
 
-// Amplitudes that are drawn as their prior says make chi-square of a block exceed that of noise by
-// the variance of its prediction from the others.
+// Amplitudes are drawn as their prior says. Chi-square of a block then exceeds that of noise by the
+// variance of its prediction from the others.
 TEST(CrossValidation, IsOnAverageTheNoiseAndTheVarianceOfThePrediction) {
   constexpr unsigned kSeed = 33;
   constexpr int kDraws = 60, kDirections = 40;

@@ -128,8 +128,8 @@ TEST(Discretisation, OfTheFinerMeshIsAQuarterOfTheCoarserOnes) {
   EXPECT_LT((direction[7] + 4 * direction[13]).norm(), 0.03 * direction[7].norm());
 }
 
-// From a cloth of twice the cells a side the model differs by three quarters of what its mesh errs
-// by. The cloth has the other quarter itself.
+// The model differs from a cloth of twice the cells a side by three quarters of its mesh's error.
+// The cloth has the other quarter itself.
 TEST(Discretisation, ExplainsAClothOfTwiceTheCells) {
   const SyntheticCloth cloth = cut_cloth(13, 1e-4);
   SCOPED_TRACE("seed " + std::to_string(cloth.seed));

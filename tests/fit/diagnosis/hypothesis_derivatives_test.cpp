@@ -62,8 +62,8 @@ bool only_adds_force(const Hypothesis& hypothesis) {
   return !effect->changes_force() && !effect->shifts_supports();
 }
 
-/// Returns the residuals of a model that has a hypothesis with one of its amplitudes so far beyond
-/// neutral, from a run with the same time steps.
+/// Returns the residuals of a model that has a hypothesis with one amplitude so far beyond neutral.
+/// The run has the same time steps.
 Eigen::VectorXd residual_with(const DiagnosisSetup& setup, const FittedModel& model,
                               const Hypothesis& hypothesis, const std::string& amplitude,
                               double more) {
@@ -82,7 +82,7 @@ void expect_differences(const DiagnosisSetup& setup, const FittedModel& model,
   ASSERT_EQ(columns.size(), 1u);  // recordings
   ASSERT_EQ(columns.front().cols(), std::ssize(hypothesis.amplitudes));
   const EffectDescription effect = describe_effect(hypothesis.effect);
-  // An added force is carried on from the beginning of a step to its end, with an error of first
+  // An added force is carried on from the beginning of a step to its end. Its error is of first
   // order in the step. All else errs as the differences do.
   const double within = only_adds_force(hypothesis) ? 2e-3 : 1e-4;
   for (size_t k = 0; k < hypothesis.amplitudes.size(); ++k) {

@@ -85,8 +85,8 @@ TEST(Score, SharesThePhysicsOfTwoRecordingsAndNotTheirClocks) {
   ASSERT_EQ(two[0].amplitude.size(), 1);
   EXPECT_NEAR(two[0].sigma[0], one[0].sigma[0] / std::sqrt(2.0), 0.02 * one[0].sigma[0]);
   ASSERT_EQ(two[1].amplitude.size(), 2);
-  // What both clocks do alike is known as one of them alone is. What they do in opposite ways no
-  // parameter of the cloth can do, so that it is known better.
+  // Both clocks' common error is known as that of one of them alone is. No parameter of the cloth
+  // can do what they do in opposite ways, so that this is known better.
   for (const double sigma_s : two[1].sigma) {
     EXPECT_LT(sigma_s, 1.01 * one[1].sigma[0]);
     EXPECT_GT(sigma_s, 0.99 * one[1].sigma[0] / std::sqrt(2.0));
