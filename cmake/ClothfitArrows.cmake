@@ -63,7 +63,8 @@ set(CLOTHFIT_ARROWS
                            model/topology model/fabric model/cloth model/effects
                            model/integrate fit/jobs fit/measurement_effects fit/problem fit
                            fit/diagnosis"
-  "apps/study/trials    -> data/algebra data model/cloth fit/jobs fit/measurement_effects
+  "apps/study/trials    -> data/algebra data model/cloth fit/interface fit/jobs
+                           fit/measurement_effects
                            fit/problem fit/cost fit/refine fit/uncertainty fit/diagnosis
                            apps/study/scene"
   "apps/study/louchet1995 -> data/algebra data model/fabric model/effects fit/jobs fit/problem

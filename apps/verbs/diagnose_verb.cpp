@@ -49,7 +49,7 @@ int parse_plant(const std::string& text) {
   if (text == "all") return std::numeric_limits<int>::max();
   const std::optional<double> count = parse_number(text);
   if (!count || *count < 0 || *count > 1000 || *count != std::floor(*count))
-    throw InputError("--plant", "'" + text + "' is no number of laws", "0 to 1000, or all");
+    throw InputError("--plant", "'" + text + "' is no number of modes", "0 to 1000, or all");
   return static_cast<int>(*count);
 }
 
@@ -218,9 +218,11 @@ void add_diagnose_verb(Verb program) {
   verb.add_option("--work", &options.fit.work,
                   "Times as much work as refinement is allowed before it ends unconverged")
       .shows_default();
-  verb.add_option("--lines", &options.beam_width, "Lines of search that are followed side by side")
+  verb.add_option("--lines", &options.beam_width,
+                  "Entries of the beam that are followed side by side")
       .shows_default();
-  verb.add_option("--refits", &options.refits, "Laws of each line that are fitted in one round")
+  verb.add_option("--refits", &options.refits,
+                  "Modes that are fitted in one round, of each entry of the beam")
       .shows_default();
   verb.add_option("--most-effects", &options.most_effects, "Effects to add, at most")
       .shows_default();
@@ -228,7 +230,7 @@ void add_diagnose_verb(Verb program) {
                   "Terms of a law that is proposed for what remains, at most; 0: none is")
       .shows_default();
   verb.add_option("--plant", &flags->plant,
-                  "Laws that are planted on twins of the recording at 1.6 times their limit, to "
+                  "Modes that are planted on twins of the recording at 1.6 times their limit, to "
                   "see whether they are named: a number, or all")
       .shows_default();
   verb.add_option("--threads", &options.fit.threads, "Threads; 0 for as many as the machine has")

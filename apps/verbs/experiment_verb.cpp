@@ -61,7 +61,7 @@ int run_louchet1995(const ExperimentVerbOptions& options) {
   Louchet1995Study study;
   {
     Journal journal(journal_file, options.study.key(),
-                    options.resume ? JournalStart::resume : JournalStart::anew);
+                    options.resume ? JournalStart::resume : JournalStart::fresh);
     ProgressLine line;
     study = study_louchet1995(options.study, &journal, watch(line));
   }

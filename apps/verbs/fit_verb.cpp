@@ -76,7 +76,7 @@ void require_new_checkpoint(const FitOptions& options) {
   if (options.checkpoint.empty() || options.resume || !fs::exists(options.checkpoint)) return;
   throw InputError("--checkpoint", options.checkpoint.string() + " exists already",
                    "the name of a new file, or --resume to go on from this one",
-                   "remove it to search anew");
+                   "remove it to search from scratch");
 }
 
 /// Tells how to go on from what a cancelled fit leaves.

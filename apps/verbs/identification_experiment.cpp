@@ -93,7 +93,7 @@ int run_identification(const IdentificationOptions& options) {
     ProgressLine line;
     result =
         measure_targets(options.targets, journals,
-                        options.resume ? JournalStart::resume : JournalStart::anew, watch(line));
+                        options.resume ? JournalStart::resume : JournalStart::fresh, watch(line));
   }
   if (result.cancelled || interrupted()) {
     spdlog::info("what was finished is in {}; go on with the same command and --resume",

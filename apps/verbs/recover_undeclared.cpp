@@ -79,7 +79,7 @@ UndeclaredOptions options_of(const UndeclaredFlags& flags, const UndeclaredRun& 
 void add_undeclared_options(Verb verb, UndeclaredFlags& flags) {
   const Option undeclared = verb.add_flag("--undeclared", flags.undeclared,
                                           "Hide effects that the recordings do not declare, and "
-                                          "diagnose them; --trials is of each law");
+                                          "diagnose them; --trials is of each mode");
   const auto add_flag = [&](const char* name, bool& value, const char* what) {
     return verb.add_flag(name, value, what).needs(undeclared);
   };
@@ -88,7 +88,7 @@ void add_undeclared_options(Verb verb, UndeclaredFlags& flags) {
   };
   const Option hidden =
       verb.add_option("--hidden", &flags.hidden,
-                      "Effect to hide, or one of its laws as EFFECT:LAW (default: the library)")
+                      "Effect to hide, or one of its modes as EFFECT:MODE (default: the library)")
           .needs(undeclared)
           .type_name("EFFECT");
   const Option clean = add_flag("--clean", flags.clean, "Hide nothing: count false alarms");
@@ -118,7 +118,7 @@ int run_undeclared(const UndeclaredFlags& flags, const UndeclaredRun& run) {
   const fs::path journal_file =
       run.journal.empty() ? fs::path(out.final_path().string() + ".journal") : run.journal;
   Journal journal(journal_file, options.key(),
-                  run.resume ? JournalStart::resume : JournalStart::anew);
+                  run.resume ? JournalStart::resume : JournalStart::fresh);
   UndeclaredResult result;
   {
     ProgressLine line;

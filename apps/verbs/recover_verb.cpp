@@ -91,7 +91,7 @@ int run_recover(const RecoverFlags& flags, const std::string& command) {
   const fs::path journal_file =
       flags.journal.empty() ? fs::path(out.final_path().string() + ".journal") : flags.journal;
   Journal journal(journal_file, options.key(),
-                  flags.resume ? JournalStart::resume : JournalStart::anew);
+                  flags.resume ? JournalStart::resume : JournalStart::fresh);
   RecoverResult result;
   {
     ProgressLine line;

@@ -107,7 +107,7 @@ int run_recordings_study(const StudyFlags& flags, const std::string& command) {
   std::vector<StudyRow> rows;
   {
     Journal journal(journal_file, options.key(),
-                    flags.resume ? JournalStart::resume : JournalStart::anew);
+                    flags.resume ? JournalStart::resume : JournalStart::fresh);
     ProgressLine line;
     try {
       rows = study_recordings(options, &journal, watch(line));

@@ -18,7 +18,7 @@
 #include "data/shown_text.h"
 #include "data/sync_to_disk.h"
 #include "fit/jobs/checksum.h"
-#include "fit/jobs/shown_difference.h"
+#include "fit/jobs/journal_key.h"
 
 namespace clothfit {
 namespace {
@@ -36,10 +36,10 @@ constexpr std::chrono::seconds kSyncInterval{1};
 
 /// Opens the journal for this process alone.
 int open_locked(const std::filesystem::path& file, JournalStart start) {
-  const int fresh_only = start == JournalStart::anew ? O_EXCL : 0;
+  const int fresh_only = start == JournalStart::fresh ? O_EXCL : 0;
   const int descriptor = open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | fresh_only, 0666);
   if (descriptor < 0 && errno == EEXIST && fresh_only != 0) {
-    throw InputError(file.string(), "exists", "a new file, for this run starts anew",
+    throw InputError(file.string(), "exists", "a new file, for this run starts from scratch",
                      "give --resume to go on with it, or remove it");
   }
   if (descriptor < 0) refuse(file, "cannot be opened", errno);
@@ -120,8 +120,8 @@ std::optional<Record> record_at(std::string_view bytes, std::size_t begin) {
   bytes.remove_prefix(kVersionLine.size());
   const std::string_view other = bytes.substr(0, bytes.find('\n'));
   throw InputError(file.string(), 2,
-                   fmt::format("belongs to another run, of `{}`", shown_difference(other, key)),
-                   fmt::format("this run is of `{}`", shown_difference(key, other)),
+                   fmt::format("belongs to another run, of `{}`", differing_fields(other, key)),
+                   fmt::format("this run is of `{}`", differing_fields(key, other)),
                    "give the options that it was started with, or another file");
 }
 

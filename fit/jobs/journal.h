@@ -10,7 +10,7 @@
 namespace clothfit {
 
 enum class JournalStart {
-  anew,   ///< the file must not exist yet
+  fresh,  ///< the file must not exist yet
   resume  ///< goes on with the file that is there; begins one where none is
 };
 
@@ -34,9 +34,9 @@ enum class JournalStart {
 class Journal {
  public:
   /// Opens the file. `key` is one line that names all that determines the payloads, such as options
-  /// and seed. The number of pieces need not be in it, so that a run can be prolonged. Throws
-  /// InputError where the file exists and `start` is `anew`, belongs to another key, is no journal,
-  /// is written by another process, or cannot be read and written.
+  /// and seed (fit/jobs/journal_key.h). The number of pieces need not be in it, so that a run can
+  /// be prolonged. Throws InputError where the file exists and `start` is `fresh`, belongs to
+  /// another key, is no journal, is written by another process, or cannot be read and written.
   Journal(const std::filesystem::path& file, const std::string& key, JournalStart start);
   ~Journal();
   Journal(const Journal&) = delete;

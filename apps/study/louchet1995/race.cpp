@@ -97,8 +97,8 @@ Race race(const PaperExperiment& experiment, const RecordedStates& states, Racer
     return record.race();
   }
   EvolutionOptions options{.population = population_of(racer), .least_gain = 0, .seed = seed};
-  const long anew = options.population - options.kept_count();
-  options.generations = static_cast<int>(1 + (length - options.population) / anew);
+  const long bred = options.population - options.kept_count();
+  options.generations = static_cast<int>(1 + (length - options.population) / bred);
   evolve(ranges, options, cost, {}, {}, [&](const EvolutionState& state) {
     record.note(state.generations(), state.evaluations, state.best_cost.back());
   });

@@ -11,6 +11,7 @@
 #include "apps/study/louchet1995/payload.h"
 #include "data/input_error.h"
 #include "fit/jobs/executor.h"
+#include "fit/jobs/journal_key.h"
 #include "fit/problem/parameterised_model.h"
 
 namespace clothfit {
@@ -155,8 +156,9 @@ void Louchet1995Options::validate() const {
 }
 
 std::string Louchet1995Options::key() const {
-  return fmt::format("louchet1995 study 1, seeds {} from {}{}", seeds, seed,
-                     quick ? ", quick" : "");
+  JournalKey key("louchet1995/2");
+  key.add("seeds", seeds).add("seed", seed).add("quick", quick);
+  return key.line();
 }
 
 bool RecoveryTrials::determined(Eigen::Index p) const {

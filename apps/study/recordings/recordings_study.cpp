@@ -19,6 +19,7 @@
 #include "data/text_file.h"
 #include "fit/jobs/checksum.h"
 #include "fit/jobs/executor.h"
+#include "fit/jobs/journal_key.h"
 #include "fit/observe/marker_error.h"
 #include "fit/observe/trivial_predictors.h"
 #include "fit/problem/drive.h"
@@ -90,13 +91,13 @@ MarkerTracks driving_markers(const FitInput& input, std::size_t markers, int fra
 
 /// Returns the error from `held_out_from` on, with the mean error before subtracted.
 double centred_held_out_rms(const Tracks& observed, const Tracks& predicted, int held_out_from) {
-  Tracks later, foreseen = centred(observed, predicted, held_out_from);
+  Tracks later, forecast = centred(observed, predicted, held_out_from);
   for (std::size_t m = 0; m < observed.size(); ++m) {
     const Eigen::Index count = observed[m].cols() - held_out_from;
     later.push_back(observed[m].rightCols(count));
-    foreseen[m] = foreseen[m].rightCols(count).eval();
+    forecast[m] = forecast[m].rightCols(count).eval();
   }
-  return rms_distance(later, foreseen);
+  return rms_distance(later, forecast);
 }
 
 /// Computes errors over all frames, of the model and of a rigid motion with the driven points.
@@ -255,14 +256,17 @@ std::string RecordingsStudyOptions::key() const {
   for (const auto& [name, error_m] : published) add(fmt::format("{} {}", name, error_m));
   if (weights)
     for (const auto& [name, weight] : *weights) add(fmt::format("{} {}", name, weight));
-  return fmt::format(
-      "study recordings, clothfit {}, seed {}, mesh {}x{}, observations {}, search {} over {}, "
-      "population {}, generations {}, refine best {}, work {}, substep scale {}, marker offsets {} "
-      "m, recordings and models {:016x}",
-      program_version(), fit.seed, fit.mesh_columns, fit.mesh_rows,
-      static_cast<int>(fit.observations), static_cast<int>(fit.search), fit.search_share,
-      fit.population, fit.generations, fit.refine_best, fit.work, fit.substep_scale,
-      fit.marker_offset_sigma_m, sum);
+  JournalKey key("study recordings/2");
+  key.add("clothfit", program_version()).add("seed", fit.seed);
+  key.add("mesh_columns", fit.mesh_columns).add("mesh_rows", fit.mesh_rows);
+  key.add("observations", static_cast<int>(fit.observations));
+  key.add("search", static_cast<int>(fit.search)).add("search_share", fit.search_share);
+  key.add("population", fit.population).add("generations", fit.generations);
+  key.add("refine_best", fit.refine_best).add("work", fit.work);
+  key.add("substep_scale", fit.substep_scale);
+  key.add("marker_offset_sigma_m", fit.marker_offset_sigma_m);
+  key.add("recordings_and_models", fmt::format("{:016x}", sum));
+  return key.line();
 }
 
 std::vector<StudyRow> study_recordings(const RecordingsStudyOptions& options, Journal* journal,

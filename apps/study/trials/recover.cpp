@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/study/trials/json_number.h"
+#include "apps/study/trials/study_key.h"
 #include "data/algebra/dense_factors.h"
 #include "data/input_error.h"
 #include "data/median.h"
@@ -170,31 +171,18 @@ void RecoverOptions::validate() const {
 }
 
 std::string RecoverOptions::key() const {
-  const Fabric& f = scene.fabric;
-  std::string effects;
-  for (const std::string& effect : fit.effects) effects += effect + " ";
-  std::string rendered;
-  if (pictures) {
-    rendered = fmt::format(" pictures {} {} {} {} {} {} {} {} {}", pictures->tags,
-                           pictures->width_px, pictures->height_px, pictures->exposure_s,
-                           pictures->instants, pictures->samples, pictures->blur_px,
-                           pictures->noise_levels, pictures->shot_levels);
-  }
-  return fmt::format(
-             "recover 2 seed {} scene {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} "
-             "{} fit "
-             "{} "
-             "{} {} {} {} {} {} {} {} start {} effects {}",
-             seed, scene.size_m, scene.mass_kg, f.tension_warp_n_per_m, f.tension_weft_n_per_m,
-             f.shear_n_per_m, f.flexion_warp_n_per_m, f.flexion_weft_n_per_m, f.damping_warp_s,
-             f.damping_weft_s, scene.drag_per_s, scene.truth_mesh, scene.truth_steps, scene.markers,
-             scene.frames, scene.frame_rate_hz, scene.before_s, scene.cameras, scene.noise_m,
-             scene.noise_px, scene.missing,
-             fmt::format("{} {} {}", scene.hand, scene.outliers, scene.noisy),
-             static_cast<int>(fit.observations), fit.mesh_columns, fit.mesh_rows, fit.population,
-             fit.generations, fit.refine_best, static_cast<int>(fit.loss), fit.start_nodes,
-             fit.substep_scale, start_factor, effects) +
-         rendered;
+  JournalKey key("recover/3");
+  key.add("seed", seed).add("start_factor", start_factor);
+  key.add("effects", fmt::format("{}", fmt::join(fit.effects, ", ")));
+  add_fields(scene, key);
+  add_fields(fit, key);
+  if (!pictures) return key.line();
+  key.add("tags", pictures->tags).add("width_px", pictures->width_px);
+  key.add("height_px", pictures->height_px).add("exposure_s", pictures->exposure_s);
+  key.add("instants", pictures->instants).add("samples", pictures->samples);
+  key.add("blur_px", pictures->blur_px).add("noise_levels", pictures->noise_levels);
+  key.add("shot_levels", pictures->shot_levels);
+  return key.line();
 }
 
 FitProblem problem_of(const SyntheticRecording& recording, const FitOptions& options) {

@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "apps/study/scene/true_sight.h"
+#include "apps/study/trials/study_key.h"
 #include "apps/study/trials/undeclared_json.h"
 #include "data/input_error.h"
 #include "fit/diagnosis/hypothesis_derivatives.h"
@@ -266,26 +267,20 @@ void UndeclaredOptions::validate() const {
 }
 
 std::string UndeclaredOptions::key() const {
-  const Fabric& f = scene.fabric;
-  const FitOptions& fit = diagnosis.fit;
   std::string hidden;
   if (hide != Hide::nothing)
-    for (const HiddenLaw& law : laws) hidden += law.title() + ", ";
-  std::string without;
-  for (const std::string& effect : diagnosis.without) without += " " + effect;
-  return fmt::format(
-      "undeclared 4 seed {} hide {} {} laws {} sigmas {} {} scene {} {} {} {} {} {} {} {} {} {} {} "
-      "{} "
-      "{} {} {} {} {} {} {} {} {} {} {} fit {} {} {} {} {} {} {} {} {} diagnosis {} {} {}{}",
-      seed, to_string(hide), most_mimicked, hidden, draw.least, draw.most, scene.size_m,
-      scene.mass_kg, f.tension_warp_n_per_m, f.tension_weft_n_per_m, f.shear_n_per_m,
-      f.flexion_warp_n_per_m, f.flexion_weft_n_per_m, f.damping_warp_s, f.damping_weft_s,
-      scene.drag_per_s, to_string(scene.integrator), scene.truth_mesh, scene.truth_steps,
-      scene.markers, scene.frames, scene.held_out_from, scene.frame_rate_hz, scene.before_s,
-      scene.cameras, scene.noise_m, scene.noise_px, scene.missing, scene.outliers,
-      static_cast<int>(fit.observations), fit.mesh_columns, fit.population, fit.generations,
-      fit.refine_best, static_cast<int>(fit.loss), fit.start_nodes, fit.substep_scale, fit.work,
-      diagnosis.beam_width, diagnosis.refits, diagnosis.most_effects, without);
+    for (const HiddenLaw& law : laws) hidden += (hidden.empty() ? "" : ", ") + law.title();
+  JournalKey key("undeclared/5");
+  key.add("seed", seed).add("hide", to_string(hide)).add("hidden", hidden);
+  key.add("most_mimicked", most_mimicked);
+  key.add("least_sigmas", draw.least).add("most_sigmas", draw.most);
+  add_fields(scene, key);
+  add_fields(diagnosis.fit, key);
+  key.add("work", diagnosis.fit.work);
+  key.add("lines", diagnosis.beam_width).add("refits", diagnosis.refits);
+  key.add("most_effects", diagnosis.most_effects);
+  key.add("without", fmt::format("{}", fmt::join(diagnosis.without, ", ")));
+  return key.line();
 }
 
 bool UndeclaredTrial::right_first() const {

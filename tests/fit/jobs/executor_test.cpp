@@ -83,7 +83,7 @@ TEST(Executor, RethrowsTheExceptionOfTheLowestIndexForAnyNumberOfThreads) {
   for (const int threads : kThreads) {
     SCOPED_TRACE(threads);
     const TemporaryFolder folder;
-    Journal journal(folder / "journal", "key", JournalStart::anew);
+    Journal journal(folder / "journal", "key", JournalStart::fresh);
     try {
       execute(50, work, {.threads = threads}, &journal);
       ADD_FAILURE() << "nothing was thrown";
@@ -162,7 +162,7 @@ TEST(Executor, GoesOnFromAJournalWithTheSameBytesAndRedoesNothing) {
       // Given a run that was cancelled,
       std::size_t kept = 0;
       {
-        Journal journal(folder / "journal", "key", JournalStart::anew);
+        Journal journal(folder / "journal", "key", JournalStart::fresh);
         const ExecuteResult first =
             execute(40, uneven_piece, {.threads = threads}, &journal,
                     [&](const Progress& progress) { return progress.done < stop_at; });
@@ -204,7 +204,7 @@ TEST(Executor, GoesOnFromAJournalWithTheSameBytesAndRedoesNothing) {
 TEST(Executor, ProlongsARun) {
   const TemporaryFolder folder;
   {
-    Journal journal(folder / "journal", "key", JournalStart::anew);
+    Journal journal(folder / "journal", "key", JournalStart::fresh);
     execute(10, uneven_piece, {}, &journal);
   }
   Journal journal(folder / "journal", "key", JournalStart::resume);

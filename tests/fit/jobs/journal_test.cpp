@@ -9,6 +9,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "fit/jobs/journal_key.h"
+#include "fit/jobs/journal_key.h"
 #include "tests/data/expect_refused.h"
 
 namespace clothfit {
@@ -29,7 +31,7 @@ std::map<int, std::string> awkward_payloads() {
 }
 
 void write_journal(const std::filesystem::path& file, const std::map<int, std::string>& payloads) {
-  Journal journal(file, kKey, JournalStart::anew);
+  Journal journal(file, kKey, JournalStart::fresh);
   for (const auto& [index, payload] : payloads) journal.append(index, payload);
 }
 
@@ -65,7 +67,7 @@ TEST(Journal, CutAtAnyByteLosesOnlyTheRecordThatWasCut) {
       {5, "five"}, {2, "two\nrecord 2 3\n"}, {9, ""}, {0, std::string("\0zero", 5)}};
   std::map<std::size_t, std::map<int, std::string>> held_from;
   {
-    Journal journal(folder / "journal", kKey, JournalStart::anew);
+    Journal journal(folder / "journal", kKey, JournalStart::fresh);
     held_from[std::filesystem::file_size(folder / "journal")] = {};
     for (const auto& [index, payload] : payloads) {
       journal.append(index, payload);
@@ -100,7 +102,7 @@ TEST(Journal, LeavesOutTheDamagedRecordAloneAndTakesItsPieceAgain) {
   const std::map<int, std::string> payloads = {{0, "zero"}, {1, "one"}, {2, "two"}};
   std::map<int, std::pair<std::size_t, std::size_t>> place;
   {
-    Journal journal(folder / "journal", kKey, JournalStart::anew);
+    Journal journal(folder / "journal", kKey, JournalStart::fresh);
     for (const auto& [index, payload] : payloads) {
       const std::size_t begin = std::filesystem::file_size(folder / "journal");
       journal.append(index, payload);
@@ -156,14 +158,30 @@ TEST(Journal, RefusesAnotherRunsJournalAndLeavesItAsItIs) {
       "journal:2: belongs to another run, of `trials of towel, options default, seed "
       "3`; this run is of `trials of towel, options default, seed 31`; give the options",
       [&] { Journal(folder / "journal", kKey + std::string("1"), JournalStart::resume); });
-  const std::string lengthy(100, 'k');
-  Journal(folder / "long", lengthy + " seed 4 end", JournalStart::anew);
+  const auto key = [](int seed, const char* hidden) {
+    return JournalKey("trials/1").add("mesh", "9x9").add("seed", seed).add("hidden", hidden).line();
+  };
+  Journal(folder / "fields", key(4, "wind"), JournalStart::fresh);
   expect_refused(folder,
-                 "long:2: belongs to another run, of `... 4 end`; this run is of `... 5 end`",
-                 [&] { Journal(folder / "long", lengthy + " seed 5 end", JournalStart::resume); });
-  expect_refused(folder, "journal: exists; a new file, for this run starts anew; give --resume",
-                 [&] { Journal(folder / "journal", kKey, JournalStart::anew); });
+                 "fields:2: belongs to another run, of `seed=4`; this run is of `seed=5`; give",
+                 [&] { Journal(folder / "fields", key(5, "wind"), JournalStart::resume); });
+  expect_refused(
+      folder,
+      "fields:2: belongs to another run, of `seed=4, hidden=wind`; this run is of `seed=5, "
+      "hidden=gust`",
+      [&] { Journal(folder / "fields", key(5, "gust"), JournalStart::resume); });
+  expect_refused(folder,
+                 "journal: exists; a new file, for this run starts from scratch; give --resume",
+                 [&] { Journal(folder / "journal", kKey, JournalStart::fresh); });
   EXPECT_EQ(read_text(folder / "journal"), before);
+}
+
+TEST(JournalKey, NamesTheFieldsThatDiffer) {
+  const std::string one = JournalKey("a/1").add("x", 1).add("y", 0.5).add("z", "p; q").line();
+  EXPECT_EQ(one, "a/1; x=1; y=0.5; z=p  q");
+  EXPECT_EQ(differing_fields(one, one), "");
+  EXPECT_EQ(differing_fields(one, "a/2; x=1; y=0.25"), "a/1, y=0.5, z=p  q");
+  EXPECT_EQ(differing_fields("a/2; x=1; y=0.25", one), "a/2, y=0.25, z not given");
 }
 
 TEST(Journal, RefusesWhatIsNoJournalAndLeavesItAsItIs) {
@@ -182,14 +200,14 @@ TEST(Journal, RefusesWhatIsNoJournalAndLeavesItAsItIs) {
   expect_refused(folder, "endless: is no file of records",
                  [&] { Journal(folder / "endless", kKey, JournalStart::resume); });
   expect_refused(folder, "no/such/journal: cannot be opened",
-                 [&] { Journal(folder / "no/such/journal", kKey, JournalStart::anew); });
+                 [&] { Journal(folder / "no/such/journal", kKey, JournalStart::fresh); });
 }
 
 TEST(Journal, HasOneWriterAtATime) {
   const TemporaryFolder folder;
   const auto second = [&] { Journal(folder / "journal", kKey, JournalStart::resume); };
   {
-    Journal first(folder / "journal", kKey, JournalStart::anew);
+    Journal first(folder / "journal", kKey, JournalStart::fresh);
     first.append(0, "zero");
     expect_refused(folder, "journal: is being written by another process", second);
 
@@ -219,7 +237,7 @@ TEST(Journal, KeepsItsRecordsWhenTheDiskIsFull) {
   ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);
   const auto previous_handler = signal(SIGXFSZ, SIG_IGN);
   {
-    Journal journal(folder / "journal", kKey, JournalStart::anew);
+    Journal journal(folder / "journal", kKey, JournalStart::fresh);
     journal.append(0, "zero");
     const std::uintmax_t size = std::filesystem::file_size(folder / "journal");
     const rlimit tight{.rlim_cur = size + 10, .rlim_max = before.rlim_max};

@@ -152,7 +152,7 @@ TEST_F(RecordingsStudy, GoesOnWhereItWasCancelled) {
   const std::string whole = text_of(study_recordings(options, nullptr, {}));
   const fs::path file = scratch_.path() / "journal";
   {
-    Journal journal(file, options.key(), JournalStart::anew);
+    Journal journal(file, options.key(), JournalStart::fresh);
     const auto one_fit = [](const Progress& progress) { return progress.done < 1; };
     EXPECT_THROW(study_recordings(options, &journal, one_fit), Cancelled);
   }

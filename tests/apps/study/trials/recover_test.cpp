@@ -75,7 +75,7 @@ TEST(Recover, IsTheSameForAnyNumberOfThreadsAndAfterAnInterruption) {
   const test::ScratchFolder scratch("recover");
   const std::filesystem::path file = scratch.path() / "recover.journal";
   {
-    Journal journal(file, options.key(), JournalStart::anew);
+    Journal journal(file, options.key(), JournalStart::fresh);
     int told = 0;
     const RecoverResult cut =
         recover(options, &journal, [&](const Progress&) { return ++told < 3; });

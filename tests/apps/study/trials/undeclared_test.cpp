@@ -329,7 +329,7 @@ TEST(Undeclared, GoesOnFromItsJournalToTheSameNumbers) {
   const test::ScratchFolder scratch("undeclared");
   const std::filesystem::path file = scratch.path() / "undeclared.journal";
   {
-    Journal journal(file, options.key(), JournalStart::anew);
+    Journal journal(file, options.key(), JournalStart::fresh);
     int told = 0;
     recover_undeclared(options, &journal, [&](const Progress&) { return ++told < 2; });
     EXPECT_EQ(journal.finished().size(), 1u);
