@@ -163,7 +163,7 @@ std::string drive_line(const FitProblem& problem, const Eigen::VectorXd& values)
                                    problem.frame_time_s.begin() + problem.first_held_out);
   return fmt::format(
       "drive corrected at {} knots for each of {} tracked points: {:.2g} mm rms per coordinate "
-      "over the fitted frames, {:.2g} mm foreseen from the tracks' noise",
+      "over the fitted frames, {:.2g} mm predicted from the tracks' noise",
       correction.knots(), correction.points.size(),
       1e3 * rms_correction_m(correction, values, fitted), 1e3 * correction.prior_rms_m);
 }

@@ -33,7 +33,7 @@ constexpr double kFineShares[] = {kSearchShare, 0.7};
 /// A given start may be far off, and nothing has been simulated yet.
 constexpr double kGivenShares[] = {0.1, 0.2, 0.4};
 /// Where an optimum may be a local one: over so few frames there is but one, and it is followed by
-/// steps so short that a horizon's optimum lies in the next one's valley.
+/// steps so short that a horizon's optimum lies in the next one's basin.
 constexpr double kSecondLookShares[] = {0.2, 0.25, 0.3, 0.36, 0.45, 0.7, 1};
 /// Closer than this factor to an end of its range a logarithmic parameter is at that end.
 constexpr double kEnd = 1.5;
@@ -85,7 +85,7 @@ constexpr Effort kFinalEffort{.rounds = 6,
                               .exact_in_the_end = true,
                               .most_spring_steps = 2e10};
 
-/// From a local optimum: on a shorter horizon the same valley leads past it.
+/// From a local optimum: on a shorter horizon the same basin leads past it.
 constexpr Effort kSecondLookEffort{.rounds = 3,
                                    .least_gain = 1e-6,
                                    .derivatives = Derivatives::tangents,
@@ -245,7 +245,7 @@ Eigen::VectorXd away_from_ends(const FitProblem& problem, const Eigen::VectorXd&
 /// Whether residuals are no larger than the noise makes them: the sum of n squares is n, give or
 /// take sqrt(2 n).
 bool is_noise_alone(const FitProblem& problem, const RefineResult& result) {
-  // Not of the derivatives' rows: a fit that did not settle has none.
+  // Not of the derivatives' rows: a fit that did not converge has none.
   const TrajectoryObjective whole(problem, problem.first_held_out,
                                   std::numeric_limits<double>::infinity());
   const auto residuals = static_cast<double>(whole.residual_count());
@@ -354,7 +354,7 @@ RefineResult refine_on(const FitProblem& coarse_problem, const FitProblem& probl
     if (follows_it) break;
   }
   improve({.problem = problem, .effort = kFinalEffort});
-  // What was followed from the start is a valley that is known.
+  // What was followed from the start is a basin that is known.
   return follows_it && !approach.by_coarse_mesh
              ? best
              : second_look(problem, options, best, progress, report);

@@ -14,7 +14,7 @@ void DiagnoseOptions::validate() const {
   require(refits >= 1 && refits <= 50, "refits", "1 to 50");
   require(most_effects >= 0 && most_effects <= 10, "most-effects", "0 to 10");
   require(law_terms >= 0 && law_terms <= 10, "law-terms", "0 to 10");
-  require(plants >= 0, "plant", "a number of laws, or all");
+  require(plants >= 0, "plant", "a number of modes, or all");
   require(!fit.forecast && !fit.start, "start", "a diagnosis finds its own");
   for (const std::string& effect : without) require_effect(effect, "--without");
 }

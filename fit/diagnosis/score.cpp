@@ -75,10 +75,10 @@ std::vector<Score> score_hypotheses(const FittedModel& model, const ModelProject
   std::vector<Score> best;
   size_t mode_of_best = 0;
   for (size_t first = 0; first < tests.size(); first += kAtOnce) {
-    report_progress(progress, {.stage = "scoring laws",
+    report_progress(progress, {.stage = "scoring modes",
                                .done = static_cast<double>(first),
                                .total = static_cast<double>(tests.size()),
-                               .unit = "laws",
+                               .unit = "modes",
                                .note = ""});
     const std::span<const Hypothesis> some =
         std::span(tests).subspan(first, std::min(kAtOnce, tests.size() - first));

@@ -289,7 +289,7 @@ void record(const FittedModel& model, const FitProblem* other, const std::vector
             const ProgressCallback& progress, std::vector<Recorded>& recorded) {
   std::atomic<size_t> begun = 0;
   for_each_index(recorded.size(), [&](size_t n) {
-    report_progress(progress, {.stage = "recordings that would tell laws apart",
+    report_progress(progress, {.stage = "recordings that would tell modes apart",
                                .done = static_cast<double>(begun++),
                                .total = static_cast<double>(recorded.size()),
                                .unit = "recordings",

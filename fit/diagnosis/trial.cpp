@@ -46,7 +46,7 @@ class Asked {
         std::max(least_decrease(models_.score.amplitude.size()),
                  models_.scored_elsewhere ? 0 : kCriteria.predicted_share * models_.score.decrease);
     return {"decrease", trial_.decrease, least, !(trial_.decrease < least),
-            "the fit gains less than half of what was foreseen"};
+            "the fit gains less than half of what was predicted"};
   }
 
   Criterion is_worth_a_name() const {

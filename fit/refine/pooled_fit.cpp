@@ -288,7 +288,7 @@ Quadratic quadratic_of(const FitProblem& problem, const PooledPart& part, double
     Eigen::MatrixXd own = part.directions.transpose() * weight.asDiagonal() * part.directions;
     own.diagonal().array() += 1;
     const SymmetricFactors solver(own);
-    // Zero where the amounts are at their least, but for the weights' last change.
+    // Zero where the amplitudes are at their least, but for the weights' last change.
     const Eigen::VectorXd pull =
         part.directions.transpose() * weight.cwiseProduct(residual) + part.amplitudes;
     result.gradient -= between * solver.solve(pull);

@@ -23,7 +23,7 @@ struct PooledPart {
   /// What the model is expected to err by, added to its residuals; empty: nothing.
   Eigen::VectorXd correction;
   /// Directions, residuals x any, in which it may err beyond that, each by a standard normal
-  /// amount: residuals are r + correction + directions * amount, and the amounts are fitted along.
+  /// amplitude: residuals are r + correction + directions * amplitudes, which are fitted along.
   Eigen::MatrixXd directions;
   Eigen::VectorXd amplitudes;  ///< of the directions, as they were fitted
 };
@@ -36,18 +36,18 @@ Eigen::VectorXd residual_of(const PooledPart& part);
 
 struct PooledOptions {
   int iterations = 60;       ///< in all, without steps that were refused
-  int rounds = 6;            ///< each with time steps and loss chosen anew, until one hardly moves
+  int rounds = 6;            ///< each with its own time steps and loss, until one hardly moves
   double least_step = 1e-7;  ///< it ends when no shared coordinate moves further,
   /// or the next step promises no more of the cost than this, times chi-square per residual where
   /// that is above one: the more is left, the less sure is any parameter.
   double least_decrease = 0;
   double stability_margin = 1.5;
   Loss loss = Loss::squared;
-  /// Exact derivatives are had anew, updated, or kept, as in a refinement (RefineOptions).
+  /// Exact derivatives are computed, updated, or kept, as in a refinement (RefineOptions).
   double kept_within = 0;
   double updated_within = 0;
   bool own_only = false;  ///< shared parameters stay where they are
-  /// Derivatives that a fit begins with are updated and never had anew: near the optimum for the
+  /// Derivatives that a fit begins with are updated and never computed: near the optimum for the
   /// price of some runs. One round; `updated_within` must be more than 0.
   bool unrefined = false;
   /// Springs times time steps of the runs with derivatives: looked at after each iteration.
@@ -77,7 +77,7 @@ PooledFit fit_pooled(std::span<const FitProblem* const> problems,
                      const ProgressCallback& progress);
 
 /// One recording's cost to second order where it was linearised, over its own space's parameters,
-/// amounts of its directions eliminated. `threshold`: Huber's, infinite for plain squares.
+/// amplitudes of its directions eliminated. `threshold`: Huber's, infinite for plain squares.
 Quadratic quadratic_of(const FitProblem& problem, const PooledPart& part, double threshold);
 
 }  // namespace clothfit

@@ -101,7 +101,7 @@ class SharedEvaluation final : public ceres::EvaluationCallback {
     if (has_jacobian_) simulations_ += now_.runs;
   }
 
-  /// Makes the objective anew with finer time steps where a trial asks for them: the jump of the
+  /// Makes the objective again with finer time steps where a trial asks for them: the jump of the
   /// cost is small beside what such a trial changes, and to refuse it would hold back all other
   /// coordinates for many steps. A trial that asks for far finer ones is refused.
   void cut_time_for(const Eigen::VectorXd& values) {
@@ -129,9 +129,9 @@ class SharedEvaluation final : public ceres::EvaluationCallback {
   /// RefineOptions::kept_within). The residuals are this point's then.
   bool serves_on(const Eigen::VectorXd& values) {
     constexpr int kMostUpdates = 8;
-    const bool dear =
+    const bool expensive =
         options_.derivatives == Derivatives::tangents && !objective_->has_cheap_derivatives();
-    if (!dear || !now_.usable || linearised_at_.size() != coordinates_.size()) return false;
+    if (!expensive || !now_.usable || linearised_at_.size() != coordinates_.size()) return false;
     if (ran_at_.size() != coordinates_.size() || ran_at_ != coordinates_) run(values);
     if (!now_.usable) return false;
     const ReuseLimits limits{

@@ -12,13 +12,13 @@ namespace clothfit {
 
 struct RefineOptions {
   int iterations = 25;       ///< of one Ceres solve
-  int rounds = 6;            ///< solves, each with a time step chosen anew
+  int rounds = 6;            ///< solves, each with a time step of its own
   double least_gain = 1e-7;  ///< a solve ends when the cost falls by less than this share
   double least_step = 1e-6;  ///< or when a step is less than this share of the coordinates' norm
   Derivatives derivatives = Derivatives::tangents;
   double difference_step = Objective::kDifferenceStep;  ///< in coordinates; wider sees the trend
   /// Exact derivatives cost as much as ten runs. Those had at one point serve at another while they
-  /// foretell the residuals' change on the way to within `kept_within` of it: they err by about
+  /// predict the residuals' change on the way to within `kept_within` of it: they err by about
   /// that share then, and the optimum by that share of its sigma. Up to `updated_within` they are
   /// corrected by what they missed [broyden1965], and another round looks at where they lead.
   double kept_within = 0.01;

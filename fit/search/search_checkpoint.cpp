@@ -24,7 +24,7 @@ namespace {
 
 constexpr std::string_view kFormat = "clothfit-search/";
 constexpr std::string_view kVersionLine = "clothfit-search/1";
-constexpr const char* kDamageRemedy = "take an older copy, or remove it and start anew";
+constexpr const char* kDamageRemedy = "take an older copy, or remove it and start from scratch";
 
 template <class Enum, std::size_t count>
 using Words = std::array<std::pair<std::string_view, Enum>, count>;
@@ -102,7 +102,7 @@ class LineReader {
     if (version != kVersionLine) {
       throw InputError(file_, 1,
                        fmt::format("is a checkpoint of version `{}`", shown_text(version)),
-                       fmt::format("`{}`", kVersionLine), "remove it and start anew");
+                       fmt::format("`{}`", kVersionLine), "remove it and start from scratch");
     }
   }
 

@@ -111,7 +111,7 @@ Table term_table(const ProposedLaw& law) {
 }
 
 Table law_trial_table(const ProposedLaw& law) {
-  Table table{{"term", "foreseen fall", "left out", "without it", "outcome"}, {}};
+  Table table{{"term", "predicted decrease", "left out", "without it", "outcome"}, {}};
   for (const TermTrial& trial : law.trials)
     table.rows.push_back({trial.hypothesis.title(), significant(trial.predicted_decrease, 3),
                           significant(trial.cross_validated, 4), significant(trial.without_it, 4),
@@ -168,7 +168,7 @@ std::string proposed_law_html(const Diagnosis& diagnosis) {
   }
   return fmt::format("<pre>{}</pre>\n", escape_xml(law.formula)) +
          paragraph(fmt::format(
-             "An empirical law for what is left: a is a force per mass, p one per area, v the "
+             "An empirical law for the residual: a is a force per mass, p one per area, v the "
              "velocity, n the "
              "surface's normal, v_t the velocity in the surface, s / w and t / h the place on the "
              "cloth, T the tension of a spring and e its elongation. It says what the missing "

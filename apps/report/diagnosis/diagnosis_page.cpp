@@ -40,7 +40,7 @@ std::string verdict_text(const Diagnosis& diagnosis) {
                          several ? "these recordings" : "this recording", several ? "they" : "it");
     case DiagnosisVerdict::explained:
       return "The model lacked " + effects_text(diagnosis) +
-             ". With that, what is left looks like noise.";
+             ". With that, the residual looks like noise.";
     case DiagnosisVerdict::partly_explained:
       return "The model lacked " + effects_text(diagnosis) +
              ". With that, structure still remains that no tested effect explains.";
@@ -101,7 +101,7 @@ std::string before_after_text(const Diagnosis& diagnosis) {
 std::string what_to_record(std::span<const Separation> separations) {
   const Table table = separation_table(separations);
   if (table.rows.empty()) return "";
-  return paragraph("What to record next: laws are told apart from about five sigma on.") +
+  return paragraph("What to record next: modes are told apart from about five sigma on.") +
          html_table(table,
                     "How far this law, as it was found, is from what the other one can do in its "
                     "place, all else fitted again, in standard deviations of the noise: now, and "
@@ -118,7 +118,7 @@ std::string what_was_missing(const Diagnosis& diagnosis) {
         "Each marker is seen beside where the model has it by about a constant: it sits elsewhere "
         "on the cloth, the tracker misplaces it, or the cloth rests in folds that no parameter "
         "describes. Laws alone leave more, and the constants found in the fitted frames are added "
-        "wherever else the cloth is foreseen.");
+        "wherever else the cloth is predicted.");
     content += fmt::format("<p class=\"found\"><strong>{}</strong></p>\n",
                            escape_xml(seen_elsewhere_text(seen)));
     content += paragraph(fmt::format(
@@ -134,7 +134,8 @@ std::string what_was_missing(const Diagnosis& diagnosis) {
     content += fmt::format("<p class=\"found\"><strong>{}</strong></p>\n",
                            escape_xml(found_text(trial.hypothesis, diagnosis.found().result)));
     content += paragraph(fmt::format(
-        "Chi-square falls by {}, of {} that the derivatives foresaw. Blocks of time that were left "
+        "Chi-square falls by {}, of {} that the derivatives predicted. Blocks of time that were "
+        "left "
         "out in turn are predicted with a chi-square of {} per number, {} without it, {} with the "
         "best correction that needs no physics. Its amplitude stands {:.0f} sigma clear of doing "
         "nothing, with errors that may depend on each other over the cloth.",
@@ -144,7 +145,7 @@ std::string what_was_missing(const Diagnosis& diagnosis) {
     if (trial.clear_of_neutral < kCriteria.clear_of_neutral)
       content += paragraph(
           "That is less than five, the usual bar; all else that the model lacks counts as error "
-          "here. The effect is accepted because it takes a good part of what is left, and nothing "
+          "here. The effect is accepted because it takes a good part of the residual, and nothing "
           "that was left out is predicted worse with it.");
     if (trial.on_credit)
       content += paragraph(
@@ -237,7 +238,8 @@ std::string words() {
          "free to move along; a mean over short horizons.</dd>\n"
          "<dt>left out</dt><dd>Cross-validation: the fitted frames are cut into blocks of time, "
          "and each is predicted by a fit of the others.</dd>\n"
-         "<dt>mended without physics</dt><dd>The best of: a constant offset for every marker; the "
+         "<dt>corrected without physics</dt><dd>The best of: a constant offset for every marker; "
+         "the "
          "last residual, held; forces that follow no law, the last ones held. An effect that does "
          "not beat the first two is refused, unless those accepted after it and it beat them "
          "together; one that does not beat such forces is refused unless it takes a tenth of what "
@@ -274,15 +276,16 @@ std::string diagnosis_page_html(const Diagnosis& diagnosis, std::span<const Reco
   body += section("Where and when it is off", maps(diagnosis, recordings));
   body +=
       section("Which force is missing", residual_force_html(diagnosis.residual_force, recording));
-  body += section("Does what is left look like noise?",
+  body += section("Does the residual look like noise?",
                   html_table(adequacy_table(diagnosis),
                              "Residuals after everything that was fitted has been taken out."));
-  body += section(
-      "Which laws were asked",
-      wide(html_table(short_candidate_table(diagnosis),
-                      fmt::format("The most telling of {} laws, scored where the model as declared "
-                                  "first misses something: over its first {} frames.",
-                                  diagnosis.scores.size(), diagnosis.score_frames))));
+  body +=
+      section("Which modes were asked",
+              wide(html_table(
+                  short_candidate_table(diagnosis),
+                  fmt::format("The most telling of {} modes, scored where the model as declared "
+                              "first misses something: over its first {} frames.",
+                              diagnosis.scores.size(), diagnosis.score_frames))));
   const Table trials = trial_table(diagnosis);
   if (!trials.rows.empty())
     body += section("Which were fitted",
@@ -292,7 +295,7 @@ std::string diagnosis_page_html(const Diagnosis& diagnosis, std::span<const Reco
       "What would have been seen",
       wide(html_table(limit_table(diagnosis),
                       "In the last model: amplitudes that would stand five sigma clear and take "
-                      "enough of what is left to be accepted. Limits are linear, from the "
+                      "enough of the residual to be accepted. Limits are linear, from the "
                       "derivatives; the estimate is the score's, not a fit's.")) +
           planted(diagnosis));
   body += section("What the words mean", words());

@@ -48,7 +48,8 @@ Table candidate_table(const Diagnosis& diagnosis) {
 }
 
 Table short_candidate_table(const Diagnosis& diagnosis) {
-  Table table{{"law", "explains", "fall of chi-square", "amplitudes beyond neutral", "at"}, {}};
+  Table table{{"mode", "explains", "decrease of chi-square", "amplitudes beyond neutral", "at"},
+              {}};
   for (size_t n = 0; n < std::min(kShown, diagnosis.scores.size()); ++n) {
     const Score& score = diagnosis.scores[n];
     table.rows.push_back({score.hypothesis.title(), fmt::format("{:.0f} %", 100 * score.share),
@@ -59,8 +60,8 @@ Table short_candidate_table(const Diagnosis& diagnosis) {
 }
 
 Table trial_table(const Diagnosis& diagnosis) {
-  Table table{{"round", "law", "foreseen fall", "fall", "left out", "without it",
-               "mended without physics", "clear of neutral", "outcome"},
+  Table table{{"round", "mode", "predicted decrease", "decrease", "left out", "without it",
+               "corrected without physics", "clear of neutral", "outcome"},
               {}};
   const auto add = [&](size_t round, const Trial& trial) {
     table.rows.push_back(
@@ -83,7 +84,7 @@ Table trial_table(const Diagnosis& diagnosis) {
 }
 
 Table limit_table(const Diagnosis& diagnosis) {
-  Table table{{"law", "parameter", "would have been seen from", "unit", "score's estimate", "at"},
+  Table table{{"mode", "parameter", "would have been seen from", "unit", "score's estimate", "at"},
               {}};
   for (const DetectionLimit& limit : diagnosis.limits)
     for (Eigen::Index k = 0; k < limit.limit.size(); ++k)
@@ -101,7 +102,7 @@ std::string outcome_text(const PlantOutcome& outcome) {
 }
 
 Table plant_table(const Diagnosis& diagnosis) {
-  Table table{{"law", "parameter", "planted, beyond neutral", "unit", "outcome", "at"}, {}};
+  Table table{{"mode", "parameter", "planted, beyond neutral", "unit", "outcome", "at"}, {}};
   for (const PlantOutcome& outcome : diagnosis.plants) {
     const Plant& plant = outcome.plant;
     const EffectDescription effect = describe_effect(plant.hypothesis.effect);
@@ -116,7 +117,7 @@ Table plant_table(const Diagnosis& diagnosis) {
 
 Table separation_table(std::span<const Separation> separations) {
   constexpr double kSomething = 1;  // sigmas; the best one is shown even so
-  Table table{{"law", "now, sigma", "in a recording", "then, sigma"}, {}};
+  Table table{{"mode", "now, sigma", "in a recording", "then, sigma"}, {}};
   for (const Separation& separation : separations)
     for (const SeparatingRecording& recording : separation.recordings)
       if (recording.sigmas > kSomething || &recording == &separation.recordings.front())

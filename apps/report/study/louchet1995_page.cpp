@@ -49,7 +49,7 @@ std::string setting_section(const Louchet1995Study& study) {
       nearest_settings_table(study),
       "The nearest settings: of each reading and cost three grid points and what CMA-ES made of "
       "the best. Distance: root mean square of log(our cost / printed cost). Factor and spread: "
-      "the mean of that ratio, and what is left about it. Overshoot: largest deformation rate at "
+      "the mean of that ratio, and the residual about it. Overshoot: largest deformation rate at "
       "the end over tau; settings above 3 are left out. Off: how far the printed good and bad "
       "individuals run from the original, in l01; the paper says about 0.05 and slightly less "
       "than half.");
@@ -67,7 +67,7 @@ std::string landscape_section(const Louchet1995Study& study) {
   for (const double elongation : {0.1, 0.5})
     content += figure(
         landscapes_svg(study, elongation),
-        fmt::format("Figure {} anew: K = 4, tau = {}. The ring is the reference, the dot the "
+        fmt::format("Figure {} again: K = 4, tau = {}. The ring is the reference, the dot the "
                     "lowest place of the grid; there the cost is 0 (white). Each map has its own "
                     "colours; the full cost is summed over {} of the transitions.",
                     elongation < 0.3 ? 3 : 4, elongation, study.landscapes.front().transitions));
@@ -194,7 +194,7 @@ std::string motion_section(const Louchet1995Study& study) {
   const Reconstruction& bad = study.reconstructions[1];
   const double length_m = study.experiment.reference.natural_length_01_m;
   std::string content = figure(hanging_cloth_svg(study),
-                               "Figure 2 anew: the reference cloth (K = 4, tau = 0.5), seen from "
+                               "Figure 2 again: the reference cloth (K = 4, tau = 0.5), seen from "
                                "slightly above.");
   content += paragraph(fmt::format(
       "Of its good case the paper says that the error is about one twentieth of the springs' "
@@ -204,7 +204,7 @@ std::string motion_section(const Louchet1995Study& study) {
       significant(good.rms_m / length_m, 2), significant(bad.rms_m / length_m, 2)));
   content += figure(
       reconstructions_svg(study),
-      fmt::format("Figure 5 anew. Left: original; middle: printed good (K = {}, full cost {} m²); "
+      fmt::format("Figure 5 again. Left: original; middle: printed good (K = {}, full cost {} m²); "
                   "right: printed bad (K = {}, full cost {} m²).",
                   significant(good.set.stiffness_n_per_m, 4), significant(good.cost_m2, 2),
                   significant(bad.set.stiffness_n_per_m, 4), significant(bad.cost_m2, 2)));
@@ -219,7 +219,7 @@ std::string motion_section(const Louchet1995Study& study) {
 std::string louchet1995_page_html(const Louchet1995Study& study, const Louchet1995Options& options,
                                   const std::string& command, const std::string& version) {
   std::string body = fmt::format(
-      "<h1>Evolutionary identification of cloth animation models, 1995, anew</h1>\n"
+      "<h1>Evolutionary identification of cloth animation models, 1995, again</h1>\n"
       "<p class=\"meta\">clothfit {} · {} seeds from {}, comparisons over {}{}</p>\n",
       escape_xml(version), options.seeds, options.seed, options.compared_seeds(),
       options.quick ? " · QUICK: coarse grids and short searches, not the experiment itself" : "");

@@ -158,8 +158,8 @@ TEST(Quadratic, HasTheGradientThatDifferencesOfTheCostShow) {
   }
 }
 
-// Directions of unit variance are a covariance I + E E': with their amounts eliminated a part's
-// cost is that of generalised least squares, of what is left beside what is expected.
+// Directions of unit variance are a covariance I + E E': with these eliminated a part's
+// cost is that of generalised least squares, of the residual less what is expected.
 TEST(Quadratic, CountsDirectionsAsACovariance) {
   const FitProblem problem = make_problem(synthetic_input(tiny_cloth(1)), {}, 5, 5);
   ASSERT_TRUE(problem.priors.empty());
@@ -321,7 +321,7 @@ TEST(PooledFit, GoesRoughlyTheWholeWayWithTheDerivativesThatItBeginsWith) {
 
   ASSERT_TRUE(found.usable);
   EXPECT_LT(found.cost, 1e-3 * start);
-  EXPECT_TRUE(found.parts.front().borrowed) << "derivatives were had anew";
+  EXPECT_TRUE(found.parts.front().borrowed) << "derivatives were computed";
 }
 
 TEST(PooledFit, LiesBetweenTheFitsOfItsRecordingsAlone) {

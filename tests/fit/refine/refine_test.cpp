@@ -135,14 +135,14 @@ TEST(Uncertainty, ForeseesWhatALongTimeStepDoesToTheParameters) {
   const TrajectoryObjective objective(problem, problem.frames(), rough.time_step_s);
   const Uncertainty uncertainty = estimate_uncertainty(objective, rough.values);
 
-  // Then the shift is foreseen: to first order in the step, and 9/10 of it was taken away
+  // Then the shift is predicted: to first order in the step, and 9/10 of it was taken away
   ASSERT_TRUE(uncertainty.usable);
-  const Eigen::VectorXd foreseen = 0.9 * uncertainty.step_shift;
+  const Eigen::VectorXd predicted = 0.9 * uncertainty.step_shift;
   const Eigen::VectorXd seen = fine.values - rough.values;
   for (const char* name : {"tension_warp", "tension_weft", "damping_warp"}) {
     SCOPED_TRACE(name);
     const int p = problem.space.index(name);
-    EXPECT_NEAR(seen[p], foreseen[p], 0.25 * std::abs(foreseen[p]) + 0.1 * uncertainty.sigma[p]);
+    EXPECT_NEAR(seen[p], predicted[p], 0.25 * std::abs(predicted[p]) + 0.1 * uncertainty.sigma[p]);
   }
 }
 

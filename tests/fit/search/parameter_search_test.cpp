@@ -89,8 +89,8 @@ Eigen::Vector2d physical(const Eigen::VectorXd& coordinates) {
   return {coordinates[0], coordinates[2]};
 }
 
-/// A valley, along which both parameters nearly make up for each other.
-double valley(const Eigen::VectorXd& coordinates) {
+/// A trough, along which both parameters nearly make up for each other.
+double trough(const Eigen::VectorXd& coordinates) {
   const Eigen::Vector2d off = physical(coordinates) - kOptimum;
   return std::hypot(off[0] + off[1], 0.3 * (off[0] - off[1]));
 }
@@ -161,17 +161,17 @@ class ParameterSearch : public SearchOptima, public testing::WithParamInterface<
 
 TEST_P(ParameterSearch, FindsTheOptimumOfAValleyAndLeavesWhatIsNoPhysics) {
   SCOPED_TRACE("seed 61");
-  const KnownCost cost(problem_, valley);
+  const KnownCost cost(problem_, trough);
 
   const SearchedParameters found = found_in(cost, searching(GetParam()));
 
   ASSERT_FALSE(found.optima.empty());
   const SearchOptimum& best = found.optima.front();
-  EXPECT_EQ(best.cost, valley(problem_.space.coordinates(best.values)));
+  EXPECT_EQ(best.cost, trough(problem_.space.coordinates(best.values)));
   EXPECT_EQ(best.cost, found.best_cost.back());
   EXPECT_EQ(best.values[1], 0.25);
   EXPECT_TRUE(cost.others_stay);
-  // The cost is some sigmas over the ranges. The paper's strategy crawls along a valley.
+  // The cost is some sigmas over the ranges. The paper's strategy crawls along a trough.
   EXPECT_LT(best.cost, GetParam() == SearchMethod::cma ? 0.02 : 0.2);
   for (size_t generation = 1; generation < found.best_cost.size(); ++generation)
     EXPECT_LE(found.best_cost[generation], found.best_cost[generation - 1]);
@@ -181,7 +181,7 @@ TEST_P(ParameterSearch, TakesAsManySimulationsAsItSays) {
   SCOPED_TRACE("seed 61");
   EXPECT_EQ(search_simulations({.population = 100, .generations = 40}), 2050);
   EXPECT_EQ(search_simulations({.population = 2, .generations = 1}), 2);
-  const KnownCost cost(problem_, valley);
+  const KnownCost cost(problem_, trough);
   const FitOptions options = searching(GetParam());
 
   const SearchedParameters found = found_in(cost, options);
@@ -193,7 +193,7 @@ TEST_P(ParameterSearch, TakesAsManySimulationsAsItSays) {
 
 TEST_P(ParameterSearch, EndsOnceTheModelFollowsTheCloth) {
   SCOPED_TRACE("seed 61");
-  const KnownCost cost(problem_, valley);
+  const KnownCost cost(problem_, trough);
   // The marker was observed twice, and had moved by 20 sigmas the second time.
   ASSERT_NEAR(cost_of_following(cost), 0.05 * 10, 1e-12);
   FitOptions options = searching(GetParam());
@@ -248,15 +248,15 @@ TEST_P(ParameterSearch, RefusesTheFileOfAnotherProblem) {
   FitOptions options = searching(GetParam());
   options.checkpoint = folder_.path() / "search";
   options.generations = 3;
-  found_in(KnownCost(problem_, valley), options);
+  found_in(KnownCost(problem_, trough), options);
   options.resume = true;
-  EXPECT_NO_THROW(found_in(KnownCost(problem_, valley), options));
+  EXPECT_NO_THROW(found_in(KnownCost(problem_, trough), options));
 
   EXPECT_THROW(found_in(KnownCost(problem_, troughs), options), InputError);
   const auto expect_refused = [&](const auto& change) {
     FitProblem other = searched_problem();
     change(other);
-    const KnownCost cost(other, valley);
+    const KnownCost cost(other, trough);
     EXPECT_THROW(found_in(cost, options), InputError);
   };
   expect_refused([](FitProblem& other) { other.observations[0].rows[1].observed.x() += 1e-9; });
@@ -265,7 +265,7 @@ TEST_P(ParameterSearch, RefusesTheFileOfAnotherProblem) {
   expect_refused([](FitProblem& other) { other.space.parameters[2].start += 1; });
   expect_refused([](FitProblem& other) { other.cloth.mesh.columns = 9; });
   options.seed += 1;
-  EXPECT_THROW(found_in(KnownCost(problem_, valley), options), InputError);
+  EXPECT_THROW(found_in(KnownCost(problem_, trough), options), InputError);
 }
 
 TEST_P(ParameterSearch, RanksWhatDivergedLast) {
