@@ -55,8 +55,8 @@ struct Identified {
 };
 
 Identified identified(const FitInput& input, const FitOptions& options,
-                      const ProgressCallback& progress = {}) {
-  Identified found{.problem = make_problem(input, options, kTinyMesh, kTinyMesh)};
+                      const ProgressCallback& progress = {}, int mesh = kTinyMesh) {
+  Identified found{.problem = make_problem(input, options, mesh, mesh)};
   found.optimum = identify(input, found.problem, options, progress, found.report, found.candidates);
   return found;
 }
@@ -170,6 +170,28 @@ TEST_P(IdentifyWay, LeadsToTheOptimumThatTheTruthLeadsTo) {
 
 INSTANTIATE_TEST_SUITE_P(Whichever, IdentifyWay, testing::ValuesIn(ways()),
                          [](const auto& way) { return way.param.name; });
+
+// A search looks at half the cells a side, 7 x 7 vertices at least, and at the first frames.
+TEST(Identify, LeadsFromACoarseMeshAndFewFramesToItsOwnMeshAndAllFrames) {
+  SCOPED_TRACE("seed 1");
+  const FitInput input =
+      synthetic_input({.mesh = 9, .markers = 4, .frames = 14, .held_out_from = 14});
+  FitOptions options = tiny_options();
+  const Identified found = identified(input, options, {}, 9);
+  options.start = named(SyntheticCloth().fabric);
+  const Identified expected = identified(input, options, {}, 9);
+
+  ASSERT_TRUE(found.optimum.usable && found.optimum.converged) << found.optimum.message;
+  const std::vector<std::string>& stages = found.report.stages;
+  EXPECT_THAT(stages.front(), testing::HasSubstr("mesh 7 x 7, 8 frames"));
+  EXPECT_THAT(stages, testing::Contains(testing::HasSubstr(
+                          "refinement on 9 x 9 with the coarse mesh's derivatives over 8 frames")));
+  EXPECT_THAT(stages, testing::Contains(testing::HasSubstr("refinement on 9 x 9 over 14 frames")));
+  // Few frames leave a valley so flat that the two ways may end a sigma apart in it.
+  const Eigen::VectorXd off = found.coordinates() - expected.coordinates();
+  EXPECT_LT(off.dot(expected.information() * off), 2 * 2);
+  EXPECT_NEAR(found.optimum.cost, expected.optimum.cost, 0.01 * expected.optimum.cost);
+}
 
 TEST(Identify, SearchesWhereAGivenStartLeadsToNoOptimum) {
   SCOPED_TRACE("seed 1");
