@@ -1,8 +1,10 @@
 #include "fit/diagnosis/basin.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
+#include "fit/cost/huber.h"
 #include "fit/diagnosis/beam.h"
 #include "fit/diagnosis/clearance.h"
 #include "fit/diagnosis/criteria.h"
@@ -33,12 +35,29 @@ bool leaves_good_part(const SearchContext& search, const Extended& extended,
   return search.left_by(extended.model) >= kCriteria.good_part * search.left_by(without);
 }
 
+void begin_at(SearchContext& search, BeamEntry& entry) {
+  search.base_chi_square = entry.model.chi_square(search.threshold);
+  search.base_cost = entry.cost = search.cost(entry.model);
+}
+
+void stand_at(SearchContext& search, BeamEntry& entry, FittedModel there) {
+  entry.model = std::move(there);
+  entry.last.clear();
+  if (entry.accepted.empty()) {
+    search.base = entry.model;
+    if (std::isfinite(search.threshold))
+      search.threshold = kHuberScales * robust_scale(entry.model.residual());
+    begin_at(search, entry);
+  }
+  entry.cost = search.cost(entry.model);
+}
+
 void converge(SearchContext& search, BeamEntry& entry) {
   if (!entry.model.is_unrefined() || !entry.accepted.empty()) return;
   FittedModel converged = entry.model;
   refine_with_discretisation(converged, search.setup, search.progress);
   entry.model.state = FitState::complete;
-  if (converged.usable()) search.stand_at(entry, std::move(converged));
+  if (converged.usable()) stand_at(search, entry, std::move(converged));
 }
 
 void look_for_better_basin(const SearchContext& search, FittedModel& model) {

@@ -24,6 +24,13 @@ const Extended& best_of(const SearchContext& search, const std::vector<Extended>
 bool leaves_good_part(const SearchContext& search, const Extended& extended,
                       const FittedModel& without);
 
+/// Takes an entry that has found nothing for the base of all others.
+void begin_at(SearchContext& search, BeamEntry& entry);
+
+/// Moves an entry to another model of the same hypotheses. What was scored where it stood says
+/// nothing of it there.
+void stand_at(SearchContext& search, BeamEntry& entry, FittedModel there);
+
 /// Refines a base model that was left unrefined. Where that does not work out, it stands as it is.
 void converge(SearchContext& search, BeamEntry& entry);
 

@@ -197,7 +197,7 @@ std::vector<BeamEntry> expand(SearchContext& search, BeamEntry& entry, const Sho
   FittedModel there = in_basin_of(search, best_of(search, extended), entry.model);
   const bool moves = there.usable();
   if (moves) {
-    search.stand_at(entry, std::move(there));
+    stand_at(search, entry, std::move(there));
     entry.basin = BasinOrigin::changed;
   }
 

@@ -15,7 +15,7 @@ namespace {
 
 BeamEntry first_entry(SearchContext& search, FittedModel base) {
   BeamEntry entry{.model = std::move(base), .accepted = {}, .last = {}, .refused = {}};
-  search.begin_at(entry);
+  begin_at(search, entry);
   return entry;
 }
 

@@ -1,16 +1,11 @@
 #include "fit/diagnosis/search_context.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
-#include <utility>
 
-#include "fit/cost/huber.h"
-#include "fit/diagnosis/beam.h"
 #include "fit/diagnosis/criteria.h"
 #include "fit/diagnosis/worth.h"
 #include "fit/jobs/stop_token.h"
-#include "fit/uncertainty/uncertainty.h"
 
 namespace clothfit {
 
@@ -46,22 +41,6 @@ std::vector<ShapeCandidates> SearchContext::untested(const FittedModel& model) c
                              [&](const Hypothesis& own) { return own.same_mode(shapes.front()); }))
       result.push_back(at_shapes_of(model.hypotheses, values, shapes));
   return result;
-}
-
-void SearchContext::begin_at(BeamEntry& entry) {
-  base_chi_square = entry.model.chi_square(threshold);
-  base_cost = entry.cost = cost(entry.model);
-}
-
-void SearchContext::stand_at(BeamEntry& entry, FittedModel there) {
-  entry.model = std::move(there);
-  entry.last.clear();
-  if (entry.accepted.empty()) {
-    base = entry.model;
-    if (std::isfinite(threshold)) threshold = kHuberScales * robust_scale(entry.model.residual());
-    begin_at(entry);
-  }
-  entry.cost = cost(entry.model);
 }
 
 }  // namespace clothfit

@@ -7,8 +7,6 @@
 
 namespace clothfit {
 
-struct BeamEntry;
-
 struct SearchOptions {
   std::vector<ShapeCandidates> hypotheses;  ///< to test
   int beam_width = 3;                       ///< entries that are followed side by side
@@ -46,12 +44,6 @@ struct SearchContext {
   bool is_far_off(const FittedModel& model) const;
   /// Returns hypotheses that a model does not have, at the shapes that it has for their effects.
   std::vector<ShapeCandidates> untested(const FittedModel& model) const;
-
-  /// Takes an entry that has found nothing for the base of all others.
-  void begin_at(BeamEntry& entry);
-  /// Moves an entry to another model of the same hypotheses. Its scores are dropped, for they say
-  /// nothing of the entry there.
-  void stand_at(BeamEntry& entry, FittedModel there);
 };
 
 }  // namespace clothfit

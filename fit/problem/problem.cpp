@@ -137,19 +137,6 @@ Rigid3 place_sheet_of(const Recording& recording, FitProblem& problem) {
 
 }  // namespace
 
-void add_derivative_weights(FitProblem& problem) {
-  const auto shifts_place = [](const FitProblem::MeasurementTerm& term) {
-    return term.effect->shifts_place();
-  };
-  if (!problem.derivative_weights.empty()) return;
-  if (std::ranges::none_of(problem.measurement, shifts_place)) return;
-  const Mesh& mesh = problem.cloth.mesh;
-  for (const SurfaceQuantity derivative : kSurfaceDerivatives)
-    problem.derivative_weights.push_back(vertex_weights(
-        make_surface(mesh.columns, mesh.rows, mesh.width_m, mesh.height_m, problem.marker_place_m,
-                     SurfaceInterpolation::bicubic, derivative)));
-}
-
 FitProblem make_problem(const FitInput& input, const FitOptions& options, int mesh_columns,
                         int mesh_rows) {
   const Recording& recording = input.recording;
@@ -183,12 +170,6 @@ FitProblem make_problem(const FitInput& input, const FitOptions& options, int me
   for (const UnknownGroup* group : unknown_groups()) group->declare(source, problem);
   add_given_priors(options, problem);
   return problem;
-}
-
-MeasurementSetting measurement_setting(const FitProblem& problem) {
-  return {.observations = problem.observations,
-          .tracks_held_points = !problem.driving_markers.empty(),
-          .limits_strain = problem.cloth.strain_limit.mode != StrainLimitMode::off};
 }
 
 }  // namespace clothfit

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "calib/camera/rigid3.h"
-#include "fit/problem/problem.h"
+#include "fit/problem/fit_problem.h"
 #include "model/integrate/simulate.h"
 #include "model/integrate/tangent_step.h"
 
@@ -20,7 +20,7 @@ struct ProblemSource {
 };
 
 /// A group of a fit's unknowns. It declares its parameters, writes their values into the model, and
-/// says how they change it. A new group is one file and one line in unknown_groups().
+/// says how they change it. A new group is a file, its name below and its line in unknown_groups().
 class UnknownGroup {
  public:
   virtual ~UnknownGroup() = default;

@@ -310,6 +310,7 @@ PooledFit fit_pooled(std::span<const FitProblem* const> problems, std::vector<Po
   int refusals = 0;
   for (int round = 0; round < options.rounds; ++round) {
     if (!pool.begin_round(round == 0)) {
+      result.usable = false;
       result.message = "a recording cannot be simulated from the starting values";
       return result;
     }

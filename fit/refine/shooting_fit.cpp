@@ -73,9 +73,12 @@ struct ShootingRound {
 /// with time steps that follow the parameters: all trials from one place have the same.
 class ShootingCost final : public LeastSquares {
  public:
-  ShootingCost(const ShootingRound& round, Eigen::VectorXd values, double most_spring_steps)
+  /// `runs`: of the rounds before, which count towards the limit of work.
+  ShootingCost(const ShootingRound& round, Eigen::VectorXd values, double runs,
+               double most_spring_steps)
       : round_(round),
         values_(std::move(values)),
+        runs_before_(runs),
         most_spring_steps_(most_spring_steps),
         objective_(round.objective_at(steps_now(), {})) {}
 
@@ -83,12 +86,13 @@ class ShootingCost final : public LeastSquares {
   const Eigen::VectorXd& values() const { return values_; }
   double runs() const { return runs_; }
 
-  double cost() const override { return equations_.cost; }
+  double cost() const override { return cost_; }
   const Eigen::VectorXd* gradient() override {
     if (!is_current_) {
       if (runs_ > 0) objective_ = round_.objective_at(steps_now(), objective_->corrections());
       equations_ = objective_->equations(values_, round_.huber_threshold);
       runs_ += equations_.runs;
+      if (equations_.usable) cost_ = equations_.cost;
       gradient_ = -equations_.chain.border_right;
       is_current_ = true;
     }
@@ -116,17 +120,20 @@ class ShootingCost final : public LeastSquares {
     for (size_t w = 0; w < corrections.size(); ++w) corrections[w] += step_.blocks[w];
     const Eigen::VectorXd values = round_.problem.space.values(next);
     ++runs_;
+    is_tried_ = true;
     const double cost = round_.cost_of_trial(*objective_, values, corrections);
-    if (!(cost <= equations_.cost)) return false;
+    if (!(cost <= cost_)) return false;
     values_ = values;
     objective_->set_corrections(std::move(corrections));
-    equations_.cost = cost;
+    cost_ = cost;
     is_current_ = false;
     return true;
   }
-  double least_decrease() const override { return round_.least_gain * equations_.cost; }
+  double least_decrease() const override { return round_.least_gain * cost_; }
+  /// However large the mesh, one step is tried in a round.
   bool is_out_of_work() const override {
-    return runs_ * objective_->spring_steps_per_run() > most_spring_steps_;
+    return is_tried_ &&
+           (runs_before_ + runs_) * objective_->spring_steps_per_run() > most_spring_steps_;
   }
 
  private:
@@ -134,11 +141,13 @@ class ShootingCost final : public LeastSquares {
 
   const ShootingRound& round_;
   Eigen::VectorXd values_;
-  double most_spring_steps_;
+  double runs_before_, most_spring_steps_;
   std::unique_ptr<ShootingObjective> objective_;  ///< with the corrections where the fit stands
   ShootingObjective::Equations equations_;
   Eigen::VectorXd gradient_;
-  bool is_current_ = false;  ///< the equations, but for their cost
+  double cost_ = std::numeric_limits<double>::infinity();
+  bool is_current_ = false;  ///< whether the equations are those of where the fit stands
+  bool is_tried_ = false;    ///< whether a step has been
   BorderedChainSolution step_;
   double damping_ = 0, runs_ = 0;
 };
@@ -234,7 +243,7 @@ ShootingFit fit_by_shooting(const FitProblem& problem, int frames, const Eigen::
                         .continuity = {gap_m, gap_m / window_s},
                         .stability_margin = options.stability_margin,
                         .least_gain = options.least_gain};
-    ShootingCost cost(round, result.values, options.most_spring_steps - result.runs);
+    ShootingCost cost(round, result.values, result.runs + 1, options.most_spring_steps);
     const Eigen::VectorXd before = cost.objective().residuals({result.values}).front();
     ++result.runs;
     if (options.loss == Loss::huber) round.huber_threshold = kHuberScales * robust_scale(before);

@@ -78,10 +78,12 @@ class ProfiledLeastSquares final : public LeastSquares {
       right[p] = 0;
     }
     information.diagonal() *= 1 + damping;
-    return SymmetricFactors(information).solve(right);
+    step_ = SymmetricFactors(information).solve(right);
+    return step_;
   }
-  double predicted_decrease(const Eigen::VectorXd& way) const override {
-    return -gradient_.dot(way) - 0.5 * way.dot(information_ * way);
+  /// Of the whole step: where the box cuts it short, the others may have far to go.
+  double predicted_decrease(const Eigen::VectorXd&) const override {
+    return -0.5 * gradient_.dot(step_);
   }
   bool move_to(const Eigen::VectorXd& next) override {
     Linearisation there = fixed_.objective().linearise(fixed_.values(next));
@@ -111,7 +113,7 @@ class ProfiledLeastSquares final : public LeastSquares {
   Linearisation linear_;
   double cost_ = kInfinite;
   Eigen::MatrixXd information_;
-  Eigen::VectorXd gradient_;
+  Eigen::VectorXd gradient_, step_;
 };
 
 /// Minimises the cost over all coordinates but `held`, from `start`. The point's `others` are all

@@ -10,6 +10,7 @@
 #include <limits>
 
 #include "data/input_error.h"
+#include "fit/jobs/stop_token.h"
 
 namespace clothfit {
 namespace {
@@ -331,12 +332,10 @@ TargetsResult measure_targets(const TargetsOptions& options, const std::filesyst
   for (const TargetStudy& study : target_studies(options)) {
     if (!is_wanted(options, study)) continue;
     Journal journal(journals / (study.name + ".journal"), study.options.key(), start);
-    bool cancelled = false;
     const ProgressCallback named = [&](const Progress& now) {
       Progress of_study = now;
       of_study.stage = study.name;
-      cancelled = progress && !progress(of_study);
-      return !cancelled;
+      return !progress || progress(of_study);
     };
     RecoverResult found = recover(study.options, &journal, named);
     if (found.stop == ExecuteStop::cancelled) {
@@ -344,10 +343,10 @@ TargetsResult measure_targets(const TargetsOptions& options, const std::filesyst
       return result;
     }
     if (study.drag_sigmas > 0) {
-      PlantedDrag drag{.sigmas = study.drag_sigmas,
-                       .pseudo = pseudo_truth(study.options, kPooledReleases, named),
-                       .rows = {}};
-      if (cancelled) {
+      PlantedDrag drag{.sigmas = study.drag_sigmas, .pseudo = {}, .rows = {}};
+      try {
+        drag.pseudo = pseudo_truth(study.options, kPooledReleases, named);
+      } catch (const StopRequested&) {
         result.cancelled = true;
         return result;
       }
