@@ -187,7 +187,7 @@ TEST(Identify, LeadsFromACoarseMeshAndFewFramesToItsOwnMeshAndAllFrames) {
   EXPECT_THAT(stages, testing::Contains(testing::HasSubstr(
                           "refinement on 9 x 9 with the coarse mesh's derivatives over 8 frames")));
   EXPECT_THAT(stages, testing::Contains(testing::HasSubstr("refinement on 9 x 9 over 14 frames")));
-  // Few frames leave a valley so flat that the two ways may end a sigma apart in it.
+  // Few frames leave a trough so flat that the two ways may end a sigma apart in it.
   const Eigen::VectorXd off = found.coordinates() - expected.coordinates();
   EXPECT_LT(off.dot(expected.information() * off), 2 * 2);
   EXPECT_NEAR(found.optimum.cost, expected.optimum.cost, 0.01 * expected.optimum.cost);

@@ -10,7 +10,6 @@
 #include <unistd.h>
 
 #include "fit/jobs/journal_key.h"
-#include "fit/jobs/journal_key.h"
 #include "tests/data/expect_refused.h"
 
 namespace clothfit {
