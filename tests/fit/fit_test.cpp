@@ -215,20 +215,6 @@ std::string fit_json(FitReport report, const TemporaryFolder& folder) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-TEST(Fit, FindsTheFabricByCmaToo) {
-  const SyntheticCloth truth;
-  FitOptions options = quick();
-  options.search = SearchMethod::cma;
-
-  const FitReport report = fit(synthetic_input(truth), options, {});
-
-  ASSERT_TRUE(report.usable()) << report.message;
-  EXPECT_THAT(report.stages.front(), ::testing::HasSubstr("CMA-ES"));
-  expect_within(report.result, "tension_warp", truth.fabric.tension_warp_n_per_m, 0.05);
-  expect_within(report.result, "shear", truth.fabric.shear_n_per_m, 0.03);
-  expect_within(report.result, "damping_warp", truth.fabric.damping_warp_s, 0.2);
-}
-
 TEST(Fit, LooksAtNoFewerFramesThanItSearchedOver) {
   const SyntheticCloth truth{.seed = 7};  // 26 frames are fitted
   FitOptions options = quick();
@@ -433,30 +419,6 @@ TEST(Fit, BeginsWithTheParametersOfAnEarlierFitWithoutASearch) {
   }
   (*options.start)["sheer"] = 1;
   EXPECT_THROW(fit(tiny_input(), options, {}), InputError);
-}
-
-TEST(Fit, EndsAtTheTrajectorysOptimumWhicheverCostLeadsThere) {
-  const SyntheticCloth truth;
-  const FitInput input = synthetic_input(truth);
-  const FitReport searched = fit(input, quick(), {});
-  ASSERT_TRUE(searched.usable()) << searched.message;
-  for (const LeadingCost cost : {LeadingCost::shooting, LeadingCost::full, LeadingCost::small}) {
-    SCOPED_TRACE(to_string(cost));
-    EXPECT_EQ(leading_cost_named(to_string(cost)), cost);
-    FitOptions options = quick();
-    options.cost = cost;
-
-    const FitReport led = fit(input, options, {});
-
-    ASSERT_EQ(led.stop, FitStop::converged) << led.message;
-    EXPECT_TRUE(led.search_cost.empty());  // nothing had to be searched for
-    EXPECT_THAT(led.stages.front(), testing::HasSubstr(to_string(cost)));
-    for (const char* name : {"tension_warp", "tension_weft", "shear"}) {
-      const ParameterEstimate& one = find(searched.result, name);
-      // Both ended at the optimum, each with the time step of its last round.
-      EXPECT_NEAR(find(led.result, name).value, one.value, 0.3 * one.sigma) << name;
-    }
-  }
 }
 
 TEST(Fit, TakesShootingButNoStatesFromPixels) {
