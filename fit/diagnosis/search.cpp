@@ -41,9 +41,8 @@ bool refine(const SearchContext& search, bool is_best, BeamEntry& entry) {
   return true;
 }
 
-/// Extends an entry, and once more where nothing was found but other hypotheses may show. They may
-/// where the entry turns out to stand in another basin, or was scored on the coarse mesh: they may
-/// show in its own basin, and on its own mesh.
+/// Extends an entry. Where nothing was found, it is extended once more if it has changed its basin
+/// or was scored on the coarse mesh: other hypotheses may show in its own basin, on its own mesh.
 std::vector<BeamEntry> extend(SearchContext& search, BeamEntry& entry, const Shortlist& list) {
   std::vector<BeamEntry> children = expand(search, entry, list);
   const bool changed = entry.basin == BasinOrigin::changed;

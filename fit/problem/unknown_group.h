@@ -11,7 +11,7 @@
 
 namespace clothfit {
 
-/// What a problem is made of, beside the problem as far as it is made.
+/// The sources from which a group declares its unknowns.
 struct ProblemSource {
   const FitInput& input;
   const FitOptions& options;
