@@ -19,10 +19,9 @@ BodyPath read_body_path(const std::filesystem::path& file) {
     const double w = table.number(row, kQw), x = table.number(row, kQx);
     const double y = table.number(row, kQy), z = table.number(row, kQz);
     const std::optional<Eigen::Quaterniond> rotation = unit_quaternion(w, x, y, z);
-    if (!rotation) {
+    if (!rotation)
       table.refuse(row, fmt::format("quaternion ({}, {}, {}, {})", w, x, y, z),
                    "a rotation of norm 1, off by 0.001 at most");
-    }
     path.rotation.push_back(*rotation);
   }
   return path;

@@ -24,7 +24,7 @@ std::vector<std::pair<std::string, CameraModel>> camera_model_words() {
 }
 
 /// Returns how many distortion coefficients a model may have; the first count means "none given".
-std::vector<std::size_t> distortion_counts(CameraModel model) {
+std::vector<size_t> distortion_counts(CameraModel model) {
   switch (model) {
     case CameraModel::pinhole:
       return {0};
@@ -39,19 +39,18 @@ std::vector<std::size_t> distortion_counts(CameraModel model) {
 
 std::vector<double> read_distortion(const YamlValue* value, CameraModel model,
                                     const std::string& model_name) {
-  const std::vector<std::size_t> counts = distortion_counts(model);
+  const std::vector<size_t> counts = distortion_counts(model);
   std::vector<double> distortion;
   if (value != nullptr) distortion = value->numbers();
   if (distortion.empty()) distortion.assign(counts.front(), 0.0);
-  if (std::find(counts.begin(), counts.end(), distortion.size()) == counts.end()) {
+  if (std::find(counts.begin(), counts.end(), distortion.size()) == counts.end())
     value->refuse(fmt::format("{} distortion coefficients for {}", distortion.size(), model_name),
                   "brown_conrady has 4, 5 or 8, kannala_brandt 4, pinhole none");
-  }
   return distortion;
 }
 
 constexpr int kPoseSize = 6;
-constexpr std::size_t kTriangleSize = 21;  ///< of a symmetric 6 x 6 matrix
+constexpr size_t kTriangleSize = 21;  ///< of a symmetric 6 x 6 matrix
 
 /// Says whether a matrix may be a covariance: singular, but without negative variance in any
 /// direction. It is judged after scaling to correlations, since radians and metres differ in size.
@@ -68,16 +67,13 @@ bool is_covariance(const Eigen::Matrix<double, 6, 6>& matrix) {
 Eigen::Matrix<double, 6, 6> read_covariance(const YamlValue& value) {
   const std::array<double, kTriangleSize> triangle = value.numbers<kTriangleSize>();
   Eigen::Matrix<double, 6, 6> covariance;
-  std::size_t next = 0;
-  for (int row = 0; row < kPoseSize; ++row) {
-    for (int column = row; column < kPoseSize; ++column) {
+  size_t next = 0;
+  for (int row = 0; row < kPoseSize; ++row)
+    for (int column = row; column < kPoseSize; ++column)
       covariance(row, column) = covariance(column, row) = triangle[next++];
-    }
-  }
-  if (!is_covariance(covariance)) {
+  if (!is_covariance(covariance))
     value.refuse(value.name() + " has a negative variance",
                  "the upper triangle of a positive semi-definite matrix, row by row");
-  }
   return covariance;
 }
 
@@ -87,16 +83,14 @@ CameraPose read_pose(const YamlValue& value) {
   const YamlValue& rotation = map.at("rotation");
   const auto [w, x, y, z] = rotation.numbers<4>();
   const std::optional<Eigen::Quaterniond> unit = unit_quaternion(w, x, y, z);
-  if (!unit) {
+  if (!unit)
     rotation.refuse(fmt::format("{} = [{}, {}, {}, {}]", rotation.name(), w, x, y, z),
                     "a quaternion [w, x, y, z] of norm 1, off by 0.001 at most");
-  }
   pose.rotation = *unit;
   const auto [tx, ty, tz] = map.at("translation").numbers<3>();
   pose.translation_m = {tx, ty, tz};
-  if (const YamlValue* covariance = map.find("covariance")) {
+  if (const YamlValue* covariance = map.find("covariance"))
     pose.covariance = read_covariance(*covariance);
-  }
   return pose;
 }
 
@@ -114,30 +108,26 @@ CameraParameters read_camera(const std::filesystem::path& file) {
 
   const YamlValue& size = map.at("image_size");
   const std::vector<YamlValue> sides = size.items();
-  if (sides.size() != 2) {
+  if (sides.size() != 2)
     size.refuse(fmt::format("image_size has {} items", sides.size()), "[width, height] in pixels");
-  }
   camera.image_width = sides[0].whole_number(1);
   camera.image_height = sides[1].whole_number(1);
 
   const YamlValue& focal = map.at("focal");
   const auto [fx, fy] = focal.numbers<2>();
-  if (fx <= 0 || fy <= 0) {
+  if (fx <= 0 || fy <= 0)
     focal.refuse(fmt::format("focal = [{}, {}]", fx, fy), "[fx, fy] in pixels, both > 0");
-  }
   camera.focal_px = {fx, fy};
   const auto [cx, cy] = map.at("centre").numbers<2>();
   camera.centre_px = {cx, cy};
   camera.distortion = read_distortion(map.find("distortion"), camera.model, model.text());
-  if (const YamlValue* pose = map.find("camera_from_world")) {
+  if (const YamlValue* pose = map.find("camera_from_world"))
     camera.camera_from_world = read_pose(*pose);
-  }
   if (const YamlValue* readout = map.find("readout_time")) {
     camera.readout_time_s = readout->number();
-    if (camera.readout_time_s < 0) {
+    if (camera.readout_time_s < 0)
       readout->refuse(fmt::format("readout_time = {}", camera.readout_time_s),
                       "seconds from the first to the last row, >= 0");
-    }
   }
   return camera;
 }
@@ -147,9 +137,8 @@ void write_camera(const CameraParameters& camera, const std::filesystem::path& f
   out.begin_map();
   out.key("format").value("clothfit-camera/1");
   out.key("name").value(camera.name);
-  for (const auto& [word, model] : camera_model_words()) {
+  for (const auto& [word, model] : camera_model_words())
     if (model == camera.model) out.key("model").value(word);
-  }
   out.key("image_size").begin_flow_list();
   out.value(camera.image_width).value(camera.image_height).end_list();
   out.key("focal").value(std::array{camera.focal_px.x(), camera.focal_px.y()});
@@ -165,11 +154,9 @@ void write_camera(const CameraParameters& camera, const std::filesystem::path& f
     out.key("translation").value(std::array{t.x(), t.y(), t.z()});
     if (pose.covariance) {
       std::vector<double> triangle;
-      for (int row = 0; row < kPoseSize; ++row) {
-        for (int column = row; column < kPoseSize; ++column) {
+      for (int row = 0; row < kPoseSize; ++row)
+        for (int column = row; column < kPoseSize; ++column)
           triangle.push_back((*pose.covariance)(row, column));
-        }
-      }
       out.key("covariance").value(triangle);
     }
     out.end_map();

@@ -15,16 +15,16 @@ namespace clothfit {
 namespace {
 
 std::string_view trimmed(std::string_view text) {
-  const std::size_t first = text.find_first_not_of(" \t");
+  const size_t first = text.find_first_not_of(" \t");
   if (first == std::string_view::npos) return {};
   return text.substr(first, text.find_last_not_of(" \t") - first + 1);
 }
 
 /// Appends the fields of a line and returns their number.
-std::size_t split(std::string_view line, std::vector<std::string_view>& fields) {
-  std::size_t count = 0;
-  for (std::size_t begin = 0;; ++count) {
-    const std::size_t comma = line.find(',', begin);
+size_t split(std::string_view line, std::vector<std::string_view>& fields) {
+  size_t count = 0;
+  for (size_t begin = 0;; ++count) {
+    const size_t comma = line.find(',', begin);
     fields.push_back(trimmed(line.substr(begin, comma - begin)));
     if (comma == std::string_view::npos) return count + 1;
     begin = comma + 1;
@@ -52,7 +52,7 @@ CsvTable::CsvTable(const std::filesystem::path& file, std::vector<CsvColumn> col
   std::vector<std::string_view> header;
   std::string_view rest = content_;
   for (int line = 1; !rest.empty(); ++line) {
-    const std::size_t end = rest.find('\n');
+    const size_t end = rest.find('\n');
     const std::string_view text = trimmed(rest.substr(0, end));
     rest.remove_prefix(end == std::string_view::npos ? rest.size() : end + 1);
     if (text.empty() || text.front() == '#') continue;
@@ -60,7 +60,7 @@ CsvTable::CsvTable(const std::filesystem::path& file, std::vector<CsvColumn> col
     if (header.empty()) {
       width_ = split(text, header);
       place_.assign(columns_.size(), -1);
-      for (std::size_t field = 0; field < width_; ++field) {
+      for (size_t field = 0; field < width_; ++field) {
         const auto column = std::find_if(columns_.begin(), columns_.end(), [&](const CsvColumn& c) {
           return c.name == header[field];
         });
@@ -70,23 +70,21 @@ CsvTable::CsvTable(const std::filesystem::path& file, std::vector<CsvColumn> col
           throw InputError(file_, line, "unknown column " + shown(header[field]),
                            known_names(std::string(header[field]), names));
         }
-        int& place = place_[static_cast<std::size_t>(column - columns_.begin())];
-        if (place >= 0) {
+        int& place = place_[static_cast<size_t>(column - columns_.begin())];
+        if (place >= 0)
           throw InputError(file_, line, "column " + shown(header[field]) + " appears twice",
                            "every column once", "remove one of them");
-        }
         place = static_cast<int>(field);
       }
-      for (std::size_t column = 0; column < columns_.size(); ++column) {
-        if (place_[column] < 0 && columns_[column].required) {
+      for (size_t column = 0; column < columns_.size(); ++column) {
+        if (place_[column] < 0 && columns_[column].required)
           throw InputError(file_, line, "column " + shown(columns_[column].name) + " is missing",
                            expected_header(), "name the columns in the first line");
-        }
       }
       continue;
     }
 
-    const std::size_t count = split(text, fields_);
+    const size_t count = split(text, fields_);
     if (count != width_) {
       throw InputError(file_, line, std::to_string(count) + (count == 1 ? " field" : " fields"),
                        std::to_string(width_) + " fields, as the first line has columns",
@@ -94,47 +92,43 @@ CsvTable::CsvTable(const std::filesystem::path& file, std::vector<CsvColumn> col
     }
     line_.push_back(line);
   }
-  if (header.empty()) {
+  if (header.empty())
     throw InputError(file_, 1, "the table is empty", expected_header(),
                      "name the columns in the first line");
-  }
 }
 
 std::string_view CsvTable::text(int row, int column) const {
   assert(row >= 0 && row < rows());
-  const int place = place_[static_cast<std::size_t>(column)];
+  const int place = place_[static_cast<size_t>(column)];
   if (place < 0) return {};
-  return fields_[static_cast<std::size_t>(row) * width_ + static_cast<std::size_t>(place)];
+  return fields_[static_cast<size_t>(row) * width_ + static_cast<size_t>(place)];
 }
 
 double CsvTable::number(int row, int column) const {
   const std::string_view field = text(row, column);
   const std::optional<double> value = parse_number(field);
-  if (!value) {
-    refuse(row, columns_[static_cast<std::size_t>(column)].name + " = " + shown(field),
+  if (!value)
+    refuse(row, columns_[static_cast<size_t>(column)].name + " = " + shown(field),
            "a finite number", "leave out the row of what was not observed");
-  }
   return *value;
 }
 
 double CsvTable::rising_number(int row, int column) const {
   const double value = number(row, column);
-  if (row > 0 && value <= number(row - 1, column)) {
+  if (row > 0 && value <= number(row - 1, column))
     refuse(row,
-           columns_[static_cast<std::size_t>(column)].name + " = " + shown(text(row, column)) +
+           columns_[static_cast<size_t>(column)].name + " = " + shown(text(row, column)) +
                " after " + shown(text(row - 1, column)),
            "numbers that rise from row to row", "sort the rows and remove repeated ones");
-  }
   return value;
 }
 
 int CsvTable::whole_number(int row, int column, int least) const {
   const std::string_view field = text(row, column);
   const std::optional<int> value = parse_whole_number(field);
-  if (!value || *value < least) {
-    refuse(row, columns_[static_cast<std::size_t>(column)].name + " = " + shown(field),
+  if (!value || *value < least)
+    refuse(row, columns_[static_cast<size_t>(column)].name + " = " + shown(field),
            "a whole number, " + std::to_string(least) + " or more");
-  }
   return *value;
 }
 
@@ -144,7 +138,7 @@ std::string CsvTable::name(int row, int column) const {
     return static_cast<unsigned char>(c) < ' ' || c == 127;
   });
   if (field.empty() || field.front() == '#' || !printable) {
-    refuse(row, columns_[static_cast<std::size_t>(column)].name + " = " + shown(field),
+    refuse(row, columns_[static_cast<size_t>(column)].name + " = " + shown(field),
            "a name of printable characters without a comma, the first of them no `#`");
   }
   return std::string(field);

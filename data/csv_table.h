@@ -25,7 +25,7 @@ class CsvTable {
   CsvTable& operator=(const CsvTable&) = delete;
 
   int rows() const { return static_cast<int>(line_.size()); }
-  int line(int row) const { return line_[static_cast<std::size_t>(row)]; }
+  int line(int row) const { return line_[static_cast<size_t>(row)]; }
 
   /// Returns a field; `column` counts in the constructor's list. Empty where the file lacks an
   /// optional column.
@@ -51,7 +51,7 @@ class CsvTable {
   std::string content_;
   std::vector<CsvColumn> columns_;
   std::vector<int> place_;                ///< column -> field of a line; -1 when the file lacks it
-  std::size_t width_ = 0;                 ///< fields per line
+  size_t width_ = 0;                      ///< fields per line
   std::vector<std::string_view> fields_;  ///< rows x width, into content_
   std::vector<int> line_;                 ///< of each row, from 1
 };

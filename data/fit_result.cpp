@@ -88,17 +88,15 @@ class JsonValue {
   bool is_list() const { return json_.is_array(); }
   JsonValue at(const std::string& key) const {
     if (!json_.is_object()) refuse("is not an object", "an object");
-    if (!json_.contains(key)) {
+    if (!json_.contains(key))
       throw InputError(file_, "`" + place_ + "/" + key + "` is missing", kExpectedFile, kRemedy);
-    }
     return {json_.at(key), file_, place_ + "/" + key};
   }
   std::vector<JsonValue> items() const {
     if (!json_.is_array()) refuse("is not a list", "a list");
     std::vector<JsonValue> items;
-    for (const Json& item : json_) {
+    for (const Json& item : json_)
       items.emplace_back(item, file_, fmt::format("{}/{}", place_, items.size()));
-    }
     return items;
   }
   std::vector<std::string> keys() const {
@@ -164,9 +162,8 @@ ParameterEstimate read_parameter(const JsonValue& json) {
                                               ParameterState::undetermined};
   const auto found = std::find_if(states.begin(), states.end(),
                                   [&](ParameterState s) { return to_string(s) == word; });
-  if (found == states.end()) {
+  if (found == states.end())
     state.refuse("is `" + word + "`", "`fitted`, `fixed` or `undetermined`");
-  }
   parameter.state = *found;
   parameter.reason = json.text_or_empty("reason");
   parameter.interval_90 = read_interval(json, "interval_90");
@@ -252,9 +249,8 @@ std::string to_string(ParameterState state) {
 
 void write_fit_result(const FitResult& result, const std::filesystem::path& file) {
   Json effects = Json::array();
-  for (const EffectEstimate& effect : result.effects) {
+  for (const EffectEstimate& effect : result.effects)
     effects.push_back({{"name", effect.name}, {"parameters", to_json(effect.parameters)}});
-  }
   Json errors = Json::array();
   for (const ObservationErrors& kind : result.errors) errors.push_back(to_json(kind));
   if (errors.size() == 1) errors = Json(errors.front());
@@ -302,9 +298,8 @@ FitResult read_fit_result(const std::filesystem::path& file) {
   const std::string name = file.string();
   const JsonValue json(parsed, name, "");
   const JsonValue format = json.at("format");
-  if (format.text() != kFormat) {
+  if (format.text() != kFormat)
     format.refuse("is `" + format.text() + "`", std::string("`") + kFormat + "`");
-  }
 
   FitResult result;
   result.recording = json.at("recording").text();
@@ -321,9 +316,8 @@ FitResult read_fit_result(const std::filesystem::path& file) {
   if (model.has("time_step_s")) result.time_step_s = model.at("time_step_s").number();
   result.start = model.at("start").text();
   result.parameters = read_parameters(json.at("parameters"));
-  for (const JsonValue& effect : json.at("effects").items()) {
+  for (const JsonValue& effect : json.at("effects").items())
     result.effects.push_back({effect.at("name").text(), read_parameters(effect.at("parameters"))});
-  }
   if (json.has("nuisance")) result.nuisance = read_parameters(json.at("nuisance"));
   if (json.has("marker_offsets")) {
     const JsonValue offsets = json.at("marker_offsets");
@@ -332,16 +326,14 @@ FitResult read_fit_result(const std::filesystem::path& file) {
     for (const std::string& marker : by_marker.keys())
       result.marker_offsets.push_back({marker, read_vector(by_marker.at(marker))});
   }
-  if (json.has("basins")) {
+  if (json.has("basins"))
     for (const JsonValue& basin : json.at("basins").items())
       result.basins.push_back(read_basin(basin));
-  }
   const JsonValue errors = json.at("errors");
-  if (errors.is_list()) {
+  if (errors.is_list())
     for (const JsonValue& kind : errors.items()) result.errors.push_back(read_errors(kind));
-  } else {
+  else
     result.errors.push_back(read_errors(errors));
-  }
   if (json.has("clouds")) {
     const JsonValue clouds = json.at("clouds");
     result.clouds = CloudErrors{.fitted = read_cloud_errors(clouds.at("fitted")),
@@ -351,9 +343,8 @@ FitResult read_fit_result(const std::filesystem::path& file) {
   const JsonValue observations = json.at("observations");
   result.observations_used = observations.at("used").count();
   const JsonValue rejected = observations.at("rejected");
-  for (const std::string& reason : rejected.keys()) {
+  for (const std::string& reason : rejected.keys())
     result.observations_rejected[reason] = rejected.at(reason).count();
-  }
   return result;
 }
 

@@ -41,9 +41,8 @@ class Buffer {
     if (with_bounds) {
       for (const auto& [key, bounds] :
            {std::pair("min", Eigen::VectorXf(values.rowwise().minCoeff())),
-            std::pair("max", Eigen::VectorXf(values.rowwise().maxCoeff()))}) {
+            std::pair("max", Eigen::VectorXf(values.rowwise().maxCoeff()))})
         for (const float bound : bounds) accessors_.back()[key].push_back(bound);
-      }
     }
     for (const float value : values.reshaped()) append_float32(value, bytes_);
     end();
@@ -76,7 +75,7 @@ class Buffer {
   }
   void end() {
     Json& view = views_.back();
-    view["byteLength"] = bytes_.size() - view["byteOffset"].get<std::size_t>();
+    view["byteLength"] = bytes_.size() - view["byteOffset"].get<size_t>();
   }
 
   std::string bytes_;
@@ -86,18 +85,17 @@ class Buffer {
 
 /// Frames [first, last] as one mesh: the first one, and a morph target for each of the others.
 struct Part {
-  std::size_t first = 0;
-  std::size_t last = 0;
-  std::size_t targets() const { return last - first; }
+  size_t first = 0;
+  size_t last = 0;
+  size_t targets() const { return last - first; }
 };
 
 /// Divides the frames into parts; neighbouring parts share a frame.
-std::vector<Part> parts_of(std::size_t frames) {
+std::vector<Part> parts_of(size_t frames) {
   std::vector<Part> parts;
-  std::size_t first = 0;
+  size_t first = 0;
   do {
-    const std::size_t last =
-        std::min(first + static_cast<std::size_t>(kMostMorphTargets), frames - 1);
+    const size_t last = std::min(first + static_cast<size_t>(kMostMorphTargets), frames - 1);
     parts.push_back({first, last});
     first = last;
   } while (first + 1 < frames);
@@ -107,10 +105,9 @@ std::vector<Part> parts_of(std::size_t frames) {
 /// Returns the seconds from the first frame, 1 x frames of the part.
 Eigen::MatrixXf times_of(const MeshSequence& mesh, const Part& part) {
   Eigen::MatrixXf times(1, static_cast<Eigen::Index>(part.targets() + 1));
-  for (std::size_t f = part.first; f <= part.last; ++f) {
+  for (size_t f = part.first; f <= part.last; ++f)
     times(0, static_cast<Eigen::Index>(f - part.first)) =
         static_cast<float>(mesh.time_s[f] - mesh.time_s.front());
-  }
   return times;
 }
 
@@ -119,9 +116,8 @@ class GlbWriter {
   explicit GlbWriter(const MeshSequence& mesh) : mesh_(mesh) {
     std::vector<int> triangles;
     const Eigen::Matrix4Xi cells = quads(mesh);
-    for (const auto& q : cells.colwise()) {
+    for (const auto& q : cells.colwise())
       triangles.insert(triangles.end(), {q[0], q[1], q[2], q[0], q[2], q[3]});
-    }
     indices_ = buffer_.add_indices(triangles);
     // glTF's v runs downwards.
     Eigen::MatrixXf uv = texture_coordinates(mesh).cast<float>();
@@ -136,7 +132,7 @@ class GlbWriter {
                         {"TEXCOORD_0", texture_coordinates_}}},
                       {"indices", indices_},
                       {"material", 0}};
-    for (std::size_t f = part.first + 1; f <= part.last; ++f) {
+    for (size_t f = part.first + 1; f <= part.last; ++f) {
       const Eigen::MatrixXf moved = (mesh_.position_m[f] - base_m).cast<float>();
       primitive["targets"].push_back({{"POSITION", buffer_.add_floats(moved, "VEC3", true, true)}});
     }
@@ -152,7 +148,7 @@ class GlbWriter {
   std::string bytes() {
     const Eigen::Quaterniond turn = turn_to_y(mesh_.up);
     Json children = Json::array();
-    for (std::size_t n = 0; n < nodes_.size(); ++n) children.push_back(n + 1);
+    for (size_t n = 0; n < nodes_.size(); ++n) children.push_back(n + 1);
     Json root = {{"name", "world"},
                  {"rotation", {turn.x(), turn.y(), turn.z(), turn.w()}},
                  {"children", children}};
@@ -205,8 +201,8 @@ class GlbWriter {
     Eigen::MatrixXf from(1, static_cast<Eigen::Index>(keys.size()));
     Eigen::MatrixXf scale(3, from.cols());
     for (Eigen::Index k = 0; k < from.cols(); ++k) {
-      from(0, k) = keys[static_cast<std::size_t>(k)].first;
-      scale.col(k).setConstant(keys[static_cast<std::size_t>(k)].second);
+      from(0, k) = keys[static_cast<size_t>(k)].first;
+      scale.col(k).setConstant(keys[static_cast<size_t>(k)].second);
     }
     const int input = buffer_.add_floats(from, "SCALAR", true, false);
     const int output = buffer_.add_floats(scale, "VEC3", false, false);
@@ -218,9 +214,9 @@ class GlbWriter {
   /// long.
   std::string packed(std::string json) const {
     json.resize((json.size() + 3) / 4 * 4, ' ');
-    const std::size_t length = 12 + 8 + json.size() + 8 + buffer_.bytes().size();
+    const size_t length = 12 + 8 + json.size() + 8 + buffer_.bytes().size();
     if (length > std::numeric_limits<std::uint32_t>::max()) return {};
-    const auto size = [](std::size_t value) { return static_cast<std::uint32_t>(value); };
+    const auto size = [](size_t value) { return static_cast<std::uint32_t>(value); };
     std::string bytes;
     for (const std::uint32_t word : {kMagic, kVersion, size(length), size(json.size()), kJsonChunk})
       append_uint32(word, bytes);
@@ -243,14 +239,12 @@ class GlbWriter {
 void write_glb(const MeshSequence& mesh, const std::filesystem::path& file) {
   GlbWriter writer(mesh);
   const std::vector<Part> parts = parts_of(mesh.position_m.size());
-  for (std::size_t n = 0; n < parts.size(); ++n) {
+  for (size_t n = 0; n < parts.size(); ++n)
     writer.add_part(parts[n], parts.size() == 1, n + 1 == parts.size());
-  }
   const std::string bytes = writer.bytes();
-  if (bytes.empty()) {
+  if (bytes.empty())
     throw InputError(file.string(), "would be longer than the 4 GiB that glTF allows",
                      "fewer frames or a smaller mesh", "use --format pc2");
-  }
   write_text(bytes, file);
 }
 

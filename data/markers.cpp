@@ -14,19 +14,17 @@ template <class Point>
 void read_tag(const CsvTable& table, int row, int tag_column, int corner_column, Point& point) {
   const bool has_tag = !table.empty(row, tag_column);
   const bool has_corner = !table.empty(row, corner_column);
-  if (has_tag != has_corner) {
+  if (has_tag != has_corner)
     table.refuse(row,
                  fmt::format("`{}` has a {} but no {}", point.name, has_tag ? "tag" : "corner",
                              has_tag ? "corner" : "tag"),
                  "both tag and corner, or neither");
-  }
   if (!has_tag) return;
   point.tag = table.whole_number(row, tag_column, 0);
   point.corner = table.whole_number(row, corner_column, 0);
-  if (*point.corner > 3) {
+  if (*point.corner > 3)
     table.refuse(row, fmt::format("corner = {}", *point.corner),
                  "0 bottom left, 1 bottom right, 2 top right or 3 top left");
-  }
 }
 
 /// Refuses a second use of a point's name or of a tag's corner.
@@ -46,10 +44,9 @@ class NamesSoFar {
   static void check(const CsvTable& table, int row, const std::string& what,
                     const std::string& name, LineOfName& lines) {
     const auto [earlier, is_new] = lines.emplace(name, table.line(row));
-    if (!is_new) {
+    if (!is_new)
       table.refuse(row, fmt::format("{} stands on line {} already", what, earlier->second),
                    "each once", "remove one of the two rows");
-    }
   }
   LineOfName names_;
   LineOfName corners_;
@@ -62,9 +59,8 @@ std::string tag_fields(const Point& point) {
 
 template <class Point>
 bool any_tag(const std::vector<Point>& points) {
-  for (const Point& point : points) {
+  for (const Point& point : points)
     if (point.tag) return true;
-  }
   return false;
 }
 
@@ -81,20 +77,19 @@ std::vector<Marker> read_markers(const std::filesystem::path& file, double width
   const CsvTable table(file, {{"marker"}, {"s"}, {"t"}, {"tag", false}, {"corner", false}});
   table.require_rows("markers");
   std::vector<Marker> markers;
-  markers.reserve(static_cast<std::size_t>(table.rows()));
+  markers.reserve(static_cast<size_t>(table.rows()));
   NamesSoFar names;
   for (int row = 0; row < table.rows(); ++row) {
     Marker marker;
     marker.name = table.name(row, kMarker);
     marker.s_m = table.number(row, kS);
     marker.t_m = table.number(row, kT);
-    if (!lies_on_cloth(marker.s_m, marker.t_m, width_m, height_m)) {
+    if (!lies_on_cloth(marker.s_m, marker.t_m, width_m, height_m))
       table.refuse(row,
                    fmt::format("marker `{}` at (s, t) = ({}, {}) lies outside the cloth",
                                marker.name, marker.s_m, marker.t_m),
                    fmt::format("0 <= s <= {}, 0 <= t <= {} (metres)", width_m, height_m),
                    "correct the marker, or `size` in recording.yaml");
-    }
     read_tag(table, row, kTag, kCorner, marker);
     names.add(table, row, marker, "marker");
     markers.push_back(std::move(marker));
@@ -105,10 +100,9 @@ std::vector<Marker> read_markers(const std::filesystem::path& file, double width
 void write_markers(const std::vector<Marker>& markers, const std::filesystem::path& file) {
   const bool tags = any_tag(markers);
   std::string text = tags ? "marker,s,t,tag,corner\n" : "marker,s,t\n";
-  for (const Marker& marker : markers) {
+  for (const Marker& marker : markers)
     text += fmt::format("{},{},{}{}\n", marker.name, number_text(marker.s_m),
                         number_text(marker.t_m), tags ? tag_fields(marker) : "");
-  }
   write_text(text, file);
 }
 
@@ -117,7 +111,7 @@ std::vector<ReferencePoint> read_reference_points(const std::filesystem::path& f
   const CsvTable table(file, {{"point"}, {"x"}, {"y"}, {"z"}, {"tag", false}, {"corner", false}});
   table.require_rows("reference points");
   std::vector<ReferencePoint> points;
-  points.reserve(static_cast<std::size_t>(table.rows()));
+  points.reserve(static_cast<size_t>(table.rows()));
   NamesSoFar names;
   for (int row = 0; row < table.rows(); ++row) {
     ReferencePoint point;
@@ -136,11 +130,10 @@ void write_reference_points(const std::vector<ReferencePoint>& points,
                             const std::filesystem::path& file) {
   const bool tags = any_tag(points);
   std::string text = tags ? "point,x,y,z,tag,corner\n" : "point,x,y,z\n";
-  for (const ReferencePoint& point : points) {
+  for (const ReferencePoint& point : points)
     text +=
         fmt::format("{},{},{},{}{}\n", point.name, number_text(point.x_m), number_text(point.y_m),
                     number_text(point.z_m), tags ? tag_fields(point) : "");
-  }
   write_text(text, file);
 }
 

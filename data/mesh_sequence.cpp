@@ -24,25 +24,22 @@ Eigen::Matrix4Xi quads(const MeshSequence& mesh) {
 Eigen::Matrix2Xd texture_coordinates(const MeshSequence& mesh) {
   Eigen::Matrix2Xd uv(2, mesh.columns * mesh.rows);
   for (int i = 0; i < mesh.rows; ++i) {
-    for (int j = 0; j < mesh.columns; ++j) {
+    for (int j = 0; j < mesh.columns; ++j)
       uv.col(i * mesh.columns + j) << static_cast<double>(j) / (mesh.columns - 1),
           1 - static_cast<double>(i) / (mesh.rows - 1);
-    }
   }
   return uv;
 }
 
 void write_obj(const MeshSequence& mesh, int frame, const std::filesystem::path& file) {
-  const Eigen::Matrix3Xd& position_m = mesh.position_m[static_cast<std::size_t>(frame)];
+  const Eigen::Matrix3Xd& position_m = mesh.position_m[static_cast<size_t>(frame)];
   std::string text = fmt::format("# frame {}, {} s; metres\no cloth\n", frame,
-                                 number_text(mesh.time_s[static_cast<std::size_t>(frame)]));
-  for (const auto& p : position_m.colwise()) {
+                                 number_text(mesh.time_s[static_cast<size_t>(frame)]));
+  for (const auto& p : position_m.colwise())
     text += fmt::format("v {} {} {}\n", number_text(p.x()), number_text(p.y()), number_text(p.z()));
-  }
   const Eigen::Matrix2Xd texture = texture_coordinates(mesh);
-  for (const auto& uv : texture.colwise()) {
+  for (const auto& uv : texture.colwise())
     text += fmt::format("vt {} {}\n", number_text(uv.x()), number_text(uv.y()));
-  }
   const Eigen::Matrix4Xi cells = quads(mesh);
   for (const auto& q : cells.colwise()) {  // OBJ counts from 1
     text +=
@@ -58,9 +55,8 @@ void write_pc2(const MeshSequence& mesh, const std::filesystem::path& file) {
   append_float32(0, bytes);
   append_float32(1, bytes);
   append_int32(static_cast<int>(mesh.position_m.size()), bytes);
-  for (const Eigen::Matrix3Xd& position_m : mesh.position_m) {
+  for (const Eigen::Matrix3Xd& position_m : mesh.position_m)
     for (const double coordinate : position_m.reshaped()) append_float32(coordinate, bytes);
-  }
   write_text(bytes, file);
 }
 

@@ -15,9 +15,8 @@ std::optional<std::vector<double>> frame_times(double frame_rate_hz, double dura
   const double intervals = std::floor(duration_s * frame_rate_hz + 1e-6);
   if (!(intervals >= 1 && intervals <= kMostModelFrames - 1)) return std::nullopt;
   std::vector<double> times_s;
-  for (int frame = 0; frame <= static_cast<int>(intervals); ++frame) {
+  for (int frame = 0; frame <= static_cast<int>(intervals); ++frame)
     times_s.push_back(frame / frame_rate_hz);
-  }
   return times_s;
 }
 

@@ -43,11 +43,10 @@ std::map<std::string, double> read_fabric(const YamlValue& value) {
     fabric[parameter.name] = number;
     if (stiffness) stiffest = std::max(stiffest, number);
   }
-  if (stiffest == 0) {
+  if (stiffest == 0)
     value.refuse("fabric: every stiffness is 0",
                  "springs: at least one of tension, shear and flexion above 0",
                  "a woven cloth has a tension of some ten to some hundred newtons per metre");
-  }
   return fabric;
 }
 
@@ -61,13 +60,11 @@ ModelSprings read_springs(const YamlValue& value) {
       .stiffness_n_per_m = six("stiffness", 0, kStiffest_n_per_m, "stiffness in newtons per metre"),
       .damping_ns_per_m = six("damping", 0, kStiffest_n_per_m * kLongestRetardation_s,
                               "dampings in newton seconds per metre")};
-  if (map.find("critical_elongation") != nullptr) {
+  if (map.find("critical_elongation") != nullptr)
     springs.critical_elongation =
         six("critical_elongation", 0, kMostElongation, "elongations as shares of the lengths");
-  }
-  if (std::ranges::max(springs.stiffness_n_per_m) == 0) {
+  if (std::ranges::max(springs.stiffness_n_per_m) == 0)
     value.refuse("springs: every stiffness is 0", "at least one type of springs that pulls");
-  }
   return springs;
 }
 
@@ -80,9 +77,8 @@ void read_cloth_springs(const YamlMap& map, ModelDescription& model) {
     model.fabric_line = fabric.line();
     return;
   }
-  if (const YamlValue* fabric = map.find("fabric")) {
+  if (const YamlValue* fabric = map.find("fabric"))
     fabric->refuse("the model has both a fabric and springs", "one of the two");
-  }
   model.springs = read_springs(*springs);
   model.fabric_line = springs->line();
 }
@@ -91,21 +87,18 @@ void read_strain_limit(const YamlValue& value, ModelDescription& model) {
   const YamlMap map = value.map({"mode", "elongation"});
   model.strain_limit = map.at("mode").one_of(strain_limit_words());
   if (model.springs) {
-    if (const YamlValue* elongation = map.find("elongation")) {
+    if (const YamlValue* elongation = map.find("elongation"))
       elongation->refuse("strain_limit.elongation stands beside springs",
                          "springs.critical_elongation, a number for each type");
-    }
-    if (model.strain_limit != StrainLimitKind::off && !model.springs->critical_elongation) {
+    if (model.strain_limit != StrainLimitKind::off && !model.springs->critical_elongation)
       value.refuse("the strain is limited, and the springs have no limits",
                    "springs.critical_elongation, a number for each type");
-    }
     return;
   }
   const bool needed = model.strain_limit != StrainLimitKind::off;
-  if (const YamlValue* elongation = needed ? &map.at("elongation") : map.find("elongation")) {
+  if (const YamlValue* elongation = needed ? &map.at("elongation") : map.find("elongation"))
     model.critical_elongation = elongation->number_between(
         0, kMostElongation, "an elongation as a share of the natural length");
-  }
 }
 
 SheetPose read_sheet(const YamlMap& start) {
@@ -117,11 +110,10 @@ SheetPose read_sheet(const YamlMap& start) {
   if (const YamlValue* orientation = start.find("orientation")) {
     const auto [w, x, y, z] = orientation->numbers<4>();
     const std::optional<Eigen::Quaterniond> unit = unit_quaternion(w, x, y, z);
-    if (!unit) {
+    if (!unit)
       orientation->refuse(
           fmt::format("{} = [{}, {}, {}, {}] is no rotation", orientation->name(), w, x, y, z),
           "a unit quaternion [w, x, y, z]", "divide it by its norm");
-    }
     sheet.orientation = *unit;
   }
   return sheet;
@@ -139,21 +131,18 @@ ModelStartState read_start_state(const std::filesystem::path& file, int columns,
   state.velocity_m_per_s = state.position_m;
   for (int n = 0; n < table.rows(); ++n) {
     const int row = table.whole_number(n, kRow, 0), column = table.whole_number(n, kColumn, 0);
-    if (row >= rows || column >= columns) {
+    if (row >= rows || column >= columns)
       table.refuse(n, fmt::format("there is no vertex [{}, {}]", row, column), expected,
                    "count rows and columns from 0");
-    }
     const int vertex = row * columns + column;
-    if (!std::isnan(state.position_m(0, vertex))) {
+    if (!std::isnan(state.position_m(0, vertex)))
       table.refuse(n, fmt::format("vertex [{}, {}] comes twice", row, column), expected);
-    }
     state.position_m.col(vertex) << table.number(n, kX), table.number(n, kY), table.number(n, kZ);
     state.velocity_m_per_s.col(vertex) << table.number(n, kVx), table.number(n, kVy),
         table.number(n, kVz);
   }
-  if (table.rows() != columns * rows) {
+  if (table.rows() != columns * rows)
     throw InputError(file.string(), fmt::format("has {} rows", table.rows()), expected);
-  }
   return state;
 }
 
@@ -162,12 +151,11 @@ void read_start(const YamlMap& map, const RecordingFiles& files, ModelDescriptio
   const bool in_motion = model.start == StartKind::unknown;
   for (const char* key : {"position", "orientation", "file"}) {
     const YamlValue* value = map.find(key);
-    if (value != nullptr && in_motion != (std::string_view(key) == "file")) {
+    if (value != nullptr && in_motion != (std::string_view(key) == "file"))
       value->refuse(fmt::format("{} stands beside {}", value->name(),
                                 word_of(model_start_words(), model.start)),
                     in_motion ? "a file, which says where each vertex is"
                               : "position and orientation of the flat sheet");
-    }
   }
   if (!in_motion) {
     model.sheet = read_sheet(map);
@@ -183,28 +171,25 @@ void read_model_time(const YamlValue& value, const RecordingFiles& files, ModelD
   const YamlValue* file = map.find("file");
   if (file != nullptr) {
     for (const char* key : {"frame_rate", "duration"}) {
-      if (const YamlValue* other = map.find(key)) {
+      if (const YamlValue* other = map.find(key))
         other->refuse(fmt::format("time has both a file and a {}", key),
                       "{frame_rate: HZ, duration: SECONDS} or {file: times.csv}");
-      }
     }
     files.file(*file);
     model.frame_time_s = read_times(files.shown(*file));
-    if (model.frame_time_s.size() < 2) {
+    if (model.frame_time_s.size() < 2)
       file->refuse("there is one frame only", "at least two frames");
-    }
     return;
   }
   model.frame_rate_hz = read_frame_rate(map.at("frame_rate"));
   const YamlValue& duration = map.at("duration");
   const double duration_s = duration.number();
   const auto times = frame_times(*model.frame_rate_hz, duration_s);
-  if (!times) {
+  if (!times)
     duration.refuse(
         fmt::format("{} = {}", duration.name(), duration_s),
         fmt::format("seconds, at least one frame interval ({:.3g} s) and at most {} of them",
                     1 / *model.frame_rate_hz, kMostModelFrames - 1));
-  }
   model.frame_time_s = *times;
 }
 
@@ -222,20 +207,17 @@ ModelDescription read_model(const std::filesystem::path& file) {
   model.name = read_file_name(map.at("name"));
   const YamlValue& cloth = map.at("cloth");
   model.cloth = read_cloth(cloth);
-  if (!model.cloth.mass_kg) {
+  if (!model.cloth.mass_kg)
     cloth.refuse("cloth.mass is missing", "the dry cloth's mass in kilograms",
                  "a light woven fabric weighs 0.1 kg per square metre");
-  }
   model.mesh_columns = model.cloth.mesh_columns;
   model.mesh_rows = model.cloth.mesh_rows;
-  if (const YamlValue* mesh = map.find("mesh")) {
+  if (const YamlValue* mesh = map.find("mesh"))
     std::tie(model.mesh_columns, model.mesh_rows) = read_mesh(*mesh);
-  }
   read_cloth_springs(map, model);
   if (const YamlValue* limit = map.find("strain_limit")) read_strain_limit(*limit, model);
-  if (const YamlValue* gravity = map.find("gravity")) {
+  if (const YamlValue* gravity = map.find("gravity"))
     model.gravity_m_per_s2 = read_gravity(*gravity);
-  }
   if (const YamlValue* obstacle = map.find("obstacle")) {
     files.file(*obstacle);
     model.obstacle = read_obj(files.shown(*obstacle));

@@ -14,9 +14,8 @@ namespace {
 
 void write_fabric(YamlWriter& out, const ModelDescription& model) {
   out.key("fabric").begin_map();
-  for (const FabricParameterName& parameter : kFabricParameters) {
+  for (const FabricParameterName& parameter : kFabricParameters)
     out.key(parameter.name).value(model.fabric.at(parameter.name));
-  }
   out.end_map();
 }
 
@@ -65,9 +64,8 @@ void write_start(YamlWriter& out, const ModelDescription& model,
 
 void write_times(const std::vector<double>& time_s, const std::filesystem::path& file) {
   std::string text = "frame,time\n";
-  for (std::size_t frame = 0; frame < time_s.size(); ++frame) {
+  for (size_t frame = 0; frame < time_s.size(); ++frame)
     text += fmt::format("{},{}\n", frame, number_text(time_s[frame]));
-  }
   write_text(text, file);
 }
 
@@ -90,11 +88,10 @@ void write_model(const ModelDescription& model, const std::filesystem::path& fol
   out.key("name").value(model.name);
   write_cloth(out, model.cloth);
   write_mesh(out, model.mesh_columns, model.mesh_rows);
-  if (model.springs) {
+  if (model.springs)
     write_springs(out, *model.springs);
-  } else {
+  else
     write_fabric(out, model);
-  }
   if (model.strain_limit != StrainLimitKind::off) {
     out.key("strain_limit").begin_flow_map();
     out.key("mode").value(to_string(model.strain_limit));

@@ -42,15 +42,13 @@ void require_replaceable(const fs::path& final_path) {
   std::error_code error;
   const fs::file_status status = fs::symlink_status(final_path, error);
   if (!fs::exists(status)) return;
-  if (!fs::is_directory(status)) {
+  if (!fs::is_directory(status))
     throw InputError(final_path.string(), "exists and is not a folder", "a folder to write to",
                      "choose another --out");
-  }
-  if (!fs::exists(final_path / kPublishedMark, error)) {
+  if (!fs::exists(final_path / kPublishedMark, error))
     throw InputError(final_path.string(), "exists and was not written by clothfit",
                      "a new folder or an older result",
                      "choose another --out, or move that folder away");
-  }
 }
 
 /// Removes the folders that killed runs left beside `final_path`. A folder that cannot be removed
@@ -120,16 +118,14 @@ OutputFolder::OutputFolder(fs::path final_path) {
   final_path_ = resolved(final_path);
   const fs::path parent = final_path_.parent_path();
   std::error_code error;
-  if (!fs::is_directory(parent, error)) {
+  if (!fs::is_directory(parent, error))
     throw InputError(final_path.string(), "the folder " + parent.string() + " does not exist",
                      "an existing folder to write into", "create it");
-  }
   require_replaceable(final_path_);
   remove_stale(final_path_);
   work_path_ = parent / fmt::format("{}{}", partial_prefix(final_path_), getpid());
-  if (!fs::create_directory(work_path_, error)) {
+  if (!fs::create_directory(work_path_, error))
     refuse(work_path_, "cannot be created", error ? error.value() : EEXIST);
-  }
 }
 
 OutputFolder::~OutputFolder() {

@@ -12,13 +12,12 @@ namespace clothfit {
 double Recording::frame_time_s(int frame) const {
   if (frame_rate_hz) return frame / *frame_rate_hz;
   assert(frame >= 0);
-  if (frame >= static_cast<int>(times_s.size())) {
+  if (frame >= static_cast<int>(times_s.size()))
     throw InputError(times_file ? times_file->string() : name,
                      fmt::format("there is no time for frame {}", frame),
                      "a time for every frame that the tracks name",
                      fmt::format("the last one is frame {}", times_s.size() - 1));
-  }
-  return times_s[static_cast<std::size_t>(frame)];
+  return times_s[static_cast<size_t>(frame)];
 }
 
 const CameraEntry* Recording::find_camera(const std::string& camera_name) const {

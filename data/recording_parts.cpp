@@ -64,10 +64,9 @@ std::string RelativePaths::operator()(const std::filesystem::path& path) const {
 
 std::string read_file_name(const YamlValue& value) {
   const std::string name = value.text();
-  if (!can_name_a_file(name)) {
+  if (!can_name_a_file(name))
     value.refuse(value.name() + " cannot name a file",
                  "printable characters without a slash, the first of them no dot");
-  }
   return name;
 }
 
@@ -75,10 +74,9 @@ std::pair<int, int> read_mesh(const YamlValue& value) {
   const YamlMap sizes = value.map({"columns", "rows"});
   const int columns = sizes.at("columns").whole_number(2);
   const int rows = sizes.at("rows").whole_number(2);
-  if (!is_possible_mesh(columns, rows)) {
+  if (!is_possible_mesh(columns, rows))
     value.refuse(fmt::format("{} = {} x {}", value.name(), columns, rows),
                  fmt::format("{} vertices at most", kMostMeshVertices));
-  }
   return {columns, rows};
 }
 
@@ -91,12 +89,10 @@ ClothDescription read_cloth(const YamlValue& value) {
   cloth.height_m = height;
   if (const YamlValue* mass = map.find("mass"))
     cloth.mass_kg = mass->number_between(1e-6, 1e4, "the dry cloth's mass in kilograms (or null)");
-  if (const YamlValue* masses = map.find("masses")) {
+  if (const YamlValue* masses = map.find("masses"))
     cloth.masses = masses->one_of(mass_distribution_words());
-  }
-  if (const YamlValue* mesh = map.find("mesh")) {
+  if (const YamlValue* mesh = map.find("mesh"))
     std::tie(cloth.mesh_columns, cloth.mesh_rows) = read_mesh(*mesh);
-  }
   return cloth;
 }
 
@@ -116,27 +112,24 @@ std::vector<double> read_times(const std::filesystem::path& file) {
   std::vector<double> times_s;
   for (int row = 0; row < table.rows(); ++row) {
     const int frame = table.whole_number(row, kFrame, 0);
-    if (frame != row) {
+    if (frame != row)
       table.refuse(row, fmt::format("frame {} where frame {} was due", frame, row),
                    "every frame from 0 on, in order");
-    }
     times_s.push_back(table.rising_number(row, kTime));
     const double interval_s = row > 0 ? times_s.back() - times_s[times_s.size() - 2] : 0;
-    if (interval_s > kLongestInterval_s) {
+    if (interval_s > kLongestInterval_s)
       table.refuse(row, fmt::format("{} seconds after the frame before", interval_s),
                    fmt::format("{} seconds at most", kLongestInterval_s),
                    "correct the time (seconds), or make two recordings of it");
-    }
   }
   return times_s;
 }
 
 Eigen::Vector2d read_place(const YamlValue& value, const ClothDescription& cloth) {
   const auto [s, t] = value.numbers<2>();
-  if (!lies_on_cloth(s, t, cloth.width_m, cloth.height_m)) {
+  if (!lies_on_cloth(s, t, cloth.width_m, cloth.height_m))
     value.refuse(fmt::format("{} = [{}, {}] lies outside the cloth", value.name(), s, t),
                  fmt::format("0 <= s <= {}, 0 <= t <= {} (metres)", cloth.width_m, cloth.height_m));
-  }
   return {s, t};
 }
 
@@ -147,24 +140,20 @@ std::vector<HeldPoint> read_held(const YamlValue& value, const RecordingFiles& f
     const YamlMap map = item.map({"at", "edge", "motion", "file"});
     const YamlValue* at = map.find("at");
     const YamlValue* edge = map.find("edge");
-    if ((at == nullptr) == (edge == nullptr)) {
+    if ((at == nullptr) == (edge == nullptr))
       item.refuse(item.name() + (at ? " has both `at` and `edge`" : " has neither `at` nor `edge`"),
                   "at: [s, t] or edge: top, bottom, left or right");
-    }
     HeldPoint point;
     if (at != nullptr) point.at_m = read_place(*at, cloth);
     if (edge != nullptr) point.edge = edge->one_of(cloth_edge_words());
-    for (const HeldPoint& earlier : held) {
-      if (earlier.edge == point.edge && (earlier.at_m - point.at_m).norm() <= kPlaceRounding_m) {
+    for (const HeldPoint& earlier : held)
+      if (earlier.edge == point.edge && (earlier.at_m - point.at_m).norm() <= kPlaceRounding_m)
         item.refuse(item.name() + " is held already", "every held point or edge once");
-      }
-    }
     const YamlValue& motion = map.at("motion");
     point.motion = motion.one_of(motions);
-    if (point.edge && point.motion != HeldMotion::fixed) {
+    if (point.edge && point.motion != HeldMotion::fixed)
       motion.refuse(item.name() + ": an edge with motion " + motion.text(),
                     "motion: fixed for an edge", "list the edge's points one by one instead");
-    }
     if (point.motion == HeldMotion::path) {
       point.file = files.file(map.at("file"));
     } else if (const YamlValue* file = map.find("file")) {
@@ -184,16 +173,14 @@ std::vector<DeclaredEffect> read_declared(const YamlValue& value) {
     effect.name = map.at("effect").text();
     effect.line = map.at("effect").line();
     for (const DeclaredEffect& earlier : declared) {
-      if (earlier.name == effect.name) {
+      if (earlier.name == effect.name)
         map.at("effect").refuse("effect `" + effect.name + "` is declared twice",
                                 "every effect once");
-      }
     }
     if (const YamlValue* parameters = map.find("parameters")) {
-      for (const auto& [name, number] : parameters->entries()) {
+      for (const auto& [name, number] : parameters->entries())
         effect.parameters[name] =
             number.is_list() ? number.numbers() : std::vector<double>{number.number()};
-      }
     }
     declared.push_back(std::move(effect));
   }
@@ -209,11 +196,10 @@ void write_cloth(YamlWriter& out, const ClothDescription& cloth) {
   out.key("cloth").begin_map();
   out.key("size").value(std::array{cloth.width_m, cloth.height_m});
   out.key("mass");
-  if (cloth.mass_kg) {
+  if (cloth.mass_kg)
     out.value(*cloth.mass_kg);
-  } else {
+  else
     out.null();
-  }
   out.key("masses").value(word_of(mass_distribution_words(), cloth.masses));
   write_mesh(out, cloth.mesh_columns, cloth.mesh_rows);
   out.end_map();
@@ -221,11 +207,10 @@ void write_cloth(YamlWriter& out, const ClothDescription& cloth) {
 
 void write_held_point(YamlWriter& out, const HeldPoint& point, const RelativePaths& relative) {
   out.begin_flow_map();
-  if (point.edge) {
+  if (point.edge)
     out.key("edge").value(to_string(*point.edge));
-  } else {
+  else
     out.key("at").value(numbers(point.at_m));
-  }
   out.key("motion").value(to_string(point.motion));
   if (point.file) out.key("file").value(relative(*point.file));
   out.end_map();
@@ -237,11 +222,10 @@ void write_declared_effect(YamlWriter& out, const DeclaredEffect& effect) {
     out.key("parameters").begin_flow_map();
     for (const auto& [name, values] : effect.parameters) {
       out.key(name);
-      if (values.size() == 1) {
+      if (values.size() == 1)
         out.value(values.front());
-      } else {
+      else
         out.value(values);
-      }
     }
     out.end_map();
   }

@@ -20,9 +20,8 @@ void read_marker_set(const YamlValue& value, const RecordingFiles& files, Record
   MarkerSet& set = recording.markers;
   set.kind = map.at("kind").one_of(marker_kind_words());
   const bool needs_family = set.kind == MarkerKind::apriltag;
-  if (const YamlValue* family = needs_family ? &map.at("family") : map.find("family")) {
+  if (const YamlValue* family = needs_family ? &map.at("family") : map.find("family"))
     set.family = family->text();
-  }
   // A cloth without marks may still have named points, measured by other means.
   const bool needs_file = set.kind != MarkerKind::none;
   if (const YamlValue* file = needs_file ? &map.at("file") : map.find("file")) {
@@ -30,19 +29,17 @@ void read_marker_set(const YamlValue& value, const RecordingFiles& files, Record
     set.markers =
         read_markers(files.shown(*file), recording.cloth.width_m, recording.cloth.height_m);
   }
-  for (std::size_t i = 0; i < set.markers.size(); ++i) {
+  for (size_t i = 0; i < set.markers.size(); ++i)
     set.index.emplace(set.markers[i].name, static_cast<int>(i));
-  }
 }
 
 void read_time(const YamlValue& value, const RecordingFiles& files, Recording& recording) {
   const YamlMap map = value.map({"frame_rate", "file"});
   const YamlValue* rate = map.find("frame_rate");
   const YamlValue* file = map.find("file");
-  if ((rate == nullptr) == (file == nullptr)) {
+  if ((rate == nullptr) == (file == nullptr))
     value.refuse(rate ? "time has both a frame_rate and a file" : "time is not given",
                  "{frame_rate: FRAMES_PER_SECOND} or {file: times.csv}");
-  }
   if (rate != nullptr) {
     recording.frame_rate_hz = read_frame_rate(*rate);
   } else {
@@ -71,18 +68,13 @@ std::vector<CameraEntry> read_cameras(const YamlValue& value, const RecordingFil
     CameraEntry camera;
     const YamlValue& name = map.at("name");
     camera.name = read_file_name(name);
-    for (const CameraEntry& earlier : cameras) {
-      if (earlier.name == camera.name) {
+    for (const CameraEntry& earlier : cameras)
+      if (earlier.name == camera.name)
         name.refuse("a second camera `" + camera.name + "`", "a name of its own for every camera");
-      }
-    }
     if (const YamlValue* file = map.find("file")) camera.file = files.file(*file);
-    if (const YamlValue* images = map.find("images")) {
-      camera.images = files.file_or_folder(*images);
-    }
-    if (const YamlValue* calibration = map.find("calibration")) {
+    if (const YamlValue* images = map.find("images")) camera.images = files.file_or_folder(*images);
+    if (const YamlValue* calibration = map.find("calibration"))
       camera.calibration = read_calibration(*calibration, files);
-    }
     cameras.push_back(std::move(camera));
   }
   return cameras;
@@ -116,23 +108,20 @@ std::vector<RigidBody> read_bodies(const YamlValue& value, const RecordingFiles&
     RigidBody body;
     body.name = map.at("name").text();
     for (const RigidBody& earlier : bodies) {
-      if (earlier.name == body.name) {
+      if (earlier.name == body.name)
         map.at("name").refuse("a second body `" + body.name + "`",
                               "a name of its own for every body");
-      }
     }
     body.file = files.file(map.at("file"));
     if (const YamlValue* offset = map.find("clock_offset")) {
-      if (offset->is_number()) {
+      if (offset->is_number())
         body.clock_offset_s = offset->number();
-      } else if (!offset->is_word("unknown")) {
+      else if (!offset->is_word("unknown"))
         offset->refuse(offset->name() + " is neither", "a number of seconds, or `unknown`");
-      }
     }
-    if (const YamlValue* holds = map.find("holds")) {
+    if (const YamlValue* holds = map.find("holds"))
       for (const YamlValue& place : holds->items())
         body.holds_m.push_back(read_place(place, cloth));
-    }
     bodies.push_back(std::move(body));
   }
   return bodies;
@@ -142,15 +131,13 @@ std::filesystem::path find_recording_file(const std::filesystem::path& given) {
   constexpr const char* kName = "recording.yaml";
   std::error_code error;
   if (given.filename() == kName && !std::filesystem::is_directory(given, error)) return given;
-  if (!std::filesystem::exists(given, error)) {
+  if (!std::filesystem::exists(given, error))
     throw InputError(given.string(), "there is no such folder",
                      "a recording: a folder that holds recording.yaml", "check the path");
-  }
-  if (!std::filesystem::exists(given / kName, error)) {
+  if (!std::filesystem::exists(given / kName, error))
     throw InputError(given.string(), "holds no recording.yaml",
                      "a recording: a folder that holds recording.yaml",
                      "write one after the example in docs/formats.md");
-  }
   return given / kName;
 }
 
@@ -171,22 +158,18 @@ Recording read_recording(const std::filesystem::path& folder) {
   recording.cloth = read_cloth(map.at("cloth"));
   read_marker_set(map.at("markers"), files, recording);
   read_time(map.at("time"), files, recording);
-  if (const YamlValue* gravity = map.find("gravity")) {
+  if (const YamlValue* gravity = map.find("gravity"))
     recording.gravity_m_per_s2 = read_gravity(*gravity);
-  }
-  if (const YamlValue* cameras = map.find("cameras")) {
+  if (const YamlValue* cameras = map.find("cameras"))
     recording.cameras = read_cameras(*cameras, files);
-  }
-  if (const YamlValue* observations = map.find("observations")) {
+  if (const YamlValue* observations = map.find("observations"))
     read_observations(*observations, files, recording);
-  }
   if (const YamlValue* reference = map.find("reference")) {
     recording.reference_file = files.file(*reference);
     recording.reference = read_reference_points(files.shown(*reference));
   }
-  if (const YamlValue* bodies = map.find("bodies")) {
+  if (const YamlValue* bodies = map.find("bodies"))
     recording.bodies = read_bodies(*bodies, files, recording.cloth);
-  }
   if (const YamlValue* clouds = map.find("clouds")) {
     const YamlMap entry = clouds->map({"camera", "files"});
     const YamlValue& camera = entry.at("camera");
@@ -197,16 +180,13 @@ Recording read_recording(const std::filesystem::path& folder) {
     recording.obstacle_file = files.file(*obstacle);
     recording.obstacle = read_obj(files.shown(*obstacle));
   }
-  if (const YamlValue* held = map.find("held")) {
+  if (const YamlValue* held = map.find("held"))
     recording.held = read_held(*held, files, recording.cloth, held_motion_words());
-  }
   recording.start = map.at("start").one_of(start_words());
-  if (const YamlValue* declared = map.find("declared")) {
+  if (const YamlValue* declared = map.find("declared"))
     recording.declared = read_declared(*declared);
-  }
-  if (const YamlValue* held_out = map.find("held_out")) {
+  if (const YamlValue* held_out = map.find("held_out"))
     recording.held_out_from_frame = held_out->map({"from_frame"}).at("from_frame").whole_number(1);
-  }
   return recording;
 }
 

@@ -15,9 +15,8 @@ using Words = std::vector<std::pair<std::string, Choice>>;
 
 template <class Choice>
 std::string word_of(const Words<Choice>& words, Choice choice) {
-  for (const auto& [word, known] : words) {
+  for (const auto& [word, known] : words)
     if (known == choice) return word;
-  }
   assert(false && "every choice has a word");
   return {};
 }

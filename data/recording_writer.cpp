@@ -43,11 +43,10 @@ void write_observations(YamlWriter& out, const Recording& recording,
 void write_body(YamlWriter& out, const RigidBody& body, const RelativePaths& relative) {
   out.begin_flow_map().key("name").value(body.name).key("file").value(relative(body.file));
   out.key("clock_offset");
-  if (body.clock_offset_s) {
+  if (body.clock_offset_s)
     out.value(*body.clock_offset_s);
-  } else {
+  else
     out.value("unknown");
-  }
   out.key("holds").begin_flow_list();
   for (const Eigen::Vector2d& place : body.holds_m) out.value(numbers(place));
   out.end_list().end_map();
@@ -70,7 +69,7 @@ std::string to_string(ClothEdge edge) {
 
 void write_held_path(const HeldPath& path, const std::filesystem::path& file) {
   std::string text = "time,x,y,z\n";
-  for (std::size_t n = 0; n < path.time_s.size(); ++n) {
+  for (size_t n = 0; n < path.time_s.size(); ++n) {
     const Eigen::Vector3d& p = path.position_m[n];
     text += fmt::format("{},{},{},{}\n", number_text(path.time_s[n]), number_text(p.x()),
                         number_text(p.y()), number_text(p.z()));
@@ -94,11 +93,10 @@ void write_recording(const Recording& recording, const std::filesystem::path& fo
 
   assert(recording.frame_rate_hz.has_value() != recording.times_file.has_value());
   out.key("time").begin_flow_map();
-  if (recording.frame_rate_hz) {
+  if (recording.frame_rate_hz)
     out.key("frame_rate").value(*recording.frame_rate_hz);
-  } else {
+  else
     out.key("file").value(relative(*recording.times_file));
-  }
   out.end_map();
 
   const Eigen::Vector3d& gravity = recording.gravity_m_per_s2;

@@ -28,14 +28,13 @@ int lines_in(const std::string& text) {
 
 std::string read_compressed(const std::filesystem::path& file) {
   const std::unique_ptr<gzFile_s, decltype(&gzclose_r)> in(gzopen(file.c_str(), "rb"), &gzclose_r);
-  if (!in) {
+  if (!in)
     throw InputError(file.string(), "cannot be opened: " + error_text(errno), "a readable file");
-  }
   std::string text;
   std::array<char, 1 << 16> block;
   for (;;) {
     const int count = gzread(in.get(), block.data(), static_cast<unsigned>(block.size()));
-    if (count > 0) text.append(block.data(), static_cast<std::size_t>(count));
+    if (count > 0) text.append(block.data(), static_cast<size_t>(count));
     int status = Z_OK;
     gzerror(in.get(), &status);
     if (count < 0 || status == Z_BUF_ERROR) {
@@ -47,27 +46,23 @@ std::string read_compressed(const std::filesystem::path& file) {
     }
     if (count == 0) break;
   }
-  if (gzdirect(in.get()) != 0 && !text.empty()) {
+  if (gzdirect(in.get()) != 0 && !text.empty())
     throw InputError(file.string(), "the content is not gzip-compressed",
                      "gzip data behind a name that ends in .gz", "compress it, or drop the .gz");
-  }
   return text;
 }
 
 std::string read_plain(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
-  if (!in) {
+  if (!in)
     throw InputError(file.string(), "cannot be opened: " + error_text(errno), "a readable file");
-  }
   std::string text((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
-  if (in.bad()) {
+  if (in.bad())
     throw InputError(file.string(), "cannot be read: " + error_text(errno), "a readable file");
-  }
-  if (text.starts_with("\x1f\x8b")) {
+  if (text.starts_with("\x1f\x8b"))
     throw InputError(file.string(), "the content is gzip-compressed",
                      "plain text behind a name that does not end in .gz",
                      "add .gz to its name, also where recording.yaml names it");
-  }
   return text;
 }
 
@@ -75,7 +70,7 @@ void unify_line_ends(std::string& text) {
   if (text.find('\r') == std::string::npos) return;
   std::string unified;
   unified.reserve(text.size());
-  for (std::size_t i = 0; i < text.size(); ++i) {
+  for (size_t i = 0; i < text.size(); ++i) {
     if (text[i] == '\r') {
       unified += '\n';
       if (i + 1 < text.size() && text[i + 1] == '\n') ++i;
@@ -91,12 +86,10 @@ void unify_line_ends(std::string& text) {
 std::string read_text(const std::filesystem::path& file) {
   std::error_code error;
   const std::filesystem::file_status status = std::filesystem::status(file, error);
-  if (!std::filesystem::exists(status)) {
+  if (!std::filesystem::exists(status))
     throw InputError(file.string(), "there is no such file", "a file", "check the path");
-  }
-  if (std::filesystem::is_directory(status)) {
+  if (std::filesystem::is_directory(status))
     throw InputError(file.string(), "is a folder", "a file", "name the file inside it");
-  }
   std::string text = is_compressed_name(file) ? read_compressed(file) : read_plain(file);
   constexpr const char* kByteOrderMark = "\xef\xbb\xbf";
   if (text.starts_with(kByteOrderMark)) text.erase(0, std::strlen(kByteOrderMark));

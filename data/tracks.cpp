@@ -17,10 +17,9 @@ namespace {
 int read_marker(const CsvTable& table, int row, int column, const MarkerSet& markers) {
   const std::string name = table.name(row, column);
   const auto found = markers.index.find(name);
-  if (found == markers.index.end()) {
+  if (found == markers.index.end())
     table.refuse(row, fmt::format("unknown marker `{}`", name), "a marker that markers.csv names",
                  "add it there, or remove its rows here");
-  }
   return found->second;
 }
 
@@ -32,12 +31,11 @@ constexpr double kLargestSigma = 1e6;
 double read_sigma(const CsvTable& table, int row, int column, const std::string& unit) {
   if (table.empty(row, column)) return 0;
   const double sigma = table.number(row, column);
-  if (sigma < kSmallestSigma || sigma > kLargestSigma) {
+  if (sigma < kSmallestSigma || sigma > kLargestSigma)
     table.refuse(row, fmt::format("sigma = {}", sigma),
                  fmt::format("one standard deviation per coordinate ({}), {} to {}", unit,
                              kSmallestSigma, kLargestSigma),
                  "leave the field empty where it is not known");
-  }
   return sigma;
 }
 
@@ -46,10 +44,9 @@ std::string read_status(const CsvTable& table, int row, int column) {
   const std::string_view status = table.text(row, column);
   if (status.empty() || status == "ok") return "";
   constexpr std::string_view kRejected = "rejected:";
-  if (!status.starts_with(kRejected) || status.size() == kRejected.size()) {
+  if (!status.starts_with(kRejected) || status.size() == kRejected.size())
     table.refuse(row, fmt::format("status = `{}`", table.name(row, column)),
                  "`ok` or `rejected:REASON`");
-  }
   return table.name(row, column).substr(kRejected.size());
 }
 
@@ -64,9 +61,7 @@ std::vector<Position> sorted(const CsvTable& table, std::vector<Position> rows,
                              const MarkerSet& markers) {
   std::vector<int> order(rows.size());
   std::iota(order.begin(), order.end(), 0);
-  const auto at = [&rows](int row) -> const Position& {
-    return rows[static_cast<std::size_t>(row)];
-  };
+  const auto at = [&rows](int row) -> const Position& { return rows[static_cast<size_t>(row)]; };
   std::stable_sort(order.begin(), order.end(), [&at](int a, int b) {
     return std::pair(at(a).frame, at(a).marker) < std::pair(at(b).frame, at(b).marker);
   });
@@ -78,17 +73,16 @@ std::vector<Position> sorted(const CsvTable& table, std::vector<Position> rows,
         at(row).marker == at(previous).marker) {
       table.refuse(row,
                    fmt::format("marker `{}` in frame {} stands on line {} already",
-                               markers.markers[static_cast<std::size_t>(at(row).marker)].name,
+                               markers.markers[static_cast<size_t>(at(row).marker)].name,
                                at(row).frame, table.line(previous)),
                    "one row per frame and marker", "remove one of the two rows");
     }
     const int frame_before = previous >= 0 ? at(previous).frame : 0;
-    if (at(row).frame - frame_before > kLongestGap) {
+    if (at(row).frame - frame_before > kLongestGap)
       table.refuse(row,
                    fmt::format("frame {} comes next after frame {}", at(row).frame, frame_before),
                    fmt::format("{} frames without any row at most", kLongestGap),
                    "correct the number, or make two recordings of it");
-    }
     result.push_back(at(row));
     previous = row;
   }
@@ -97,7 +91,7 @@ std::vector<Position> sorted(const CsvTable& table, std::vector<Position> rows,
 
 const std::string& marker_name(const MarkerSet& markers, int marker) {
   assert(marker >= 0 && marker < static_cast<int>(markers.markers.size()));
-  return markers.markers[static_cast<std::size_t>(marker)].name;
+  return markers.markers[static_cast<size_t>(marker)].name;
 }
 
 std::string sigma_field(double sigma) {
@@ -110,7 +104,7 @@ Tracks3d read_tracks3d(const std::filesystem::path& file, const MarkerSet& marke
   enum Column { kFrame, kMarker, kX, kY, kZ, kSigma };
   const CsvTable table(file, {{"frame"}, {"marker"}, {"x"}, {"y"}, {"z"}, {"sigma", false}});
   Tracks3d tracks;
-  tracks.reserve(static_cast<std::size_t>(table.rows()));
+  tracks.reserve(static_cast<size_t>(table.rows()));
   for (int row = 0; row < table.rows(); ++row) {
     Position3d position;
     position.frame = table.whole_number(row, kFrame, 0);
@@ -127,7 +121,7 @@ Tracks2d read_tracks2d(const std::filesystem::path& file, const MarkerSet& marke
   const CsvTable table(file,
                        {{"frame"}, {"marker"}, {"u"}, {"v"}, {"sigma", false}, {"status", false}});
   Tracks2d tracks;
-  tracks.reserve(static_cast<std::size_t>(table.rows()));
+  tracks.reserve(static_cast<size_t>(table.rows()));
   for (int row = 0; row < table.rows(); ++row) {
     Position2d position;
     position.frame = table.whole_number(row, kFrame, 0);
@@ -145,11 +139,10 @@ void write_tracks3d(const Tracks3d& tracks, const MarkerSet& markers,
   const bool sigma =
       std::any_of(tracks.begin(), tracks.end(), [](const Position3d& p) { return p.sigma_m > 0; });
   std::string text = sigma ? "frame,marker,x,y,z,sigma\n" : "frame,marker,x,y,z\n";
-  for (const Position3d& p : tracks) {
+  for (const Position3d& p : tracks)
     text += fmt::format("{},{},{},{},{}{}\n", p.frame, marker_name(markers, p.marker),
                         number_text(p.position_m.x()), number_text(p.position_m.y()),
                         number_text(p.position_m.z()), sigma ? sigma_field(p.sigma_m) : "");
-  }
   write_text(text, file);
 }
 

@@ -62,10 +62,9 @@ int require_one_document(const std::string& text, const std::string& file) {
   YAML::Parser parser(stream);
   LastLine last;
   parser.HandleNextDocument(last);
-  if (parser) {
+  if (parser)
     throw InputError(file, last.line(), "the YAML document ends here but the file goes on",
                      "one document, `key: value` line by line", "remove what does not belong");
-  }
   return last.line();
 }
 
@@ -95,9 +94,8 @@ bool YamlValue::is_word(const std::string& word) const {
 }
 
 std::string YamlValue::text() const {
-  if (!node_.IsScalar() || node_.Scalar().empty()) {
+  if (!node_.IsScalar() || node_.Scalar().empty())
     refuse(name_ + " is " + (node_.IsScalar() ? "empty" : kind_of(node_)), "text");
-  }
   return node_.Scalar();
 }
 
@@ -132,7 +130,7 @@ std::vector<double> YamlValue::numbers() const {
   return result;
 }
 
-std::vector<double> YamlValue::numbers_of(std::size_t count) const {
+std::vector<double> YamlValue::numbers_of(size_t count) const {
   const std::string expected = fmt::format("a list of {} numbers", count);
   if (!node_.IsSequence()) refuse(shown(), expected);
   if (node_.size() != count) refuse(fmt::format("{} has {} items", name_, node_.size()), expected);
@@ -142,10 +140,9 @@ std::vector<double> YamlValue::numbers_of(std::size_t count) const {
 std::vector<YamlValue> YamlValue::items() const {
   if (!node_.IsSequence()) refuse(shown(), "a list");
   std::vector<YamlValue> items;
-  for (const YAML::Node& item : node_) {
+  for (const YAML::Node& item : node_)
     items.emplace_back(item, file_, fmt::format("{}[{}]", name_, items.size()),
                        line_of(item.Mark(), line_));
-  }
   return items;
 }
 
@@ -154,17 +151,15 @@ std::vector<std::pair<std::string, YamlValue>> YamlValue::entries() const {
   std::vector<std::pair<std::string, YamlValue>> entries;
   for (const auto& entry : node_) {
     const int line = line_of(entry.first.Mark(), line_);
-    if (!entry.first.IsScalar()) {
+    if (!entry.first.IsScalar())
       throw InputError(*file_, line, "a key is " + kind_of(entry.first), "a word before the colon");
-    }
     const std::string& key = entry.first.Scalar();
     for (const auto& [earlier_key, earlier] : entries) {
-      if (earlier_key == key) {
+      if (earlier_key == key)
         throw InputError(
             *file_, line,
             fmt::format("`{}` stands on line {} already", shown_text(key), earlier.line()),
             "every key once", "remove one of the two");
-      }
     }
     // An empty value has no useful place of its own, so the key's line serves.
     entries.emplace_back(
@@ -176,29 +171,27 @@ std::vector<std::pair<std::string, YamlValue>> YamlValue::entries() const {
 YamlMap YamlValue::map(const std::vector<std::string>& known_keys) const {
   std::vector<std::pair<std::string, YamlValue>> all = entries();
   for (const auto& [key, value] : all) {
-    if (std::find(known_keys.begin(), known_keys.end(), key) == known_keys.end()) {
+    if (std::find(known_keys.begin(), known_keys.end(), key) == known_keys.end())
       value.refuse(
           fmt::format("unknown key `{}`{}", shown_text(key), name_.empty() ? "" : " in " + name_),
           known_names(key, known_keys));
-    }
   }
   return {*this, std::move(all)};
 }
 
-std::size_t YamlValue::place_of(const std::vector<std::string>& words) const {
+size_t YamlValue::place_of(const std::vector<std::string>& words) const {
   const std::string word = text();
   const auto found = std::find(words.begin(), words.end(), word);
   if (found == words.end()) refuse(shown(), known_names(word, words));
-  return static_cast<std::size_t>(found - words.begin());
+  return static_cast<size_t>(found - words.begin());
 }
 
 YamlMap::YamlMap(YamlValue whole, std::vector<std::pair<std::string, YamlValue>> entries)
     : whole_(std::move(whole)), entries_(std::move(entries)) {}
 
 const YamlValue* YamlMap::find(const std::string& key) const {
-  for (const auto& [name, value] : entries_) {
+  for (const auto& [name, value] : entries_)
     if (name == key) return value.is_null() ? nullptr : &value;
-  }
   return nullptr;
 }
 
@@ -220,9 +213,8 @@ YamlValue read_yaml(const std::filesystem::path& file) {
     // silently drops whatever follows the first document.
     const int last_line = require_one_document(text, *name);
     const YAML::Node root = YAML::Load(text);
-    if (root.IsNull()) {
+    if (root.IsNull())
       throw InputError(*name, last_line, "holds no keys", "`key: value`, line by line");
-    }
     return {root, name, "", line_of(root.Mark(), 1)};
   } catch (const YAML::Exception& error) {
     throw InputError(*name, line_of(error.mark, 1), "not YAML: " + error.msg,

@@ -39,10 +39,10 @@ class YamlValue {
   int whole_number(int least, int most = std::numeric_limits<int>::max()) const;
   std::vector<double> numbers() const;
   /// Returns exactly N numbers.
-  template <std::size_t N>
+  template <size_t N>
   std::array<double, N> numbers() const;
   /// Returns exactly N numbers, each from `least` to `most`.
-  template <std::size_t N>
+  template <size_t N>
   std::array<double, N> numbers_between(double least, double most, const std::string& what) const;
   std::vector<YamlValue> items() const;
   /// Returns a map of known keys.
@@ -57,8 +57,8 @@ class YamlValue {
                            const std::string& remedy = "") const;
 
  private:
-  std::vector<double> numbers_of(std::size_t count) const;
-  std::size_t place_of(const std::vector<std::string>& words) const;
+  std::vector<double> numbers_of(size_t count) const;
+  size_t place_of(const std::vector<std::string>& words) const;
   /// Returns `NAME = value`, as an error message shows it.
   std::string shown() const;
 
@@ -86,7 +86,7 @@ class YamlMap {
 /// Reads a file of one YAML document. Throws InputError, also for what YAML's own grammar refuses.
 YamlValue read_yaml(const std::filesystem::path& file);
 
-template <std::size_t N>
+template <size_t N>
 std::array<double, N> YamlValue::numbers() const {
   const std::vector<double> all = numbers_of(N);
   std::array<double, N> result{};
@@ -94,7 +94,7 @@ std::array<double, N> YamlValue::numbers() const {
   return result;
 }
 
-template <std::size_t N>
+template <size_t N>
 std::array<double, N> YamlValue::numbers_between(double least, double most,
                                                  const std::string& what) const {
   const std::array<double, N> result = numbers<N>();

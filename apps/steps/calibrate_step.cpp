@@ -64,11 +64,10 @@ StillsCalibration calibrate_from_stills(const std::string& camera, const Calibra
   while (source->next(grey)) {
     size = grey.size();
     ++calibration.stills;
-    if (auto corners = find_chessboard(grey, stills.board)) {
+    if (auto corners = find_chessboard(grey, stills.board))
       views.push_back({source->current_name(), std::move(*corners)});
-    } else {
+    else
       calibration.board_not_found.push_back(source->current_name());
-    }
     const Progress now{.stage = "calibrate " + camera,
                        .done = static_cast<double>(calibration.stills),
                        .total = static_cast<double>(source->count()),
@@ -76,19 +75,17 @@ StillsCalibration calibrate_from_stills(const std::string& camera, const Calibra
                        .note = fmt::format("{} boards found", views.size())};
     if (!progress(now)) throw Cancelled();
   }
-  if (views.empty()) {
+  if (views.empty())
     throw InputError(stills.images.string(),
                      fmt::format("none of the {} stills shows the whole board", calibration.stills),
                      fmt::format("a chessboard with {} x {} inner corners", stills.board.columns,
                                  stills.board.rows),
                      "count the board's inner corners (squares minus one in each direction)");
-  }
 
   calibration.result = calibrate(stills.board, views, size.width, size.height, options);
-  if (!calibration.result.usable) {
+  if (!calibration.result.usable)
     throw NoResult(
         fmt::format("camera '{}' was not calibrated: {}", camera, calibration.result.message));
-  }
   calibration.result.camera.name = camera;
   return calibration;
 }
@@ -114,9 +111,8 @@ void write_calibrations(const std::vector<StillsCalibration>& calibrations,
 
 std::vector<std::string> cameras_to_calibrate(const Recording& recording, bool again) {
   std::vector<std::string> names;
-  for (const CameraEntry& camera : recording.cameras) {
+  for (const CameraEntry& camera : recording.cameras)
     if (camera.calibration && (again || !camera.file)) names.push_back(camera.name);
-  }
   return names;
 }
 
@@ -132,14 +128,13 @@ CalibrateStepResult calibrate_step(const Recording& recording,
     if (camera.images) {
       const PictureSize stills = picture_size(camera.calibration->images);
       const PictureSize frames = picture_size(*camera.images);
-      if (stills != frames) {
+      if (stills != frames)
         throw InputError(
             camera.calibration->images.string(),
             fmt::format("the stills are {}", to_string(stills)),
             fmt::format("{}, the size of the pictures in {}", to_string(frames),
                         camera.images->string()),
             "photograph the board with the settings of the recording, or scale the stills");
-      }
     }
     step.calibrations.push_back(
         calibrate_from_stills(name, *camera.calibration, options, progress));

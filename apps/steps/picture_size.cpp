@@ -12,9 +12,8 @@ namespace clothfit {
 PictureSize picture_size(const std::filesystem::path& images) {
   const std::unique_ptr<ImageSource> source = open_images(images);
   cv::Mat grey;
-  if (!source->next(grey)) {
+  if (!source->next(grey))
     throw InputError(images.string(), "holds no picture", "a folder of pictures or a video");
-  }
   return {grey.cols, grey.rows};
 }
 

@@ -15,10 +15,9 @@ fs::path place_copy(const fs::path& file, const fs::path& target) {
   std::error_code error;
   fs::create_directories(target.parent_path(), error);
   if (!error) fs::copy_file(file, target, fs::copy_options::overwrite_existing, error);
-  if (error) {
+  if (error)
     throw InputError(file.string(), "cannot be copied: " + error.message(),
                      "a file of the recording that can be read, and room for its copy");
-  }
   return target;
 }
 
@@ -31,9 +30,8 @@ fs::path copy_file_into(const fs::path& folder, const fs::path& recording_folder
   if (lies_inside) return place_copy(file, folder / inside);
 
   fs::path target = folder / subfolder / file.filename();
-  for (int number = 2; fs::exists(target); ++number) {
+  for (int number = 2; fs::exists(target); ++number)
     target = folder / subfolder / fmt::format("{}_{}", number, file.filename().string());
-  }
   return place_copy(file, target);
 }
 
@@ -58,9 +56,8 @@ Recording copy_recording(const Recording& recording, const std::filesystem::path
     const char* ending = camera.file->extension() == ".gz" ? ".yaml.gz" : ".yaml";
     camera.file = place_copy(*camera.file, folder / "cameras" / (camera.name + ending));
   }
-  for (HeldPoint& held : copy.held) {
+  for (HeldPoint& held : copy.held)
     if (held.file) move_in(*held.file, "held");
-  }
   return copy;
 }
 

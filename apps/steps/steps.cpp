@@ -24,19 +24,17 @@ std::string yaml_of(const Recording& recording) {
 void check_cameras_can_be_placed(const Recording& recording) {
   for (const CameraEntry& camera : recording.cameras) {
     if (!camera.images && !recording.tracks2d.contains(camera.name)) continue;
-    if (!camera.file && !camera.calibration) {
+    if (!camera.file && !camera.calibration)
       throw InputError(
           yaml_of(recording), fmt::format("camera '{}' has neither a file nor stills", camera.name),
           "a calibrated camera", "give it `file`, or stills of a board under `calibration`");
-    }
     const bool has_pose = camera.file && read_camera(*camera.file).camera_from_world;
     const bool can_be_placed = camera.images && !recording.reference.empty();
-    if (!has_pose && !can_be_placed) {
+    if (!has_pose && !can_be_placed)
       throw InputError(camera.file ? camera.file->string() : yaml_of(recording),
                        fmt::format("nothing says where camera '{}' stands", camera.name),
                        "camera_from_world in its file, or pictures of reference points",
                        "add reference.csv with tags that stay in the picture, or measure the pose");
-    }
   }
 }
 
@@ -94,30 +92,26 @@ FitInput read_fit_input(const Recording& recording, ObservationKind kind) {
   input.recording = recording;
   if (recording.clouds) input.clouds = read_clouds_in_world(recording, *recording.clouds);
   if (resolve_observations(recording, kind) == ObservationKind::tracks3d) {
-    if (!recording.tracks3d) {
+    if (!recording.tracks3d)
       throw InputError(yaml_of(recording), "has no 3D tracks", "observations: {tracks3d: FILE}",
                        "leave --observations out to fit what there is");
-    }
     input.tracks3d = read_tracks3d(*recording.tracks3d, recording.markers);
     return input;
   }
 
-  if (recording.tracks2d.empty()) {
+  if (recording.tracks2d.empty())
     throw InputError(yaml_of(recording), "has nothing to fit to",
                      "3D tracks, 2D tracks, or a camera with pictures", "");
-  }
   for (const auto& [name, file] : recording.tracks2d) {
     const CameraEntry* camera = recording.find_camera(name);
-    if (camera == nullptr || !camera->file) {
+    if (camera == nullptr || !camera->file)
       throw InputError(yaml_of(recording), fmt::format("camera '{}' has tracks but no file", name),
                        "a calibrated camera",
                        "give it `file`, or stills of a board under `calibration`");
-    }
     CameraParameters parameters = read_camera(*camera->file);
-    if (!parameters.camera_from_world) {
+    if (!parameters.camera_from_world)
       throw InputError(camera->file->string(), "has no camera_from_world",
                        "where the camera stands in the world", "track the recording first");
-    }
     parameters.name = name;
     input.tracks2d[name] = read_tracks2d(file, recording.markers);
     input.cameras.push_back(std::move(parameters));

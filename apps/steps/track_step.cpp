@@ -27,13 +27,12 @@ void check_size(const CameraEntry& camera) {
   const CameraParameters parameters = read_camera(*camera.file);
   const PictureSize calibrated{parameters.image_width, parameters.image_height};
   const PictureSize pictures = picture_size(*camera.images);
-  if (calibrated != pictures) {
+  if (calibrated != pictures)
     throw InputError(camera.file->string(),
                      fmt::format("the camera was calibrated at {}", to_string(calibrated)),
                      fmt::format("{}, the size of the pictures in {}", to_string(pictures),
                                  camera.images->string()),
                      "calibrate at the size of the recording, or scale focal and centre");
-  }
 }
 
 /// Returns reference points with their mean pixels. Corners of one tag lie on one plate.
@@ -41,7 +40,7 @@ std::vector<PlacedPixel> reference_pixels(const Recording& recording,
                                           const std::vector<ReferencePixel>& seen) {
   std::vector<PlacedPixel> placed;
   for (const ReferencePixel& pixel : seen) {
-    const ReferencePoint& point = recording.reference[static_cast<std::size_t>(pixel.point)];
+    const ReferencePoint& point = recording.reference[static_cast<size_t>(pixel.point)];
     placed.push_back({.point_m = {point.x_m, point.y_m, point.z_m},
                       .pixel_px = pixel.pixel_px,
                       .sigma_px = pixel.sigma_px,
@@ -56,7 +55,7 @@ std::vector<PlacedPixel> first_sheet(const Recording& recording, const Tracks2d&
   if (recording.start != StartKind::released_flat) return sheet;
   for (const Position2d& row : tracks) {
     if (row.frame != 0 || !row.rejected.empty()) continue;
-    const Marker& marker = recording.markers.markers[static_cast<std::size_t>(row.marker)];
+    const Marker& marker = recording.markers.markers[static_cast<size_t>(row.marker)];
     sheet.push_back({.point_m = {marker.s_m, marker.t_m, 0},
                      .pixel_px = row.position_px,
                      .sigma_px = row.sigma_px > 0 ? row.sigma_px : 1.0,
@@ -82,10 +81,9 @@ void place_camera(const Recording& recording, const CameraEntry& camera, CameraT
   const WorldPlacementResult placement =
       place_world(parameters, reference_pixels(recording, tracks.result.reference),
                   first_sheet(recording, tracks.result.tracks));
-  if (!placement.usable) {
+  if (!placement.usable)
     throw NoResult(fmt::format("camera '{}' could not be placed in the world: {}", camera.name,
                                placement.message));
-  }
   parameters.camera_from_world =
       CameraPose{.rotation = placement.camera_from_world.rotation,
                  .translation_m = placement.camera_from_world.translation_m,
@@ -150,10 +148,9 @@ TrackStepResult track_step(const Recording& recording, const std::vector<std::st
     tracks.camera = camera.name;
     tracks.result = track(recording, given, options, progress);
     if (tracks.result.cancelled) throw Cancelled();
-    if (!tracks.result.usable) {
+    if (!tracks.result.usable)
       throw NoResult(
           fmt::format("camera '{}' gave no tracks: {}", camera.name, tracks.result.message));
-    }
     place_camera(step.recording, camera, tracks);
 
     const fs::path file = folder / "tracks2d" / (camera.name + ".csv");
@@ -163,10 +160,9 @@ TrackStepResult track_step(const Recording& recording, const std::vector<std::st
     step.recording.tracks2d[camera.name] = file;
     if (!tracks.result.overlay.empty()) {
       const fs::path overlay = folder / fmt::format("overlay_{}.png", camera.name);
-      if (!cv::imwrite(overlay.string(), tracks.result.overlay)) {
+      if (!cv::imwrite(overlay.string(), tracks.result.overlay))
         throw InputError(overlay.string(), "cannot be written",
                          "a writable place with room on its disk");
-      }
     }
     json["cameras"].push_back(to_json(tracks));
     step.cameras.push_back(std::move(tracks));

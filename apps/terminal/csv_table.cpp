@@ -16,7 +16,7 @@ std::string csv_cell(const std::string& cell) {
 }
 
 void add_line(const std::vector<std::string>& cells, std::string& text) {
-  for (std::size_t i = 0; i < cells.size(); ++i) {
+  for (size_t i = 0; i < cells.size(); ++i) {
     if (i > 0) text += ',';
     text += csv_cell(cells[i]);
   }

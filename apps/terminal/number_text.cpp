@@ -37,9 +37,8 @@ std::string value_text(double value, double sigma) {
   if (!std::isfinite(sigma) || sigma <= 0) return significant(value, 4);
   const int sigma_exponent = first_digit_exponent(sigma, 2);
   const int exponent = value == 0 ? sigma_exponent : first_digit_exponent(value, 2);
-  if (is_plain(exponent) || (is_plain(sigma_exponent) && exponent < 6)) {
+  if (is_plain(exponent) || (is_plain(sigma_exponent) && exponent < 6))
     return fmt::format("{:.{}f}", value, std::max(0, 1 - sigma_exponent));
-  }
   return fmt::format("{:.{}e}", value, std::clamp(exponent - sigma_exponent + 1, 0, 15));
 }
 

@@ -14,9 +14,8 @@ namespace {
 
 std::string duration_text(double seconds) {
   const auto whole = static_cast<long long>(std::ceil(seconds));
-  if (whole >= 3600) {
+  if (whole >= 3600)
     return fmt::format("{}:{:02}:{:02}", whole / 3600, whole / 60 % 60, whole % 60);
-  }
   return fmt::format("{}:{:02}", whole / 60, whole % 60);
 }
 
@@ -31,11 +30,10 @@ int terminal_width(std::FILE* stream) {
 std::string progress_text(const Progress& progress, double elapsed_s, int width) {
   const bool total_known = progress.total > 0;
   std::string text = progress.stage;
-  if (total_known) {
+  if (total_known)
     text += fmt::format("  {:.0f}/{:.0f} {}", progress.done, progress.total, progress.unit);
-  } else if (progress.done > 0) {
+  else if (progress.done > 0)
     text += fmt::format("  {:.0f} {}", progress.done, progress.unit);
-  }
 
   const double rate = elapsed_s > 0 ? progress.done / elapsed_s : 0;
   if (rate > 0) {
@@ -47,9 +45,9 @@ std::string progress_text(const Progress& progress, double elapsed_s, int width)
   }
   if (!progress.note.empty()) text += "  " + progress.note;
 
-  const auto limit = static_cast<std::size_t>(std::max(width, 0));
+  const auto limit = static_cast<size_t>(std::max(width, 0));
   if (text.size() > limit) {
-    std::size_t end = limit;
+    size_t end = limit;
     // The text is never cut in the middle of a UTF-8 character.
     while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0U) == 0x80U) --end;
     text.resize(end);

@@ -9,8 +9,8 @@ namespace clothfit {
 namespace {
 
 /// Counts characters, not bytes: continuation bytes of UTF-8 take no room.
-std::size_t width_of(const std::string& cell) {
-  return static_cast<std::size_t>(std::count_if(cell.begin(), cell.end(), [](char c) {
+size_t width_of(const std::string& cell) {
+  return static_cast<size_t>(std::count_if(cell.begin(), cell.end(), [](char c) {
     return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U;
   }));
 }
@@ -19,13 +19,13 @@ std::size_t width_of(const std::string& cell) {
 
 std::string text_table(const std::vector<std::string>& header,
                        const std::vector<std::vector<std::string>>& rows) {
-  const std::size_t columns = header.size();
-  std::vector<std::size_t> width(columns);
+  const size_t columns = header.size();
+  std::vector<size_t> width(columns);
   std::vector<bool> right(columns, true);
-  for (std::size_t c = 0; c < columns; ++c) width[c] = width_of(header[c]);
+  for (size_t c = 0; c < columns; ++c) width[c] = width_of(header[c]);
   for (const std::vector<std::string>& row : rows) {
     assert(row.size() == columns);
-    for (std::size_t c = 0; c < columns; ++c) {
+    for (size_t c = 0; c < columns; ++c) {
       width[c] = std::max(width[c], width_of(row[c]));
       right[c] = right[c] && shows_number(row[c]);
     }
@@ -34,7 +34,7 @@ std::string text_table(const std::vector<std::string>& header,
   std::string text;
   const auto add_row = [&](const std::vector<std::string>& row) {
     std::string line;
-    for (std::size_t c = 0; c < columns; ++c) {
+    for (size_t c = 0; c < columns; ++c) {
       const std::string blanks(width[c] - width_of(row[c]), ' ');
       line += c == 0 ? "" : "  ";
       line += right[c] ? blanks + row[c] : row[c] + blanks;
@@ -44,7 +44,7 @@ std::string text_table(const std::vector<std::string>& header,
   };
   add_row(header);
   std::vector<std::string> rule;
-  for (std::size_t c = 0; c < columns; ++c) rule.emplace_back(width[c], '-');
+  for (size_t c = 0; c < columns; ++c) rule.emplace_back(width[c], '-');
   add_row(rule);
   for (const std::vector<std::string>& row : rows) add_row(row);
   return text;

@@ -37,7 +37,7 @@ std::optional<BoardDescription> parse_board(const std::string& text) {
   constexpr std::string_view kKind = "chessboard:";
   if (!text.starts_with(kKind)) return std::nullopt;
   const std::string_view sizes = std::string_view(text).substr(kKind.size());
-  const std::size_t colon = sizes.find(':');
+  const size_t colon = sizes.find(':');
   if (colon == std::string_view::npos) return std::nullopt;
   const std::optional<GridSize> corners = parse_grid_size(sizes.substr(0, colon));
   const std::optional<double> square_m = parse_number(sizes.substr(colon + 1));
@@ -81,9 +81,8 @@ void print_calibration(const StillsCalibration& calibration) {
                     significant(parameter.sigma, 2)});
   }
   fmt::print("{}", text_table({"parameter", "value", "sigma"}, rows));
-  for (const std::string& still : calibration.board_not_found) {
+  for (const std::string& still : calibration.board_not_found)
     spdlog::warn("{}: the whole board was not found", still);
-  }
 }
 
 int run_calibrate(const CalibrateVerbOptions& options) {
@@ -92,20 +91,18 @@ int run_calibrate(const CalibrateVerbOptions& options) {
   std::vector<StillsCalibration> calibrations;
 
   if (fs::exists(folder / "recording.yaml")) {
-    if (!options.board.empty()) {
+    if (!options.board.empty())
       throw InputError("--board", "is given beside a recording", "one place that says the board",
                        "write it under `calibration` in recording.yaml");
-    }
     const Recording recording = read_recording(folder);
     std::vector<std::string> cameras = cameras_to_calibrate(recording, true);
     if (!options.name.empty()) std::erase_if(cameras, [&](auto& c) { return c != options.name; });
-    if (cameras.empty()) {
+    if (cameras.empty())
       throw InputError((folder / "recording.yaml").string(),
                        options.name.empty()
                            ? "no camera has stills to calibrate from"
                            : "camera '" + options.name + "' has no stills to calibrate from",
                        "`calibration: {images: FOLDER, board: ...}` in a camera's entry");
-    }
     OutputFolder out(out_folder(options.out, recording.name + ".calibration"));
     {
       ProgressLine line;
@@ -118,10 +115,9 @@ int run_calibrate(const CalibrateVerbOptions& options) {
     return kExitGood;
   }
 
-  if (options.board.empty()) {
+  if (options.board.empty())
     throw InputError(options.input.string(), "holds no recording.yaml, so it must be stills",
                      "--board with them", "for example --board chessboard:9x6:0.025");
-  }
   const CalibrationStills stills{.images = options.input, .board = *parse_board(options.board)};
   const std::string name = options.name.empty() ? "camera" : options.name;
   OutputFolder out(out_folder(options.out, name + ".calibration"));

@@ -66,11 +66,10 @@ Table planted_drag_table(const std::vector<PlantedDrag>& drags) {
 std::string page_html(const Table& targets, const TargetsResult& result) {
   std::string body = "<h1>What identification reaches</h1>\n";
   body += html_table(targets, "Targets, what was measured, and how to measure it again.");
-  for (const auto& [study, found] : result.studies) {
+  for (const auto& [study, found] : result.studies)
     body += section(study.name, paragraph(study.what + ".") +
                                     html_table(recovery_counts(found), "Counts.") +
                                     html_table(recovery_table(found), "Errors and intervals."));
-  }
   if (!result.planted_drag.empty())
     body += section("planted drag",
                     html_table(planted_drag_table(result.planted_drag),

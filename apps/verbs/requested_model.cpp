@@ -54,21 +54,18 @@ fs::path fit_file(const fs::path& given) {
 GivenParameters parameters_of_fit(const fs::path& fit) {
   const FitResult result = read_fit_result(fit_file(fit));
   GivenParameters given{.set = spring_set_named(result.parameter_set), .springs = {}};
-  if (!given.set) {
+  if (!given.set)
     throw InputError(fit_file(fit).string(),
                      "has the unknown parameter set '" + result.parameter_set + "'",
                      "fabric, louchet5 or louchet18");
-  }
   const std::vector<std::string> names = names_of(*given.set);
-  for (const ParameterEstimate& parameter : result.parameters) {
+  for (const ParameterEstimate& parameter : result.parameters)
     if (std::ranges::find(names, parameter.name) != names.end())
       given.springs[parameter.name] = parameter.value;
-  }
   for (const EffectEstimate& estimate : result.effects) {
     DeclaredEffect& effect = effect_named(estimate.name, given.effects);
-    for (const ParameterEstimate& parameter : estimate.parameters) {
+    for (const ParameterEstimate& parameter : estimate.parameters)
       effect.parameters[parameter.name] = {parameter.value};
-    }
   }
   return given;
 }
@@ -77,7 +74,7 @@ GivenParameters parameters_of_fit(const fs::path& fit) {
 /// number is checked when the simulation is made.
 void set_parameter(const std::string& text, GivenParameters& given) {
   const auto [name, value] = parse_assignment(text).value();
-  const std::size_t dot = name.find('.');
+  const size_t dot = name.find('.');
   if (dot != std::string::npos) {
     const std::string effect = name.substr(0, dot);
     const std::string parameter = name.substr(dot + 1);
@@ -89,16 +86,14 @@ void set_parameter(const std::string& text, GivenParameters& given) {
     effect_named(effect, given.effects).parameters[parameter] = {value};
     return;
   }
-  if (!given.set) {
+  if (!given.set)
     throw InputError("--set " + text, "the model has its springs type by type, not by parameters",
                      "a model with a fabric, or --fit", "edit the model file");
-  }
   const std::vector<std::string> known = names_of(*given.set);
-  if (std::ranges::find(known, name) == known.end()) {
+  if (std::ranges::find(known, name) == known.end())
     throw InputError("--set " + text, "there is no parameter '" + name + "'",
                      known_names(name, known),
                      "an effect's is set as --set EFFECT.PARAMETER=NUMBER");
-  }
   given.springs[name] = value;
 }
 
@@ -120,10 +115,9 @@ GivenParameters given_parameters(const ModelRequest& request, GivenParameters gi
   if (!request.fit.empty()) add(parameters_of_fit(request.fit), given);
   if (!request.model.empty()) {
     ModelDescription model = read_model(request.model);
-    if (model.springs) {
+    if (model.springs)
       throw InputError(request.model.string(), "has springs type by type instead of a fabric",
                        "a model file with a fabric", "simulate that model itself");
-    }
     for (DeclaredEffect& effect : model.effects) effect.line = 0;  // lines refer to another file
     add({SpringSet::fabric, model.fabric, model.effects}, given);
   }
@@ -146,13 +140,12 @@ ModelDescription model_of_fit(const fs::path& fit) {
   const fs::path file = fit_file(fit);
   read_fit_result(file);  // throws for a file that is no fit
   const fs::path model = file.parent_path() / kModelFile;
-  if (!fs::exists(model)) {
+  if (!fs::exists(model))
     throw InputError(file.string(), "no model.yaml lies beside it",
                      "the result folder of a fit, with the model that was found",
                      "run `clothfit fit` again, or name the recording: "
                      "clothfit simulate RECORDING --fit " +
                          file.string());
-  }
   return read_model(model);
 }
 
@@ -163,17 +156,15 @@ FitResult complete_parameters(const Recording& recording, GivenParameters given)
   FitResult result;
   for (const std::string& name : names_of(given.set.value())) {
     const auto found = given.springs.find(name);
-    if (found == given.springs.end()) {
+    if (found == given.springs.end())
       missing += (missing.empty() ? "" : ", ") + name;
-    } else {
+    else
       result.parameters.push_back({.name = name, .value = found->second});
-    }
   }
   result.parameter_set = to_string(*given.set);
-  if (!missing.empty()) {
+  if (!missing.empty())
     throw InputError(file, "a recording has no parameters, and nobody gave " + missing,
                      "a number for each parameter of the fabric", kHowToGive);
-  }
   // Declared parameters serve where the options say nothing else.
   GivenParameters all;
   all.effects = recording.declared;
@@ -198,12 +189,11 @@ FitResult complete_parameters(const Recording& recording, GivenParameters given)
     for (const EffectParameter& parameter :
          find_effect(effect.name, "--fit").describe().parameters) {
       const auto found = effect.parameters.find(parameter.name);
-      if (found == effect.parameters.end() && declared) {
+      if (found == effect.parameters.end() && declared)
         throw InputError(
             file, effect.line,
             fmt::format("{}.{} is left to a fit, and nobody gave it", effect.name, parameter.name),
             "a number for each parameter of a declared effect", kHowToGive);
-      }
       estimate.parameters.push_back(
           {.name = parameter.name,
            .value = found != effect.parameters.end() ? found->second.front() : parameter.neutral});
@@ -224,12 +214,11 @@ ModelDescription model_of_recording(const ModelRequest& request, const fs::path&
   FitOptions options;
   options.forecast = complete_parameters(given, given_parameters(request));
   options.spring_set = spring_set_named(options.forecast->parameter_set).value();
-  if (!given.tracks3d && given.tracks2d.empty() && given.cameras.empty()) {
+  if (!given.tracks3d && given.tracks2d.empty() && given.cameras.empty())
     throw InputError((given.folder / "recording.yaml").string(),
                      "has no tracks, so nothing says where the cloth starts",
                      "tracks3d or tracks2d whose first frame shows the sheet",
                      "write a model file, which says where the sheet lies: docs/formats.md");
-  }
   const Recording recording =
       complete_recording(given, ObservationKind::automatic, {}, steps, progress);
   const FitInput input = read_fit_input(recording, ObservationKind::automatic);
@@ -249,17 +238,15 @@ void set_frames(const ModelRequest& request, ModelDescription& model) {
   if (!request.duration_s && !request.frame_rate_hz) return;
   const std::optional<double> rate_hz =
       request.frame_rate_hz ? request.frame_rate_hz : model.frame_rate_hz;
-  if (!rate_hz) {
+  if (!rate_hz)
     throw InputError("--duration", "the frames of this model are not evenly spaced",
                      "--frame-rate beside it");
-  }
   const double duration_s = request.duration_s.value_or(model.frame_time_s.back());
   const auto times = frame_times(*rate_hz, duration_s);
-  if (!times) {
+  if (!times)
     throw InputError("--duration",
                      fmt::format("{} s at {} frames per second", duration_s, *rate_hz),
                      fmt::format("1 to {} frame intervals", kMostModelFrames - 1));
-  }
   model.frame_rate_hz = rate_hz;
   model.frame_time_s = *times;
 }
@@ -269,7 +256,7 @@ void set_springs(const GivenParameters& given, ModelDescription& model) {
   if (!given.set) return;
   const std::vector<std::string> names = names_of(*given.set);
   Eigen::VectorXd numbers(static_cast<Eigen::Index>(names.size()));
-  for (std::size_t n = 0; n < names.size(); ++n) {
+  for (size_t n = 0; n < names.size(); ++n) {
     const auto found = given.springs.find(names[n]);
     if (found == given.springs.end())
       throw InputError("--fit", "the fit holds no parameter '" + names[n] + "'",
@@ -294,22 +281,20 @@ void require_possible_fabric(const std::map<std::string, double>& fabric) {
   double stiffest = 0;
   for (const FabricParameterName& parameter : kFabricParameters) {
     const double value = fabric.at(parameter.name);
-    if (!(value >= 0) || !std::isfinite(value)) {
+    if (!(value >= 0) || !std::isfinite(value))
       throw InputError(parameter.name, fmt::format("{} {}", value, parameter.unit), "0 or more",
                        "correct the fit or the --set that gives it");
-    }
     if (std::string_view(parameter.unit) == "N/m") stiffest = std::max(stiffest, value);
   }
-  if (stiffest == 0) {
+  if (stiffest == 0)
     throw InputError("--set", "every stiffness is 0",
                      "springs: at least one of tension, shear and flexion above 0");
-  }
 }
 
 }  // namespace
 
 std::optional<std::pair<std::string, double>> parse_assignment(const std::string& text) {
-  const std::size_t equals = text.find('=');
+  const size_t equals = text.find('=');
   if (equals == std::string::npos || equals == 0) return std::nullopt;
   const std::optional<double> value = parse_number(std::string_view(text).substr(equals + 1));
   if (!value) return std::nullopt;
@@ -317,10 +302,9 @@ std::optional<std::pair<std::string, double>> parse_assignment(const std::string
 }
 
 std::string requested_name(const ModelRequest& request) {
-  if (request.input.empty() && request.fit.empty()) {
+  if (request.input.empty() && request.fit.empty())
     throw InputError("clothfit simulate", "there is nothing to simulate",
                      "a recording, a model file, or --fit", "see clothfit simulate --help");
-  }
   if (request.input.empty()) return model_of_fit(request.fit).name;
   const std::optional<fs::path> file = model_file(request.input);
   return file ? read_model(*file).name : read_recording(recording_folder(request.input)).name;

@@ -66,7 +66,7 @@ StepChoice choose_step(const Simulation& simulation, const ModelDescription& mod
                                            : default_time_step_s(simulation);
   const Schedule schedule{.frame_time_s = simulation.frame_time_s,
                           .time_step_s = choice.time_step_s};
-  for (std::size_t f = 1; f < schedule.frame_time_s.size(); ++f) {
+  for (size_t f = 1; f < schedule.frame_time_s.size(); ++f) {
     const int substeps = schedule.substeps(static_cast<int>(f));
     const double interval_s = schedule.frame_time_s[f] - schedule.frame_time_s[f - 1];
     choice.substeps = std::max(choice.substeps, substeps);
@@ -95,23 +95,21 @@ void require_possible(const StepChoice& choice, const Simulation& simulation,
                     rounded_down(choice.stable_s)));
   }
   const double spring_steps = choice.steps * static_cast<double>(simulation.cloth.spring_count());
-  if (spring_steps > kMostSpringSteps) {
+  if (spring_steps > kMostSpringSteps)
     throw InputError(where,
                      fmt::format("{:.3g} time steps of {} springs would take days", choice.steps,
                                  simulation.cloth.spring_count()),
                      fmt::format("{:.0e} spring steps at most", kMostSpringSteps),
                      "a shorter duration, a coarser mesh, or softer springs");
-  }
   const double numbers = 3.0 * simulation.cloth.mesh.vertex_count() *
                          static_cast<double>(simulation.frame_time_s.size());
-  if (numbers > kMostKeptNumbers) {
+  if (numbers > kMostKeptNumbers)
     throw InputError(
         model.where(0),
         fmt::format("{} frames of {} vertices do not fit into memory",
                     simulation.frame_time_s.size(), simulation.cloth.mesh.vertex_count()),
         fmt::format("{:.0e} coordinates at most", kMostKeptNumbers),
         "a lower frame rate, a shorter duration, or a coarser mesh");
-  }
 }
 
 std::string node_text(const Mesh& mesh, int vertex) {
@@ -169,7 +167,7 @@ SimulateResult run_or_explain(const Simulation& simulation, const StepChoice& ch
 double largest_stretch(const Simulation& simulation, const SimulateResult& result) {
   double largest = 0;
   for (const Eigen::Matrix3Xd& position_m : result.position_m) {
-    for (std::size_t type = 0; type < kSpringTypes; ++type) {
+    for (size_t type = 0; type < kSpringTypes; ++type) {
       const double natural_m = simulation.parameters.springs.natural_length_m[type];
       for (const Spring& spring : simulation.cloth.springs[type]) {
         const double length_m = (position_m.col(spring.b) - position_m.col(spring.a)).norm();
@@ -191,7 +189,7 @@ Json named_value(const std::string& name, const std::string& unit, double value)
 /// Adds the springs' own numbers, named by type.
 void add_springs(const ModelSprings& springs, Json& parameters) {
   const auto add = [&](const char* name, const char* unit, const ModelSprings::ByType& numbers) {
-    for (std::size_t type = 0; type < numbers.size(); ++type)
+    for (size_t type = 0; type < numbers.size(); ++type)
       parameters.push_back(named_value(fmt::format("{}_{}", name, type), unit, numbers[type]));
   };
   add("natural_length", "m", springs.natural_length_m);
@@ -253,10 +251,10 @@ Json describe_run(const ModelDescription& model, const Simulation& simulation,
                  named_value("c33", "N/m", c.c33_n_per_m)};
   }
   Json effects = Json::array();
-  for (std::size_t e = 0; e < simulation.cloth.effect_descriptions.size(); ++e) {
+  for (size_t e = 0; e < simulation.cloth.effect_descriptions.size(); ++e) {
     const EffectDescription& description = simulation.cloth.effect_descriptions[e];
     Json list = Json::array();
-    for (std::size_t p = 0; p < description.parameters.size(); ++p)
+    for (size_t p = 0; p < description.parameters.size(); ++p)
       list.push_back(named_value(description.parameters[p].name, description.parameters[p].unit,
                                  simulation.parameters.effects[e][p]));
     effects.push_back({{"name", description.name}, {"parameters", list}});
@@ -354,17 +352,16 @@ std::optional<std::vector<SimulationFormat>> parse_formats(const std::string& te
   while (!rest.empty()) {
     const std::string word = rest.substr(0, rest.find(','));
     rest.erase(0, word.size() + 1);
-    if (word == "csv") {
+    if (word == "csv")
       formats.push_back(SimulationFormat::csv);
-    } else if (word == "obj") {
+    else if (word == "obj")
       formats.push_back(SimulationFormat::obj);
-    } else if (word == "pc2") {
+    else if (word == "pc2")
       formats.push_back(SimulationFormat::pc2);
-    } else if (word == "gltf") {
+    else if (word == "gltf")
       formats.push_back(SimulationFormat::gltf);
-    } else {
+    else
       return std::nullopt;
-    }
   }
   return formats;
 }

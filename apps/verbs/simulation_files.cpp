@@ -55,7 +55,7 @@ void write_as_recording(const ModelDescription& written,
   recording.declared = written.effects;
 
   Tracks3d tracks;
-  for (std::size_t f = 0; f < position_m.size(); ++f) {
+  for (size_t f = 0; f < position_m.size(); ++f) {
     for (Eigen::Index v = 0; v < position_m[f].cols(); ++v) {
       tracks.push_back({.frame = static_cast<int>(f),
                         .marker = static_cast<int>(v),

@@ -58,8 +58,8 @@ std::vector<StudiedModel> models_of(const std::vector<std::string>& effects) {
   std::vector<StudiedModel> models{{.name = "base", .effects = {}}};
   for (const std::string& text : effects) {
     StudiedModel model{.name = "base+" + text, .effects = {}};
-    for (std::size_t begin = 0; begin <= text.size();) {
-      const std::size_t end = std::min(text.find('+', begin), text.size());
+    for (size_t begin = 0; begin <= text.size();) {
+      const size_t end = std::min(text.find('+', begin), text.size());
       if (const std::string name = text.substr(begin, end - begin); name == kMarkerOffsets) {
         model.marker_offsets = true;
       } else {

@@ -36,9 +36,8 @@ void print_tracks(const CameraTracks& tracks, const Recording& recording) {
              significant(100 * static_cast<double>(good) / possible, 3), result.message);
   if (!result.rejected.empty()) {
     std::vector<std::vector<std::string>> rows;
-    for (const auto& [reason, count] : result.rejected) {
+    for (const auto& [reason, count] : result.rejected)
       rows.push_back({reason, std::to_string(count)});
-    }
     fmt::print("\n{}", text_table({"rejected because", "count"}, rows));
   }
   if (tracks.placement) fmt::print("\n{}\n", tracks.placement->message);
@@ -48,10 +47,9 @@ int run_track(const TrackVerbOptions& options) {
   options.track.validate();
   Recording recording = read_recording(recording_folder(options.recording));
   const std::vector<std::string> cameras = cameras_to_track(recording, true);
-  if (cameras.empty()) {
+  if (cameras.empty())
     throw InputError((recording.folder / "recording.yaml").string(), "no camera has pictures",
                      "`images: FOLDER or VIDEO` in a camera's entry");
-  }
 
   OutputFolder out(out_folder(options.out, recording.name + ".tracks"));
   TrackStepResult step;
@@ -69,10 +67,9 @@ int run_track(const TrackVerbOptions& options) {
 
   for (const CameraTracks& tracks : step.cameras) {
     print_tracks(tracks, step.recording);
-    if (!tracks.not_placed.empty()) {
+    if (!tracks.not_placed.empty())
       spdlog::warn("camera '{}' has no place in the world, which a fit needs: {}", tracks.camera,
                    tracks.not_placed);
-    }
   }
   fmt::print("\nRecording with tracks: {}\n", shown_path(out.final_path()));
   return kExitGood;

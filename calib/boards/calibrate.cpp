@@ -19,9 +19,8 @@ constexpr int kMinViews = 3;
 
 double robust_cost(const std::vector<Eigen::Vector2d>& residuals_px, double scale_px) {
   double cost = 0;
-  for (const auto& residual : residuals_px) {
+  for (const auto& residual : residuals_px)
     cost += std::log1p(residual.squaredNorm() / (scale_px * scale_px));
-  }
   return cost;
 }
 
@@ -32,10 +31,10 @@ bool turn_views_round(const BoardObservations& observations, double scale_px,
                       CameraEstimate& estimate) {
   const CameraParameters camera = to_camera(observations, estimate);
   bool changed = false;
-  for (std::size_t view = 0; view < observations.seen.size(); ++view) {
+  for (size_t view = 0; view < observations.seen.size(); ++view) {
     if (!estimate.is_active(view)) continue;
     std::vector<PlacedPixel> pixels;
-    for (std::size_t corner = 0; corner < observations.on_board_m.size(); ++corner) {
+    for (size_t corner = 0; corner < observations.on_board_m.size(); ++corner) {
       const Eigen::Vector2d& on_board = observations.on_board_m[corner];
       pixels.push_back({.point_m = {on_board.x(), on_board.y(), 0},
                         .pixel_px = (*observations.seen[view])[corner],
@@ -47,11 +46,10 @@ bool turn_views_round(const BoardObservations& observations, double scale_px,
     const PoseBlock pose_now = estimate.camera_from_board[view];
     estimate.camera_from_board[view] = to_block(placed.camera_from_sheet);
     const double cost = robust_cost(view_residuals(observations, estimate, view), scale_px);
-    if (cost < 0.99 * cost_now) {
+    if (cost < 0.99 * cost_now)
       changed = true;
-    } else {
+    else
       estimate.camera_from_board[view] = pose_now;
-    }
   }
   return changed;
 }
@@ -84,15 +82,15 @@ bool refine_on_good_corners(const BoardObservations& observations, double outlie
   for (int round = 0; round < kRounds; ++round) {
     const double limit_px = outlier_sigmas * robust_sigma_px(observations, estimate);
     bool changed = round == 0;
-    for (std::size_t view = 0; view < observations.seen.size(); ++view) {
+    for (size_t view = 0; view < observations.seen.size(); ++view) {
       if (!estimate.is_active(view)) continue;
       auto& used = estimate.used[view];
       const auto residuals_px = view_residuals(observations, estimate, view);
       std::vector<char> good(used.size(), 0);
-      std::size_t count = 0;
-      for (std::size_t corner = 0; corner < good.size(); ++corner) {
+      size_t count = 0;
+      for (size_t corner = 0; corner < good.size(); ++corner) {
         good[corner] = residuals_px[corner].norm() <= limit_px ? 1 : 0;
-        count += static_cast<std::size_t>(good[corner]);
+        count += static_cast<size_t>(good[corner]);
       }
       if (2 * count < good.size()) good.assign(good.size(), 0);
       changed = changed || good != used;
@@ -112,17 +110,15 @@ std::vector<std::string> intrinsic_names(CameraModel model) {
 /// Returns the largest angle between the planes of any two active views.
 double largest_tilt_rad(const CameraEstimate& estimate) {
   std::vector<Eigen::Vector3d> normals;
-  for (std::size_t view = 0; view < estimate.used.size(); ++view) {
+  for (size_t view = 0; view < estimate.used.size(); ++view) {
     if (!estimate.is_active(view)) continue;
     normals.emplace_back(from_block(estimate.camera_from_board[view]).rotation *
                          Eigen::Vector3d::UnitZ());
   }
   double largest = 0;
-  for (const auto& a : normals) {
-    for (const auto& b : normals) {
+  for (const auto& a : normals)
+    for (const auto& b : normals)
       largest = std::max(largest, std::atan2(a.cross(b).norm(), std::abs(a.dot(b))));
-    }
-  }
   return largest;
 }
 
@@ -130,9 +126,9 @@ double largest_tilt_rad(const CameraEstimate& estimate) {
 /// distortion folds the picture over itself.
 bool is_one_to_one(const BoardObservations& observations, const CameraEstimate& estimate) {
   const CameraParameters camera = to_camera(observations, estimate);
-  for (std::size_t view = 0; view < observations.seen.size(); ++view) {
+  for (size_t view = 0; view < observations.seen.size(); ++view) {
     const Rigid3 camera_from_board = from_block(estimate.camera_from_board[view]);
-    for (std::size_t corner = 0; corner < observations.on_board_m.size(); ++corner) {
+    for (size_t corner = 0; corner < observations.on_board_m.size(); ++corner) {
       if (!estimate.used[view][corner]) continue;
       const Eigen::Vector2d& on_board = observations.on_board_m[corner];
       const Eigen::Vector3d in_camera =
@@ -154,18 +150,16 @@ std::string problem_with(const BoardDescription& board, const std::vector<BoardV
         "a board of {} x {} inner corners, {} m apart; 3 x 3 or more are needed, at a distance > 0",
         board.columns, board.rows, board.square_m);
   }
-  if (image_width <= 0 || image_height <= 0) {
+  if (image_width <= 0 || image_height <= 0)
     return fmt::format("pictures of {} x {} px", image_width, image_height);
-  }
-  const auto corners = static_cast<std::size_t>(board.columns * board.rows);
+  const auto corners = static_cast<size_t>(board.columns * board.rows);
   for (const auto& view : views) {
     if (view.corners_px.size() != corners) {
       return fmt::format("{}: {} corners; a board of {} x {} has {}", view.name,
                          view.corners_px.size(), board.columns, board.rows, corners);
     }
-    for (const auto& corner : view.corners_px) {
+    for (const auto& corner : view.corners_px)
       if (!corner.allFinite()) return fmt::format("{}: a corner that is not a number", view.name);
-    }
   }
   if (views.size() < kMinViews) {
     return fmt::format(
@@ -186,10 +180,9 @@ void CalibrateOptions::validate() const {
     throw InputError("distortion_count", fmt::format("{}", distortion_count),
                      "brown_conrady has 4, 5 or 8 coefficients");
   }
-  if (!(outlier_sigmas >= 2) || !std::isfinite(outlier_sigmas)) {
+  if (!(outlier_sigmas >= 2) || !std::isfinite(outlier_sigmas))
     throw InputError("outlier_sigmas", fmt::format("{}", outlier_sigmas),
                      "a number >= 2 (good corners are lost below that)");
-  }
 }
 
 CalibrateResult calibrate(const BoardDescription& board, const std::vector<BoardView>& views,
@@ -202,11 +195,9 @@ CalibrateResult calibrate(const BoardDescription& board, const std::vector<Board
   BoardObservations observations;
   observations.image_width = image_width;
   observations.image_height = image_height;
-  for (int row = 0; row < board.rows; ++row) {
-    for (int column = 0; column < board.columns; ++column) {
+  for (int row = 0; row < board.rows; ++row)
+    for (int column = 0; column < board.columns; ++column)
       observations.on_board_m.emplace_back(column * board.square_m, row * board.square_m);
-    }
-  }
   for (const auto& view : views) observations.seen.push_back(&view.corners_px);
 
   const int distortion_count = options.model == CameraModel::pinhole ? 0
@@ -223,13 +214,13 @@ CalibrateResult calibrate(const BoardDescription& board, const std::vector<Board
 
   double sum_px2 = 0;
   int active_views = 0;
-  for (std::size_t view = 0; view < views.size(); ++view) {
+  for (size_t view = 0; view < views.size(); ++view) {
     ViewError error;
     error.name = views[view].name;
     error.camera_from_board = from_block(estimate.camera_from_board[view]);
     const auto residuals_px = view_residuals(observations, estimate, view);
     double view_sum_px2 = 0;
-    for (std::size_t corner = 0; corner < residuals_px.size(); ++corner) {
+    for (size_t corner = 0; corner < residuals_px.size(); ++corner) {
       if (!estimate.used[view][corner]) {
         ++error.rejected;
         continue;
@@ -269,7 +260,7 @@ CalibrateResult calibrate(const BoardDescription& board, const std::vector<Board
   }
   const auto names = intrinsic_names(options.model);
   for (int i = 0; i < estimate.intrinsics_count(); ++i) {
-    const auto at = static_cast<std::size_t>(i);
+    const auto at = static_cast<size_t>(i);
     result.intrinsics.push_back({names[at], estimate.intrinsics[at], (*sigmas)[i]});
   }
   const double relative_sigma =

@@ -26,7 +26,7 @@ std::vector<Eigen::Vector2d> focal_candidates(const BoardObservations& observati
     std::vector<cv::Point3f> board;
     std::vector<cv::Point2f> image;
     for (const int i : homography_inliers(observations.on_board_m, *seen, tolerance_px)) {
-      const auto corner = static_cast<std::size_t>(i);
+      const auto corner = static_cast<size_t>(i);
       const Eigen::Vector2f on_board = observations.on_board_m[corner].cast<float>();
       const Eigen::Vector2f pixel = (*seen)[corner].cast<float>();
       board.emplace_back(on_board.x(), on_board.y(), 0.0F);
@@ -46,16 +46,13 @@ std::vector<Eigen::Vector2d> focal_candidates(const BoardObservations& observati
                                           static_cast<int>(observations.image_height)),
                                  0);
       const Eigen::Vector2d focal(matrix(0, 0), matrix(1, 1));
-      if (focal.allFinite() && focal.minCoeff() > 0.1 * size_px &&
-          focal.maxCoeff() < 100 * size_px) {
+      if (focal.allFinite() && focal.minCoeff() > 0.1 * size_px && focal.maxCoeff() < 100 * size_px)
         candidates.push_back(focal);
-      }
     } catch (const cv::Exception&) {  // views that do not determine it: the usual lenses remain
     }
   }
-  for (const double factor : {0.6, 1.0, 1.6, 2.5, 5.0}) {
+  for (const double factor : {0.6, 1.0, 1.6, 2.5, 5.0})
     candidates.push_back(Eigen::Vector2d::Constant(factor * size_px));
-  }
   return candidates;
 }
 
@@ -73,9 +70,8 @@ CameraEstimate start_at(const BoardObservations& observations, CameraModel model
       0.01 * std::hypot(observations.image_width, observations.image_height) / focal_px.maxCoeff();
   for (const auto* seen : observations.seen) {
     std::vector<Eigen::Vector2d> on_image;
-    for (const auto& pixel : *seen) {
+    for (const auto& pixel : *seen)
       on_image.emplace_back((pixel - centre_px).cwiseQuotient(focal_px));
-    }
     const auto poses = plane_poses(observations.on_board_m, on_image, tolerance);
     start.camera_from_board.push_back(to_block(poses.empty() ? Rigid3{} : poses.front()));
     start.used.emplace_back(seen->size(), poses.empty() ? char{0} : char{1});

@@ -69,10 +69,10 @@ struct RationalPrior {
 /// for plain least squares.
 void build_problem(const BoardObservations& observations, double cauchy_scale_px,
                    CameraEstimate& estimate, ceres::Problem& problem) {
-  for (std::size_t view = 0; view < observations.seen.size(); ++view) {
+  for (size_t view = 0; view < observations.seen.size(); ++view) {
     double* pose = estimate.camera_from_board[view].data();
     bool any = false;
-    for (std::size_t corner = 0; corner < observations.on_board_m.size(); ++corner) {
+    for (size_t corner = 0; corner < observations.on_board_m.size(); ++corner) {
       if (!estimate.used[view][corner]) continue;
       any = true;
       problem.AddResidualBlock(
@@ -83,16 +83,15 @@ void build_problem(const BoardObservations& observations, double cauchy_scale_px
     }
     if (any) problem.SetManifold(pose, new PoseManifold);
   }
-  if (estimate.distortion_count == 8 && problem.NumResidualBlocks() > 0) {
+  if (estimate.distortion_count == 8 && problem.NumResidualBlocks() > 0)
     problem.AddResidualBlock(new ceres::AutoDiffCostFunction<RationalPrior, 3, 12>(
                                  new RationalPrior{estimate.corner_sigma_px}),
                              nullptr, estimate.intrinsics.data());
-  }
 }
 
 }  // namespace
 
-bool CameraEstimate::is_active(std::size_t view) const {
+bool CameraEstimate::is_active(size_t view) const {
   return std::ranges::find(used[view], char{1}) != used[view].end();
 }
 
@@ -116,10 +115,10 @@ bool refine_camera(const BoardObservations& observations, double cauchy_scale_px
 }
 
 std::vector<Eigen::Vector2d> view_residuals(const BoardObservations& observations,
-                                            const CameraEstimate& estimate, std::size_t view) {
+                                            const CameraEstimate& estimate, size_t view) {
   std::vector<Eigen::Vector2d> residuals_px;
   const Rigid3 camera_from_board = from_block(estimate.camera_from_board[view]);
-  for (std::size_t corner = 0; corner < observations.on_board_m.size(); ++corner) {
+  for (size_t corner = 0; corner < observations.on_board_m.size(); ++corner) {
     const Eigen::Vector2d& on_board = observations.on_board_m[corner];
     const Eigen::Vector3d in_camera =
         camera_from_board * Eigen::Vector3d(on_board.x(), on_board.y(), 0);
@@ -136,7 +135,7 @@ std::vector<Eigen::Vector2d> view_residuals(const BoardObservations& observation
 
 double robust_sigma_px(const BoardObservations& observations, const CameraEstimate& estimate) {
   std::vector<double> coordinates;
-  for (std::size_t view = 0; view < observations.seen.size(); ++view) {
+  for (size_t view = 0; view < observations.seen.size(); ++view) {
     if (!estimate.is_active(view)) continue;
     for (const auto& residual : view_residuals(observations, estimate, view)) {
       coordinates.push_back(residual.x());

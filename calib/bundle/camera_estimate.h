@@ -32,7 +32,7 @@ struct CameraEstimate {
 
   int intrinsics_count() const { return 4 + distortion_count; }
   /// Says whether any corner of the view takes part.
-  bool is_active(std::size_t view) const;
+  bool is_active(size_t view) const;
 };
 
 /// Refines intrinsics and poses by least squares on the used corners, under a Cauchy loss of this
@@ -43,7 +43,7 @@ bool refine_camera(const BoardObservations& observations, double cauchy_scale_px
 /// Returns observed minus projected, px, for every corner of a view; infinite where it lies behind
 /// the camera.
 std::vector<Eigen::Vector2d> view_residuals(const BoardObservations& observations,
-                                            const CameraEstimate& estimate, std::size_t view);
+                                            const CameraEstimate& estimate, size_t view);
 
 /// Estimates the robust standard deviation per coordinate over all corners, good or bad, of the
 /// active views.

@@ -42,9 +42,8 @@ std::vector<Eigen::Vector2d> standardised_residuals(const FixedCamera& camera,
   std::vector<Eigen::Vector2d> residuals;
   for (const auto& pixel : pixels) {
     Eigen::Vector2d residual;
-    if (!camera.residual<double>(camera_from_world * pixel.point_m, pixel, residual.data())) {
+    if (!camera.residual<double>(camera_from_world * pixel.point_m, pixel, residual.data()))
       residual.setConstant(std::numeric_limits<double>::infinity());
-    }
     residuals.push_back(residual);
   }
   return residuals;
@@ -64,7 +63,7 @@ bool refine_pose(const FixedCamera& camera, const std::vector<PlacedPixel>& pixe
   PoseBlock block = to_block(camera_from_world);
   ceres::Problem problem;
   problem.AddParameterBlock(block.data(), 7, new PoseManifold);
-  for (std::size_t i = 0; i < pixels.size(); ++i) {
+  for (size_t i = 0; i < pixels.size(); ++i) {
     if (!used[i]) continue;
     problem.AddResidualBlock(new ceres::AutoDiffCostFunction<PixelOfExactPoint, 2, 7>(
                                  new PixelOfExactPoint{&camera, &pixels[i]}),
@@ -90,9 +89,8 @@ RobustPose refine_pose_robustly(const FixedCamera& camera, const std::vector<Pla
     if (result.spread > 0.9 * before) break;
   }
   result.cost = 0;
-  for (const auto& residual : standardised_residuals(camera, pixels, result.camera_from_world)) {
+  for (const auto& residual : standardised_residuals(camera, pixels, result.camera_from_world))
     result.cost += std::log1p(residual.squaredNorm());
-  }
   return result;
 }
 

@@ -35,7 +35,7 @@ struct FixedCamera {
                 Real* out) const {
     if (!(in_camera[2] > Real(0.0))) return false;
     std::array<Real, kMaxIntrinsics> numbers;
-    for (std::size_t i = 0; i < numbers.size(); ++i) numbers[i] = Real(intrinsics[i]);
+    for (size_t i = 0; i < numbers.size(); ++i) numbers[i] = Real(intrinsics[i]);
     const Eigen::Matrix<Real, 2, 1> pixel =
         project<Real>(model, numbers.data(), distortion_count, in_camera);
     out[0] = (pixel[0] - observed.pixel_px.x()) / observed.sigma_px;

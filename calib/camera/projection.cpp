@@ -32,9 +32,8 @@ std::optional<Eigen::Vector2d> project(const CameraParameters& camera,
   using Dual = Eigen::AutoDiffScalar<Eigen::Vector3d>;
   const auto values = intrinsics_of(camera);
   std::array<Dual, kMaxIntrinsics> intrinsics;
-  for (std::size_t i = 0; i < values.size(); ++i) {
+  for (size_t i = 0; i < values.size(); ++i)
     intrinsics[i] = Dual(values[i], Eigen::Vector3d::Zero());
-  }
   Eigen::Matrix<Dual, 3, 1> point;
   for (int axis = 0; axis < 3; ++axis) point[axis] = Dual(point_in_camera[axis], 3, axis);
 

@@ -44,9 +44,8 @@ SheetPoseResult place_sheet(const CameraParameters& parameters,
   constexpr double kOutlierSpreads = 5;
   const auto residuals = standardised_residuals(camera, sheet, best.camera_from_world);
   std::vector<char> used;
-  for (const auto& residual : residuals) {
+  for (const auto& residual : residuals)
     used.push_back(residual.norm() <= kOutlierSpreads * best.spread ? 1 : 0);
-  }
   const auto good = std::count(used.begin(), used.end(), char{1});
   result.camera_from_sheet = best.camera_from_world;
   if (good < 4 || !refine_pose(camera, sheet, used, 0, result.camera_from_sheet)) {
@@ -55,9 +54,8 @@ SheetPoseResult place_sheet(const CameraParameters& parameters,
   }
   double sum_px2 = 0;
   const auto final_residuals = standardised_residuals(camera, sheet, result.camera_from_sheet);
-  for (std::size_t i = 0; i < sheet.size(); ++i) {
+  for (size_t i = 0; i < sheet.size(); ++i)
     if (used[i]) sum_px2 += (sheet[i].sigma_px * final_residuals[i]).squaredNorm();
-  }
   result.rms_px = std::sqrt(sum_px2 / (2 * static_cast<double>(good)));
   result.usable = std::isfinite(result.rms_px);
   result.message = fmt::format("{} of {} points, rms {:.3f} px", good, sheet.size(), result.rms_px);

@@ -39,7 +39,7 @@ struct SurveyOfPoint {
 };
 
 template <class Real>
-Eigen::Matrix<Real, 3, 1> square_corner(std::size_t k, const Real* world_from_square,
+Eigen::Matrix<Real, 3, 1> square_corner(size_t k, const Real* world_from_square,
                                         const Real* side_m) {
   const Eigen::Matrix<Real, 3, 1> corner = unit_square_corner(k).cast<Real>() * side_m[0];
   return transform(world_from_square, corner);
@@ -48,7 +48,7 @@ Eigen::Matrix<Real, 3, 1> square_corner(std::size_t k, const Real* world_from_sq
 struct PixelOfSquare {
   const FixedCamera* camera;
   const PlacedPixel* observed;
-  std::size_t corner;
+  size_t corner;
   double sigma_factor;
   template <class Real>
   bool operator()(const Real* camera_from_world, const Real* world_from_square, const Real* side_m,
@@ -73,7 +73,7 @@ struct SideLikeTheOthers {
 struct SurveyOfSquare {
   const PlacedPixel* surveyed;
   double sigma_m;
-  std::size_t corner;
+  size_t corner;
   template <class Real>
   bool operator()(const Real* world_from_square, const Real* side_m, Real* out) const {
     const Eigen::Matrix<Real, 3, 1> place = square_corner(corner, world_from_square, side_m);
@@ -92,7 +92,7 @@ struct WorldUnknowns {
   std::vector<TagSquare> squares;
   std::vector<PoseBlock> world_from_square;
   std::vector<double> common_sides_m;          ///< of squares that are alike
-  std::vector<std::size_t> single;             ///< points that belong to no square
+  std::vector<size_t> single;                  ///< points that belong to no square
   std::vector<std::array<double, 3>> place_m;  ///< of the single points
 };
 
@@ -120,7 +120,7 @@ WorldSolve solve_world(const FixedCamera& camera, const std::vector<PlacedPixel>
   double* pose = unknowns.camera_from_world.data();
   problem.AddParameterBlock(pose, 7, new PoseManifold);
   std::vector<ceres::ResidualBlockId> square_pixels, others, surveys;
-  for (std::size_t s = 0; s < unknowns.squares.size(); ++s) {
+  for (size_t s = 0; s < unknowns.squares.size(); ++s) {
     double* square = unknowns.world_from_square[s].data();
     double* side = &unknowns.squares[s].side_m;
     double* common_side = &unknowns.common_sides_m[unknowns.squares[s].alike];
@@ -129,7 +129,7 @@ WorldSolve solve_world(const FixedCamera& camera, const std::vector<PlacedPixel>
         problem.AddResidualBlock(new ceres::AutoDiffCostFunction<SideLikeTheOthers, 1, 1, 1>(
                                      new SideLikeTheOthers{kPrintTolerance * *common_side}),
                                  nullptr, side, common_side));
-    for (std::size_t k = 0; k < 4; ++k) {
+    for (size_t k = 0; k < 4; ++k) {
       const PlacedPixel* point = &reference[unknowns.squares[s].corners[k]];
       square_pixels.push_back(
           problem.AddResidualBlock(new ceres::AutoDiffCostFunction<PixelOfSquare, 2, 7, 7, 1>(
@@ -141,7 +141,7 @@ WorldSolve solve_world(const FixedCamera& camera, const std::vector<PlacedPixel>
                                    nullptr, square, side));
     }
   }
-  for (std::size_t i = 0; i < unknowns.single.size(); ++i) {
+  for (size_t i = 0; i < unknowns.single.size(); ++i) {
     const PlacedPixel* point = &reference[unknowns.single[i]];
     double* place = unknowns.place_m[i].data();
     others.push_back(problem.AddResidualBlock(
@@ -171,9 +171,9 @@ WorldSolve solve_world(const FixedCamera& camera, const std::vector<PlacedPixel>
   if (!problem.Evaluate(evaluate, nullptr, &residuals, nullptr, &sparse)) return result;
   Eigen::MatrixXd jacobian = Eigen::MatrixXd::Zero(sparse.num_rows, sparse.num_cols);
   for (int row = 0; row < sparse.num_rows; ++row) {
-    const auto begin = static_cast<std::size_t>(sparse.rows[static_cast<std::size_t>(row)]);
-    const auto end = static_cast<std::size_t>(sparse.rows[static_cast<std::size_t>(row) + 1]);
-    for (std::size_t at = begin; at < end; ++at) jacobian(row, sparse.cols[at]) = sparse.values[at];
+    const auto begin = static_cast<size_t>(sparse.rows[static_cast<size_t>(row)]);
+    const auto end = static_cast<size_t>(sparse.rows[static_cast<size_t>(row) + 1]);
+    for (size_t at = begin; at < end; ++at) jacobian(row, sparse.cols[at]) = sparse.values[at];
   }
 
   // Columns are scaled to length 1: metres and radians, pixels and millimetres stay comparable.
@@ -207,7 +207,7 @@ std::optional<Rigid3> start_world(const CameraParameters& parameters, const Fixe
   if (!image) return std::nullopt;
   Eigen::Matrix3Xd points(3, static_cast<Eigen::Index>(reference.size()));
   std::vector<Eigen::Vector3d> in_world_m;
-  for (std::size_t i = 0; i < reference.size(); ++i) {
+  for (size_t i = 0; i < reference.size(); ++i) {
     points.col(static_cast<Eigen::Index>(i)) = reference[i].point_m;
     in_world_m.push_back(reference[i].point_m);
   }
@@ -222,12 +222,10 @@ std::optional<Rigid3> start_world(const CameraParameters& parameters, const Fixe
   if (axes.determinant() < 0) axes.col(2) *= -1;
   const Rigid3 world_from_plane{Eigen::Quaterniond(axes), middle};
   std::vector<Eigen::Vector2d> on_plane_m;
-  for (const auto& point : in_world_m) {
+  for (const auto& point : in_world_m)
     on_plane_m.emplace_back((inverse(world_from_plane) * point).head<2>());
-  }
-  for (const auto& camera_from_plane : plane_poses(on_plane_m, *image)) {
+  for (const auto& camera_from_plane : plane_poses(on_plane_m, *image))
     candidates.push_back(camera_from_plane * inverse(world_from_plane));
-  }
 
   std::optional<RobustPose> best;
   for (const auto& candidate : candidates) {
@@ -247,16 +245,15 @@ std::vector<PlacedPixel> without_blunders(const FixedCamera& camera,
   constexpr double kBlunderSpreads = 8;
   const auto residuals = standardised_residuals(camera, reference, camera_from_world);
   std::vector<Eigen::Vector2d> across_ray_m;
-  for (std::size_t i = 0; i < reference.size(); ++i) {
+  for (size_t i = 0; i < reference.size(); ++i) {
     const double depth_m = (camera_from_world * reference[i].point_m).z();
     across_ray_m.emplace_back(residuals[i] * reference[i].sigma_px * depth_m /
                               camera.intrinsics[0]);
   }
   const double limit_m = kBlunderSpreads * robust_spread(across_ray_m);
   std::vector<PlacedPixel> good;
-  for (std::size_t i = 0; i < reference.size(); ++i) {
+  for (size_t i = 0; i < reference.size(); ++i)
     if (across_ray_m[i].norm() <= limit_m) good.push_back(reference[i]);
-  }
   return good;
 }
 
@@ -268,9 +265,9 @@ WorldUnknowns first_unknowns(const std::vector<PlacedPixel>& reference,
   std::vector<char> in_square(reference.size(), 0);
   for (const auto& square : unknowns.squares) {
     unknowns.world_from_square.push_back(to_block(square.world_from_square));
-    for (const std::size_t corner : square.corners) in_square[corner] = 1;
+    for (const size_t corner : square.corners) in_square[corner] = 1;
   }
-  for (std::size_t i = 0; i < reference.size(); ++i) {
+  for (size_t i = 0; i < reference.size(); ++i) {
     if (in_square[i]) continue;
     const auto& point = reference[i].point_m;
     unknowns.single.push_back(i);
@@ -294,14 +291,12 @@ WorldSolve solve_with_spread(const FixedCamera& camera, const std::vector<Placed
     spread.survey_sigma_m =
         std::max(before.survey_sigma_m * std::sqrt(solve.survey_sum / solve.survey_redundancy),
                  kSmallestSurveySigmaM);
-    if (solve.square_redundancy > kLeastSquareRedundancy) {
+    if (solve.square_redundancy > kLeastSquareRedundancy)
       spread.square_factor = std::max(
           before.square_factor * std::sqrt(solve.square_sum / solve.square_redundancy), 1.0);
-    }
     if (settled(spread.survey_sigma_m, before.survey_sigma_m) &&
-        settled(spread.square_factor, before.square_factor)) {
+        settled(spread.square_factor, before.square_factor))
       break;
-    }
   }
   return solve;
 }
@@ -347,9 +342,8 @@ WorldPlacementResult place_world(const CameraParameters& parameters,
   result.reference_survey_sigma_m = spread.survey_sigma_m;
   double sum_px2 = 0;
   const auto residuals = standardised_residuals(camera, good, result.camera_from_world);
-  for (std::size_t i = 0; i < good.size(); ++i) {
+  for (size_t i = 0; i < good.size(); ++i)
     sum_px2 += (good[i].sigma_px * residuals[i]).squaredNorm();
-  }
   result.reference_rms_px = std::sqrt(sum_px2 / (2 * static_cast<double>(good.size())));
   result.usable = std::isfinite(result.reference_rms_px) && result.covariance.allFinite();
   result.message = fmt::format(

@@ -38,11 +38,10 @@ std::vector<Eigen::MatrixXd> held_tracks(const FitProblem& problem, const Observ
     for (int f = 0; f < problem.frames(); ++f) {
       const double time_s = problem.frame_time_s[static_cast<size_t>(f)];
       const auto seen = set.predict(held.motion ? held.motion(time_s) : start);
-      if (seen) {
+      if (seen)
         track.col(f) = seen->head(set.dimension);
-      } else {
+      else
         track.col(f).setConstant(std::numeric_limits<double>::quiet_NaN());
-      }
     }
     tracks.push_back(std::move(track));
   }

@@ -71,11 +71,10 @@ std::optional<HeldLine> held_line(const FitProblem& problem) {
       kStraight * std::min(problem.cloth.mesh.width_m, problem.cloth.mesh.height_m);
   if (svd.values.size() > 1 && svd.values[1] > small_m) return std::nullopt;
   line.single = svd.values[0] < small_m;
-  if (!line.single) {
+  if (!line.single)
     line.along = svd.vectors.col(0);
-  } else if (const Eigen::Vector3d level = axes.normal.cross(axes.down); level.norm() > 0.1) {
+  else if (const Eigen::Vector3d level = axes.normal.cross(axes.down); level.norm() > 0.1)
     line.along = level.normalized();
-  }
   // The decomposition leaves the sign open.
   if (line.along.dot(axes.along_s) < 0) line.along = -line.along;
   return line;

@@ -11,9 +11,8 @@ constexpr std::uint64_t kEmptyChecksum = 0xcbf29ce484222325u;
 /// forgery. Every step is a bijection of the sum so far, so that one changed byte always changes
 /// the result. Wider damage passes with a probability of 2^-64.
 constexpr std::uint64_t checksum(std::string_view bytes, std::uint64_t before = kEmptyChecksum) {
-  for (const char byte : bytes) {
+  for (const char byte : bytes)
     before = (before ^ static_cast<unsigned char>(byte)) * 0x100000001b3u;
-  }
   return before;
 }
 

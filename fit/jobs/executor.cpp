@@ -25,14 +25,12 @@ class Run {
   Run(int count, const Work& work, const ExecuteOptions& options, Journal* journal,
       const ProgressCallback& progress)
       : work_(work), options_(options), journal_(journal), progress_(progress), failed_(count) {
-    payloads_.resize(static_cast<std::size_t>(count));
-    for (int index = 0; index < count; ++index) {
-      if (journal_ != nullptr && journal_->finished().contains(index)) {
+    payloads_.resize(static_cast<size_t>(count));
+    for (int index = 0; index < count; ++index)
+      if (journal_ != nullptr && journal_->finished().contains(index))
         payload(index) = journal_->finished().at(index);
-      } else {
+      else
         left_.push_back(index);
-      }
-    }
     tell_progress();
   }
 
@@ -41,7 +39,7 @@ class Run {
   /// Does pieces, one after another, until none is left to hand out.
   void do_pieces() {
     while (!stops_) {
-      const std::size_t turn = next_++;
+      const size_t turn = next_++;
       if (turn >= left_.size()) return;
       // A piece that was handed out is done whatever stops the others: the promise about the lowest
       // index rests on it. In isolation, a thread that waits inside a piece finds only the piece's
@@ -57,10 +55,9 @@ class Run {
     result.performed = performed_;
     result.message =
         fmt::format("{} of {} {}", result.resumed + performed_, payloads_.size(), options_.unit);
-    if (result.resumed > 0) {
+    if (result.resumed > 0)
       result.message +=
           fmt::format(", {} of them from {}", result.resumed, journal_->file().string());
-    }
     if (performed_ == left()) {
       result.payloads = std::move(payloads_);
     } else {
@@ -71,7 +68,7 @@ class Run {
   }
 
  private:
-  std::string& payload(int index) { return payloads_[static_cast<std::size_t>(index)]; }
+  std::string& payload(int index) { return payloads_[static_cast<size_t>(index)]; }
 
   void do_piece(int index) {
     try {
@@ -91,13 +88,12 @@ class Run {
 
   void tell_progress() {
     if (!progress_) return;
-    const std::size_t done = payloads_.size() - left_.size() + static_cast<std::size_t>(performed_);
+    const size_t done = payloads_.size() - left_.size() + static_cast<size_t>(performed_);
     if (!progress_({.stage = options_.unit,
                     .done = static_cast<double>(done),
                     .total = static_cast<double>(payloads_.size()),
-                    .unit = options_.unit})) {
+                    .unit = options_.unit}))
       stops_ = true;
-    }
   }
 
   const Work& work_;
@@ -106,7 +102,7 @@ class Run {
   const ProgressCallback& progress_;
 
   std::vector<int> left_;  ///< pieces to do, ascending
-  std::atomic<std::size_t> next_ = 0;
+  std::atomic<size_t> next_ = 0;
   std::atomic<bool> stops_ = false;
 
   std::mutex mutex_;                   ///< guards all below, the journal and progress
@@ -119,10 +115,9 @@ class Run {
 }  // namespace
 
 void ExecuteOptions::validate() const {
-  if (threads < 0) {
+  if (threads < 0)
     throw InputError("threads", "threads = " + std::to_string(threads),
                      "0 (as many as the machine has), or 1 on");
-  }
 }
 
 ExecuteResult execute(int count, const Work& work, const ExecuteOptions& options, Journal* journal,
@@ -133,10 +128,9 @@ ExecuteResult execute(int count, const Work& work, const ExecuteOptions& options
   const int threads = options.threads > 0 ? options.threads : tbb::info::default_concurrency();
   // oneTBB gives no more threads than processors unless it is told that more are welcome.
   std::optional<global_control> more;
-  if (static_cast<std::size_t>(threads) >
-      global_control::active_value(global_control::max_allowed_parallelism)) {
+  if (static_cast<size_t>(threads) >
+      global_control::active_value(global_control::max_allowed_parallelism))
     more.emplace(global_control::max_allowed_parallelism, threads);
-  }
 
   Run run(count, work, options, journal, progress);
   tbb::task_arena arena(threads);

@@ -38,10 +38,9 @@ constexpr std::chrono::seconds kSyncInterval{1};
 int open_locked(const std::filesystem::path& file, JournalStart start) {
   const int fresh_only = start == JournalStart::fresh ? O_EXCL : 0;
   const int descriptor = open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | fresh_only, 0666);
-  if (descriptor < 0 && errno == EEXIST && fresh_only != 0) {
+  if (descriptor < 0 && errno == EEXIST && fresh_only != 0)
     throw InputError(file.string(), "exists", "a new file, for this run starts from scratch",
                      "give --resume to go on with it, or remove it");
-  }
   if (descriptor < 0) refuse(file, "cannot be opened", errno);
   struct stat status {};
   if (fstat(descriptor, &status) != 0 || !S_ISREG(status.st_mode)) {
@@ -68,12 +67,12 @@ std::string read_all(const std::filesystem::path& file, int descriptor) {
     if (count < 0 && errno == EINTR) continue;
     if (count < 0) refuse(file, "cannot be read", errno);
     if (count == 0) return bytes;
-    bytes.append(block.data(), static_cast<std::size_t>(count));
+    bytes.append(block.data(), static_cast<size_t>(count));
   }
 }
 
 /// Returns the first line of a record that begins at byte `begin`.
-std::string record_head(std::size_t begin, int index, std::string_view payload) {
+std::string record_head(size_t begin, int index, std::string_view payload) {
   const std::string what = fmt::format("{}{} {}", kRecord, index, payload.size());
   const std::uint64_t sum = checksum(payload, checksum(fmt::format("{} at {}\n", what, begin)));
   return fmt::format("{} {:016x}\n", what, sum);
@@ -82,21 +81,21 @@ std::string record_head(std::size_t begin, int index, std::string_view payload) 
 struct Record {
   int index = 0;
   std::string_view payload;
-  std::size_t end = 0;  ///< the byte behind the record
+  size_t end = 0;  ///< the byte behind the record
 };
 
 /// Returns the record that begins at byte `begin`, where there is an intact one.
-std::optional<Record> record_at(std::string_view bytes, std::size_t begin) {
+std::optional<Record> record_at(std::string_view bytes, size_t begin) {
   std::string_view rest = bytes.substr(begin);
   if (!rest.starts_with(kRecord)) return std::nullopt;
   const char* const end = rest.data() + rest.size();
   int index = -1;
-  std::size_t length = 0;
+  size_t length = 0;
   const auto [after_index, no_index] = std::from_chars(rest.data() + kRecord.size(), end, index);
   if (no_index != std::errc() || index < 0 || after_index == end) return std::nullopt;
   if (std::from_chars(after_index + 1, end, length).ec != std::errc()) return std::nullopt;
 
-  const std::size_t head = std::min(rest.find('\n'), rest.size() - 1) + 1;
+  const size_t head = std::min(rest.find('\n'), rest.size() - 1) + 1;
   if (rest.size() - head <= length || rest[head + length] != '\n') return std::nullopt;
   const std::string_view payload = rest.substr(head, length);
   if (rest.substr(0, head) != record_head(begin, index, payload)) return std::nullopt;
@@ -107,16 +106,14 @@ std::optional<Record> record_at(std::string_view bytes, std::size_t begin) {
 [[noreturn]] void refuse_header(const std::filesystem::path& file, std::string_view bytes,
                                 const std::string& key) {
   const std::string remedy = "name another file, or remove this one";
-  if (!bytes.starts_with(kFormat)) {
+  if (!bytes.starts_with(kFormat))
     throw InputError(file.string(), 1, "is no journal of a run",
                      fmt::format("`{}1` in the first line", kFormat), remedy);
-  }
-  if (!bytes.starts_with(kVersionLine)) {
+  if (!bytes.starts_with(kVersionLine))
     throw InputError(
         file.string(), 1,
         fmt::format("is a journal of version `{}`", shown_text(bytes.substr(0, bytes.find('\n')))),
         fmt::format("`{}1`", kFormat), remedy);
-  }
   bytes.remove_prefix(kVersionLine.size());
   const std::string_view other = bytes.substr(0, bytes.find('\n'));
   throw InputError(file.string(), 2,
@@ -144,9 +141,8 @@ Journal::Journal(const std::filesystem::path& file, const std::string& key, Jour
   write_at_end(header);
   sync();
   const std::filesystem::path folder = file_.has_parent_path() ? file_.parent_path() : ".";
-  if (const int error_number = sync_to_disk(folder)) {
+  if (const int error_number = sync_to_disk(folder))
     refuse(file_, "cannot be synced", error_number);
-  }
 }
 
 Journal::~Journal() {
@@ -155,9 +151,9 @@ Journal::~Journal() {
   close(descriptor_);
 }
 
-void Journal::read_records(std::string_view bytes, std::size_t begin) {
+void Journal::read_records(std::string_view bytes, size_t begin) {
   end_ = begin;
-  for (std::size_t at = begin; at < bytes.size();) {
+  for (size_t at = begin; at < bytes.size();) {
     if (const std::optional<Record> record = record_at(bytes, at)) {
       if (at != end_) ++damaged_places_;
       finished_.emplace(record->index, record->payload);
@@ -166,9 +162,8 @@ void Journal::read_records(std::string_view bytes, std::size_t begin) {
       at = std::min(bytes.find(kRecord, at + 1), bytes.size());
     }
   }
-  if (end_ < bytes.size() && ftruncate(descriptor_, static_cast<off_t>(end_)) != 0) {
+  if (end_ < bytes.size() && ftruncate(descriptor_, static_cast<off_t>(end_)) != 0)
     refuse(file_, "its torn last record cannot be cut off", errno);
-  }
 }
 
 void Journal::append(int index, std::string_view payload) {
@@ -183,7 +178,7 @@ void Journal::append(int index, std::string_view payload) {
 }
 
 void Journal::write_at_end(std::string_view bytes) {
-  std::size_t written = 0;
+  size_t written = 0;
   while (written < bytes.size()) {
     const ssize_t count = pwrite(descriptor_, bytes.data() + written, bytes.size() - written,
                                  static_cast<off_t>(end_ + written));
@@ -194,7 +189,7 @@ void Journal::write_at_end(std::string_view bytes) {
       static_cast<void>(!ftruncate(descriptor_, static_cast<off_t>(end_)));
       refuse(file_, "cannot be written", error_number);
     }
-    written += static_cast<std::size_t>(count);
+    written += static_cast<size_t>(count);
   }
   end_ += bytes.size();
 }

@@ -54,13 +54,13 @@ class Journal {
 
  private:
   Journal(const std::filesystem::path& file, int descriptor);
-  void read_records(std::string_view bytes, std::size_t begin);
+  void read_records(std::string_view bytes, size_t begin);
   void write_at_end(std::string_view bytes);
   void sync();
 
   std::filesystem::path file_;
   int descriptor_ = -1;
-  std::size_t end_ = 0;  ///< bytes that are header or records
+  size_t end_ = 0;  ///< bytes that are header or records
   std::map<int, std::string> finished_;
   int damaged_places_ = 0;
   std::chrono::steady_clock::time_point synced_at_;

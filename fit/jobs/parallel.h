@@ -13,11 +13,11 @@ namespace clothfit {
 /// the first exception is thrown once those that run have ended. A loop within a body always ends
 /// whole: TBB itself would cut nested loops short without a word to the code behind them.
 template <class Body>
-void for_each_index(std::size_t count, const Body& body) {
+void for_each_index(size_t count, const Body& body) {
   std::atomic<bool> thrown = false;
   std::exception_ptr first;
   std::mutex mutex;
-  tbb::parallel_for(std::size_t{0}, count, [&](std::size_t n) {
+  tbb::parallel_for(size_t{0}, count, [&](size_t n) {
     if (thrown) return;
     try {
       body(n);

@@ -10,7 +10,7 @@ namespace clothfit {
 class ThreadLimit {
  public:
   explicit ThreadLimit(int threads)
-      : control_(kParallelism, threads > 0 ? static_cast<std::size_t>(threads)
+      : control_(kParallelism, threads > 0 ? static_cast<size_t>(threads)
                                            : tbb::global_control::active_value(kParallelism)) {}
 
  private:

@@ -35,7 +35,7 @@ double rms_distance(const std::vector<Eigen::MatrixXd>& observed,
                     const std::vector<Eigen::MatrixXd>& predicted) {
   assert(observed.size() == predicted.size());
   Squares all;
-  for (std::size_t m = 0; m < observed.size(); ++m) {
+  for (size_t m = 0; m < observed.size(); ++m) {
     const Squares marker = squared_distances(observed[m], predicted[m]);
     all.sum += marker.sum;
     all.count += marker.count;
@@ -46,7 +46,7 @@ double rms_distance(const std::vector<Eigen::MatrixXd>& observed,
 std::vector<Eigen::MatrixXd> centred(const std::vector<Eigen::MatrixXd>& observed,
                                      std::vector<Eigen::MatrixXd> predicted, int held_out_from) {
   assert(observed.size() == predicted.size());
-  for (std::size_t m = 0; m < observed.size(); ++m) {
+  for (size_t m = 0; m < observed.size(); ++m) {
     Eigen::VectorXd sum = Eigen::VectorXd::Zero(observed[m].rows());
     int count = 0;
     for (Eigen::Index frame = 0; frame < std::min<Eigen::Index>(held_out_from, observed[m].cols());
@@ -66,7 +66,7 @@ double weighted_rms_distance(const std::vector<Eigen::MatrixXd>& observed,
                              const std::vector<double>& weights) {
   assert(observed.size() == predicted.size() && observed.size() == weights.size());
   double sum = 0, weight = 0;
-  for (std::size_t m = 0; m < observed.size(); ++m) {
+  for (size_t m = 0; m < observed.size(); ++m) {
     const Squares marker = squared_distances(observed[m], predicted[m]);
     if (marker.count == 0) continue;
     sum += weights[m] * marker.sum / marker.count;

@@ -16,16 +16,15 @@ const double kMedianToSigma = kMadToSigma / std::sqrt(20.0);
 constexpr double kBeyond = 5;
 
 /// Says whether the three intervals between frames f ... f + 3 are nearly equal.
-bool evenly_spaced(const std::vector<double>& time_s, std::size_t f, double tolerance) {
+bool evenly_spaced(const std::vector<double>& time_s, size_t f, double tolerance) {
   const double mean = (time_s[f + 3] - time_s[f]) / 3;
-  for (std::size_t k = f; k < f + 3; ++k) {
+  for (size_t k = f; k < f + 3; ++k)
     if (std::abs(time_s[k + 1] - time_s[k] - mean) > tolerance * mean) return false;
-  }
   return true;
 }
 
 /// Returns the median of the first `count` of rising values.
-double median(const std::vector<double>& sorted, std::size_t count) {
+double median(const std::vector<double>& sorted, size_t count) {
   return (sorted[(count - 1) / 2] + sorted[count / 2]) / 2;
 }
 
@@ -34,11 +33,11 @@ double median(const std::vector<double>& sorted, std::size_t count) {
 /// therefore left out and the median taken again until nothing changes; of normal noise, next to
 /// none lies there.
 double robust_sigma(const std::vector<double>& sorted) {
-  std::size_t count = sorted.size();
+  size_t count = sorted.size();
   while (true) {
     const double middle = median(sorted, count);
     const auto end = std::upper_bound(sorted.begin(), sorted.end(), kBeyond * kMadToSigma * middle);
-    const auto within = static_cast<std::size_t>(end - sorted.begin());
+    const auto within = static_cast<size_t>(end - sorted.begin());
     if (within >= count) return kMedianToSigma * middle;
     count = within;
   }
@@ -51,7 +50,7 @@ NoiseEstimate estimate_noise(const std::vector<double>& time_s,
                              const NoiseOptions& options) {
   assert(options.interval_tolerance >= 0);
   std::vector<double> differences;
-  for (std::size_t f = 0; f + 3 < time_s.size(); ++f) {
+  for (size_t f = 0; f + 3 < time_s.size(); ++f) {
     if (!evenly_spaced(time_s, f, options.interval_tolerance)) continue;
     for (const Eigen::MatrixXd& track : tracks) {
       assert(track.cols() == static_cast<Eigen::Index>(time_s.size()));

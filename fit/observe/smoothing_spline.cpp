@@ -51,7 +51,7 @@ System make_system(const std::vector<double>& time_s, const Eigen::VectorXd& var
   system.r = Band::Zero(3, m);
   system.qwq = Band::Zero(3, m);
   for (Eigen::Index i = 0; i < m; ++i) {
-    const auto k = static_cast<std::size_t>(i);
+    const auto k = static_cast<size_t>(i);
     const double before = time_s[k + 1] - time_s[k];
     const double after = time_s[k + 2] - time_s[k + 1];
     system.q.col(i) << 1 / before, -1 / before - 1 / after, 1 / after;
@@ -59,11 +59,9 @@ System make_system(const std::vector<double>& time_s, const Eigen::VectorXd& var
     if (i + 1 < m) system.r(1, i) = after / 6;
   }
   for (Eigen::Index i = 0; i < m; ++i) {
-    for (Eigen::Index b = 0; b < 3 && i + b < m; ++b) {
-      for (Eigen::Index knot = i + b; knot <= i + 2; ++knot) {
+    for (Eigen::Index b = 0; b < 3 && i + b < m; ++b)
+      for (Eigen::Index knot = i + b; knot <= i + 2; ++knot)
         system.qwq(b, i) += system.q(knot - i, i) * variance(knot) * system.q(knot - i - b, i + b);
-      }
-    }
   }
   return system;
 }
@@ -236,9 +234,8 @@ Weighted fit_weighted(const std::vector<double>& time_s, const Eigen::MatrixXd& 
       residual.col(i + a) += factor * gamma.col(i);
       // diag(Q S Q'), each pair of Q's columns once
       fit.freedom(i + a) += factor * system.q(a, i) * s(0, i);
-      for (Eigen::Index b = 1; b <= a && i + b < n - 2; ++b) {
+      for (Eigen::Index b = 1; b <= a && i + b < n - 2; ++b)
         fit.freedom(i + a) += 2 * factor * system.q(a - b, i + b) * s(b, i);
-      }
     }
   }
   spline.value = y - residual;
@@ -247,10 +244,9 @@ Weighted fit_weighted(const std::vector<double>& time_s, const Eigen::MatrixXd& 
   const double weighted_sum =
       (residual.array().square().rowwise() / variance.transpose().array()).sum();
   spline.noise_sigma = std::sqrt(weighted_sum / left_over);
-  for (Eigen::Index i = 0; i < n; ++i) {
+  for (Eigen::Index i = 0; i < n; ++i)
     spline.value_sigma.push_back(spline.noise_sigma *
                                  std::sqrt(variance(i) * std::max(0.0, 1 - fit.freedom(i))));
-  }
   return fit;
 }
 
@@ -258,7 +254,7 @@ Weighted fit_weighted(const std::vector<double>& time_s, const Eigen::MatrixXd& 
 std::pair<std::vector<double>, std::vector<Eigen::Index>> used_samples(
     const std::vector<double>& time_s, const std::vector<bool>& outlier) {
   std::pair<std::vector<double>, std::vector<Eigen::Index>> used;
-  for (std::size_t k = 0; k < time_s.size(); ++k) {
+  for (size_t k = 0; k < time_s.size(); ++k) {
     if (outlier[k]) continue;
     used.first.push_back(time_s[k]);
     used.second.push_back(static_cast<Eigen::Index>(k));
@@ -292,7 +288,7 @@ Eigen::VectorXd robust_distances(const SmoothingSpline& spline, const Eigen::Vec
   Eigen::MatrixXd distance(samples.rows(), n), step = Eigen::MatrixXd::Zero(samples.rows(), n);
   for (Eigen::Index i = 0; i < n; ++i) {
     distance.col(i) =
-        (samples.col(i) - spline.position(time_s[static_cast<std::size_t>(i)])).cwiseAbs() /
+        (samples.col(i) - spline.position(time_s[static_cast<size_t>(i)])).cwiseAbs() /
         (sigma[i] * std::sqrt(std::max(freedom(i), 1e-6)));
     if (i > 0) step.col(i) = (samples.col(i) - samples.col(i - 1)).cwiseAbs() / sigma[i];
   }
@@ -355,9 +351,8 @@ std::vector<bool> find_outliers(const std::vector<double>& time_s, const Eigen::
     weight = kHuber / distance.array().max(kHuber);
     if ((weight - before).cwiseAbs().maxCoeff() < 0.01) break;
   }
-  for (std::size_t k = 0; k < outlier.size(); ++k) {
+  for (size_t k = 0; k < outlier.size(); ++k)
     outlier[k] = distance(static_cast<Eigen::Index>(k)) > reject_beyond;
-  }
 
   for (bool changed = true; changed;) {
     const auto [used_time_s, used] = used_samples(time_s, outlier);
@@ -368,7 +363,7 @@ std::vector<bool> find_outliers(const std::vector<double>& time_s, const Eigen::
     freedom(used) = fit.freedom;
     distance = robust_distances(fit.spline, freedom, time_s, samples, variance);
     changed = false;
-    for (std::size_t k = 0; k < outlier.size(); ++k) {
+    for (size_t k = 0; k < outlier.size(); ++k) {
       if (outlier[k] && distance(static_cast<Eigen::Index>(k)) <= reject_beyond) {
         outlier[k] = false;
         changed = true;
@@ -386,8 +381,8 @@ std::array<Eigen::VectorXd, 3> evaluate(const SmoothingSpline& spline, double ti
   const double inside = std::clamp(time, spline.time_s.front(), spline.time_s.back());
   const auto after = std::upper_bound(spline.time_s.begin(), spline.time_s.end() - 1, inside);
   const auto k = std::clamp<Eigen::Index>(after - spline.time_s.begin() - 1, 0, n - 2);
-  const double start = spline.time_s[static_cast<std::size_t>(k)];
-  const double h = spline.time_s[static_cast<std::size_t>(k) + 1] - start;
+  const double start = spline.time_s[static_cast<size_t>(k)];
+  const double h = spline.time_s[static_cast<size_t>(k) + 1] - start;
   const double u = (inside - start) / h, v = 1 - u;
   const auto f0 = spline.value.col(k), f1 = spline.value.col(k + 1);
   const auto m0 = spline.second_derivative.col(k), m1 = spline.second_derivative.col(k + 1);
@@ -404,13 +399,11 @@ std::array<Eigen::VectorXd, 3> evaluate(const SmoothingSpline& spline, double ti
 }  // namespace
 
 void SmoothingSplineOptions::validate() const {
-  if (smoothing && !(*smoothing > 0 && std::isfinite(*smoothing))) {
+  if (smoothing && !(*smoothing > 0 && std::isfinite(*smoothing)))
     throw InputError("smoothing", "smoothing = " + std::to_string(*smoothing), "a number > 0");
-  }
-  if (!(reject_beyond > 0)) {
+  if (!(reject_beyond > 0))
     throw InputError("reject_beyond", "reject_beyond = " + std::to_string(reject_beyond),
                      "robust standard deviations, > 0");
-  }
 }
 
 SmoothingSpline fit_smoothing_spline(const std::vector<double>& time_s,
@@ -419,7 +412,7 @@ SmoothingSpline fit_smoothing_spline(const std::vector<double>& time_s,
                                      const SmoothingSplineOptions& options) {
   options.validate();
   const Eigen::Index n = samples.cols();
-  assert(n >= 1 && time_s.size() == static_cast<std::size_t>(n));
+  assert(n >= 1 && time_s.size() == static_cast<size_t>(n));
   assert(sigma.empty() || sigma.size() == time_s.size());
   assert(samples.allFinite());
   assert(std::adjacent_find(time_s.begin(), time_s.end(), std::greater_equal<>()) == time_s.end());

@@ -20,17 +20,15 @@ bool observed(const Eigen::MatrixXd& track, Eigen::Index frame) {
 /// Returns the first frame in [from, to) that shows the marker.
 std::optional<Eigen::Index> first_observed(const Eigen::MatrixXd& track, Eigen::Index from,
                                            Eigen::Index to) {
-  for (Eigen::Index frame = from; frame < to; ++frame) {
+  for (Eigen::Index frame = from; frame < to; ++frame)
     if (observed(track, frame)) return frame;
-  }
   return std::nullopt;
 }
 
 std::optional<Eigen::Index> last_observed(const Eigen::MatrixXd& track, Eigen::Index from,
                                           Eigen::Index to) {
-  for (Eigen::Index frame = to - 1; frame >= from; --frame) {
+  for (Eigen::Index frame = to - 1; frame >= from; --frame)
     if (observed(track, frame)) return frame;
-  }
   return std::nullopt;
 }
 
@@ -52,7 +50,7 @@ TrivialPrediction judged(TrivialPrediction prediction, const std::vector<Eigen::
   for (Eigen::Index frame = 0; frame < frames; ++frame) {
     double square = 0;
     int count = 0;
-    for (std::size_t m = 0; m < tracks.size(); ++m) {
+    for (size_t m = 0; m < tracks.size(); ++m) {
       assert(tracks[m].cols() == frames);
       if (!observed(tracks[m], frame)) continue;
       if (observed(prediction.predicted[m], frame)) {
@@ -102,9 +100,9 @@ TrivialPrediction predict_last_velocity(const std::vector<double>& time_s,
                                         const std::vector<Eigen::MatrixXd>& tracks,
                                         int held_out_from) {
   TrivialPrediction prediction;
-  const auto time = [&](Eigen::Index frame) { return time_s[static_cast<std::size_t>(frame)]; };
+  const auto time = [&](Eigen::Index frame) { return time_s[static_cast<size_t>(frame)]; };
   for (const Eigen::MatrixXd& track : tracks) {
-    assert(time_s.size() == static_cast<std::size_t>(track.cols()));
+    assert(time_s.size() == static_cast<size_t>(track.cols()));
     Eigen::MatrixXd predicted = Eigen::MatrixXd::Constant(track.rows(), track.cols(), kNotDefined);
     const Eigen::Index fitted = fitted_frames(track, held_out_from);
     const Eigen::Index from = std::max<Eigen::Index>(0, fitted - 1 - kVelocityIntervals);
@@ -113,9 +111,8 @@ TrivialPrediction predict_last_velocity(const std::vector<double>& time_s,
     if (first && *first < *last) {
       const Eigen::VectorXd velocity =
           (track.col(*last) - track.col(*first)) / (time(*last) - time(*first));
-      for (Eigen::Index frame = fitted; frame < track.cols(); ++frame) {
+      for (Eigen::Index frame = fitted; frame < track.cols(); ++frame)
         predicted.col(frame) = track.col(*last) + (time(frame) - time(*last)) * velocity;
-      }
     }
     prediction.predicted.push_back(std::move(predicted));
   }

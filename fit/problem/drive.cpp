@@ -58,11 +58,10 @@ void hold_edge(const HeldPoint& edge, const Mesh& mesh, std::vector<HeldVertexWe
   const int count = along_s ? mesh.columns : mesh.rows;
   for (int n = 0; n < count; ++n) {
     int i = n, j = n;
-    if (along_s) {
+    if (along_s)
       i = edge.edge == ClothEdge::top ? 0 : mesh.rows - 1;
-    } else {
+    else
       j = edge.edge == ClothEdge::left ? 0 : mesh.columns - 1;
-    }
     held.push_back({.weights = {{mesh.vertex(i, j), 1.0}}, .motion = {}});
   }
 }

@@ -26,9 +26,8 @@ std::string number(double value) {
 Individual random_individual(const std::vector<SearchParameter>& parameters, Draws& draws) {
   Individual individual;
   individual.values.resize(static_cast<Eigen::Index>(parameters.size()));
-  for (std::size_t p = 0; p < parameters.size(); ++p) {
+  for (size_t p = 0; p < parameters.size(); ++p)
     individual.values(static_cast<Eigen::Index>(p)) = parameters[p].value_at(draws.uniform());
-  }
   return individual;
 }
 
@@ -38,7 +37,7 @@ Individual given_individual(const std::vector<SearchParameter>& parameters,
   Individual individual;
   individual.values = values;
   individual.origin = Origin::given;
-  for (std::size_t p = 0; p < parameters.size(); ++p) {
+  for (size_t p = 0; p < parameters.size(); ++p) {
     double& value = individual.values(static_cast<Eigen::Index>(p));
     value = std::clamp(value, parameters[p].lower, parameters[p].upper);
   }
@@ -50,10 +49,10 @@ Individual mutated_individual(const std::vector<SearchParameter>& parameters,
                               const std::vector<Individual>& ranked, Draws& draws) {
   const int rank = draws.index(options.mutation_parent_count());
   const int chosen = draws.index(static_cast<int>(parameters.size()));
-  const SearchParameter& parameter = parameters[static_cast<std::size_t>(chosen)];
+  const SearchParameter& parameter = parameters[static_cast<size_t>(chosen)];
 
   Individual individual;
-  individual.values = ranked[static_cast<std::size_t>(rank)].values;
+  individual.values = ranked[static_cast<size_t>(rank)].values;
   individual.origin = Origin::mutated;
   individual.parent_ranks = {rank};
   double& value = individual.values(chosen);
@@ -73,30 +72,27 @@ Individual crossed_individual(int parameter_count, const EvolutionOptions& optio
                               const std::vector<Individual>& ranked, Draws& draws) {
   Individual individual;
   individual.origin = Origin::crossed;
-  for (int k = 0; k < parameter_count; ++k) {
+  for (int k = 0; k < parameter_count; ++k)
     individual.parent_ranks.push_back(draws.index(options.kept_count()));
-  }
   individual.values.resize(parameter_count);
   for (int p = 0; p < parameter_count; ++p) {
-    const int parent =
-        individual.parent_ranks[static_cast<std::size_t>(draws.index(parameter_count))];
-    individual.values(p) = ranked[static_cast<std::size_t>(parent)].values(p);
+    const int parent = individual.parent_ranks[static_cast<size_t>(draws.index(parameter_count))];
+    individual.values(p) = ranked[static_cast<size_t>(parent)].values(p);
   }
   return individual;
 }
 
 /// Computes the costs of the individuals from `first_new` on, ranks all and notes the best.
-void evaluate_and_rank(const GenerationCost& cost, std::size_t first_new, EvolutionState& state) {
-  const std::size_t count = state.population.size() - first_new;
+void evaluate_and_rank(const GenerationCost& cost, size_t first_new, EvolutionState& state) {
+  const size_t count = state.population.size() - first_new;
   if (count > 0) {
     Eigen::MatrixXd individuals(state.population.front().values.size(),
                                 static_cast<Eigen::Index>(count));
-    for (std::size_t k = 0; k < count; ++k) {
+    for (size_t k = 0; k < count; ++k)
       individuals.col(static_cast<Eigen::Index>(k)) = state.population[first_new + k].values;
-    }
     const Eigen::VectorXd costs = cost(individuals);
     assert(costs.size() == individuals.cols());
-    for (std::size_t k = 0; k < count; ++k) {
+    for (size_t k = 0; k < count; ++k) {
       const double value = costs(static_cast<Eigen::Index>(k));
       state.population[first_new + k].cost = std::isfinite(value) ? value : kInfinity;
     }
@@ -110,7 +106,7 @@ void evaluate_and_rank(const GenerationCost& cost, std::size_t first_new, Evolut
 /// Returns the share of itself by which the best cost fell over the last `window` generations.
 double relative_gain(const std::vector<double>& best_cost, int window) {
   const double now = best_cost.back();
-  const double before = best_cost[best_cost.size() - 1 - static_cast<std::size_t>(window)];
+  const double before = best_cost[best_cost.size() - 1 - static_cast<size_t>(window)];
   if (!(now < before)) return 0;
   if (!std::isfinite(before) || before == 0) return kInfinity;
   return (before - now) / std::abs(before);
@@ -120,9 +116,8 @@ std::optional<EvolutionStop> stop_reason(const EvolutionOptions& options,
                                          const EvolutionState& state) {
   if (state.best_cost.back() <= options.cost_below) return EvolutionStop::cost_below;
   if (options.least_gain > 0 && state.generations() > options.gain_window &&
-      relative_gain(state.best_cost, options.gain_window) < options.least_gain) {
+      relative_gain(state.best_cost, options.gain_window) < options.least_gain)
     return EvolutionStop::no_gain;
-  }
   if (state.generations() >= options.generations) return EvolutionStop::reached_generations;
   return std::nullopt;
 }
@@ -172,34 +167,26 @@ void EvolutionOptions::validate() const {
   const auto say = [](const char* name, double value) {
     return std::string(name) + " = " + number(value);
   };
-  if (population < 2) {
+  if (population < 2)
     throw InputError("population", "population = " + std::to_string(population),
                      "at least 2 individuals", "the founding paper has 100");
-  }
-  if (generations < 1) {
+  if (generations < 1)
     throw InputError("generations", "generations = " + std::to_string(generations), "at least 1");
-  }
   for (const auto& [name, share] :
-       {std::pair{"kept", kept}, {"mutated", mutated}, {"mutation_parents", mutation_parents}}) {
-    if (!(share >= 0 && share <= 1)) {
+       {std::pair{"kept", kept}, {"mutated", mutated}, {"mutation_parents", mutation_parents}})
+    if (!(share >= 0 && share <= 1))
       throw InputError(name, say(name, share), "a share of the population, 0 to 1");
-    }
-  }
-  if (kept + mutated > 1 + 1e-12 || kept_count() >= population) {
+  if (kept + mutated > 1 + 1e-12 || kept_count() >= population)
     throw InputError("kept", say("kept", kept) + " and " + say("mutated", mutated),
                      "together at most 1, and someone new in each generation");
-  }
-  if (!(mutation_step > 0) || !std::isfinite(mutation_step)) {
+  if (!(mutation_step > 0) || !std::isfinite(mutation_step))
     throw InputError("mutation_step", say("mutation_step", mutation_step),
                      "a share of the range, > 0");
-  }
-  if (gain_window < 1) {
+  if (gain_window < 1)
     throw InputError("gain_window", "gain_window = " + std::to_string(gain_window),
                      "at least 1 generation");
-  }
-  if (!(least_gain >= 0)) {
+  if (!(least_gain >= 0))
     throw InputError("least_gain", say("least_gain", least_gain), "a share of the cost, >= 0");
-  }
   if (std::isnan(cost_below)) throw InputError("cost_below", "not a number", "a cost");
 }
 
@@ -215,9 +202,8 @@ EvolutionState first_generation(const std::vector<SearchParameter>& parameters,
   assert(static_cast<int>(given.size()) <= options.population);
 
   EvolutionState state;
-  for (const Eigen::VectorXd& values : given) {
+  for (const Eigen::VectorXd& values : given)
     state.population.push_back(given_individual(parameters, values));
-  }
   for (int place = static_cast<int>(given.size()); place < options.population; ++place) {
     Draws draws(options.seed, 0, place);
     state.population.push_back(random_individual(parameters, draws));
@@ -229,10 +215,10 @@ EvolutionState first_generation(const std::vector<SearchParameter>& parameters,
 double diversity(const std::vector<SearchParameter>& parameters, const EvolutionState& state) {
   const auto individuals = static_cast<Eigen::Index>(state.population.size());
   double sum = 0;
-  for (std::size_t p = 0; p < parameters.size(); ++p) {
+  for (size_t p = 0; p < parameters.size(); ++p) {
     Eigen::ArrayXd shares(individuals);
     for (Eigen::Index n = 0; n < individuals; ++n) {
-      const Individual& individual = state.population[static_cast<std::size_t>(n)];
+      const Individual& individual = state.population[static_cast<size_t>(n)];
       shares[n] = parameters[p].fraction(individual.values(static_cast<Eigen::Index>(p)));
     }
     sum += std::sqrt((shares - shares.mean()).square().mean());
@@ -250,7 +236,7 @@ EvolutionState next_generation(const std::vector<SearchParameter>& parameters,
   next.best_cost = state.best_cost;
   next.evaluations = state.evaluations;
   for (int rank = 0; rank < options.kept_count(); ++rank) {
-    Individual individual = ranked[static_cast<std::size_t>(rank)];
+    Individual individual = ranked[static_cast<size_t>(rank)];
     individual.origin = Origin::kept;
     individual.parent_ranks = {rank};
     next.population.push_back(std::move(individual));
@@ -263,7 +249,7 @@ EvolutionState next_generation(const std::vector<SearchParameter>& parameters,
             ? mutated_individual(parameters, options, ranked, draws)
             : crossed_individual(static_cast<int>(parameters.size()), options, ranked, draws));
   }
-  evaluate_and_rank(cost, static_cast<std::size_t>(options.kept_count()), next);
+  evaluate_and_rank(cost, static_cast<size_t>(options.kept_count()), next);
   return next;
 }
 

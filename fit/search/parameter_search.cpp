@@ -82,11 +82,10 @@ class Distinct {
                  .cwiseAbs()
                  .maxCoeff() <= kDifferentOptima;
     });
-    if (near != optima_.end()) {
+    if (near != optima_.end())
       ++near->runs;
-    } else {
+    else
       optima_.push_back({.values = values, .cost = cost});
-    }
   }
 
  private:

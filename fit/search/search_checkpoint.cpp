@@ -26,7 +26,7 @@ constexpr std::string_view kFormat = "clothfit-search/";
 constexpr std::string_view kVersionLine = "clothfit-search/1";
 constexpr const char* kDamageRemedy = "take an older copy, or remove it and start from scratch";
 
-template <class Enum, std::size_t count>
+template <class Enum, size_t count>
 using Words = std::array<std::pair<std::string_view, Enum>, count>;
 
 constexpr Words<Origin, 5> kOrigins = {{{"random", Origin::random},
@@ -42,7 +42,7 @@ constexpr Words<CmaEnd, 5> kEnds = {{{"costs_equal", CmaEnd::costs_equal},
 constexpr Words<MutationLaw, 2> kMutationLaws = {
     {{"redraw", MutationLaw::redraw}, {"gaussian", MutationLaw::gaussian}}};
 
-template <class Enum, std::size_t count>
+template <class Enum, size_t count>
 std::string_view word_of(Enum value, const Words<Enum, count>& words) {
   const auto found = std::ranges::find(words, value, &std::pair<std::string_view, Enum>::second);
   assert(found != words.end());
@@ -94,31 +94,28 @@ class LineReader {
  public:
   explicit LineReader(const std::filesystem::path& file)
       : file_(file.string()), text_(read_text(file)), rest_(text_) {
-    if (!rest_.starts_with(kFormat)) {
+    if (!rest_.starts_with(kFormat))
       throw InputError(file_, 1, "is no checkpoint of a search",
                        fmt::format("`{}` in the first line", kVersionLine), "name another file");
-    }
     const std::string_view version = rest_.substr(0, rest_.find_first_of(" \n"));
-    if (version != kVersionLine) {
+    if (version != kVersionLine)
       throw InputError(file_, 1,
                        fmt::format("is a checkpoint of version `{}`", shown_text(version)),
                        fmt::format("`{}`", kVersionLine), "remove it and start from scratch");
-    }
   }
 
   /// Returns the whole next line, without its checksum.
   std::string_view line() {
     ++number_;
-    const std::size_t end = rest_.find('\n');
+    const size_t end = rest_.find('\n');
     if (end == std::string_view::npos) refuse("the file ends too early", "a line `end`");
     std::string_view line = rest_.substr(0, end);
-    const std::size_t sum_size = line_end(0).size();
+    const size_t sum_size = line_end(0).size();
     const std::string_view sum = line.substr(line.size() - std::min(line.size(), sum_size));
     line.remove_suffix(sum.size());
     sum_ = line_sum(line, sum_);
-    if (sum != line_end(sum_)) {
+    if (sum != line_end(sum_))
       refuse("does not match its checksum", "the line that the search wrote");
-    }
     rest_.remove_prefix(end + 1);
     words_ = line;
     return line;
@@ -135,9 +132,8 @@ class LineReader {
     const std::string_view text = word();
     Number value{};
     const auto [stopped_at, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    if (error != std::errc() || stopped_at != text.data() + text.size()) {
+    if (error != std::errc() || stopped_at != text.data() + text.size())
       refuse_content(std::is_integral_v<Number> ? "a whole number" : "a number");
-    }
     return value;
   }
 
@@ -154,7 +150,7 @@ class LineReader {
     return values;
   }
 
-  template <class Enum, std::size_t count>
+  template <class Enum, size_t count>
   Enum choice(const Words<Enum, count>& words) {
     const std::string_view text = word();
     for (const auto& [word, value] : words)
@@ -188,7 +184,7 @@ class LineReader {
   }
 
   std::string_view word() {
-    const std::size_t space = std::min(words_.find(' '), words_.size());
+    const size_t space = std::min(words_.find(' '), words_.size());
     const std::string_view word = words_.substr(0, space);
     words_.remove_prefix(std::min(space + 1, words_.size()));
     return word;
@@ -236,10 +232,9 @@ Lines header_lines(const std::string& problem, const std::vector<SearchParameter
                    const Options& options) {
   Lines lines = {std::string(kVersionLine), "problem " + problem};
   std::ranges::move(lines_of(options), std::back_inserter(lines));
-  for (const SearchParameter& parameter : parameters) {
+  for (const SearchParameter& parameter : parameters)
     lines.push_back(fmt::format("parameter {} {} {} {}", parameter.lower, parameter.upper,
                                 parameter.log_scale ? "logarithmic" : "linear", parameter.name));
-  }
   lines.push_back("state");
   return lines;
 }
@@ -259,10 +254,9 @@ void write_state(const EvolutionState& state, LineWriter& writer) {
   assert(!state.population.empty());
   writer.line("evaluations", state.evaluations);
   writer.line("best_cost", state.best_cost);
-  for (const Individual& individual : state.population) {
+  for (const Individual& individual : state.population)
     writer.line("individual", word_of(individual.origin, kOrigins), individual.cost,
                 individual.values, individual.parent_ranks);
-  }
 }
 
 EvolutionState read_state(Eigen::Index parameters, const EvolutionOptions& options,
@@ -313,9 +307,8 @@ void write_state(const CmaState& state, LineWriter& writer) {
   writer.line("mean", state.mean);
   writer.line("covariance_path", state.covariance_path);
   writer.line("step_path", state.step_path);
-  for (Eigen::Index row = 0; row < state.covariance.rows(); ++row) {
+  for (Eigen::Index row = 0; row < state.covariance.rows(); ++row)
     writer.line("covariance", Eigen::VectorXd(state.covariance.row(row)));
-  }
   writer.line("recent_best", state.recent_best);
   write_optimum(state.so_far, writer);
 }
@@ -339,11 +332,10 @@ CmaState read_state(Eigen::Index parameters, const CmaOptions&, LineReader& read
   };
   number("evaluations", state.evaluations);
   state.best_cost = series("best_cost");
-  std::size_t optima = 0;
+  size_t optima = 0;
   number("optima", optima);
-  for (std::size_t run = 0; run < optima; ++run) {
+  for (size_t run = 0; run < optima; ++run)
     state.optima.push_back(read_optimum(parameters, reader));
-  }
   number("population", state.population);
   reader.require(state.population >= 4, "4 individuals at least");
   number("generation", state.generation);
@@ -352,9 +344,8 @@ CmaState read_state(Eigen::Index parameters, const CmaOptions&, LineReader& read
   state.covariance_path = vector("covariance_path");
   state.step_path = vector("step_path");
   state.covariance.resize(parameters, parameters);
-  for (Eigen::Index row = 0; row < parameters; ++row) {
+  for (Eigen::Index row = 0; row < parameters; ++row)
     state.covariance.row(row) = vector("covariance").transpose();
-  }
   state.recent_best = series("recent_best");
   state.so_far = read_optimum(parameters, reader);
   return state;

@@ -20,20 +20,16 @@ double SearchParameter::value_at(double fraction) const {
 }
 
 void require_ranges(const std::vector<SearchParameter>& parameters) {
-  if (parameters.empty()) {
-    throw InputError("search", "no parameter to search", "at least one");
-  }
+  if (parameters.empty()) throw InputError("search", "no parameter to search", "at least one");
   for (const SearchParameter& parameter : parameters) {
     std::ostringstream range;
     range << "range [" << parameter.lower << ", " << parameter.upper << "]";
     if (!std::isfinite(parameter.lower) || !std::isfinite(parameter.upper) ||
-        !(parameter.lower < parameter.upper)) {
+        !(parameter.lower < parameter.upper))
       throw InputError(parameter.name, range.str(), "a finite lower end below a finite upper end");
-    }
-    if (parameter.log_scale && !(parameter.lower > 0)) {
+    if (parameter.log_scale && !(parameter.lower > 0))
       throw InputError(parameter.name, range.str(),
                        "a logarithmic scale needs a lower end above 0");
-    }
   }
 }
 

@@ -53,12 +53,11 @@ ClusterCovariance cluster_covariance(const LinearisedFit& fit, const Eigen::Vect
   result.covariance = Eigen::MatrixXd::Zero(coordinates, coordinates);
   result.degrees_of_freedom = Eigen::VectorXd::Ones(coordinates);
   std::vector<Eigen::Index> known;
-  for (Eigen::Index i = 0; i < coordinates; ++i) {
+  for (Eigen::Index i = 0; i < coordinates; ++i)
     if (all.total_information(i, i) > kLeastInformation)
       known.push_back(i);
     else
       result.covariance(i, i) = kInfinite;
-  }
   if (known.empty()) {
     result.reason = "no coordinate changes any residual";
     return result;

@@ -109,11 +109,10 @@ Eigen::Matrix<double, kFabricNumbers, kSpringNumbers> fabric_by_springs(
   const Shares shares = damping_shares();
   for (int type = 0; type < kSpringTypes; ++type) {
     DampingMatrix da = DampingMatrix::Zero();
-    if (type == shear_down || type == shear_up) {
+    if (type == shear_down || type == shear_up)
       da.middleRows<2>(shear_down) = 0.5 * shares.middleRows<2>(shear_down);
-    } else {
+    else
       da.row(type) = shares.row(type);
-    }
     result.block<2, 1>(5, stiffness_block + type) =
         inverse * (da.transpose() * left - a.transpose() * (da * times));
   }

@@ -89,11 +89,10 @@ std::optional<Divergence> find_divergence(const Cloth& cloth, const ParameterSet
   const Eigen::Matrix3Xd& before = result.position_m[bad - 1];
   Eigen::Index furthest = 0;
   const double away_m = distances_m(parameters.start_position_m, before).maxCoeff(&furthest);
-  if (away_m > kFlownAway * std::hypot(cloth.mesh.width_m, cloth.mesh.height_m)) {
+  if (away_m > kFlownAway * std::hypot(cloth.mesh.width_m, cloth.mesh.height_m))
     divergence.vertex = static_cast<int>(furthest);
-  } else {
+  else
     divergence.spring = most_stretched(cloth, parameters, before, false);
-  }
   return divergence;
 }
 

@@ -48,7 +48,7 @@ class AlignedArray : public Eigen::Map<Eigen::Array<Number, rows, Eigen::Dynamic
  private:
   /// Resizes and leaves zeros.
   void resize(Eigen::Index columns) {
-    numbers_ = AlignedNumbers<Number>(static_cast<std::size_t>(rows * columns + kPadding));
+    numbers_ = AlignedNumbers<Number>(static_cast<size_t>(rows * columns + kPadding));
     look_at(columns);
   }
   void swap(AlignedArray& other) noexcept {

@@ -16,10 +16,10 @@ struct CacheLineAllocator {
   CacheLineAllocator() = default;
   template <class Other>
   CacheLineAllocator(const CacheLineAllocator<Other>&) {}
-  Number* allocate(std::size_t count) {
+  Number* allocate(size_t count) {
     return static_cast<Number*>(::operator new(count * sizeof(Number), kLine));
   }
-  void deallocate(Number* numbers, std::size_t) { ::operator delete(numbers, kLine); }
+  void deallocate(Number* numbers, size_t) { ::operator delete(numbers, kLine); }
   bool operator==(const CacheLineAllocator&) const { return true; }
 };
 

@@ -39,9 +39,8 @@ Eigen::MatrixXd natural_second_derivatives(int n) {
 Surface::Weights axis_weights(int n, double length_m, const Eigen::VectorXd& x_m,
                               SurfaceInterpolation interpolation, int order) {
   Eigen::MatrixXd second_derivatives;
-  if (interpolation == SurfaceInterpolation::bicubic) {
+  if (interpolation == SurfaceInterpolation::bicubic)
     second_derivatives = natural_second_derivatives(n);
-  }
   std::vector<Eigen::Triplet<double>> kept;
   for (Eigen::Index point = 0; point < x_m.size(); ++point) {
     assert(x_m(point) >= -kOutsideAllowed_m && x_m(point) <= length_m + kOutsideAllowed_m);
@@ -63,9 +62,8 @@ Surface::Weights axis_weights(int n, double length_m, const Eigen::VectorXd& x_m
     weight *= std::pow((n - 1) / length_m, order);
 
     const double smallest = kSmallestRelativeWeight * weight.cwiseAbs().maxCoeff();
-    for (int j = 0; j < n; ++j) {
+    for (int j = 0; j < n; ++j)
       if (std::abs(weight(j)) > smallest) kept.emplace_back(static_cast<int>(point), j, weight(j));
-    }
   }
   Surface::Weights weights(x_m.size(), n);
   weights.setFromTriplets(kept.begin(), kept.end());
@@ -111,24 +109,22 @@ Surface make_surface(int columns, int rows, double width_m, double height_m,
 void interpolate(const Surface& surface, int width, std::span<const double> vertex_values,
                  std::span<double> point_values) {
   assert(width >= 1);
-  const auto stride = static_cast<std::size_t>(width);
-  assert(vertex_values.size() == stride * static_cast<std::size_t>(surface.vertices()));
-  assert(point_values.size() == stride * static_cast<std::size_t>(surface.points()));
-  const auto columns = static_cast<std::size_t>(surface.columns);
+  const auto stride = static_cast<size_t>(width);
+  assert(vertex_values.size() == stride * static_cast<size_t>(surface.vertices()));
+  assert(point_values.size() == stride * static_cast<size_t>(surface.points()));
+  const auto columns = static_cast<size_t>(surface.columns);
 
   std::fill(point_values.begin(), point_values.end(), 0.0);
   double* point_value = point_values.data();
   for (int point = 0; point < surface.points(); ++point, point_value += stride) {
     for (Surface::Weights::InnerIterator row(surface.row_weights, point); row; ++row) {
       const double* row_values =
-          vertex_values.data() + static_cast<std::size_t>(row.index()) * columns * stride;
+          vertex_values.data() + static_cast<size_t>(row.index()) * columns * stride;
       for (Surface::Weights::InnerIterator column(surface.column_weights, point); column;
            ++column) {
         const double weight = row.value() * column.value();
-        const double* value = row_values + static_cast<std::size_t>(column.index()) * stride;
-        for (std::size_t field = 0; field < stride; ++field) {
-          point_value[field] += weight * value[field];
-        }
+        const double* value = row_values + static_cast<size_t>(column.index()) * stride;
+        for (size_t field = 0; field < stride; ++field) point_value[field] += weight * value[field];
       }
     }
   }
@@ -137,8 +133,8 @@ void interpolate(const Surface& surface, int width, std::span<const double> vert
 Eigen::Matrix3Xd Surface::evaluate(const Eigen::Matrix3Xd& positions) const {
   assert(positions.cols() == vertices());
   Eigen::Matrix3Xd at_points(3, points());
-  interpolate(*this, 3, {positions.data(), static_cast<std::size_t>(positions.size())},
-              {at_points.data(), static_cast<std::size_t>(at_points.size())});
+  interpolate(*this, 3, {positions.data(), static_cast<size_t>(positions.size())},
+              {at_points.data(), static_cast<size_t>(at_points.size())});
   return at_points;
 }
 

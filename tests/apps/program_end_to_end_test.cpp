@@ -48,10 +48,9 @@ TEST(ProgramFit, WritesAWholeResultFolder) {
 
   ASSERT_EQ(run.exit_code, 0) << run.error;
   EXPECT_THAT(names_in(here.path()), ElementsAre("a.fit"));
-  for (const char* name : {"fit.json", "report.html", "parameters.csv", "errors.csv",
-                           "residuals.csv", "overlay.svg"}) {
+  for (const char* name :
+       {"fit.json", "report.html", "parameters.csv", "errors.csv", "residuals.csv", "overlay.svg"})
     EXPECT_TRUE(fs::exists(here.path() / "a.fit" / name)) << name;
-  }
   EXPECT_THAT(run.out, HasSubstr("Report: a.fit/report.html"));
   const FitResult result = read_fit_result(here.path() / "a.fit" / "fit.json");
   EXPECT_EQ(result.recording, "swing_plain");
@@ -82,14 +81,14 @@ TEST(ProgramSimulate, OfAFitGivesTheFitsOwnError) {
     mesh.back().col(row.marker) = row.position_m;
   }
   Eigen::Matrix2Xd places(2, static_cast<Eigen::Index>(measured.markers.markers.size()));
-  for (std::size_t m = 0; m < measured.markers.markers.size(); ++m)
+  for (size_t m = 0; m < measured.markers.markers.size(); ++m)
     places.col(static_cast<Eigen::Index>(m)) << measured.markers.markers[m].s_m,
         measured.markers.markers[m].t_m;
   const Surface surface = make_surface(9, 9, 0.4, 0.4, places);
   double fitted = 0, held_out = 0;
   int fitted_count = 0, held_out_count = 0;
   for (const Position3d& row : read_tracks3d(*measured.tracks3d, measured.markers)) {
-    const Eigen::Matrix3Xd at = surface.evaluate(mesh[static_cast<std::size_t>(row.frame)]);
+    const Eigen::Matrix3Xd at = surface.evaluate(mesh[static_cast<size_t>(row.frame)]);
     const bool is_held_out = row.frame >= *measured.held_out_from_frame;
     (is_held_out ? held_out : fitted) += (at.col(row.marker) - row.position_m).squaredNorm();
     ++(is_held_out ? held_out_count : fitted_count);
@@ -130,9 +129,8 @@ TEST(ProgramFit, GoesOnFromItsCheckpointAfterCtrlCToTheSameBytes) {
   saved.insert(saved.end(), {"--checkpoint", "search.txt"});
   const auto interrupt_after_a_generation = [&](int process) {
     const auto give_up = std::chrono::steady_clock::now() + std::chrono::seconds(60);
-    while (!fs::exists(here.path() / "search.txt") && std::chrono::steady_clock::now() < give_up) {
+    while (!fs::exists(here.path() / "search.txt") && std::chrono::steady_clock::now() < give_up)
       std::this_thread::yield();
-    }
     kill(process, SIGINT);
   };
 
@@ -231,7 +229,7 @@ TEST(ProgramFit, OfAClothInMotionCanBeSimulated) {
   const Tracks3d after = read_tracks3d(*again.tracks3d, again.markers);
   ASSERT_EQ(before.size(), after.size());
   double sum = 0;
-  for (std::size_t n = 0; n < before.size(); ++n)
+  for (size_t n = 0; n < before.size(); ++n)
     sum += (before[n].position_m - after[n].position_m).squaredNorm();
   const FitResult result = read_fit_result(here.path() / "a.fit" / "fit.json");
   EXPECT_EQ(result.start, "unknown");
@@ -251,9 +249,8 @@ TEST(ProgramFit, LeavesNothingWhenInterrupted) {
     // The hidden folder of the result appears when the work begins. From then on signals are
     // caught.
     const auto give_up = std::chrono::steady_clock::now() + std::chrono::seconds(30);
-    while (names_in(here.path()).empty() && std::chrono::steady_clock::now() < give_up) {
+    while (names_in(here.path()).empty() && std::chrono::steady_clock::now() < give_up)
       std::this_thread::yield();
-    }
     // Two at once are one wish: `timeout` tells a program and its group.
     kill(process, SIGINT);
     kill(process, SIGINT);

@@ -80,7 +80,7 @@ class Program : public ::testing::Test {
   void spoil_yaml(const std::string& from, const std::string& to) {
     std::ifstream in(recording_ / "recording.yaml");
     std::string text{std::istreambuf_iterator<char>(in), {}};
-    const std::size_t at = text.find(from);
+    const size_t at = text.find(from);
     ASSERT_NE(at, std::string::npos) << from;
     text.replace(at, from.size(), to);
     write_text(recording_ / "recording.yaml", text);

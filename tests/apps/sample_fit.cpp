@@ -47,7 +47,7 @@ FitReport::Residuals sample_residuals(const Recording& recording, int coordinate
     double sum = 0;
     int count = 0;
     for (int index = 0; index < kSide * kSide; ++index) {
-      const Marker& marker = recording.markers.markers[static_cast<std::size_t>(index)];
+      const Marker& marker = recording.markers.markers[static_cast<size_t>(index)];
       const double swing = 0.12 * std::sin(0.15 * frame) * marker.t_m / kSize_m;
       FitReport::Residuals::Row row;
       row.frame = frame;
@@ -142,9 +142,8 @@ SampleFit sample_fit(int coordinates) {
   report.correlation_names = {"tension_warp", "tension_weft", "shear"};
   report.correlation.resize(3, 3);
   report.correlation << 1, -0.42, 0.91, -0.42, 1, 0.07, 0.91, 0.07, 1;
-  for (int generation = 0; generation < 20; ++generation) {
+  for (int generation = 0; generation < 20; ++generation)
     report.search_cost.push_back(0.4 + 60 * std::exp(-0.35 * generation));
-  }
   report.stages = {"search: 20 generations of 100, windows of 10 frames, cost 0.46",
                    "refinement: 16 frames, 24 substeps, 31 evaluations, cost 0.21"};
   return sample;

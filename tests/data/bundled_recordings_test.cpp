@@ -18,11 +18,9 @@ namespace fs = std::filesystem;
 
 std::vector<fs::path> recordings_below(const fs::path& folder) {
   std::vector<fs::path> recordings;
-  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
-    if (entry.path().filename() == "recording.yaml") {
+  for (const auto& entry : fs::recursive_directory_iterator(folder))
+    if (entry.path().filename() == "recording.yaml")
       recordings.push_back(entry.path().parent_path());
-    }
-  }
   std::sort(recordings.begin(), recordings.end());
   return recordings;
 }
@@ -44,19 +42,16 @@ void read_all(const fs::path& folder) {
     last_frame = std::max(last_frame, tracks.back().frame);
   }
   EXPECT_GT(last_frame == 0 ? 1 : recording.frame_time_s(last_frame), 0);
-  for (const CameraEntry& camera : recording.cameras) {
+  for (const CameraEntry& camera : recording.cameras)
     if (camera.file) {
       EXPECT_EQ(read_camera(*camera.file).name, camera.name);
     }
-  }
-  for (const RigidBody& body : recording.bodies) {
+  for (const RigidBody& body : recording.bodies)
     EXPECT_GT(read_body_path(body.file).time_s.size(), 1u);
-  }
-  for (const HeldPoint& held : recording.held) {
+  for (const HeldPoint& held : recording.held)
     if (held.file) {
       EXPECT_FALSE(read_held_path(*held.file).time_s.empty());
     }
-  }
 }
 
 TEST(BundledRecordings, AllRead) {
@@ -82,7 +77,7 @@ TEST(BundledRecordings, AreCompleteAndReadAlikePlainAndCompressed) {
   EXPECT_EQ(recording.markers.markers.size(), 17u * 17u);
   EXPECT_EQ(packed.back().frame, 71);
   ASSERT_EQ(packed.size(), unpacked.size());
-  for (std::size_t i = 0; i < packed.size(); ++i) {
+  for (size_t i = 0; i < packed.size(); ++i) {
     ASSERT_EQ(packed[i].frame, unpacked[i].frame);
     ASSERT_EQ(packed[i].marker, unpacked[i].marker);
     ASSERT_EQ(packed[i].position_m, unpacked[i].position_m);

@@ -21,7 +21,7 @@ const std::string kCamera =
     "readout_time: 0.01\n";                                                    // 9
 
 std::string with_replaced(std::string text, const std::string& from, const std::string& to) {
-  const std::size_t at = text.find(from);
+  const size_t at = text.find(from);
   EXPECT_NE(at, std::string::npos) << from;
   return text.replace(at, from.size(), to);
 }
@@ -69,15 +69,14 @@ TEST(CameraFile, ReadsBackToTheLastBit) {
   std::mt19937_64 rng(1);
   std::normal_distribution<double> normal;
   const auto draw = [&] { return normal(rng); };
-  const std::vector<std::pair<CameraModel, std::size_t>> models = {
-      {CameraModel::pinhole, 0},
-      {CameraModel::brown_conrady, 4},
-      {CameraModel::brown_conrady, 5},
-      {CameraModel::brown_conrady, 8},
-      {CameraModel::kannala_brandt, 4}};
+  const std::vector<std::pair<CameraModel, size_t>> models = {{CameraModel::pinhole, 0},
+                                                              {CameraModel::brown_conrady, 4},
+                                                              {CameraModel::brown_conrady, 5},
+                                                              {CameraModel::brown_conrady, 8},
+                                                              {CameraModel::kannala_brandt, 4}};
   for (int round = 0; round < 100; ++round) {
     SCOPED_TRACE(round);
-    const auto& [model, distortion_count] = models[static_cast<std::size_t>(round) % models.size()];
+    const auto& [model, distortion_count] = models[static_cast<size_t>(round) % models.size()];
     CameraParameters camera;
     camera.name = "left: #2";
     camera.model = model;
@@ -85,9 +84,8 @@ TEST(CameraFile, ReadsBackToTheLastBit) {
     camera.image_height = 720;
     camera.focal_px = {1000 * std::exp(draw()), 1000 * std::exp(draw())};
     camera.centre_px = {draw(), 1e6 * draw()};
-    for (std::size_t i = 0; i < distortion_count; ++i) {
+    for (size_t i = 0; i < distortion_count; ++i)
       camera.distortion.push_back(draw() * std::exp(20 * draw()));
-    }
     camera.readout_time_s = std::abs(draw());
     if (round % 3 > 0) {
       CameraPose pose;

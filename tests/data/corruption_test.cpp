@@ -28,7 +28,7 @@ int refusals(const std::string& text, int rounds, const Read& read) {
     std::string damaged = text;
     const int changes = round % 4 == 3 ? 5 : 1;
     for (int change = 0; change < changes; ++change) {
-      const std::size_t at = rng() % damaged.size();
+      const size_t at = rng() % damaged.size();
       switch (rng() % 4) {
         case 0:  // any byte
           damaged[at] = static_cast<char>(rng() % 256);
@@ -144,7 +144,7 @@ TEST(DamagedFitJson, IsReadOrRefused) {
 
 TEST(HostileYaml, IsRefusedWithoutExhaustingTheStack) {
   const TemporaryFolder folder;
-  const std::size_t depth = 50000;
+  const size_t depth = 50000;
   const std::vector<std::string> texts = {std::string(depth, '['), std::string(depth, '{'),
                                           "a: " + std::string(depth, '['), "&a [*a]",
                                           "a: &a {b: *a}"};

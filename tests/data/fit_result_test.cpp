@@ -60,7 +60,7 @@ void expect_same(const CloudErrors::Summary& a, const CloudErrors::Summary& b) {
 
 void expect_same(const std::vector<ParameterEstimate>& a, const std::vector<ParameterEstimate>& b) {
   ASSERT_EQ(a.size(), b.size());
-  for (std::size_t i = 0; i < a.size(); ++i) {
+  for (size_t i = 0; i < a.size(); ++i) {
     EXPECT_EQ(a[i].name, b[i].name);
     EXPECT_EQ(a[i].unit, b[i].unit);
     EXPECT_EQ(a[i].value, b[i].value);
@@ -95,13 +95,13 @@ void expect_same(const FitResult& a, const FitResult& b) {
   EXPECT_EQ(a.start, b.start);
   expect_same(a.parameters, b.parameters);
   ASSERT_EQ(a.effects.size(), b.effects.size());
-  for (std::size_t i = 0; i < a.effects.size(); ++i) {
+  for (size_t i = 0; i < a.effects.size(); ++i) {
     EXPECT_EQ(a.effects[i].name, b.effects[i].name);
     expect_same(a.effects[i].parameters, b.effects[i].parameters);
   }
   expect_same(a.nuisance, b.nuisance);
   ASSERT_EQ(a.errors.size(), b.errors.size());
-  for (std::size_t i = 0; i < a.errors.size(); ++i) {
+  for (size_t i = 0; i < a.errors.size(); ++i) {
     EXPECT_EQ(a.errors[i].kind, b.errors[i].kind);
     EXPECT_EQ(a.errors[i].unit, b.errors[i].unit);
     expect_same(a.errors[i].fitted, b.errors[i].fitted);
@@ -119,17 +119,17 @@ void expect_same(const FitResult& a, const FitResult& b) {
   }
   EXPECT_EQ(a.marker_offset_sigma_m, b.marker_offset_sigma_m);
   ASSERT_EQ(a.marker_offsets.size(), b.marker_offsets.size());
-  for (std::size_t i = 0; i < a.marker_offsets.size(); ++i) {
+  for (size_t i = 0; i < a.marker_offsets.size(); ++i) {
     EXPECT_EQ(a.marker_offsets[i].marker, b.marker_offsets[i].marker);
     EXPECT_EQ(a.marker_offsets[i].offset_m, b.marker_offsets[i].offset_m);
   }
   ASSERT_EQ(a.basins.size(), b.basins.size());
-  for (std::size_t i = 0; i < a.basins.size(); ++i) {
+  for (size_t i = 0; i < a.basins.size(); ++i) {
     EXPECT_EQ(a.basins[i].cost, b.basins[i].cost);
     EXPECT_EQ(a.basins[i].ended, b.basins[i].ended);
     EXPECT_EQ(a.basins[i].refined, b.basins[i].refined);
     ASSERT_EQ(a.basins[i].parameters.size(), b.basins[i].parameters.size());
-    for (std::size_t p = 0; p < a.basins[i].parameters.size(); ++p) {
+    for (size_t p = 0; p < a.basins[i].parameters.size(); ++p) {
       EXPECT_EQ(a.basins[i].parameters[p].name, b.basins[i].parameters[p].name);
       EXPECT_EQ(a.basins[i].parameters[p].value, b.basins[i].parameters[p].value);
     }

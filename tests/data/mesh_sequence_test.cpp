@@ -44,7 +44,7 @@ std::string bytes_of(const std::filesystem::path& file) {
 
 /// Reads a number in a file's bytes, which are little-endian as this machine is.
 template <class Number>
-Number at(const std::string& bytes, std::size_t offset) {
+Number at(const std::string& bytes, size_t offset) {
   Number value;
   EXPECT_LE(offset + sizeof value, bytes.size());
   std::memcpy(&value, bytes.data() + offset, sizeof value);
@@ -122,8 +122,8 @@ TEST(Pc2, HoldsItsHeaderAndEveryPosition) {
   EXPECT_EQ(at<float>(bytes, 20), 0.0f);      // first frame
   EXPECT_EQ(at<float>(bytes, 24), 1.0f);      // frames per sample
   EXPECT_EQ(at<std::int32_t>(bytes, 28), 5);  // samples
-  for (std::size_t f = 0; f < 5; ++f)
-    for (std::size_t n = 0; n < 18; ++n)
+  for (size_t f = 0; f < 5; ++f)
+    for (size_t n = 0; n < 18; ++n)
       EXPECT_EQ(at<float>(bytes, 32 + 4 * (18 * f + n)),
                 static_cast<float>(mesh.position_m[f].reshaped()[static_cast<Eigen::Index>(n)]));
 }
@@ -136,7 +136,7 @@ class Glb {
     EXPECT_EQ(at<std::uint32_t>(bytes, 0), 0x46546C67u);
     EXPECT_EQ(at<std::uint32_t>(bytes, 4), 2u);
     EXPECT_EQ(at<std::uint32_t>(bytes, 8), bytes.size());
-    const std::size_t json_length = at<std::uint32_t>(bytes, 12);
+    const size_t json_length = at<std::uint32_t>(bytes, 12);
     EXPECT_EQ(json_length % 4, 0u);
     EXPECT_EQ(at<std::uint32_t>(bytes, 16), 0x4E4F534Au);
     json = Json::parse(bytes.substr(20, json_length));
@@ -149,25 +149,25 @@ class Glb {
 
   /// Returns components x elements. Bounds that are stated must be those of the data.
   Eigen::MatrixXd values(int accessor) const {
-    const Json& a = json["accessors"].at(static_cast<std::size_t>(accessor));
-    const Json& view = json["bufferViews"].at(a["bufferView"].get<std::size_t>());
+    const Json& a = json["accessors"].at(static_cast<size_t>(accessor));
+    const Json& view = json["bufferViews"].at(a["bufferView"].get<size_t>());
     const std::map<std::string, int> widths = {{"SCALAR", 1}, {"VEC2", 2}, {"VEC3", 3}};
     const int width = widths.at(a["type"]);
     const int count = a["count"];
-    const auto offset = view["byteOffset"].get<std::size_t>();
+    const auto offset = view["byteOffset"].get<size_t>();
     EXPECT_EQ(offset % 4, 0u);
     EXPECT_EQ(view["byteLength"], 4 * width * count);
-    EXPECT_LE(offset + view["byteLength"].get<std::size_t>(), binary_.size());
+    EXPECT_LE(offset + view["byteLength"].get<size_t>(), binary_.size());
     Eigen::MatrixXd result(width, count);
     for (Eigen::Index n = 0; n < result.size(); ++n) {
-      const std::size_t place = offset + 4 * static_cast<std::size_t>(n);
+      const size_t place = offset + 4 * static_cast<size_t>(n);
       result.reshaped()[n] = a["componentType"] == 5126
                                  ? static_cast<double>(at<float>(binary_, place))
                                  : static_cast<double>(at<std::uint32_t>(binary_, place));
     }
     for (Eigen::Index c = 0; a.contains("min") && c < width; ++c) {
-      EXPECT_EQ(a["min"][static_cast<std::size_t>(c)].get<double>(), result.row(c).minCoeff());
-      EXPECT_EQ(a["max"][static_cast<std::size_t>(c)].get<double>(), result.row(c).maxCoeff());
+      EXPECT_EQ(a["min"][static_cast<size_t>(c)].get<double>(), result.row(c).minCoeff());
+      EXPECT_EQ(a["max"][static_cast<size_t>(c)].get<double>(), result.row(c).maxCoeff());
     }
     return result;
   }
@@ -178,7 +178,7 @@ class Glb {
     const Json& animation = json["animations"][0];
     for (const Json& channel : animation["channels"]) {
       if (channel["target"]["node"] != node || channel["target"]["path"] != path) continue;
-      const Json& sampler = animation["samplers"].at(channel["sampler"].get<std::size_t>());
+      const Json& sampler = animation["samplers"].at(channel["sampler"].get<size_t>());
       const Eigen::MatrixXd times = values(sampler["input"]);
       Eigen::MatrixXd keys = values(sampler["output"]);
       EXPECT_EQ(keys.size() % times.size(), 0);
@@ -203,16 +203,14 @@ class Glb {
       const auto scale = animated(node, "scale", time_s);
       if (scale && scale->norm() == 0) continue;
       ++count;
-      const Json& primitive = json["meshes"].at(json["nodes"]
-                                                    .at(static_cast<std::size_t>(node))["mesh"]
-                                                    .get<std::size_t>())["primitives"][0];
+      const Json& primitive = json["meshes"].at(
+          json["nodes"].at(static_cast<size_t>(node))["mesh"].get<size_t>())["primitives"][0];
       visible = values(primitive["attributes"]["POSITION"]);
       const auto weights = animated(node, "weights", time_s);
       EXPECT_EQ(weights->size(), static_cast<Eigen::Index>(primitive["targets"].size()));
       EXPECT_LE((weights->array() != 0).count(), 2);
       for (Eigen::Index t = 0; t < weights->size(); ++t)
-        visible +=
-            (*weights)[t] * values(primitive["targets"][static_cast<std::size_t>(t)]["POSITION"]);
+        visible += (*weights)[t] * values(primitive["targets"][static_cast<size_t>(t)]["POSITION"]);
     }
     EXPECT_EQ(count, 1) << "meshes shown at " << time_s;
     const auto q = root["rotation"].get<std::vector<double>>();
@@ -238,7 +236,7 @@ TEST(Glb, ShowsEveryFrameAtItsTimeAndBlendsBetweenThem) {
     const Glb glb(folder / "a.glb");
     const Eigen::Matrix3d y_up{{1, 0, 0}, {0, 0, 1}, {0, -1, 0}};
     for (int f = 0; f<frames; f += frames> 20 ? 7 : 1) {
-      const auto frame = static_cast<std::size_t>(f);
+      const auto frame = static_cast<size_t>(f);
       const double time_s = static_cast<float>(mesh.time_s[frame] - 2);
       // Numbers below 1 round in single precision once each for base, displacement and weights.
       EXPECT_LT((glb.shown(time_s) - y_up * mesh.position_m[frame]).cwiseAbs().maxCoeff(), 3e-7);
@@ -257,11 +255,11 @@ TEST(Glb, NamesOnlyWhatIsThere) {
   write_glb(mesh, folder / "a.glb");
   const Glb glb(folder / "a.glb");
 
-  for (std::size_t a = 0; a < glb.json["accessors"].size(); ++a) glb.values(static_cast<int>(a));
+  for (size_t a = 0; a < glb.json["accessors"].size(); ++a) glb.values(static_cast<int>(a));
   ASSERT_EQ(glb.json["meshes"].size(), 3u);
   for (const Json& gltf_mesh : glb.json["meshes"]) {
     const Json& primitive = gltf_mesh["primitives"][0];
-    EXPECT_LE(primitive["targets"].size(), static_cast<std::size_t>(kMostMorphTargets));
+    EXPECT_LE(primitive["targets"].size(), static_cast<size_t>(kMostMorphTargets));
     EXPECT_EQ(gltf_mesh["weights"].size(), primitive["targets"].size());
     const Eigen::MatrixXd indices = glb.values(primitive["indices"]);
     EXPECT_EQ(indices.size(), 3 * 4);

@@ -57,7 +57,7 @@ class ModelFile : public testing::Test {
   /// Replaces the first `from` in the model.
   static std::string with(const std::string& from, const std::string& to) {
     std::string text = kModel;
-    const std::size_t at = text.find(from);
+    const size_t at = text.find(from);
     EXPECT_NE(at, std::string::npos) << from;
     return text.replace(at, from.size(), to);
   }
@@ -119,7 +119,7 @@ TEST_F(ModelFile, NeedsLittle) {
 TEST_F(ModelFile, OfTheDocumentsIsOne) {
   std::ifstream in(std::string(CLOTHFIT_SOURCE_DIR) + "/docs/formats.md");
   const std::string page{std::istreambuf_iterator<char>(in), {}};
-  const std::size_t begin = page.find("format: clothfit-model/1");
+  const size_t begin = page.find("format: clothfit-model/1");
   ASSERT_NE(begin, std::string::npos);
 
   const ModelDescription model = read(page.substr(begin, page.find("```", begin) - begin));
@@ -165,7 +165,7 @@ TEST_F(ModelFile, ReadsBackAsWrittenToTheLastBit) {
 /// Returns the model with springs instead of its fabric.
 std::string with_springs(const std::string& damping = "[0, 0, 0, 0, 0, 0.001]") {
   std::string text = kModel;
-  const std::size_t begin = text.find("fabric:"), end = text.find("gravity:");
+  const size_t begin = text.find("fabric:"), end = text.find("gravity:");
   return text.replace(begin, end - begin,
                       "springs:\n"
                       "  natural_length: [0.05, 0.05, 0.07, 0.07, 0.1, 0.1]\n"
@@ -198,7 +198,7 @@ TEST_F(ModelFile, RefusesSpringsThatCannotBe) {
   const auto expect = [&](const std::string& from, const std::string& to,
                           const std::string& beginning) {
     std::string text = with_springs();
-    const std::size_t at = text.find(from);
+    const size_t at = text.find(from);
     ASSERT_NE(at, std::string::npos) << from;
     text.replace(at, from.size(), to);
     expect_refused(folder_, beginning, [&] { read(text); });
@@ -218,7 +218,7 @@ TEST_F(ModelFile, RefusesSpringsThatCannotBe) {
 std::string in_motion(const std::string& start = "{kind: in_motion, file: start.csv}") {
   std::string text = kModel;
   text.replace(text.find("{columns: 9, rows: 7}"), 21, "{columns: 2, rows: 2}");
-  const std::size_t begin = text.find("{kind: at_rest"), end = text.find("\n", begin);
+  const size_t begin = text.find("{kind: at_rest"), end = text.find("\n", begin);
   return text.replace(begin, end - begin, start);
 }
 
@@ -356,7 +356,7 @@ TEST_F(ModelFile, IsRefusedWhereItsObstacleIsNoSurface) {
 TEST_F(ModelFile, IsRefusedWithoutAnyStiffness) {
   std::string text = kModel;
   for (const char* number : {"41.5", " 40", " 15", " 8", " 7"}) {
-    const std::size_t at = text.find(number, text.find("tension_warp"));
+    const size_t at = text.find(number, text.find("tension_warp"));
     text.replace(at, std::string(number).size(), " 0");
   }
 

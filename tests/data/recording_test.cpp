@@ -11,7 +11,7 @@ namespace clothfit {
 namespace {
 
 std::string replaced(std::string text, const std::string& from, const std::string& to) {
-  const std::size_t at = text.find(from);
+  const size_t at = text.find(from);
   EXPECT_NE(at, std::string::npos) << from;
   return text.replace(at, from.size(), to);
 }
@@ -42,7 +42,7 @@ void expect_same(const Recording& a, const Recording& b) {
   EXPECT_EQ(a.times_s, b.times_s);
   EXPECT_EQ(a.gravity_m_per_s2, b.gravity_m_per_s2);
   ASSERT_EQ(a.cameras.size(), b.cameras.size());
-  for (std::size_t i = 0; i < a.cameras.size(); ++i) {
+  for (size_t i = 0; i < a.cameras.size(); ++i) {
     EXPECT_EQ(a.cameras[i].name, b.cameras[i].name);
     EXPECT_EQ(a.cameras[i].file, b.cameras[i].file);
     EXPECT_EQ(a.cameras[i].images, b.cameras[i].images);
@@ -58,7 +58,7 @@ void expect_same(const Recording& a, const Recording& b) {
   EXPECT_EQ(a.reference_file, b.reference_file);
   EXPECT_EQ(a.reference.size(), b.reference.size());
   ASSERT_EQ(a.bodies.size(), b.bodies.size());
-  for (std::size_t i = 0; i < a.bodies.size(); ++i) {
+  for (size_t i = 0; i < a.bodies.size(); ++i) {
     EXPECT_EQ(a.bodies[i].name, b.bodies[i].name);
     EXPECT_EQ(a.bodies[i].file, b.bodies[i].file);
     EXPECT_EQ(a.bodies[i].clock_offset_s, b.bodies[i].clock_offset_s);
@@ -75,7 +75,7 @@ void expect_same(const Recording& a, const Recording& b) {
     EXPECT_EQ(a.obstacle->vertex_m, b.obstacle->vertex_m);
   }
   ASSERT_EQ(a.held.size(), b.held.size());
-  for (std::size_t i = 0; i < a.held.size(); ++i) {
+  for (size_t i = 0; i < a.held.size(); ++i) {
     EXPECT_EQ(a.held[i].at_m, b.held[i].at_m);
     EXPECT_EQ(a.held[i].edge, b.held[i].edge);
     EXPECT_EQ(a.held[i].motion, b.held[i].motion);
@@ -83,7 +83,7 @@ void expect_same(const Recording& a, const Recording& b) {
   }
   EXPECT_EQ(a.start, b.start);
   ASSERT_EQ(a.declared.size(), b.declared.size());
-  for (std::size_t i = 0; i < a.declared.size(); ++i) {
+  for (size_t i = 0; i < a.declared.size(); ++i) {
     EXPECT_EQ(a.declared[i].name, b.declared[i].name);
     EXPECT_EQ(a.declared[i].parameters, b.declared[i].parameters);
   }
@@ -241,9 +241,8 @@ TEST(Recording, IsWrittenInTheStyleOfTheFormat) {
         "  - {at: [0.4, 0], motion: path, file: held/right.csv}\n",
         "  - {edge: bottom, motion: fixed}\n",
         "  - {effect: wind, parameters: {c: 0.5, q: [0, 0.25, 0]}}\n",
-        "obstacle: scene/table.obj\n", "held_out: {from_frame: 2}\n"}) {
+        "obstacle: scene/table.obj\n", "held_out: {from_frame: 2}\n"})
     EXPECT_THAT(text, testing::HasSubstr(line));
-  }
 }
 
 TEST(Recording, KeepsTextThatLooksLikeYaml) {

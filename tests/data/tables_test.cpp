@@ -63,7 +63,7 @@ TEST(Tracks3d, ReadBackToTheLastBit) {
     const Tracks3d again = read_tracks3d(folder / name, two_markers());
 
     ASSERT_EQ(again.size(), tracks.size());
-    for (std::size_t i = 0; i < tracks.size(); ++i) {
+    for (size_t i = 0; i < tracks.size(); ++i) {
       EXPECT_EQ(again[i].frame, tracks[i].frame);
       EXPECT_EQ(again[i].marker, tracks[i].marker);
       EXPECT_EQ(again[i].position_m, tracks[i].position_m);
@@ -190,13 +190,12 @@ TEST(Tables, RefuseAFileThatCannotBeRead) {
 TEST(Tables, RefuseCompressedDataCutShortAtEveryPlace) {
   const TemporaryFolder folder;
   Tracks3d tracks;
-  for (int frame = 0; frame < 30; ++frame) {
+  for (int frame = 0; frame < 30; ++frame)
     tracks.push_back({.frame = frame, .marker = 0, .position_m = {frame * 0.1, frame / 7.0, 1}});
-  }
   write_tracks3d(tracks, two_markers(), folder / "whole.csv.gz");
   const std::string whole = file_bytes(folder / "whole.csv.gz");
 
-  for (std::size_t size = 0; size < whole.size(); ++size) {
+  for (size_t size = 0; size < whole.size(); ++size) {
     SCOPED_TRACE(size);
     write_bytes(folder / "cut.csv.gz", whole.substr(0, size));
     EXPECT_THROW(read_tracks3d(folder / "cut.csv.gz", two_markers()), InputError);

@@ -60,9 +60,7 @@ bool was_killed(int status) {
 
 std::string joined(const std::vector<std::string>& payloads) {
   std::string all;
-  for (const std::string& payload : payloads) {
-    all += std::to_string(payload.size()) + " " + payload;
-  }
+  for (const std::string& payload : payloads) all += std::to_string(payload.size()) + " " + payload;
   return all;
 }
 
@@ -123,9 +121,8 @@ constexpr int kNever = 1000;
 
 std::string uninterrupted() {
   std::vector<std::string> payloads;
-  for (int index = 0; index < kPieces; ++index) {
+  for (int index = 0; index < kPieces; ++index)
     payloads.push_back(piece(index, derived_seed(1, index)));
-  }
   return joined(payloads);
 }
 
@@ -152,7 +149,7 @@ TEST(KilledRuns, ResumeToTheBytesOfAnUninterruptedRunAndRedoOnlyWhatWasAtWork) {
         for (const int index : done) EXPECT_FALSE(finished.contains(index)) << index;
         const std::set<int> now = finished_in(folder / "journal");
         EXPECT_TRUE(std::ranges::includes(now, finished));
-        EXPECT_LE(finished.size() + done.size(), now.size() + static_cast<std::size_t>(threads));
+        EXPECT_LE(finished.size() + done.size(), now.size() + static_cast<size_t>(threads));
         finished = now;
         if (!was_killed(status)) {
           ASSERT_EQ(status, 0);
@@ -161,7 +158,7 @@ TEST(KilledRuns, ResumeToTheBytesOfAnUninterruptedRunAndRedoOnlyWhatWasAtWork) {
         ++kills;
       }
 
-      EXPECT_EQ(finished.size(), static_cast<std::size_t>(kPieces));
+      EXPECT_EQ(finished.size(), static_cast<size_t>(kPieces));
       EXPECT_TRUE(bytes_of(folder / "out") == expected);
     }
   }
@@ -175,17 +172,17 @@ TEST(KilledRuns, ResumeFromAJournalTornAtAnyByteOfItsLastTwoRecords) {
   const std::string whole = bytes_of(folder / "journal");
   const std::string expected = bytes_of(folder / "out");
   ASSERT_TRUE(expected == uninterrupted());
-  const std::size_t tail = whole.rfind("\nrecord " + std::to_string(kPieces - 2) + " ") + 1;
+  const size_t tail = whole.rfind("\nrecord " + std::to_string(kPieces - 2) + " ") + 1;
   ASSERT_LT(tail, whole.size());
 
   // when it is torn at any byte of the last two (every 997th where they are long),
-  const std::size_t last = whole.rfind("\nrecord " + std::to_string(kPieces - 1) + " ") + 1;
-  const auto is_inside_payload = [&](std::size_t size) {
-    const std::size_t begin = size < last ? tail : last;
-    const std::size_t end = size < last ? last : whole.size();
+  const size_t last = whole.rfind("\nrecord " + std::to_string(kPieces - 1) + " ") + 1;
+  const auto is_inside_payload = [&](size_t size) {
+    const size_t begin = size < last ? tail : last;
+    const size_t end = size < last ? last : whole.size();
     return size > begin + 200 && size + 200 < end;
   };
-  for (std::size_t size = tail; size <= whole.size(); ++size) {
+  for (size_t size = tail; size <= whole.size(); ++size) {
     if (is_inside_payload(size) && size % 997 != 0) continue;
     SCOPED_TRACE(size);
     write_bytes(folder / "journal", whole.substr(0, size));

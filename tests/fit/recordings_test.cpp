@@ -74,8 +74,9 @@ TEST(Recordings, SwingPlainFrom3dTracks) {
 
 TEST(Recordings, SwingPlainForecastsTheSameClothReleasedOtherwise) {
   const fs::path other = further_data() / "recordings" / "swing_plain_b";
-  if (further_data().empty() || !fs::exists(other))
+  if (further_data().empty() || !fs::exists(other)) {
     GTEST_SKIP() << "CLOTHFIT_DATA names no folder with recordings/swing_plain_b";
+  }
   const FitReport& report = plain_fit();
   ASSERT_TRUE(report.usable()) << report.message;
 
@@ -138,8 +139,9 @@ TEST(Recordings, AHiddenWindLeavesAnErrorThatThePlainModelCannotHide) {
 
 TEST(Recordings, RealClothOnARobotArmIsFittedWithNumbersWhateverTheyAre) {
   const fs::path folder = further_data() / "real/iri-robot-cloth/s0623_n7_traj8_1";
-  if (further_data().empty() || !fs::exists(folder))
+  if (further_data().empty() || !fs::exists(folder)) {
     GTEST_SKIP() << "CLOTHFIT_DATA names no folder with real/iri-robot-cloth";
+  }
   const FitInput input = whole_recording(folder);
 
   const FitReport report = fit(input,

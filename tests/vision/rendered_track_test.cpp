@@ -65,7 +65,7 @@ TEST(RenderedTrack, FindsTheMarkersOfASwingingSheetWithinTheStatedSigma) {
   for (const Position2d& row : result.tracks) {
     if (!row.rejected.empty()) continue;
     const TrueMarker& marker =
-        truth.at(static_cast<std::size_t>(row.frame)).at(static_cast<std::size_t>(row.marker));
+        truth.at(static_cast<size_t>(row.frame)).at(static_cast<size_t>(row.marker));
     ASSERT_EQ(marker.sight, MarkerSight::seen);
     const Eigen::Vector2d error_px = row.position_px - marker.pixel_px;
     ++good;

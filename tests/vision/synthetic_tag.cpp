@@ -28,7 +28,7 @@ struct Print {
     image_u8_t* image = apriltag_to_image(family, static_cast<uint32_t>(tag.id));
     border = family->width_at_border;
     cells = cv::Mat(image->height, image->width, CV_8UC1, image->buf,
-                    static_cast<std::size_t>(image->stride))
+                    static_cast<size_t>(image->stride))
                 .clone();
     image_u8_destroy(image);
     if (tag.family == "tag16h5") tag16h5_destroy(family);
@@ -77,7 +77,7 @@ std::array<Eigen::Vector2d, 4> true_corners(const SyntheticTag& tag,
   const std::array<Eigen::Vector2d, 4> upright = {Eigen::Vector2d(-1, 1), Eigen::Vector2d(1, 1),
                                                   Eigen::Vector2d(1, -1), Eigen::Vector2d(-1, -1)};
   std::array<Eigen::Vector2d, 4> corners;
-  for (std::size_t c = 0; c < 4; ++c) {
+  for (size_t c = 0; c < 4; ++c) {
     const Eigen::Vector3d point =
         tag.camera_from_tag * on_surface(upright[c].x(), upright[c].y(), tag.radius);
     corners[c] = camera.focal_px * point.hnormalized() + middle_px(camera);
@@ -107,9 +107,8 @@ cv::Mat render(const SyntheticTag& tag, const SyntheticCamera& camera, std::mt19
   cv::GaussianBlur(picture, picture, cv::Size(), camera.blur_px, camera.blur_px,
                    cv::BORDER_REPLICATE);
   std::normal_distribution<double> noise(0, camera.noise_levels);
-  for (int v = 0; v < camera.height; ++v) {
+  for (int v = 0; v < camera.height; ++v)
     for (int u = 0; u < camera.width; ++u) picture.at<double>(v, u) += noise(rng);
-  }
   cv::Mat grey;
   picture.convertTo(grey, CV_8UC1);
   return grey;

@@ -16,7 +16,7 @@ MarkerSet tag_markers(int across, double width_m) {
   for (int tag = 0; tag < across * across; ++tag) {
     const double s_m = (tag % across + 0.5) * spacing_m, t_m = (tag / across + 0.5) * spacing_m;
     for (int corner = 0; corner < 4; ++corner) {
-      const auto [right, down] = kCorners[static_cast<std::size_t>(corner)];
+      const auto [right, down] = kCorners[static_cast<size_t>(corner)];
       const std::string name = fmt::format("t{}_{}", tag, corner);
       set.index[name] = static_cast<int>(set.markers.size());
       set.markers.push_back({.name = name,
@@ -36,10 +36,9 @@ PlacedSheet place_sheet(const SheetPrint& print, int columns,
                     .rows = columns,
                     .position_m = Eigen::Matrix3Xd(3, columns * columns)};
   for (int i = 0; i < columns; ++i) {
-    for (int j = 0; j < columns; ++j) {
+    for (int j = 0; j < columns; ++j)
       sheet.position_m.col(i * columns + j) =
           shape(j * print.width_m() / (columns - 1), i * print.height_m() / (columns - 1));
-    }
   }
   return sheet;
 }

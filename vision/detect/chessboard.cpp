@@ -17,15 +17,13 @@ double smallest_spacing_px(const std::vector<cv::Point2f>& corners, int columns,
   double smallest = INFINITY;
   for (int r = 0; r < rows; ++r) {
     for (int c = 0; c < columns; ++c) {
-      const cv::Point2f& here = corners[static_cast<std::size_t>(r * columns + c)];
-      if (c + 1 < columns) {
-        smallest = std::min(
-            smallest, cv::norm(corners[static_cast<std::size_t>(r * columns + c + 1)] - here));
-      }
-      if (r + 1 < rows) {
-        smallest = std::min(
-            smallest, cv::norm(corners[static_cast<std::size_t>((r + 1) * columns + c)] - here));
-      }
+      const cv::Point2f& here = corners[static_cast<size_t>(r * columns + c)];
+      if (c + 1 < columns)
+        smallest =
+            std::min(smallest, cv::norm(corners[static_cast<size_t>(r * columns + c + 1)] - here));
+      if (r + 1 < rows)
+        smallest = std::min(smallest,
+                            cv::norm(corners[static_cast<size_t>((r + 1) * columns + c)] - here));
     }
   }
   return smallest;
@@ -34,7 +32,7 @@ double smallest_spacing_px(const std::vector<cv::Point2f>& corners, int columns,
 /// Says whether columns (right) and rows (down) turn as on a board seen from its front. y of the
 /// picture points down.
 bool turns_like_the_board(const std::vector<cv::Point2f>& corners, int columns, int rows) {
-  const auto at = [&](int r, int c) { return corners[static_cast<std::size_t>(r * columns + c)]; };
+  const auto at = [&](int r, int c) { return corners[static_cast<size_t>(r * columns + c)]; };
   const cv::Point2f along_row = at(0, columns - 1) - at(0, 0);
   const cv::Point2f along_column = at(rows - 1, 0) - at(0, 0);
   return along_row.cross(along_column) > 0;
@@ -44,12 +42,11 @@ bool turns_like_the_board(const std::vector<cv::Point2f>& corners, int columns, 
 
 std::optional<std::vector<Eigen::Vector2d>> find_chessboard(const cv::Mat& grey,
                                                             const BoardDescription& board) {
-  if (!is_possible(board)) {
+  if (!is_possible(board))
     throw InputError(
         "board", fmt::format("{} x {} inner corners", board.columns, board.rows),
         fmt::format("{} to {} along each side", kFewestBoardCorners, kMostBoardCorners),
         "count where four squares meet");
-  }
   std::vector<cv::Point2f> corners;
   const cv::Size pattern(board.columns, board.rows);
   const int flags = cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_NORMALIZE_IMAGE;

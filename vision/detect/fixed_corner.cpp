@@ -23,7 +23,7 @@ FixedCorner average_fixed_corner(const std::vector<Eigen::Vector2d>& pixels,
   Eigen::Vector2d sum = Eigen::Vector2d::Zero();
   double square_sigma_sum = 0;
   int used = 0;
-  for (std::size_t i = 0; i < pixels.size(); ++i) {
+  for (size_t i = 0; i < pixels.size(); ++i) {
     if (distance[i] > reach) continue;
     sum += pixels[i];
     square_sigma_sum += sigmas[i] * sigmas[i];
@@ -31,9 +31,8 @@ FixedCorner average_fixed_corner(const std::vector<Eigen::Vector2d>& pixels,
   }
   const Eigen::Vector2d mean = sum / used;
   double scatter = 0;  // variance per coordinate
-  for (std::size_t i = 0; i < pixels.size(); ++i) {
+  for (size_t i = 0; i < pixels.size(); ++i)
     if (distance[i] <= reach) scatter += (pixels[i] - mean).squaredNorm() / 2;
-  }
   const double stated = square_sigma_sum / used;
   scatter = used > 1 ? scatter / (used - 1) : stated;
   return {.pixel_px = mean, .sigma_px = std::sqrt(stated + scatter / used), .frames = used};

@@ -93,9 +93,8 @@ std::vector<TagDetection> TagDetector::detect(const cv::Mat& grey) {
     detection.id = raw->id;
     detection.corrected_bits = raw->hamming;
     detection.decision_margin = raw->decision_margin;
-    for (std::size_t c = 0; c < 4; ++c) {
+    for (size_t c = 0; c < 4; ++c)
       detection.corner_px[c] = Eigen::Vector2d(raw->p[c][0], raw->p[c][1]) - kHalfPixel;
-    }
     const RefinedTag refined =
         refine_tag(grey, library_->pattern(raw->id), pixel_from_tag(*raw->H));
     detection.explained = refined.explained;

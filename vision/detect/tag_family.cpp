@@ -51,28 +51,24 @@ std::vector<std::string> tag_families() {
 TagFamily make_tag_family(const std::string& name) {
   const auto found = std::find_if(kFamilies.begin(), kFamilies.end(),
                                   [&](const Family& family) { return name == family.name; });
-  if (found == kFamilies.end()) {
+  if (found == kFamilies.end())
     throw InputError("markers", fmt::format("unknown tag family '{}'", name),
                      fmt::format("one of {}", fmt::join(tag_families(), ", ")));
-  }
   return {found->create(), found->destroy};
 }
 
 TagPattern printed_tag(apriltag_family& family, int id) {
-  if (id < 0 || static_cast<uint32_t>(id) >= family.ncodes) {
+  if (id < 0 || static_cast<uint32_t>(id) >= family.ncodes)
     throw InputError("markers", fmt::format("there is no tag {} in {}", id, family.name),
                      fmt::format("0 to {}", family.ncodes - 1));
-  }
   const std::unique_ptr<image_u8_t, void (*)(image_u8_t*)> image(
       apriltag_to_image(&family, static_cast<uint32_t>(id)), image_u8_destroy);
   TagPattern pattern{
       .border_cells = family.width_at_border, .total_cells = family.total_width, .white = {}};
   assert(image->width == pattern.total_cells && image->height == pattern.total_cells);
-  for (int row = 0; row < image->height; ++row) {
-    for (int column = 0; column < image->width; ++column) {
+  for (int row = 0; row < image->height; ++row)
+    for (int column = 0; column < image->width; ++column)
       pattern.white.push_back(image->buf[row * image->stride + column] > 127 ? 1.0F : 0.0F);
-    }
-  }
   return pattern;
 }
 

@@ -66,7 +66,7 @@ class NormalTable {
     double value = 0, density = 0;
   };
   NormalTable() {
-    for (std::size_t i = 0; i < entries_.size(); ++i) {
+    for (size_t i = 0; i < entries_.size(); ++i) {
       const double u = static_cast<double>(i) / kPerUnit - kReach;
       entries_[i] = {0.5 * std::erfc(-u * M_SQRT1_2),
                      std::exp(-0.5 * u * u) * (0.5 * M_2_SQRTPI * M_SQRT1_2)};
@@ -74,7 +74,7 @@ class NormalTable {
   }
   Entry at(double u) const {
     const double place = (std::clamp(u, -kReach, kReach) + kReach) * kPerUnit;
-    const auto i = std::min(static_cast<std::size_t>(place), entries_.size() - 2);
+    const auto i = std::min(static_cast<size_t>(place), entries_.size() - 2);
     const double share = place - static_cast<double>(i);
     const Entry& a = entries_[i];
     const Entry& b = entries_[i + 1];
@@ -114,7 +114,7 @@ AxisWeights axis_weights(const TagPattern& pattern, double place, double blur) {
   // Value, density and density times place of the normal distribution at each cell's left end.
   double value = 1, density = 0, moment = 0;
   for (int i = 0; i < result.count; ++i) {
-    const auto k = static_cast<std::size_t>(i);
+    const auto k = static_cast<size_t>(i);
     double next_value = 0, next_density = 0, next_moment = 0;
     if (i + 1 < result.count) {
       const double u = (place - (origin + cell * (result.first + i + 1))) / blur;
@@ -146,17 +146,17 @@ PatternValue pattern_value(const TagPattern& pattern, double x, double y, double
   const AxisWeights down = axis_weights(pattern, y, blur_y);
   PatternValue result;
   for (int j = 0; j < down.count; ++j) {
-    const float* row = &pattern.white[static_cast<std::size_t>(
-        (down.first + j) * pattern.total_cells + across.first)];
+    const float* row =
+        &pattern.white[static_cast<size_t>((down.first + j) * pattern.total_cells + across.first)];
     double value = 0, by_x = 0, by_blur = 0;
     for (int i = 0; i < across.count; ++i) {
-      const auto k = static_cast<std::size_t>(i);
+      const auto k = static_cast<size_t>(i);
       const double white = row[i];
       value += white * across.weight[k];
       by_x += white * across.by_place[k];
       by_blur += white * across.by_log_blur[k];
     }
-    const auto k = static_cast<std::size_t>(j);
+    const auto k = static_cast<size_t>(j);
     result.value += down.weight[k] * value;
     result.by_x += down.weight[k] * by_x;
     result.by_log_blur_x += down.weight[k] * by_blur;
@@ -183,9 +183,8 @@ std::vector<Sample> pixels_of_tag(const cv::Mat& grey, const TagPattern& pattern
   // stay out.
   const double reach = 1 + 0.75 * pattern.cell();
   Eigen::AlignedBox2d box;
-  for (const double x : {-reach, reach}) {
+  for (const double x : {-reach, reach})
     for (const double y : {-reach, reach}) box.extend(through(pixel_from_tag, {x, y}));
-  }
   const int u_begin = std::max(0, static_cast<int>(std::ceil(box.min().x())));
   const int v_begin = std::max(0, static_cast<int>(std::ceil(box.min().y())));
   const int u_end = std::min(grey.cols - 1, static_cast<int>(std::floor(box.max().x())));
@@ -241,10 +240,9 @@ void weigh(Fit& fit) {
   const double noise =
       std::max(flat.empty() ? 0 : kMadToSigma * median(std::move(flat)), kRounding);
   double square_roughness = 0;
-  if (!rough.empty()) {
+  if (!rough.empty())
     square_roughness = square(kMadToSigma * median(std::move(rough))) -
                        square(noise) * median(std::move(inverse_square_slope));
-  }
   square_roughness = std::max(square_roughness, 0.0);
 
   constexpr double kCauchy = 3;
@@ -261,7 +259,7 @@ void evaluate(const TagPattern& pattern, const std::vector<Sample>& samples,
   const double blur_x = std::exp(now[kBlur]);
   const double blur_y = std::exp(now[kBlur + 1]);
   const Eigen::Matrix2d tag_by_pixel = pixel_by_tag.inverse();
-  for (std::size_t i = 0; i < samples.size(); ++i) {
+  for (size_t i = 0; i < samples.size(); ++i) {
     const Sample& sample = samples[i];
     const auto row = static_cast<Eigen::Index>(i);
     const Terms terms = polynomials(sample.x, sample.y);
@@ -289,19 +287,19 @@ void evaluate(const TagPattern& pattern, const std::vector<Sample>& samples,
 /// Thins out samples that say little. Flat ones tell only the light, and one in four of them stays;
 /// of a large tag's samples `kEnough` stay in all. Sigma accounts for the samples left out.
 void thin_out(std::vector<Sample>& samples, const Fit& fit) {
-  constexpr std::size_t kEnough = 4000;
+  constexpr size_t kEnough = 4000;
   const double flat = 0.03 * fit.slope.maxCoeff();
   std::vector<Sample> kept;
-  for (std::size_t i = 0; i < samples.size(); ++i) {
+  for (size_t i = 0; i < samples.size(); ++i) {
     const bool tells = fit.slope[static_cast<Eigen::Index>(i)] > flat;
     if (tells || (samples[i].u + 2 * samples[i].v) % 4 == 0) kept.push_back(samples[i]);
   }
-  const std::size_t stride = (kept.size() + kEnough - 1) / kEnough;
+  const size_t stride = (kept.size() + kEnough - 1) / kEnough;
   samples.clear();
-  for (std::size_t i = 0; i < kept.size(); i += stride) samples.push_back(kept[i]);
+  for (size_t i = 0; i < kept.size(); i += stride) samples.push_back(kept[i]);
 }
 
-void resize(Fit& fit, std::size_t count) {
+void resize(Fit& fit, size_t count) {
   const auto rows = static_cast<Eigen::Index>(count);
   fit.jacobian.resize(rows, kUnknowns);
   fit.residual.resize(rows);
@@ -382,7 +380,7 @@ RefinedTag refine_tag(const cv::Mat& grey, const TagPattern& pattern,
   assert(pattern.total_cells <= AxisWeights::kMaxCells);
   RefinedTag result;
   std::vector<Sample> samples = pixels_of_tag(grey, pattern, pixel_from_tag);
-  constexpr std::size_t kFewest = 4 * kUnknowns;
+  constexpr size_t kFewest = 4 * kUnknowns;
   if (samples.size() < kFewest) return result;
 
   // The start has no bending, a sharp lens and a square pixel, and light from the extremes.
@@ -418,9 +416,8 @@ RefinedTag refine_tag(const cv::Mat& grey, const TagPattern& pattern,
     moved = step(prior_mean, prior, fit, covariance);
     constexpr double kFarBlur = 3;  // of the logarithm: a factor of 20, no tag any more
     if (!fit.unknowns.allFinite() ||
-        (fit.unknowns - prior_mean).segment<2>(kBlur).cwiseAbs().maxCoeff() > kFarBlur) {
+        (fit.unknowns - prior_mean).segment<2>(kBlur).cwiseAbs().maxCoeff() > kFarBlur)
       return result;
-    }
   }
   result.explained = fit.trust;
   result.usable = moved < kStill && fit.unknowns[kLight + 3] > 0;  // white is brighter than black
@@ -428,7 +425,7 @@ RefinedTag refine_tag(const cv::Mat& grey, const TagPattern& pattern,
 
   const double left_out = left_out_variance(fit.unknowns, pixel_by_tag);
   constexpr std::array<std::array<double, 2>, 4> kCorners = {{{-1, 1}, {1, 1}, {1, -1}, {-1, -1}}};
-  for (std::size_t c = 0; c < 4; ++c) {
+  for (size_t c = 0; c < 4; ++c) {
     const Corner corner = corner_of(fit.unknowns, {kCorners[c][0], kCorners[c][1]}, pixel_from_tag);
     const double variance =
         (corner.by_unknowns * covariance * corner.by_unknowns.transpose()).trace() / 2;

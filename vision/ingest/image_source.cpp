@@ -33,13 +33,11 @@ bool is_picture(const fs::path& file) {
 class PictureFolder : public ImageSource {
  public:
   explicit PictureFolder(const fs::path& folder) {
-    for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
+    for (const fs::directory_entry& entry : fs::directory_iterator(folder))
       if (entry.is_regular_file() && is_picture(entry.path())) files_.push_back(entry.path());
-    }
-    if (files_.empty()) {
+    if (files_.empty())
       throw InputError(folder.string(), "the folder holds no picture", ".jpg, .jpeg or .png files",
                        "name the folder that holds the frames themselves");
-    }
     std::sort(files_.begin(), files_.end());
   }
 
@@ -49,10 +47,9 @@ class PictureFolder : public ImageSource {
     // A turn noted in the file's metadata is not applied. The camera file describes the sensor as
     // it is read out, and stills and video of one camera must agree.
     grey = cv::imread(file.string(), cv::IMREAD_GRAYSCALE | cv::IMREAD_IGNORE_ORIENTATION);
-    if (grey.empty()) {
+    if (grey.empty())
       throw InputError(file.string(), "the picture cannot be decoded", "a whole JPEG or PNG file",
                        "copy it again or remove it");
-    }
     if (next_ == 0) size_ = grey.size();
     refuse_other_size(grey, size_, file.string());
     ++next_;
@@ -67,7 +64,7 @@ class PictureFolder : public ImageSource {
 
  private:
   std::vector<fs::path> files_;
-  std::size_t next_ = 0;
+  size_t next_ = 0;
   cv::Size size_;
 };
 
@@ -77,10 +74,9 @@ class VideoFile : public ImageSource {
   // machine.
   explicit VideoFile(const fs::path& file) : file_(file.string()), capture_(file_, cv::CAP_FFMPEG) {
     capture_.set(cv::CAP_PROP_ORIENTATION_AUTO, 0);  // as for pictures
-    if (!capture_.isOpened() || !capture_.read(picture_) || picture_.empty()) {
+    if (!capture_.isOpened() || !capture_.read(picture_) || picture_.empty())
       throw InputError(file_, "no picture can be read from it", "a folder of pictures or a video",
                        "check that the file is whole and that a video player shows it");
-    }
     size_ = picture_.size();
     const double stated = capture_.get(cv::CAP_PROP_FRAME_COUNT);
     count_ = stated > 0 && stated < 1e9 ? static_cast<int>(stated) : 0;
@@ -89,17 +85,15 @@ class VideoFile : public ImageSource {
   bool next(cv::Mat& grey) override {
     if (frames_ > 0 && !capture_.read(picture_)) {
       // Containers round their count, so one missing picture is no sign of damage.
-      if (frames_ + 1 < count_) {
+      if (frames_ + 1 < count_)
         throw InputError(file_, fmt::format("the video breaks off after {} frames", frames_),
                          fmt::format("{} frames as it states itself", count_), "copy it again");
-      }
       return false;
     }
-    if (picture_.channels() == 1) {
+    if (picture_.channels() == 1)
       picture_.copyTo(grey);
-    } else {
+    else
       cv::cvtColor(picture_, grey, cv::COLOR_BGR2GRAY);
-    }
     ++frames_;
     refuse_other_size(grey, size_, fmt::format("{}, {}", file_, current_name()));
     return true;
@@ -124,10 +118,9 @@ class VideoFile : public ImageSource {
 
 std::unique_ptr<ImageSource> open_images(const fs::path& path) {
   if (fs::is_directory(path)) return std::make_unique<PictureFolder>(path);
-  if (!fs::exists(path)) {
+  if (!fs::exists(path))
     throw InputError(path.string(), "there is nothing at this path",
                      "a folder of pictures or a video file", "check the recording's `images`");
-  }
   return std::make_unique<VideoFile>(path);
 }
 

@@ -41,15 +41,14 @@ CameraRays::CameraRays(const CameraParameters& camera, int margin_px)
   node_rows_ = cell_rows + 3;
   const double origin_px = -0.5 - margin_px;
   for (int r = 0; r < node_rows_; ++r) {
-    for (int c = 0; c < node_columns_; ++c) {
+    for (int c = 0; c < node_columns_; ++c)
       nodes_.push_back(exact_direction(
           camera, {origin_px + kSpacing_px * (c - 1), origin_px + kSpacing_px * (r - 1)}));
-    }
   }
 
   constexpr double kOff_px = 1e-4;
   const double tolerance = kOff_px / camera.focal_px.maxCoeff();
-  smooth_.assign(static_cast<std::size_t>(cell_rows * cell_columns), true);
+  smooth_.assign(static_cast<size_t>(cell_rows * cell_columns), true);
   for (int r = 0; r < cell_rows; ++r) {
     const double v_px = origin_px + kSpacing_px * (r + 0.5);
     for (int c = 0; c < cell_columns; ++c) {
@@ -57,7 +56,7 @@ CameraRays::CameraRays(const CameraParameters& camera, int margin_px)
       std::array<Eigen::Vector2d, 1> direction;
       row(u_px, v_px, direction);
       // A direction that is missing at a node makes this NaN, and the comparison false.
-      smooth_[static_cast<std::size_t>(r * cell_columns + c)] =
+      smooth_[static_cast<size_t>(r * cell_columns + c)] =
           (direction[0] - exact_direction(camera, {u_px[0], v_px})).norm() < tolerance;
     }
   }
@@ -74,21 +73,19 @@ void CameraRays::row(std::span<const double> u_px, double v_px,
   const Eigen::Vector4d down = cubic_weights(row_place - cell_row);
   const auto column_value = [&](int node_column) {
     Eigen::Vector2d value = Eigen::Vector2d::Zero();
-    for (int k = 0; k < 4; ++k) {
-      value +=
-          down[k] * nodes_[static_cast<std::size_t>((cell_row + k) * node_columns_ + node_column)];
-    }
+    for (int k = 0; k < 4; ++k)
+      value += down[k] * nodes_[static_cast<size_t>((cell_row + k) * node_columns_ + node_column)];
     return value;
   };
 
   // Values at the four node columns around the current cell.
   Eigen::Matrix<double, 2, 4> values = Eigen::Matrix<double, 2, 4>::Zero();
   int current = -1;
-  for (std::size_t i = 0; i < u_px.size(); ++i) {
+  for (size_t i = 0; i < u_px.size(); ++i) {
     const double place = (u_px[i] - origin_px) / kSpacing_px;
     assert(place >= 0 && place <= cell_columns);
     const int cell = std::min(static_cast<int>(place), cell_columns - 1);
-    if (!smooth_[static_cast<std::size_t>(cell_row * cell_columns + cell)]) {
+    if (!smooth_[static_cast<size_t>(cell_row * cell_columns + cell)]) {
       direction[i] = exact_direction(camera_, {u_px[i], v_px});
       continue;
     }

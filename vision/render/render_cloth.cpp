@@ -56,7 +56,7 @@ struct Lighting {
   double level(const SheetHit& hit, const Eigen::Matrix2d& step,
                std::span<const PlacedSheet> sheets) const {
     if (hit.sheet < 0) return options.background_level;
-    const SheetPrint& print = *sheets[static_cast<std::size_t>(hit.sheet)].print;
+    const SheetPrint& print = *sheets[static_cast<size_t>(hit.sheet)].print;
     const double reflectance = hit.printed_side
                                    ? print.reflectance(hit.place_m, hit.place_by_direction * step)
                                    : print.back_reflectance();
@@ -70,9 +70,9 @@ cv::Mat sample_rows(const CameraRays& rays, std::span<const std::vector<PlacedSh
                     const std::vector<SheetScene>& scenes, const Lighting& lighting,
                     const SampleAxis& axis) {
   const int width = rays.camera().image_width;
-  const auto across = static_cast<std::size_t>(axis.count(width));
+  const auto across = static_cast<size_t>(axis.count(width));
   std::vector<double> u_px(across);
-  for (std::size_t k = 0; k < across; ++k) u_px[k] = axis.place_px(static_cast<int>(k));
+  for (size_t k = 0; k < across; ++k) u_px[k] = axis.place_px(static_cast<int>(k));
 
   cv::Mat rows(axis.count(rays.camera().image_height), width, CV_32FC1);
   tbb::parallel_for(tbb::blocked_range<int>(0, rows.rows),
@@ -84,24 +84,23 @@ cv::Mat sample_rows(const CameraRays& rays, std::span<const std::vector<PlacedSh
                       for (int row = part.begin(); row < part.end(); ++row) {
                         rays.row(u_px, axis.place_px(row), direction);
                         rays.row(u_px, axis.place_px(row + 1), below);
-                        for (std::size_t k = 0; k < across; ++k) {
-                          const std::size_t left = std::min(k, across - 2);
+                        for (size_t k = 0; k < across; ++k) {
+                          const size_t left = std::min(k, across - 2);
                           step[k] << direction[left + 1] - direction[left], below[k] - direction[k];
                           if (!step[k].allFinite())
                             step[k].setZero();  // at the rim of what the lens shows
                         }
                         std::fill(level.begin(), level.end(), 0.0);
-                        for (std::size_t i = 0; i < scenes.size(); ++i) {
+                        for (size_t i = 0; i < scenes.size(); ++i) {
                           scenes[i].look(direction, hit);
-                          for (std::size_t k = 0; k < across; ++k) {
+                          for (size_t k = 0; k < across; ++k)
                             level[k] += lighting.level(hit[k], step[k], instants[i]);
-                          }
                         }
                         float* out = rows.ptr<float>(row);
                         for (int u = 0; u < width; ++u) {
-                          const double* around = &level[static_cast<std::size_t>(u * axis.samples)];
+                          const double* around = &level[static_cast<size_t>(u * axis.samples)];
                           double sum = 0;
-                          for (std::size_t k = 0; k < axis.weight.size(); ++k)
+                          for (size_t k = 0; k < axis.weight.size(); ++k)
                             sum += axis.weight[k] * around[k];
                           out[u] = static_cast<float>(sum / static_cast<double>(scenes.size()));
                         }
@@ -121,9 +120,8 @@ std::mt19937_64 row_generator(std::uint64_t noise_seed, int row) {
 
 void RenderOptions::validate() const {
   const auto check = [](const char* name, double value, const char* unit) {
-    if (!(value >= 0 && std::isfinite(value))) {
+    if (!(value >= 0 && std::isfinite(value)))
       throw InputError(name, fmt::format("{}", value), fmt::format("{}, >= 0", unit));
-    }
   };
   check("ambient_levels", ambient_levels, "grey levels");
   check("direct_levels", direct_levels, "grey levels");
@@ -131,13 +129,11 @@ void RenderOptions::validate() const {
   check("blur_px", blur_px, "pixels");
   check("noise_levels", noise_levels, "grey levels");
   check("shot_levels", shot_levels, "variance per grey level");
-  if (!(towards_light.norm() > 0 && towards_light.allFinite())) {
+  if (!(towards_light.norm() > 0 && towards_light.allFinite()))
     throw InputError("towards_light", "has no direction", "a vector towards the light");
-  }
-  if (samples < 1 || samples > 16) {
+  if (samples < 1 || samples > 16)
     throw InputError("samples", fmt::format("{}", samples),
                      "lines of sight across a pixel, 1 to 16");
-  }
 }
 
 cv::Mat render_cloth(const CameraRays& rays, std::span<const std::vector<PlacedSheet>> instants,
@@ -145,15 +141,13 @@ cv::Mat render_cloth(const CameraRays& rays, std::span<const std::vector<PlacedS
   options.validate();
   assert(!instants.empty());
   const CameraParameters& camera = rays.camera();
-  if (!camera.camera_from_world) {
+  if (!camera.camera_from_world)
     throw InputError(camera.name, "the camera has no pose",
                      "camera_from_world, to render its view");
-  }
   const SampleAxis axis(options);
-  if (axis.margin_px > rays.margin_px()) {
+  if (axis.margin_px > rays.margin_px())
     throw InputError("blur_px", fmt::format("{}", options.blur_px),
                      fmt::format("at most {} px here", rays.margin_px() / kReach));
-  }
 
   const Rigid3 pose = camera_from_world(camera);
   std::vector<SheetScene> scenes;
@@ -167,9 +161,8 @@ cv::Mat render_cloth(const CameraRays& rays, std::span<const std::vector<PlacedS
     std::normal_distribution<double> normal;
     for (int u = 0; u < picture.cols; ++u) {
       double level = 0;
-      for (std::size_t k = 0; k < axis.weight.size(); ++k) {
+      for (size_t k = 0; k < axis.weight.size(); ++k)
         level += axis.weight[k] * double{rows.at<float>(v * axis.samples + static_cast<int>(k), u)};
-      }
       const double variance =
           options.noise_levels * options.noise_levels + options.shot_levels * level;
       if (variance > 0) level += std::sqrt(variance) * normal(generator);

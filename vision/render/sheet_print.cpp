@@ -24,7 +24,7 @@ std::map<int, Corners> corners_by_tag(const MarkerSet& markers) {
   std::map<int, Corners> by_tag;
   for (const Marker& marker : markers.markers) {
     if (!marker.tag || !marker.corner) continue;
-    by_tag[*marker.tag].at(static_cast<std::size_t>(*marker.corner)) =
+    by_tag[*marker.tag].at(static_cast<size_t>(*marker.corner)) =
         Eigen::Vector2d(marker.s_m, marker.t_m);
   }
   return by_tag;
@@ -36,11 +36,10 @@ struct Border {
 };
 
 Border border_of(int tag, const Corners& corners) {
-  for (std::size_t c = 0; c < 4; ++c) {
-    if (!corners[c]) {
+  for (size_t c = 0; c < 4; ++c) {
+    if (!corners[c])
       throw InputError("markers", fmt::format("tag {} has no marker at its corner {}", tag, c),
                        "all four corners of every tag that is to be printed");
-    }
   }
   const Eigen::Vector2d &bottom_left = *corners[0], &bottom_right = *corners[1],
                         &top_right = *corners[2], &top_left = *corners[3];
@@ -53,11 +52,10 @@ Border border_of(int tag, const Corners& corners) {
   // Seen from the printed side s runs to the right and t down, and so do a tag's columns and rows.
   const double turn =
       border.right_m.x() * border.down_m.y() - border.right_m.y() * border.down_m.x();
-  if (!(side_m > 0) || !rectangle || !(turn > 0)) {
+  if (!(side_m > 0) || !rectangle || !(turn > 0))
     throw InputError("markers", fmt::format("the corners of tag {} are not a rectangle's", tag),
                      "0 bottom left, 1 bottom right, 2 top right, 3 top left, as the tag is seen "
                      "upright from the printed side");
-  }
   return border;
 }
 
@@ -72,15 +70,13 @@ double share(double low, double high, int index) {
 
 void PrintOptions::validate() const {
   const auto check = [](const char* name, double value) {
-    if (!(value >= 0 && value <= 1)) {
+    if (!(value >= 0 && value <= 1))
       throw InputError(name, fmt::format("{}", value), "a reflectance, 0 to 1");
-    }
   };
   check("paper", paper);
   check("ink", ink);
-  if (!(dot_radius_m > 0 && std::isfinite(dot_radius_m))) {
+  if (!(dot_radius_m > 0 && std::isfinite(dot_radius_m)))
     throw InputError("dot_radius_m", fmt::format("{}", dot_radius_m), "metres, > 0");
-  }
 }
 
 SheetPrint::SheetPrint(const MarkerSet& markers, double width_m, double height_m,
@@ -88,11 +84,10 @@ SheetPrint::SheetPrint(const MarkerSet& markers, double width_m, double height_m
     : width_m_(width_m),
       height_m_(height_m),
       options_(options),
-      bins_(static_cast<std::size_t>(kBinsAcross * kBinsAcross)) {
+      bins_(static_cast<size_t>(kBinsAcross * kBinsAcross)) {
   options.validate();
-  if (!(width_m > 0 && height_m > 0 && std::isfinite(width_m) && std::isfinite(height_m))) {
+  if (!(width_m > 0 && height_m > 0 && std::isfinite(width_m) && std::isfinite(height_m)))
     throw InputError("cloth", fmt::format("size = [{}, {}]", width_m, height_m), "metres, > 0");
-  }
   switch (markers.kind) {
     case MarkerKind::apriltag:
       add_tags(markers);
@@ -158,12 +153,10 @@ void SheetPrint::list_in_bins(const Eigen::Vector2d& low_m, const Eigen::Vector2
   const auto first = [](int bin) { return std::max(bin - 1, 0); };
   const auto last = [](int bin) { return std::min(bin + 1, kBinsAcross - 1); };
   for (int row = first(bin_along(low_m.y(), height_m_));
-       row <= last(bin_along(high_m.y(), height_m_)); ++row) {
+       row <= last(bin_along(high_m.y(), height_m_)); ++row)
     for (int column = first(bin_along(low_m.x(), width_m_));
-         column <= last(bin_along(high_m.x(), width_m_)); ++column) {
-      (bins_[static_cast<std::size_t>(row * kBinsAcross + column)].*list).push_back(item);
-    }
-  }
+         column <= last(bin_along(high_m.x(), width_m_)); ++column)
+      (bins_[static_cast<size_t>(row * kBinsAcross + column)].*list).push_back(item);
 }
 
 double SheetPrint::Tag::ink_share(const Eigen::Vector2d& place_m,
@@ -176,17 +169,14 @@ double SheetPrint::Tag::ink_share(const Eigen::Vector2d& place_m,
     return static_cast<int>(std::clamp(std::floor(x), 0.0, cells - 1.0));
   };
   const int first_row = clamped(low.y()), first_column = clamped(low.x());
-  if (high.x() <= first_column + 1 && high.y() <= first_row + 1 && low.minCoeff() >= 0) {
-    return black[static_cast<std::size_t>(first_row * cells + first_column)] ? 1 : 0;
-  }
+  if (high.x() <= first_column + 1 && high.y() <= first_row + 1 && low.minCoeff() >= 0)
+    return black[static_cast<size_t>(first_row * cells + first_column)] ? 1 : 0;
   double ink = 0;
   for (int row = first_row; row <= clamped(high.y()); ++row) {
     const double down = share(low.y(), high.y(), row);
-    for (int column = first_column; column <= clamped(high.x()); ++column) {
-      if (black[static_cast<std::size_t>(row * cells + column)]) {
+    for (int column = first_column; column <= clamped(high.x()); ++column)
+      if (black[static_cast<size_t>(row * cells + column)])
         ink += down * share(low.x(), high.x(), column);
-      }
-    }
   }
   return ink;
 }
@@ -204,14 +194,12 @@ double SheetPrint::Dot::ink_share(const Eigen::Vector2d& place_m,
 double SheetPrint::reflectance(const Eigen::Vector2d& place_m,
                                const Eigen::Matrix2d& footprint_m) const {
   const int row = bin_along(place_m.y(), height_m_), column = bin_along(place_m.x(), width_m_);
-  const Bin& bin = bins_[static_cast<std::size_t>(row * kBinsAcross + column)];
+  const Bin& bin = bins_[static_cast<size_t>(row * kBinsAcross + column)];
   double ink = 0;
-  for (const int index : bin.tags) {
-    ink = std::max(ink, tags_[static_cast<std::size_t>(index)].ink_share(place_m, footprint_m));
-  }
-  for (const int index : bin.dots) {
-    ink = std::max(ink, dots_[static_cast<std::size_t>(index)].ink_share(place_m, footprint_m));
-  }
+  for (const int index : bin.tags)
+    ink = std::max(ink, tags_[static_cast<size_t>(index)].ink_share(place_m, footprint_m));
+  for (const int index : bin.dots)
+    ink = std::max(ink, dots_[static_cast<size_t>(index)].ink_share(place_m, footprint_m));
   return options_.paper + ink * (options_.ink - options_.paper);
 }
 

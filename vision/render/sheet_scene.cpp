@@ -67,12 +67,12 @@ Eigen::Matrix3Xd vertex_normals(const Sheet& sheet) {
 
 void attach(RTCDevice device, RTCScene scene, const Sheet& sheet) {
   RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
-  const auto vertices = static_cast<std::size_t>(sheet.position_m.cols());
+  const auto vertices = static_cast<size_t>(sheet.position_m.cols());
   auto* vertex = static_cast<float*>(rtcSetNewGeometryBuffer(
       geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), vertices));
   Eigen::Map<Eigen::Matrix3Xf>(vertex, 3, sheet.position_m.cols()) = sheet.position_m.cast<float>();
 
-  const auto triangles = static_cast<std::size_t>(2 * (sheet.columns - 1) * (sheet.rows - 1));
+  const auto triangles = static_cast<size_t>(2 * (sheet.columns - 1) * (sheet.rows - 1));
   auto* index = static_cast<unsigned*>(rtcSetNewGeometryBuffer(
       geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(unsigned), triangles));
   for (int i = 0; i + 1 < sheet.rows; ++i) {
@@ -115,9 +115,8 @@ PlaneHit meet(const Triangle& triangle, const Eigen::Vector3d& direction,
   const Eigen::Vector3d beneath = triangle.along.cross(direction);
   const double determinant = triangle.along.dot(across);
   if (!(std::abs(determinant) >
-        kEdgeOn * triangle.along.norm() * triangle.down.norm() * direction.norm())) {
+        kEdgeOn * triangle.along.norm() * triangle.down.norm() * direction.norm()))
     return {.place = rough, .by_direction = Eigen::Matrix2d::Zero()};
-  }
   const double x = -triangle.corner.dot(across) / determinant;
   const double y = -triangle.corner.dot(beneath) / determinant;
   const double depth = triangle.corner.dot(triangle.along.cross(triangle.down)) /
@@ -189,15 +188,13 @@ SheetScene::SheetScene(std::span<const PlacedSheet> sheets, const Rigid3& camera
   traced_->scene.reset(rtcNewScene(traced_->device.get()));
   // Robust tracing lets no line of sight slip through between two triangles.
   rtcSetSceneFlags(traced_->scene.get(), RTC_SCENE_FLAG_ROBUST);
-  for (const Sheet& sheet : traced_->sheets) {
+  for (const Sheet& sheet : traced_->sheets)
     attach(traced_->device.get(), traced_->scene.get(), sheet);
-  }
   // One thread builds the tree, so that it is always the same. With it, a line of sight through the
   // common edge of two triangles always meets the same one.
   tbb::task_arena(1).execute([&] { rtcCommitScene(traced_->scene.get()); });
-  if (rtcGetDeviceError(traced_->device.get()) != RTC_ERROR_NONE) {
+  if (rtcGetDeviceError(traced_->device.get()) != RTC_ERROR_NONE)
     throw std::runtime_error("Embree cannot arrange the sheets");
-  }
 }
 
 SheetScene::~SheetScene() = default;
@@ -207,10 +204,10 @@ SheetScene& SheetScene::operator=(SheetScene&&) noexcept = default;
 void SheetScene::look(std::span<const Eigen::Vector2d> direction, std::span<SheetHit> hit) const {
   assert(direction.size() == hit.size());
   std::vector<RTCRayHit> lines;
-  std::vector<std::size_t> places;  // of each line in `direction`
+  std::vector<size_t> places;  // of each line in `direction`
   lines.reserve(direction.size());
   places.reserve(direction.size());
-  for (std::size_t k = 0; k < direction.size(); ++k) {
+  for (size_t k = 0; k < direction.size(); ++k) {
     hit[k] = {};
     if (!direction[k].allFinite()) continue;
     const Eigen::Vector3d along = direction[k].homogeneous();
@@ -224,14 +221,14 @@ void SheetScene::look(std::span<const Eigen::Vector2d> direction, std::span<Shee
   context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
   rtcIntersect1M(traced_->scene.get(), &context, lines.data(), static_cast<unsigned>(lines.size()),
                  sizeof(RTCRayHit));
-  for (std::size_t l = 0; l < lines.size(); ++l) {
+  for (size_t l = 0; l < lines.size(); ++l) {
     if (lines[l].hit.geomID == RTC_INVALID_GEOMETRY_ID) continue;
     hit[places[l]] = traced_->hit_of(lines[l], direction[places[l]].homogeneous());
   }
 }
 
 SheetPoint SheetScene::point(int sheet_index, double s_m, double t_m) const {
-  const Sheet& sheet = traced_->sheets.at(static_cast<std::size_t>(sheet_index));
+  const Sheet& sheet = traced_->sheets.at(static_cast<size_t>(sheet_index));
   const double column = s_m / sheet.print->width_m() * (sheet.columns - 1);
   const double row = t_m / sheet.print->height_m() * (sheet.rows - 1);
   const int j = std::clamp(static_cast<int>(column), 0, sheet.columns - 2);

@@ -16,9 +16,8 @@ std::optional<Eigen::Vector2d> true_pixel(const CameraParameters& camera,
   if (!pixel || !pixel->allFinite()) return std::nullopt;
   const std::optional<Eigen::Vector3d> seen = unproject(camera, *pixel);
   if (!seen || (seen->hnormalized() - point_in_camera.hnormalized()).norm() >
-                   kSame * (1 + point_in_camera.hnormalized().squaredNorm())) {
+                   kSame * (1 + point_in_camera.hnormalized().squaredNorm()))
     return std::nullopt;
-  }
   return pixel;
 }
 
@@ -37,15 +36,14 @@ std::vector<TrueMarker> true_markers(const CameraParameters& camera,
     truth.pixel_px = *pixel;
     const bool inside = pixel->x() >= -0.5 && pixel->x() <= camera.image_width - 0.5 &&
                         pixel->y() >= -0.5 && pixel->y() <= camera.image_height - 0.5;
-    if (!inside) {
+    if (!inside)
       truth.sight = MarkerSight::outside_picture;
-    } else if (at.outward.dot(at.point_m) >= 0) {
+    else if (at.outward.dot(at.point_m) >= 0)
       truth.sight = MarkerSight::facing_away;
-    } else if (scene.is_hidden(at.point_m)) {
+    else if (scene.is_hidden(at.point_m))
       truth.sight = MarkerSight::hidden;
-    } else {
+    else
       truth.sight = MarkerSight::seen;
-    }
   }
   return result;
 }

@@ -18,7 +18,7 @@ double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
 /// thin. An angle is then within `kSmallestAngle` of 0 or 180 degrees.
 bool nearly_degenerate(const std::array<Eigen::Vector2d, 4>& corner_px) {
   constexpr double kSmallestAngle = 15 * M_PI / 180;
-  for (std::size_t c = 0; c < 4; ++c) {
+  for (size_t c = 0; c < 4; ++c) {
     const Eigen::Vector2d forward = corner_px[(c + 1) % 4] - corner_px[c];
     const Eigen::Vector2d back = corner_px[(c + 3) % 4] - corner_px[c];
     // Corners run counter-clockwise as seen, which is a negative turn with y pointing down.
@@ -34,18 +34,16 @@ void judge_alone(TagReading& reading, const TrackOptions& options, const cv::Siz
   if (tag.decision_margin < options.min_decision_margin) reading.reject(rejection::kLowMargin);
   if (tag.corrected_bits > options.max_corrected_bits) reading.reject(rejection::kCorrectedBits);
   if (nearly_degenerate(tag.corner_px)) reading.reject(rejection::kTooOblique);
-  if (!tag.refined || tag.explained < options.min_explained) {
+  if (!tag.refined || tag.explained < options.min_explained)
     reading.reject(rejection::kPatternMismatch);
-  }
   constexpr double kBorder = 2;  // px; reach of an edge's blur
-  for (std::size_t c = 0; c < 4; ++c) {
+  for (size_t c = 0; c < 4; ++c) {
     const Eigen::Vector2d& corner = tag.corner_px[c];
     const bool inside = corner.x() >= kBorder && corner.x() <= size.width - 1 - kBorder &&
                         corner.y() >= kBorder && corner.y() <= size.height - 1 - kBorder;
     if (!inside && reading.rejected[c].empty()) reading.rejected[c] = rejection::kTouchingBorder;
-    if (tag.sigma_px[c] > options.max_sigma_px && reading.rejected[c].empty()) {
+    if (tag.sigma_px[c] > options.max_sigma_px && reading.rejected[c].empty())
       reading.rejected[c] = rejection::kUncertain;
-    }
   }
 }
 
@@ -58,13 +56,11 @@ void judge_duplicates(TagHistory& history) {
     return a.tag.decision_margin > b.tag.decision_margin;
   });
   TagHistory kept;
-  for (TagReading& reading : history) {
-    if (kept.empty() || kept.back().frame != reading.frame) {
+  for (TagReading& reading : history)
+    if (kept.empty() || kept.back().frame != reading.frame)
       kept.push_back(std::move(reading));
-    } else if (reading.good()) {
+    else if (reading.good())
       kept.back().reject(rejection::kDuplicateId);
-    }
-  }
   history = std::move(kept);
 }
 
@@ -72,24 +68,20 @@ void judge_duplicates(TagHistory& history) {
 /// ends of its history the two next readings on the one side stand for both.
 void judge_jumps(TagHistory& history, double max_speed_px) {
   std::vector<TagReading*> good;
-  for (TagReading& reading : history) {
+  for (TagReading& reading : history)
     if (reading.good()) good.push_back(&reading);
-  }
-  const auto out_of_reach = [&](std::size_t a, std::size_t b) {
+  const auto out_of_reach = [&](size_t a, size_t b) {
     const double frames = std::abs(good[a]->frame - good[b]->frame);
     return (good[a]->centre_px() - good[b]->centre_px()).norm() > max_speed_px * frames;
   };
   if (good.size() < 3) return;
   std::vector<bool> jumps(good.size());
-  const std::size_t last = good.size() - 1;
-  for (std::size_t i = 1; i < last; ++i) {
-    jumps[i] = out_of_reach(i, i - 1) && out_of_reach(i, i + 1);
-  }
+  const size_t last = good.size() - 1;
+  for (size_t i = 1; i < last; ++i) jumps[i] = out_of_reach(i, i - 1) && out_of_reach(i, i + 1);
   jumps[0] = out_of_reach(0, 1) && out_of_reach(0, 2);
   jumps[last] = out_of_reach(last, last - 1) && out_of_reach(last, last - 2);
-  for (std::size_t i = 0; i < good.size(); ++i) {
+  for (size_t i = 0; i < good.size(); ++i)
     if (jumps[i]) good[i]->reject(rejection::kJump);
-  }
 }
 
 }  // namespace
@@ -99,9 +91,8 @@ bool TagReading::good() const {
 }
 
 void TagReading::reject(const char* reason) {
-  for (std::string& corner : rejected) {
+  for (std::string& corner : rejected)
     if (corner.empty()) corner = reason;
-  }
 }
 
 Eigen::Vector2d TagReading::centre_px() const {

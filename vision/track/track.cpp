@@ -31,19 +31,18 @@ using PointsByTag = std::map<int, std::array<int, 4>>;
 template <class Point>
 PointsByTag points_by_tag(const std::vector<Point>& points, const std::string& file) {
   PointsByTag by_tag;
-  for (std::size_t i = 0; i < points.size(); ++i) {
+  for (size_t i = 0; i < points.size(); ++i) {
     const Point& point = points[i];
     if (!point.tag || !point.corner) continue;
     std::array<int, 4>& corners =
         by_tag.try_emplace(*point.tag, std::array{kNone, kNone, kNone, kNone}).first->second;
-    int& place = corners.at(static_cast<std::size_t>(*point.corner));
-    if (place != kNone) {
+    int& place = corners.at(static_cast<size_t>(*point.corner));
+    if (place != kNone)
       throw InputError(file,
                        fmt::format("'{}' and '{}' are the same corner {} of tag {}",
-                                   points[static_cast<std::size_t>(place)].name, point.name,
+                                   points[static_cast<size_t>(place)].name, point.name,
                                    *point.corner, *point.tag),
                        "each corner of a tag once");
-    }
     place = static_cast<int>(i);
   }
   return by_tag;
@@ -114,7 +113,7 @@ Readings read_all(ImageSource& images, const std::string& family, const PointsBy
     if (progress && !progress(report)) cancelled = true;
   };
 
-  const std::size_t in_flight = 2 * static_cast<std::size_t>(tbb::info::default_concurrency());
+  const size_t in_flight = 2 * static_cast<size_t>(tbb::info::default_concurrency());
   tbb::parallel_pipeline(
       in_flight, tbb::make_filter<void, Picture>(tbb::filter_mode::serial_in_order, load) &
                      tbb::make_filter<Picture, Picture>(tbb::filter_mode::parallel, detect) &
@@ -138,22 +137,19 @@ std::string list_ids(const std::set<int>& ids) {
 
 /// Says, as a remedy, which tags the first picture shows instead of those that were looked for.
 std::string what_appears_instead(const Readings& readings, const std::string& family) {
-  if (!readings.unlisted.empty()) {
+  if (!readings.unlisted.empty())
     return fmt::format("tags {} of that family do appear: check markers.csv",
                        list_ids(readings.unlisted));
-  }
-  constexpr std::size_t kEnough = 3;   // fewer may be chance readings of a small code
+  constexpr size_t kEnough = 3;        // fewer may be chance readings of a small code
   constexpr double kClearMargin = 30;  // grey levels
   for (const std::string& other : tag_families()) {
     if (other == family) continue;
     std::set<int> ids;
-    for (const TagDetection& tag : TagDetector(other, 0).detect(readings.first_picture)) {
+    for (const TagDetection& tag : TagDetector(other, 0).detect(readings.first_picture))
       if (tag.decision_margin > kClearMargin) ids.insert(tag.id);
-    }
-    if (ids.size() >= kEnough) {
+    if (ids.size() >= kEnough)
       return fmt::format("the first picture shows tags {} of {}: set that family in recording.yaml",
                          list_ids(ids), other);
-    }
   }
   return "check the camera's `images`, the light, and that a tag is 30 pixels wide or more";
 }
@@ -164,7 +160,7 @@ std::vector<ReferencePixel> average_reference(const Readings& readings,
   for (const auto& [id, points] : reference) {
     const auto history = readings.by_tag.find(id);
     if (history == readings.by_tag.end()) continue;
-    for (std::size_t c = 0; c < 4; ++c) {
+    for (size_t c = 0; c < 4; ++c) {
       std::vector<Eigen::Vector2d> pixels;
       std::vector<double> sigmas;
       for (const TagReading& reading : history->second) {
@@ -191,7 +187,7 @@ Tracks2d collect_tracks(const Readings& readings, const PointsByTag& markers) {
     const auto history = readings.by_tag.find(id);
     if (history == readings.by_tag.end()) continue;
     for (const TagReading& reading : history->second) {
-      for (std::size_t c = 0; c < 4; ++c) {
+      for (size_t c = 0; c < 4; ++c) {
         if (points[c] == kNone) continue;
         tracks.push_back({.frame = reading.frame,
                           .marker = points[c],
@@ -209,10 +205,9 @@ Tracks2d collect_tracks(const Readings& readings, const PointsByTag& markers) {
 
 cv::Mat draw(const Readings& readings, const TrackResult& result) {
   std::vector<OverlayPoint> points;
-  for (const ReferencePixel& pixel : result.reference) {
+  for (const ReferencePixel& pixel : result.reference)
     points.push_back(
         {.kind = OverlayPoint::Kind::reference, .pixel_px = pixel.pixel_px, .label = ""});
-  }
   for (const Position2d& row : result.tracks) {
     if (row.frame != readings.overlay_frame) continue;
     points.push_back(
@@ -226,32 +221,26 @@ cv::Mat draw(const Readings& readings, const TrackResult& result) {
 }  // namespace
 
 void TrackOptions::validate() const {
-  if (!(max_speed_px > 0)) {
+  if (!(max_speed_px > 0))
     throw InputError("max_speed_px", fmt::format("{}", max_speed_px), "pixels per frame, > 0");
-  }
-  if (!(min_decision_margin >= 0)) {
+  if (!(min_decision_margin >= 0))
     throw InputError("min_decision_margin", fmt::format("{}", min_decision_margin),
                      "grey levels, >= 0");
-  }
-  if (!(min_explained >= 0 && min_explained <= 1)) {
+  if (!(min_explained >= 0 && min_explained <= 1))
     throw InputError("min_explained", fmt::format("{}", min_explained), "a share, 0 to 1");
-  }
-  if (!(max_sigma_px > 0)) {
+  if (!(max_sigma_px > 0))
     throw InputError("max_sigma_px", fmt::format("{}", max_sigma_px), "pixels, > 0");
-  }
-  if (max_corrected_bits < 0 || max_corrected_bits > 2) {
+  if (max_corrected_bits < 0 || max_corrected_bits > 2)
     throw InputError("max_corrected_bits", fmt::format("{}", max_corrected_bits), "0, 1 or 2");
-  }
 }
 
 TrackResult track(const Recording& recording, const CameraEntry& camera,
                   const TrackOptions& options, const ProgressCallback& progress) {
   options.validate();
   const std::string yaml = (recording.folder / "recording.yaml").string();
-  if (!camera.images) {
+  if (!camera.images)
     throw InputError(yaml, fmt::format("camera '{}' has no images", camera.name),
                      "`images` with a folder or a video to track in");
-  }
   const std::unique_ptr<ImageSource> images = open_images(*camera.images);
   return track(recording, *images, camera.images->string(), options, progress);
 }
@@ -261,10 +250,9 @@ TrackResult track(const Recording& recording, ImageSource& pictures, const std::
   options.validate();
   const PointsByTag markers =
       points_by_tag(recording.markers.markers, recording.markers_file.string());
-  if (markers.empty()) {
+  if (markers.empty())
     throw InputError(recording.markers_file.string(), "no marker is a corner of a tag",
                      "markers with `tag` and `corner`", "tracking finds AprilTags");
-  }
   const PointsByTag reference =
       points_by_tag(recording.reference, recording.reference_file.value_or("reference").string());
 
@@ -293,13 +281,11 @@ TrackResult track(const Recording& recording, ImageSource& pictures, const std::
   result.reference = average_reference(readings, reference);
 
   int good = 0;
-  for (const Position2d& row : result.tracks) {
-    if (row.rejected.empty()) {
+  for (const Position2d& row : result.tracks)
+    if (row.rejected.empty())
       ++good;
-    } else {
+    else
       ++result.rejected[row.rejected];
-    }
-  }
   result.overlay = draw(readings, result);
   result.overlay_frame = readings.overlay_frame;
   result.usable = good > 0;

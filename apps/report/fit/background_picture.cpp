@@ -16,9 +16,8 @@ std::optional<BackgroundPicture> read_picture(const std::string& kind,
   try {
     const std::unique_ptr<ImageSource> source = open_images(images);
     cv::Mat grey;
-    for (int i = 0; i <= frame; ++i) {
+    for (int i = 0; i <= frame; ++i)
       if (!source->next(grey)) return std::nullopt;
-    }
     std::vector<unsigned char> bytes;
     if (!cv::imencode(".jpg", grey, bytes, {cv::IMWRITE_JPEG_QUALITY, 80})) return std::nullopt;
     return BackgroundPicture{.kind = kind,
@@ -38,9 +37,8 @@ int overlay_frame(const FitReport::Residuals& residuals) {
   for (const FitReport::Residuals::Row& row : residuals.rows) ++count[row.frame];
   int most = 0;
   for (const auto& [frame, rows] : count) most = std::max(most, rows);
-  for (auto frame = count.rbegin(); frame != count.rend(); ++frame) {
+  for (auto frame = count.rbegin(); frame != count.rend(); ++frame)
     if (2 * frame->second >= most) return frame->first;
-  }
   return -1;
 }
 
@@ -51,9 +49,8 @@ std::vector<BackgroundPicture> background_pictures(const FitReport& report,
     const CameraEntry* camera = recording.find_camera(residuals.kind);
     const int frame = overlay_frame(residuals);
     if (camera == nullptr || !camera->images || frame < 0) continue;
-    if (auto picture = read_picture(residuals.kind, *camera->images, frame)) {
+    if (auto picture = read_picture(residuals.kind, *camera->images, frame))
       pictures.push_back(std::move(*picture));
-    }
   }
   return pictures;
 }

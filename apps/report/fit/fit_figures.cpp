@@ -57,9 +57,8 @@ MarkerErrors marker_errors(const FitReport::Residuals& residuals) {
 /// Returns the first held-out frame of the residuals; nothing when none is.
 std::optional<int> first_held_out(const FitReport::Residuals& residuals) {
   std::optional<int> first;
-  for (const FitReport::Residuals::Row& row : residuals.rows) {
+  for (const FitReport::Residuals::Row& row : residuals.rows)
     if (row.held_out) first = std::min(first.value_or(row.frame), row.frame);
-  }
   return first;
 }
 
@@ -107,9 +106,8 @@ double choose_magnification(const std::vector<PointPair>& points, double page_px
   const double wanted = std::clamp(9 / median_px, 1.0, 1000.0);
   double best = 1;
   for (double power = 1; power <= 1000; power *= 10) {
-    for (const double factor : {1.0, 2.0, 5.0}) {
+    for (const double factor : {1.0, 2.0, 5.0})
       if (power * factor <= wanted) best = power * factor;
-    }
   }
   return best;
 }
@@ -124,7 +122,7 @@ std::string residual_over_time_svg(const FitReport::Residuals& residuals,
     Series result;
     result.label = label;
     result.style = style;
-    for (std::size_t frame = 0; frame < by_frame.size(); ++frame) {
+    for (size_t frame = 0; frame < by_frame.size(); ++frame) {
       result.x.push_back(recording.frame_time_s(static_cast<int>(frame)));
       result.y.push_back(by_frame[frame] * unit.factor);
     }
@@ -182,14 +180,13 @@ std::string residual_map_svg(const FitReport::Residuals& residuals, const Record
     map.title = title;
     const ClothValue* worst = nullptr;
     for (const auto& [index, mean_square] : by_marker) {
-      const Marker& marker = recording.markers.markers[static_cast<std::size_t>(index)];
+      const Marker& marker = recording.markers.markers[static_cast<size_t>(index)];
       const double rms = mean_square.rms() * unit.factor;
       map.values.push_back({marker.s_m, marker.t_m, rms,
                             fmt::format("{}: {} {}", marker.name, significant(rms, 3), unit.name)});
     }
-    for (const ClothValue& value : map.values) {
+    for (const ClothValue& value : map.values)
       if (worst == nullptr || value.value > worst->value) worst = &value;
-    }
     maps.description +=
         fmt::format("{}: largest at s = {} m, t = {} m ({}). ", title, significant(worst->s, 3),
                     significant(worst->t, 3), worst->label);
@@ -205,9 +202,8 @@ std::string observed_and_predicted_svg(const FitReport::Residuals& residuals,
                                        const std::vector<BackgroundPicture>& pictures) {
   const int frame = overlay_frame(residuals);
   std::vector<const FitReport::Residuals::Row*> rows;
-  for (const FitReport::Residuals::Row& row : residuals.rows) {
+  for (const FitReport::Residuals::Row& row : residuals.rows)
     if (row.frame == frame) rows.push_back(&row);
-  }
   if (rows.empty()) return "";
 
   PointOverlay overlay;
@@ -225,7 +221,7 @@ std::string observed_and_predicted_svg(const FitReport::Residuals& residuals,
   for (const auto* row : rows) {
     const Eigen::Vector2d observed = on_page(row->observed);
     const Eigen::Vector2d predicted = on_page(row->predicted);
-    const Marker& marker = recording.markers.markers[static_cast<std::size_t>(row->marker)];
+    const Marker& marker = recording.markers.markers[static_cast<size_t>(row->marker)];
     const ShownUnit unit = shown_unit(residuals.unit);
     overlay.points.push_back(
         {observed.x(), observed.y(), predicted.x(), predicted.y(),
@@ -239,9 +235,8 @@ std::string observed_and_predicted_svg(const FitReport::Residuals& residuals,
         return one.kind == residuals.kind && one.frame == frame;
       });
   Eigen::AlignedBox2d box;
-  for (const PointPair& point : overlay.points) {
+  for (const PointPair& point : overlay.points)
     box.extend(Eigen::Vector2d(point.observed_x, point.observed_y));
-  }
   const double margin = 0.08 * box.diagonal().norm() + 1e-9;
   // A hanging strip would fill pages. The box is four wide to three high at most, the points in its
   // middle.
@@ -271,7 +266,7 @@ std::string search_cost_svg(const std::vector<double>& cost) {
   Series best;
   best.label = "best individual";
   best.style = {"#1f4e79", "", 2};
-  for (std::size_t generation = 0; generation < cost.size(); ++generation) {
+  for (size_t generation = 0; generation < cost.size(); ++generation) {
     best.x.push_back(static_cast<double>(generation));
     best.y.push_back(cost[generation]);
   }

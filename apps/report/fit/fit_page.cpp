@@ -70,20 +70,18 @@ std::string figures_of(const FitReport& report, const Recording& recording,
 
 std::string correlation_section(const FitReport& report) {
   const auto count = static_cast<Eigen::Index>(report.correlation_names.size());
-  if (count < 2 || report.correlation.rows() != count || report.correlation.cols() != count) {
+  if (count < 2 || report.correlation.rows() != count || report.correlation.cols() != count)
     return "";
-  }
   std::string html = paragraph(
       "Correlation of the estimates: near 1 or −1, the data fix a combination of two parameters "
       "better than either.");
   html += "<div class=\"wide\"><table class=\"matrix\"><thead><tr><td></td>";
-  for (const std::string& name : report.correlation_names) {
+  for (const std::string& name : report.correlation_names)
     html += fmt::format("<th scope=\"col\">{}</th>", escape_xml(name));
-  }
   html += "</tr></thead>\n<tbody>\n";
   for (Eigen::Index row = 0; row < count; ++row) {
     html += fmt::format("<tr><th scope=\"row\">{}</th>",
-                        escape_xml(report.correlation_names[static_cast<std::size_t>(row)]));
+                        escape_xml(report.correlation_names[static_cast<size_t>(row)]));
     for (Eigen::Index column = 0; column < count; ++column) {
       const double value = report.correlation(row, column);
       const bool known = std::isfinite(value);
@@ -100,7 +98,7 @@ std::string search_section(const FitReport& report) {
   std::string content =
       figure(search_cost_svg(report.search_cost), "Cost of the best individual of the search.");
   const Table basins = basin_table(report.result);
-  if (!basins.rows.empty()) {
+  if (!basins.rows.empty())
     content += "<div class=\"wide\">" +
                html_table(basins,
                           "Basins: the places in which runs of the search, or refinements of its "
@@ -108,12 +106,10 @@ std::string search_section(const FitReport& report) {
                           "window, on its mesh. A second one as low as the first says that the "
                           "recording can be explained in two ways.") +
                "</div>\n";
-  }
   if (!report.stages.empty()) {
     content += "<ol class=\"stages\">\n";
-    for (const std::string& stage : report.stages) {
+    for (const std::string& stage : report.stages)
       content += fmt::format("<li>{}</li>\n", escape_xml(stage));
-    }
     content += "</ol>\n";
   }
   return content;
@@ -142,9 +138,8 @@ std::string model_section(const FitReport& report, const Recording& recording) {
                                 result.substeps, significant(1000 * result.time_step_s, 3)));
   add("start", result.start);
   std::string effects;
-  for (const EffectEstimate& effect : result.effects) {
+  for (const EffectEstimate& effect : result.effects)
     effects += (effects.empty() ? "" : ", ") + effect.name;
-  }
   add("effects beyond springs and weight", effects.empty() ? "none" : effects);
   add("origin of the recording", recording.origin.empty() ? "not stated" : recording.origin);
   return html_table(table, "");

@@ -15,9 +15,8 @@ namespace {
 template <class Visit>
 void for_each_parameter(const FitResult& result, const Visit& visit) {
   for (const ParameterEstimate& parameter : result.parameters) visit("base", parameter);
-  for (const EffectEstimate& effect : result.effects) {
+  for (const EffectEstimate& effect : result.effects)
     for (const ParameterEstimate& parameter : effect.parameters) visit(effect.name, parameter);
-  }
   for (const ParameterEstimate& parameter : result.nuisance) visit("measurement", parameter);
 }
 
@@ -121,7 +120,7 @@ Table basin_table(const FitResult& result) {
   }
   table.rows = {cost, ended, how};
   const std::vector<Basin::Number>& names = result.basins.front().parameters;
-  for (std::size_t p = 0; p < names.size(); ++p) {
+  for (size_t p = 0; p < names.size(); ++p) {
     std::vector<std::string> row = {names[p].name};
     for (const Basin& basin : result.basins)
       row.push_back(p < basin.parameters.size() ? significant(basin.parameters[p].value, 3) : "");
@@ -185,10 +184,10 @@ Table residual_table(const FitReport& report, const Recording& recording) {
       std::array<std::string, 3> observed;
       std::array<std::string, 3> predicted;
       for (Eigen::Index c = 0; c < std::min<Eigen::Index>(3, row.observed.size()); ++c) {
-        observed[static_cast<std::size_t>(c)] = exact_text(row.observed[c]);
-        predicted[static_cast<std::size_t>(c)] = exact_text(row.predicted[c]);
+        observed[static_cast<size_t>(c)] = exact_text(row.observed[c]);
+        predicted[static_cast<size_t>(c)] = exact_text(row.predicted[c]);
       }
-      const Marker& marker = recording.markers.markers[static_cast<std::size_t>(row.marker)];
+      const Marker& marker = recording.markers.markers[static_cast<size_t>(row.marker)];
       table.rows.push_back({residuals.kind, std::to_string(row.frame), marker.name,
                             row.held_out ? "1" : "0", observed[0], observed[1], observed[2],
                             predicted[0], predicted[1], predicted[2], exact_text(row.sigma)});
@@ -199,9 +198,8 @@ Table residual_table(const FitReport& report, const Recording& recording) {
 
 Table rejection_table(const FitResult& result) {
   Table table{{"reason", "observations"}, {}};
-  for (const auto& [reason, count] : result.observations_rejected) {
+  for (const auto& [reason, count] : result.observations_rejected)
     table.rows.push_back({reason, std::to_string(count)});
-  }
   return table;
 }
 

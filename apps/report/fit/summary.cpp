@@ -55,9 +55,8 @@ std::string error_sentence(const ObservationErrors& errors) {
         "is {} {} off",
         shown(errors.held_out.rms), unit.name, errors.held_out.count, trivial.name,
         shown(trivial.rms), unit.name);
-    if (errors.held_out.rms > 0 && trivial.rms > errors.held_out.rms) {
+    if (errors.held_out.rms > 0 && trivial.rms > errors.held_out.rms)
       text += fmt::format(" ({} times as much)", significant(trivial.rms / errors.held_out.rms, 2));
-    }
   }
   if (errors.noise > 0) {
     text += fmt::format("; the measurements themselves scatter by {} {}", shown(errors.noise),
@@ -81,14 +80,12 @@ std::string parameter_sentence(const FitResult& result) {
     if (parameter.state == ParameterState::undetermined) undetermined.push_back(parameter.name);
   };
   for (const ParameterEstimate& parameter : result.parameters) look(parameter);
-  for (const EffectEstimate& effect : result.effects) {
+  for (const EffectEstimate& effect : result.effects)
     for (const ParameterEstimate& parameter : effect.parameters) look(parameter);
-  }
   std::string text =
       fmt::format("{} {} determined", fitted, fitted == 1 ? "parameter was" : "parameters were");
-  if (!undetermined.empty()) {
+  if (!undetermined.empty())
     text += fmt::format("; these data do not determine {}", fmt::join(undetermined, ", "));
-  }
   return text + ".";
 }
 
@@ -125,14 +122,12 @@ FitSummary summarise(const FitReport& report) {
                 result.observations_used, result.recording)
           : fmt::format("was fitted to {} observations of the recording “{}”. {}",
                         result.observations_used, result.recording, parameter_sentence(result));
-  for (const ObservationErrors& errors : result.errors) {
+  for (const ObservationErrors& errors : result.errors)
     summary.paragraph += fmt::format(" {}", error_sentence(errors));
-  }
-  if (judged && worst == Grade::useful) {
+  if (judged && worst == Grade::useful)
     summary.paragraph +=
         " The gap between error and noise is motion that this model does not have, or error of "
         "cameras and markers.";
-  }
   return summary;
 }
 

@@ -12,7 +12,7 @@ namespace {
 using Rgb = std::array<double, 3>;
 
 std::string mix(const Rgb& a, const Rgb& b, double weight_of_b) {
-  const auto channel = [&](std::size_t c) {
+  const auto channel = [&](size_t c) {
     return static_cast<int>(std::lround(a[c] + weight_of_b * (b[c] - a[c])));
   };
   return fmt::format("#{:02x}{:02x}{:02x}", channel(0), channel(1), channel(2));
@@ -37,7 +37,7 @@ constexpr Rgb kOrange = {0xf7, 0xb3, 0x77};
 
 std::string viridis(double fraction) {
   const double place = std::clamp(fraction, 0.0, 1.0) * (kViridis.size() - 1);
-  const auto below = std::min(static_cast<std::size_t>(place), kViridis.size() - 2);
+  const auto below = std::min(static_cast<size_t>(place), kViridis.size() - 2);
   return mix(kViridis[below], kViridis[below + 1], place - static_cast<double>(below));
 }
 

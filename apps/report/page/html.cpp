@@ -82,7 +82,7 @@ std::string typeset_number(const std::string& text) {
   if (text == "-") return "–";
   std::string mantissa = text;
   std::string power;
-  const std::size_t e = text.find('e');
+  const size_t e = text.find('e');
   if (e != std::string::npos) {
     mantissa = text.substr(0, e);
     const int exponent = std::atoi(text.c_str() + e + 1);
@@ -93,28 +93,27 @@ std::string typeset_number(const std::string& text) {
 }
 
 std::string html_table(const Table& table, const std::string& caption) {
-  constexpr std::size_t kBrief = 28;  // letters: a rate with its bounds stays on a line
+  constexpr size_t kBrief = 28;  // letters: a rate with its bounds stays on a line
   std::vector<bool> number(table.header.size(), true), brief(table.header.size(), true);
   for (const std::vector<std::string>& row : table.rows) {
-    for (std::size_t c = 0; c < row.size(); ++c) {
+    for (size_t c = 0; c < row.size(); ++c) {
       number[c] = number[c] && shows_number(row[c]);
       brief[c] = brief[c] && row[c].size() <= kBrief;
     }
   }
-  const auto mark = [&](std::size_t c) {
+  const auto mark = [&](size_t c) {
     return number[c] ? " class=\"number\"" : brief[c] ? " class=\"brief\"" : "";
   };
 
   std::string html = "<div class=\"wide\"><table>";
   if (!caption.empty()) html += "<caption>" + escape_xml(caption) + "</caption>";
   html += "<thead><tr>";
-  for (std::size_t c = 0; c < table.header.size(); ++c) {
+  for (size_t c = 0; c < table.header.size(); ++c)
     html += fmt::format("<th scope=\"col\"{}>{}</th>", mark(c), escape_xml(table.header[c]));
-  }
   html += "</tr></thead>\n<tbody>\n";
   for (const std::vector<std::string>& row : table.rows) {
     html += "<tr>";
-    for (std::size_t c = 0; c < row.size(); ++c) {
+    for (size_t c = 0; c < row.size(); ++c) {
       const char* tag = c == 0 ? "th" : "td";
       html += fmt::format("<{}{}{}>{}</{}>", tag, c == 0 ? " scope=\"row\"" : "", mark(c),
                           shows_number(row[c]) ? typeset_number(row[c]) : escape_xml(row[c]), tag);
@@ -129,12 +128,12 @@ std::string data_uri(std::string_view media_type, std::string_view bytes) {
       "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
   std::string uri = fmt::format("data:{};base64,", media_type);
   uri.reserve(uri.size() + bytes.size() * 4 / 3 + 4);
-  for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    const auto byte = [&](std::size_t k) -> std::uint32_t {
+  for (size_t i = 0; i < bytes.size(); i += 3) {
+    const auto byte = [&](size_t k) -> std::uint32_t {
       return i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0U;
     };
     const std::uint32_t word = byte(0) << 16U | byte(1) << 8U | byte(2);
-    const std::size_t given = bytes.size() - i;
+    const size_t given = bytes.size() - i;
     uri += kDigits[word >> 18U & 63U];
     uri += kDigits[word >> 12U & 63U];
     uri += given > 1 ? kDigits[word >> 6U & 63U] : '=';

@@ -38,7 +38,7 @@ std::string polylines(const Series& series, const Axis& x_axis, const Axis& y_ax
           "stroke-linejoin=\"round\"{}/>\n",
           points, series.style.colour, series.style.width_px, dashes);
     } else if (count == 1) {
-      const std::size_t comma = points.find(',');
+      const size_t comma = points.find(',');
       svg += fmt::format("<circle cx=\"{}\" cy=\"{}\" r=\"{}\" fill=\"{}\"/>\n",
                          points.substr(0, comma), points.substr(comma + 1), series.style.width_px,
                          series.style.colour);
@@ -46,7 +46,7 @@ std::string polylines(const Series& series, const Axis& x_axis, const Axis& y_ax
     points.clear();
     count = 0;
   };
-  for (std::size_t i = 0; i < std::min(series.x.size(), series.y.size()); ++i) {
+  for (size_t i = 0; i < std::min(series.x.size(), series.y.size()); ++i) {
     if (!x_axis.shows(series.x[i]) || !y_axis.shows(series.y[i])) {
       finish();
       continue;
@@ -88,8 +88,8 @@ std::string legend(const std::vector<Series>& series, double left, double right,
 /// than two.
 double usual_spacing(const std::vector<ClothValue>& values) {
   std::vector<double> nearest(values.size(), std::numeric_limits<double>::infinity());
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    for (std::size_t j = 0; j < values.size(); ++j) {
+  for (size_t i = 0; i < values.size(); ++i) {
+    for (size_t j = 0; j < values.size(); ++j) {
       if (i == j) continue;
       const double distance = std::hypot(values[i].s - values[j].s, values[i].t - values[j].t);
       nearest[i] = std::min(nearest[i], distance);
@@ -114,9 +114,8 @@ std::vector<double> nice_ticks(double low, double high, int wanted) {
                                                  : 10);
   std::vector<double> ticks;
   const double first = std::ceil(low / step - 1e-9);
-  for (double k = first; k * step <= high + 1e-9 * step; ++k) {
+  for (double k = first; k * step <= high + 1e-9 * step; ++k)
     ticks.push_back(k == 0 ? 0 : k * step);
-  }
   return ticks;
 }
 
@@ -143,7 +142,7 @@ std::string line_plot(const LinePlot& plot) {
   Extent y_extent;
   const Axis any{.logarithmic = plot.log_y};
   for (const Series& series : plot.series) {
-    for (std::size_t i = 0; i < std::min(series.x.size(), series.y.size()); ++i) {
+    for (size_t i = 0; i < std::min(series.x.size(), series.y.size()); ++i) {
       if (!std::isfinite(series.x[i]) || !any.shows(series.y[i])) continue;
       x_extent.add(series.x[i]);
       y_extent.add(series.y[i]);
@@ -190,9 +189,8 @@ std::string line_plot(const LinePlot& plot) {
     body += text_at(kLeft + 6, y - 5, plot.level->label, "start", kSoft);
   }
   // The plot is about the first series, which is drawn last, on top.
-  for (auto series = plot.series.rbegin(); series != plot.series.rend(); ++series) {
+  for (auto series = plot.series.rbegin(); series != plot.series.rend(); ++series)
     body += polylines(*series, x_axis, y_axis);
-  }
   body += text_at(0.5 * (kLeft + kRight), kBottom + 38, plot.x_label, "middle");
   body += fmt::format(
       "<text transform=\"translate(14 {:.1f}) rotate(-90)\" text-anchor=\"middle\">{}</text>\n",
@@ -220,9 +218,8 @@ std::string cloth_maps(const ClothMaps& maps) {
   double spacing_m = std::numeric_limits<double>::infinity();
   for (const ClothMap& map : maps.maps) {
     spacing_m = std::min(spacing_m, usual_spacing(map.values));
-    for (const ClothValue& value : map.values) {
+    for (const ClothValue& value : map.values)
       if (std::isfinite(value.value) && maps.largest == 0) highest = std::max(highest, value.value);
-    }
   }
   if (highest == 0) highest = 1;
   // Dots are as large as neighbours allow without touching.

@@ -186,7 +186,7 @@ Table short_undeclared_effects_table(const UndeclaredResult& result) {
   if (summaries.empty() || summaries.back().law_halves.trials == 0) return table;
   constexpr std::ptrdiff_t kBehindPartly = 7;
   table.header.insert(table.header.begin() + kBehindPartly, "law halves");
-  for (std::size_t n = 0; n < summaries.size(); ++n) {
+  for (size_t n = 0; n < summaries.size(); ++n) {
     const Rate& halves = summaries[n].law_halves;
     table.rows[n].insert(
         table.rows[n].begin() + kBehindPartly,

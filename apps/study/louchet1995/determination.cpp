@@ -48,12 +48,11 @@ Eigen::VectorXd relative_sigmas(const Objective& whitened, const Eigen::VectorXd
   for (Eigen::Index k = 0; k < truth.size(); ++k) {
     const Eigen::VectorXd& direction = information.vectors.col(k);
     const double told = information.values[k];
-    for (Eigen::Index p = 0; p < truth.size(); ++p) {
+    for (Eigen::Index p = 0; p < truth.size(); ++p)
       if (told > kNoInformation)
         variance[p] += direction[p] * direction[p] / told;
       else if (std::abs(direction[p]) > kTakesPart)
         variance[p] = INFINITY;
-    }
   }
   for (Eigen::Index p = 0; p < truth.size(); ++p)
     if (length[p] > 0) sigma[p] = std::sqrt(variance[p]) / length[p];

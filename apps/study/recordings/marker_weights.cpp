@@ -31,7 +31,7 @@ std::vector<double> weights_of(const MarkerSet& markers, const MarkerWeights& we
     if (found == markers.index.end())
       throw InputError("--weights", "names marker " + name + ", which the recording does not have",
                        "markers of every recording of the study");
-    result[static_cast<std::size_t>(found->second)] = weight;
+    result[static_cast<size_t>(found->second)] = weight;
   }
   return result;
 }

@@ -49,26 +49,26 @@ struct MarkerTracks {
   Tracks predicted;
 };
 
-MarkerTracks no_tracks(std::size_t markers, int dimension, int frames) {
+MarkerTracks no_tracks(size_t markers, int dimension, int frames) {
   const Eigen::MatrixXd nothing = Eigen::MatrixXd::Constant(dimension, frames, kNan);
   return {.observed = Tracks(markers, nothing), .predicted = Tracks(markers, nothing)};
 }
 
 /// Returns the markers with which a fit was compared.
-MarkerTracks compared_markers(const FitReport::Residuals& residuals, std::size_t markers) {
+MarkerTracks compared_markers(const FitReport::Residuals& residuals, size_t markers) {
   const int dimension =
       residuals.rows.empty() ? 3 : static_cast<int>(residuals.rows.front().observed.size());
   MarkerTracks tracks =
       no_tracks(markers, dimension, static_cast<int>(residuals.rms_by_frame.size()));
   for (const FitReport::Residuals::Row& row : residuals.rows) {
-    tracks.observed[static_cast<std::size_t>(row.marker)].col(row.frame) = row.observed;
-    tracks.predicted[static_cast<std::size_t>(row.marker)].col(row.frame) = row.predicted;
+    tracks.observed[static_cast<size_t>(row.marker)].col(row.frame) = row.observed;
+    tracks.predicted[static_cast<size_t>(row.marker)].col(row.frame) = row.predicted;
   }
   return tracks;
 }
 
 /// Returns the markers that drive held points, at their driven places.
-MarkerTracks driving_markers(const FitInput& input, std::size_t markers, int frames) {
+MarkerTracks driving_markers(const FitInput& input, size_t markers, int frames) {
   MarkerTracks tracks = no_tracks(markers, 3, frames);
   Recording driven = input.recording;
   std::erase_if(driven.held,
@@ -78,21 +78,21 @@ MarkerTracks driving_markers(const FitInput& input, std::size_t markers, int fra
   for (int f = 0; f < frames; ++f) time_s.push_back(driven.frame_time_s(f));
   const Mesh any{2, 2, driven.cloth.width_m, driven.cloth.height_m};
   const Drive drive = make_drive(driven, any, input.tracks3d, time_s);
-  for (std::size_t n = 0; n < drive.driving_markers.size(); ++n) {
-    Eigen::MatrixXd& track = tracks.predicted[static_cast<std::size_t>(drive.driving_markers[n])];
+  for (size_t n = 0; n < drive.driving_markers.size(); ++n) {
+    Eigen::MatrixXd& track = tracks.predicted[static_cast<size_t>(drive.driving_markers[n])];
     for (int f = 0; f < frames; ++f)
-      track.col(f) = drive.held[n].motion(time_s[static_cast<std::size_t>(f)]);
+      track.col(f) = drive.held[n].motion(time_s[static_cast<size_t>(f)]);
   }
   for (const Position3d& row : input.tracks3d)
     if (std::ranges::find(drive.driving_markers, row.marker) != drive.driving_markers.end())
-      tracks.observed[static_cast<std::size_t>(row.marker)].col(row.frame) = row.position_m;
+      tracks.observed[static_cast<size_t>(row.marker)].col(row.frame) = row.position_m;
   return tracks;
 }
 
 /// Returns the error from `held_out_from` on, with the mean error before subtracted.
 double centred_held_out_rms(const Tracks& observed, const Tracks& predicted, int held_out_from) {
   Tracks later, forecast = centred(observed, predicted, held_out_from);
-  for (std::size_t m = 0; m < observed.size(); ++m) {
+  for (size_t m = 0; m < observed.size(); ++m) {
     const Eigen::Index count = observed[m].cols() - held_out_from;
     later.push_back(observed[m].rightCols(count));
     forecast[m] = forecast[m].rightCols(count).eval();
@@ -103,7 +103,7 @@ double centred_held_out_rms(const Tracks& observed, const Tracks& predicted, int
 /// Computes errors over all frames, of the model and of a rigid motion with the driven points.
 void judge_whole(const FitInput& input, const FitReport::Residuals& residuals,
                  const std::optional<MarkerWeights>& weights, StudyRow& row) {
-  const std::size_t markers = input.recording.markers.markers.size();
+  const size_t markers = input.recording.markers.markers.size();
   MarkerTracks tracks = compared_markers(residuals, markers);
   row.whole_rms = rms_distance(tracks.observed, tracks.predicted);
   if (tracks.observed.empty() || tracks.observed.front().rows() != 3) return;
@@ -123,7 +123,7 @@ void judge_whole(const FitInput& input, const FitReport::Residuals& residuals,
   if (!weights) return;
 
   Tracks shifted = centred(tracks.observed, tracks.predicted, held_out_from);
-  for (std::size_t m = 0; m < markers; ++m) {
+  for (size_t m = 0; m < markers; ++m) {
     if (!driving.predicted[m].allFinite()) continue;
     shifted[m] = driving.predicted[m];
     tracks.observed[m] = driving.observed[m];
@@ -151,7 +151,7 @@ std::vector<StudyRow> rows_of(const FitInput& input, const FitReport& report,
     for (const ParameterEstimate& parameter : effect.parameters) note(effect.name + ".", parameter);
 
   std::vector<StudyRow> rows;
-  for (std::size_t k = 0; k < report.result.errors.size(); ++k) {
+  for (size_t k = 0; k < report.result.errors.size(); ++k) {
     const ObservationErrors& errors = report.result.errors[k];
     StudyRow one = row;
     one.kind = errors.kind;
@@ -208,7 +208,7 @@ std::vector<StudyRow> fit_one(const fs::path& folder, const StudiedModel& model,
 std::vector<fs::path> find_recordings(const std::vector<fs::path>& folders) {
   std::set<fs::path> found;
   for (const fs::path& folder : folders) {
-    const std::size_t before = found.size();
+    const size_t before = found.size();
     if (!fs::is_directory(folder))
       throw InputError(folder.string(), "is not a folder", "a folder with recordings in it");
     const fs::path clean = (folder.lexically_normal() / "").parent_path();
@@ -274,8 +274,8 @@ std::vector<StudyRow> study_recordings(const RecordingsStudyOptions& options, Jo
   options.validate();
   const auto models = static_cast<int>(options.models.size());
   const Work work = [&](int index, std::uint64_t) {
-    const fs::path& folder = options.recordings[static_cast<std::size_t>(index / models)];
-    const StudiedModel& model = options.models[static_cast<std::size_t>(index % models)];
+    const fs::path& folder = options.recordings[static_cast<size_t>(index / models)];
+    const StudiedModel& model = options.models[static_cast<size_t>(index % models)];
     return rows_to_text(fit_one(folder, model, options));
   };
   const ExecuteResult result = execute(

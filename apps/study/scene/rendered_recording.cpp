@@ -33,7 +33,7 @@ MarkerSet tag_corners(int tags, double size_m) {
   MarkerSet set{.kind = MarkerKind::apriltag, .family = "tag36h11", .markers = {}, .index = {}};
   for (int tag = 0; tag < tags * tags; ++tag) {
     for (int corner = 0; corner < 4; ++corner) {
-      const auto [right, down] = kCorners[static_cast<std::size_t>(corner)];
+      const auto [right, down] = kCorners[static_cast<size_t>(corner)];
       const std::string name = fmt::format("{}_{}", tag, corner);
       set.index[name] = static_cast<int>(set.markers.size());
       set.markers.push_back({.name = name,
@@ -49,7 +49,7 @@ MarkerSet tag_corners(int tags, double size_m) {
 Eigen::Matrix2Xd places_m(const std::vector<Marker>& markers) {
   Eigen::Matrix2Xd places(2, static_cast<Eigen::Index>(markers.size()));
   for (Eigen::Index m = 0; m < places.cols(); ++m) {
-    const Marker& marker = markers[static_cast<std::size_t>(m)];
+    const Marker& marker = markers[static_cast<size_t>(m)];
     places.col(m) << marker.s_m, marker.t_m;
   }
   return places;
@@ -116,9 +116,9 @@ std::vector<std::vector<Eigen::Matrix3Xd>> exposed_shapes(const SyntheticScene& 
   time_s.erase(repeated.begin(), repeated.end());
   const std::vector<Eigen::Matrix3Xd> run = simulate_scene(scene, seed, time_s);
   const auto at = [&](double when_s) -> const Eigen::Matrix3Xd& {
-    return run[static_cast<std::size_t>(std::ranges::lower_bound(time_s, when_s) - time_s.begin())];
+    return run[static_cast<size_t>(std::ranges::lower_bound(time_s, when_s) - time_s.begin())];
   };
-  for (std::size_t f = 0; f < shapes.size(); ++f) {
+  for (size_t f = 0; f < shapes.size(); ++f) {
     const Eigen::Matrix3Xd middle = std::move(shapes[f].front());
     shapes[f].clear();
     for (int k = 0; k < options.instants; ++k)
@@ -155,7 +155,7 @@ class Stage {
   /// Takes the picture of the camera with these rays at a frame.
   cv::Mat picture(const CameraRays& rays, int number, int frame) const {
     std::vector<std::vector<PlacedSheet>> instants;
-    for (const Eigen::Matrix3Xd& shape : shapes_[static_cast<std::size_t>(frame)])
+    for (const Eigen::Matrix3Xd& shape : shapes_[static_cast<size_t>(frame)])
       instants.push_back({drawn(shape)});
     const std::uint64_t noise_seed = derived_seed(derived_seed(seed_, kPictures + number), frame);
     return render_cloth(rays, instants, render_options(options_), noise_seed);
@@ -164,12 +164,12 @@ class Stage {
   /// Returns where a camera truly has the markers at a frame. Their visibility is that of the sheet
   /// that is drawn; their places are the projected points of the simulated surface.
   std::vector<TrueMarker> truth(const CameraParameters& camera, int frame) const {
-    const std::vector<Eigen::Matrix3Xd>& shapes = shapes_[static_cast<std::size_t>(frame)];
+    const std::vector<Eigen::Matrix3Xd>& shapes = shapes_[static_cast<size_t>(frame)];
     const Eigen::Matrix3Xd& shape = shapes[shapes.size() / 2];
     const PlacedSheet sheet = drawn(shape);
     std::vector<TrueMarker> truth = true_markers(camera, {&sheet, 1}, 0, markers_.markers);
     const Eigen::Matrix3Xd point_m = marker_surface_.evaluate(shape);
-    for (std::size_t m = 0; m < truth.size(); ++m) {
+    for (size_t m = 0; m < truth.size(); ++m) {
       const Eigen::Vector3d point = point_m.col(static_cast<Eigen::Index>(m));
       if (const auto pixel = project(camera, camera_from_world(camera) * point))
         truth[m].pixel_px = *pixel;
@@ -238,7 +238,7 @@ TrackerErrors errors_of(const Tracks2d& tracks, const Stage& stage,
       continue;
     }
     const TrueMarker& marker =
-        truth[static_cast<std::size_t>(row.frame)][static_cast<std::size_t>(row.marker)];
+        truth[static_cast<size_t>(row.frame)][static_cast<size_t>(row.marker)];
     const Eigen::Vector2d error_px = row.position_px - marker.pixel_px;
     ++errors.accepted;
     errors.squared_error_px2 += error_px.squaredNorm();
@@ -279,11 +279,10 @@ void PictureOptions::validate(const SyntheticScene& scene) const {
   refuse(!scene.noisy, "noisy");
 
   const double tag_px = pixels_of(kTagShare * scene.size_m / tags, scene, *this);
-  if (tag_px < kSmallestTagPx) {
+  if (tag_px < kSmallestTagPx)
     throw InputError("--tags", fmt::format("tags would be {:.1f} px wide", tag_px),
                      fmt::format("{} px or more", kSmallestTagPx),
                      "fewer --tags, or larger pictures with --picture");
-  }
 }
 
 int TrackerErrors::rejections() const {

@@ -51,9 +51,8 @@ TEST(NumberText, GivesFourDigitsToAValueWithoutSigma) {
 }
 
 TEST(NumberText, WritesExactTextThatReadsBackToTheSameBits) {
-  for (const double value : {0.1, 1.0 / 3, 6.02214076e23, -4.9e-324}) {
+  for (const double value : {0.1, 1.0 / 3, 6.02214076e23, -4.9e-324})
     EXPECT_EQ(std::strtod(exact_text(value).c_str(), nullptr), value);
-  }
 }
 
 TEST(ShowsNumber, TellsNumbersFromWords) {

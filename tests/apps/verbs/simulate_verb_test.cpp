@@ -119,7 +119,7 @@ TEST_F(Simulate, LeavesARecordingOfTheSameClothThatReadsBack) {
 
 TEST_F(Simulate, RunsSpringsThatAreGivenTypeByType) {
   std::string text = model_text(kCorners);
-  const std::size_t begin = text.find("fabric:"), end = text.find('\n', begin);
+  const size_t begin = text.find("fabric:"), end = text.find('\n', begin);
   text.replace(begin, end - begin,
                "springs: {natural_length: [0.05, 0.05, 0.07, 0.07, 0.1, 0.1], stiffness: [20, 20, "
                "10, 10, 5, 5], damping: [0.01, 0.01, 0, 0, 0, 0], critical_elongation: [0.1, 0.1, "
@@ -140,7 +140,7 @@ TEST_F(Simulate, RunsSpringsThatAreGivenTypeByType) {
 TEST_F(Simulate, BeginsInMotionWhereTheModelSays) {
   // A sheet in free flight, 1 m/s upwards
   std::string text = model_text("[]");
-  const std::size_t begin = text.find("start:"), end = text.find('\n', begin);
+  const size_t begin = text.find("start:"), end = text.find('\n', begin);
   text.replace(begin, end - begin, "start: {kind: in_motion, file: start.csv}");
   text.replace(text.find("columns: 9, rows: 7"), 19, "columns: 2, rows: 2");
   std::ofstream(here_.path() / "start.csv")
@@ -246,7 +246,7 @@ TEST_F(Simulate, RefusesAStepThatIsNotStableAndNamesOneThatIs) {
   expect_refused({"sheet.yaml", "--time-step", "0.02"}, "--time-step: steps of 0.0200 s would be ");
   const ProgramRun refused = run({"sheet.yaml", "--time-step", "0.02"});
   const std::string hint = "--time-step ";
-  const std::size_t at = refused.error.rfind(hint);
+  const size_t at = refused.error.rfind(hint);
   ASSERT_NE(at, std::string::npos);
   const std::string step =
       refused.error.substr(at + hint.size(), refused.error.find(',', at) - at - hint.size());
@@ -372,9 +372,8 @@ TEST_F(Simulate, AnswersWrongUsageWithTwo) {
         {"sheet.yaml", "--duration", "inf"},
         {"sheet.yaml", "--set", "shear"},
         {"sheet.yaml", "--set", "shear=much"},
-        {"sheet.yaml", "--mesh", "1x1"}}) {
+        {"sheet.yaml", "--mesh", "1x1"}})
     EXPECT_EQ(run(options).exit_code, 2) << ::testing::PrintToString(options);
-  }
   EXPECT_THAT(names_in(here_.path()), ElementsAre("sheet.yaml"));
 }
 

@@ -87,8 +87,7 @@ double true_value(const CameraParameters& camera, const std::string& name) {
   if (name == "cx") return camera.centre_px.x();
   if (name == "cy") return camera.centre_px.y();
   const std::vector<std::string> names{"k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"};
-  const auto at =
-      static_cast<std::size_t>(std::find(names.begin(), names.end(), name) - names.begin());
+  const auto at = static_cast<size_t>(std::find(names.begin(), names.end(), name) - names.begin());
   return at < camera.distortion.size() ? camera.distortion[at] : 0;
 }
 
@@ -105,9 +104,8 @@ TEST(Calibrate, RecoversTheCameraExactlyWithoutNoise) {
 
     ASSERT_TRUE(result.usable) << result.message;
     EXPECT_LT(result.rms_px, 1e-6);
-    for (const auto& estimate : result.intrinsics) {
+    for (const auto& estimate : result.intrinsics)
       EXPECT_NEAR(estimate.value, true_value(camera, estimate.name), 1e-4) << estimate.name;
-    }
   }
 }
 
@@ -157,7 +155,7 @@ TEST(Calibrate, ReportsTheSigmaThatItsEstimatesScatterWith) {
     square_error.resize(8);
     variance.resize(8);
     names.clear();
-    for (std::size_t i = 0; i < 8; ++i) {
+    for (size_t i = 0; i < 8; ++i) {
       const NamedSigma& estimate = result.intrinsics[i];
       const double error = estimate.value - true_value(camera, estimate.name);
       EXPECT_LT(std::abs(error), 4 * estimate.sigma) << estimate.name;
@@ -168,9 +166,8 @@ TEST(Calibrate, ReportsTheSigmaThatItsEstimatesScatterWith) {
   }
 
   // The scatter of 40 repetitions is itself known to 11 %.
-  for (std::size_t i = 0; i < names.size(); ++i) {
+  for (size_t i = 0; i < names.size(); ++i)
     EXPECT_NEAR(std::sqrt(square_error[i] / variance[i]), 1, 0.25) << names[i];
-  }
 }
 
 TEST(Calibrate, SurvivesGrossOutliers) {
@@ -181,8 +178,8 @@ TEST(Calibrate, SurvivesGrossOutliers) {
   std::uniform_real_distribution<double> wild(-60, 60);
   int spoiled = 0;
   for (auto& view : views) {
-    for (std::size_t corner = 0; corner < view.corners_px.size(); ++corner) {
-      if ((corner + 7 * static_cast<std::size_t>(spoiled)) % 12 != 0) continue;
+    for (size_t corner = 0; corner < view.corners_px.size(); ++corner) {
+      if ((corner + 7 * static_cast<size_t>(spoiled)) % 12 != 0) continue;
       view.corners_px[corner] += Eigen::Vector2d(20 + wild(rng), -20 + wild(rng));
       ++spoiled;
     }
@@ -237,11 +234,10 @@ TEST(Calibrate, RefusesParallelViews) {
   for (const double tilt : {0.0, 0.5}) {
     SCOPED_TRACE(tilt);
     std::vector<BoardView> views;
-    for (int i = 0; i < 10; ++i) {
+    for (int i = 0; i < 10; ++i)
       views.push_back(view_of(
           true_camera(), board_at({0.02 * (i % 3), 0.02 * (i % 4), 0.4 + 0.03 * i}, {tilt, 0, 0}),
           0.1, rng));
-    }
 
     const CalibrateResult result = calibrate(kBoard, views, 960, 720, four_coefficients());
 
@@ -265,9 +261,8 @@ TEST(Calibrate, RefusesWhatIsNotThisBoard) {
 
   EXPECT_FALSE(calibrate({.columns = 9, .rows = 6, .square_m = 0}, views, 960, 720, {}).usable);
 
-  for (auto& view : views) {
+  for (auto& view : views)
     for (auto& corner : view.corners_px) corner = {100, 100};
-  }
   EXPECT_FALSE(calibrate(kBoard, views, 960, 720, {}).usable);
 }
 

@@ -105,7 +105,7 @@ TEST(Projection, AgreesWithOpenCv) {
     } else {
       cv::projectPoints(points, cv::Vec3d(), cv::Vec3d(), matrix, camera.distortion, pixels);
     }
-    for (std::size_t i = 0; i < points.size(); ++i) {
+    for (size_t i = 0; i < points.size(); ++i) {
       const auto pixel = project(camera, {points[i].x, points[i].y, points[i].z});
       ASSERT_TRUE(pixel);
       EXPECT_NEAR(pixel->x(), pixels[i].x, 1e-9);
@@ -143,7 +143,7 @@ TEST(Projection, DerivativeAgreesWithCentralDifferencesAndWithJets) {
       using Jet = ceres::Jet<double, 3>;
       const auto values = intrinsics_of(camera);
       std::array<Jet, kMaxIntrinsics> intrinsics;
-      for (std::size_t i = 0; i < values.size(); ++i) intrinsics[i] = Jet(values[i]);
+      for (size_t i = 0; i < values.size(); ++i) intrinsics[i] = Jet(values[i]);
       Eigen::Matrix<Jet, 3, 1> jet_point;
       for (int axis = 0; axis < 3; ++axis) jet_point[axis] = Jet(point[axis], axis);
       const auto jet_pixel = project<Jet>(camera.model, intrinsics.data(),

@@ -111,9 +111,8 @@ TEST(FitRigid, ScattersAsTheNormalEquationsPredict) {
   constexpr double kHalfSide = 0.1, kSigma = 1e-4;
   constexpr int kTrials = 4000;
   Eigen::Matrix3Xd a(3, 8);
-  for (int i = 0; i < 8; ++i) {
+  for (int i = 0; i < 8; ++i)
     a.col(i) = kHalfSide * Eigen::Vector3d(i & 1 ? 1 : -1, i & 2 ? 1 : -1, i & 4 ? 1 : -1);
-  }
   std::mt19937_64 rng(5);
   SCOPED_TRACE("seed 5");
   double angle2 = 0, shift2 = 0;

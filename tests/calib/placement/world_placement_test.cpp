@@ -77,7 +77,7 @@ Scene random_scene(const Noise& noise, std::mt19937_64& rng) {
   constexpr std::array<std::array<double, 2>, 4> kCorners{
       {{-0.5, -0.5}, {0.5, -0.5}, {0.5, 0.5}, {-0.5, 0.5}}};
   std::normal_distribution<double> normal;
-  for (std::size_t tag = 0; tag < middles.size(); ++tag) {
+  for (size_t tag = 0; tag < middles.size(); ++tag) {
     Eigen::Matrix3d upright;  // the tag's x to the right, its y up
     upright << 1, 0, 0, 0, 0, -1, 0, 1, 0;
     Rigid3 world_from_tag{Eigen::Quaterniond(upright), middles[tag] + 0.02 * normal3(rng)};
@@ -120,9 +120,8 @@ Trials run_trials(int count, const Noise& noise, bool with_squares, unsigned see
   Trials trials;
   for (int trial = 0; trial < count; ++trial) {
     Scene scene = random_scene(noise, rng);
-    if (!with_squares) {
+    if (!with_squares)
       for (auto& point : scene.reference) point.group = -1;
-    }
     const WorldPlacementResult placed = place_world(scene.camera, scene.reference, {});
     EXPECT_TRUE(placed.usable) << placed.message;
     if (!placed.usable) continue;
@@ -207,7 +206,7 @@ TEST(PlaceWorld, PlacesTheBundledCameraFromItsSurvey) {
   ASSERT_EQ(exact.size(), surveyed.size());
   std::mt19937_64 rng(6);
   SCOPED_TRACE("seed 6");
-  for (std::size_t i = 0; i < exact.size(); ++i) {
+  for (size_t i = 0; i < exact.size(); ++i) {
     PlacedPixel pixel = seen(scene, {exact[i].x_m, exact[i].y_m, exact[i].z_m}, 0.1, rng);
     pixel.point_m = {surveyed[i].x_m, surveyed[i].y_m, surveyed[i].z_m};
     pixel.group = *surveyed[i].tag;
@@ -344,7 +343,7 @@ TEST(PlaceSheet, RefusesWhatIsNoSheet) {
   std::mt19937_64 rng(12);
   std::vector<PlacedPixel> line;
   for (int i = 0; i < 8; ++i) line.push_back(seen(scene, {0.05 * i, 0.02 * i, 1}, 0.1, rng));
-  for (int i = 0; i < 8; ++i) line[static_cast<std::size_t>(i)].point_m = {0.05 * i, 0.02 * i, 0};
+  for (int i = 0; i < 8; ++i) line[static_cast<size_t>(i)].point_m = {0.05 * i, 0.02 * i, 0};
 
   EXPECT_FALSE(place_sheet(scene.camera, line).usable);
   EXPECT_FALSE(place_sheet(scene.camera, {line[0], line[1], line[2]}).usable);

@@ -286,13 +286,11 @@ TEST(FitOnMesh, LeavesThePhysicsWhereItIsToldTo) {
 
   ASSERT_TRUE(found.usable());
   const NamedValues before = model.values().front(), after = found.values().front();
-  for (const auto& [name, value] : before) {
+  for (const auto& [name, value] : before)
     if (name.starts_with("sheet_")) {
       EXPECT_NE(after.at(name), value) << name;
-    } else {
+    } else
       EXPECT_DOUBLE_EQ(after.at(name), value) << name;
-    }
-  }
 }
 
 // With a start in motion the other mesh's fit goes by derivatives that are only updated. It may

@@ -119,12 +119,11 @@ TEST(HypothesisDerivatives, AreDifferencesOfRunsThatHaveTheEffect) {
 
   ASSERT_EQ(columns.size(), hypotheses.size());
   std::set<std::string> without;
-  for (size_t k = 0; k < hypotheses.size(); ++k) {
+  for (size_t k = 0; k < hypotheses.size(); ++k)
     if (columns[k].empty())
       without.insert(hypotheses[k].effect);
     else
       expect_differences(setup, model, hypotheses[k], columns[k]);
-  }
   EXPECT_EQ(without, (std::set<std::string>{"focal_error", "lens_distortion", "rolling_shutter"}));
 }
 

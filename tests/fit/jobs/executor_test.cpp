@@ -37,8 +37,7 @@ TEST(Executor, GivesTheSameBytesForAnyNumberOfThreads) {
       execute(60, uneven_piece, {.threads = 1, .seed = 5}).payloads;
   ASSERT_EQ(expected.size(), 60u);
   for (int index = 0; index < 60; ++index) {
-    EXPECT_EQ(expected[static_cast<std::size_t>(index)],
-              uneven_piece(index, derived_seed(5, index)));
+    EXPECT_EQ(expected[static_cast<size_t>(index)], uneven_piece(index, derived_seed(5, index)));
   }
 
   for (const int threads : kThreads) {
@@ -105,7 +104,7 @@ TEST(Executor, LetsNoThreadDoAnotherPiecesWorkWhileItWaitsInOne) {
       if (at_work_on != -1) ++strayed;
       at_work_on = index;
       std::atomic<int> sum = 0;
-      for (int round = 0; round < 100; ++round) {
+      for (int round = 0; round < 100; ++round)
         tbb::parallel_for(0, 50, [&](int k) {
           if (at_work_on != -1 && at_work_on != index) ++strayed;
           std::atomic<int> effort = 0;
@@ -113,7 +112,6 @@ TEST(Executor, LetsNoThreadDoAnotherPiecesWorkWhileItWaitsInOne) {
           }
           sum += k;
         });
-      }
       at_work_on = -1;
       return std::to_string(index + sum);
     };
@@ -160,7 +158,7 @@ TEST(Executor, GoesOnFromAJournalWithTheSameBytesAndRedoesNothing) {
       const TemporaryFolder folder;
 
       // Given a run that was cancelled,
-      std::size_t kept = 0;
+      size_t kept = 0;
       {
         Journal journal(folder / "journal", "key", JournalStart::fresh);
         const ExecuteResult first =
@@ -174,8 +172,8 @@ TEST(Executor, GoesOnFromAJournalWithTheSameBytesAndRedoesNothing) {
           EXPECT_THAT(first.message, testing::StartsWith("cancelled after "));
         }
         // those at work are finished and kept.
-        EXPECT_GE(kept, static_cast<std::size_t>(stop_at));
-        EXPECT_LE(kept, static_cast<std::size_t>(stop_at + threads));
+        EXPECT_GE(kept, static_cast<size_t>(stop_at));
+        EXPECT_LE(kept, static_cast<size_t>(stop_at + threads));
         EXPECT_EQ(first.performed, static_cast<int>(kept));
       }
 

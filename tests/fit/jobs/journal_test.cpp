@@ -52,7 +52,7 @@ TEST(Journal, GoesOnBehindTheRecordsThatItFinds) {
     EXPECT_EQ(journal.finished(), expected);
     for (int k = 0; k < session; ++k) {
       const int index = 100 * session + k;
-      expected[index] = std::string(static_cast<std::size_t>(index), '\n');
+      expected[index] = std::string(static_cast<size_t>(index), '\n');
       journal.append(index, expected[index]);
     }
   }
@@ -64,7 +64,7 @@ TEST(Journal, CutAtAnyByteLosesOnlyTheRecordThatWasCut) {
   const TemporaryFolder folder;
   const std::map<int, std::string> payloads = {
       {5, "five"}, {2, "two\nrecord 2 3\n"}, {9, ""}, {0, std::string("\0zero", 5)}};
-  std::map<std::size_t, std::map<int, std::string>> held_from;
+  std::map<size_t, std::map<int, std::string>> held_from;
   {
     Journal journal(folder / "journal", kKey, JournalStart::fresh);
     held_from[std::filesystem::file_size(folder / "journal")] = {};
@@ -76,7 +76,7 @@ TEST(Journal, CutAtAnyByteLosesOnlyTheRecordThatWasCut) {
   const std::string whole = read_text(folder / "journal");
 
   // when it is cut at any byte, header included,
-  for (std::size_t size = 0; size <= whole.size(); ++size) {
+  for (size_t size = 0; size <= whole.size(); ++size) {
     SCOPED_TRACE(size);
     folder.write("cut", whole.substr(0, size));
     const auto above = held_from.upper_bound(size);
@@ -87,9 +87,8 @@ TEST(Journal, CutAtAnyByteLosesOnlyTheRecordThatWasCut) {
       ASSERT_EQ(cut.finished(), held);
       EXPECT_EQ(cut.damaged_places(), 0);
       EXPECT_EQ(std::filesystem::file_size(folder / "cut"), end);
-      for (const auto& [index, payload] : payloads) {
+      for (const auto& [index, payload] : payloads)
         if (!held.contains(index)) cut.append(index, payload);
-      }
     }
     // then the records before the cut are there, and those redone end up as if never cut.
     EXPECT_EQ(read_text(folder / "cut"), whole);
@@ -99,11 +98,11 @@ TEST(Journal, CutAtAnyByteLosesOnlyTheRecordThatWasCut) {
 TEST(Journal, LeavesOutTheDamagedRecordAloneAndTakesItsPieceAgain) {
   const TemporaryFolder folder;
   const std::map<int, std::string> payloads = {{0, "zero"}, {1, "one"}, {2, "two"}};
-  std::map<int, std::pair<std::size_t, std::size_t>> place;
+  std::map<int, std::pair<size_t, size_t>> place;
   {
     Journal journal(folder / "journal", kKey, JournalStart::fresh);
     for (const auto& [index, payload] : payloads) {
-      const std::size_t begin = std::filesystem::file_size(folder / "journal");
+      const size_t begin = std::filesystem::file_size(folder / "journal");
       journal.append(index, payload);
       place[index] = {begin, std::filesystem::file_size(folder / "journal")};
     }
@@ -111,7 +110,7 @@ TEST(Journal, LeavesOutTheDamagedRecordAloneAndTakesItsPieceAgain) {
   const std::string whole = read_text(folder / "journal");
 
   for (const int spoiled : {0, 1, 2}) {
-    for (std::size_t at = place[spoiled].first; at < place[spoiled].second; ++at) {
+    for (size_t at = place[spoiled].first; at < place[spoiled].second; ++at) {
       for (const int bit : {0, 6}) {
         SCOPED_TRACE(testing::Message()
                      << "record " << spoiled << ", byte " << at << ", bit " << bit);
@@ -138,7 +137,7 @@ TEST(Journal, TakesNoRecordFromInsideADamagedOne) {
   write_journal(folder / "inner", {{0, "wrong"}, {1, "wrong"}});
   write_journal(folder / "outer", {{0, read_text(folder / "inner")}, {1, "right"}});
   std::string text = read_text(folder / "outer");
-  const std::size_t head = text.find("record 0");
+  const size_t head = text.find("record 0");
   text[head] = 'R';
   folder.write("damaged", text);
 

@@ -20,8 +20,7 @@ struct Tracks {
     const auto frames = static_cast<Eigen::Index>(off.size());
     observed.push_back(Eigen::MatrixXd::Constant(3, frames, 0.5));
     predicted.push_back(observed.back());
-    for (Eigen::Index f = 0; f < frames; ++f)
-      predicted.back()(0, f) += off[static_cast<std::size_t>(f)];
+    for (Eigen::Index f = 0; f < frames; ++f) predicted.back()(0, f) += off[static_cast<size_t>(f)];
   }
 };
 

@@ -42,7 +42,7 @@ std::vector<Eigen::MatrixXd> swinging_tracks(const std::vector<double>& time_s, 
   for (int m = 0; m < markers; ++m) {
     Eigen::MatrixXd track(3, static_cast<Eigen::Index>(time_s.size()));
     for (Eigen::Index f = 0; f < track.cols(); ++f) {
-      const double t = 2 * std::numbers::pi * time_s[static_cast<std::size_t>(f)];
+      const double t = 2 * std::numbers::pi * time_s[static_cast<size_t>(f)];
       track.col(f) << 0.05 * std::sin(t + m), 0.02 * std::cos(1.3 * t - m), -0.4 + 0.01 * t;
       for (double& value : track.col(f)) value += sigma * draws.normal();
     }
@@ -74,9 +74,8 @@ TEST(Noise, HardlyFeelsOutliers) {
     auto tracks = swinging_tracks(time_s, 20, kNoiseSigma, draws);
     const double clean = estimate_noise(time_s, tracks).sigma;
     for (Eigen::MatrixXd& track : tracks) {
-      for (double& value : track.reshaped()) {
+      for (double& value : track.reshaped())
         if (draws.uniform() < 0.05) value += 100 * kNoiseSigma * draws.normal();
-      }
     }
 
     const NoiseEstimate noise = estimate_noise(time_s, tracks);
@@ -91,7 +90,7 @@ TEST(Noise, IsZeroForAParabola) {
   const auto time_s = even_times(10, 30);
   Eigen::MatrixXd track(2, 10);
   for (Eigen::Index f = 0; f < 10; ++f) {
-    const double t = time_s[static_cast<std::size_t>(f)];
+    const double t = time_s[static_cast<size_t>(f)];
     track.col(f) << 1 + 2 * t - 4.9 * t * t, 3 * t;
   }
 
@@ -101,7 +100,7 @@ TEST(Noise, IsZeroForAParabola) {
 TEST(Noise, UsesRunsOfConsecutiveFramesOnly) {
   Draws draws(3);
   auto time_s = even_times(12, 60);
-  for (std::size_t f = 6; f < 12; ++f) time_s[f] += 1;  // a pause between frames 5 and 6
+  for (size_t f = 6; f < 12; ++f) time_s[f] += 1;  // a pause between frames 5 and 6
   auto tracks = swinging_tracks(time_s, 1, kNoiseSigma, draws);
 
   // Six frames on either side hold three differences each.

@@ -45,9 +45,8 @@ std::vector<double> irregular_times(int count, unsigned long long seed) {
 template <class Path>
 Eigen::MatrixXd sample(const std::vector<double>& time_s, const Path& path) {
   Eigen::MatrixXd samples(path(0.0).size(), static_cast<Eigen::Index>(time_s.size()));
-  for (std::size_t k = 0; k < time_s.size(); ++k) {
+  for (size_t k = 0; k < time_s.size(); ++k)
     samples.col(static_cast<Eigen::Index>(k)) = path(time_s[k]);
-  }
   return samples;
 }
 
@@ -129,7 +128,7 @@ TEST(SmoothingSpline, AgreesWithADenseSolveOfItsDefinition) {
   for (int k = 0; k < n; ++k) sigma.push_back(0.5 + noise.uniform());
   Eigen::MatrixXd q = Eigen::MatrixXd::Zero(n, n - 2), r = Eigen::MatrixXd::Zero(n - 2, n - 2);
   for (int i = 0; i < n - 2; ++i) {
-    const auto k = static_cast<std::size_t>(i);
+    const auto k = static_cast<size_t>(i);
     const double a = time_s[k + 1] - time_s[k], b = time_s[k + 2] - time_s[k + 1];
     q.col(i).segment<3>(i) << 1 / a, -1 / a - 1 / b, 1 / b;
     r(i, i) = (a + b) / 3;
@@ -151,8 +150,8 @@ TEST(SmoothingSpline, AgreesWithADenseSolveOfItsDefinition) {
   EXPECT_NEAR(spline.degrees_of_freedom, hat.trace(), 1e-8);
   for (int k = 0; k < n; ++k) {
     const double expected =
-        spline.noise_sigma * sigma[static_cast<std::size_t>(k)] * std::sqrt(hat(k, k));
-    EXPECT_NEAR(spline.value_sigma[static_cast<std::size_t>(k)], expected, 1e-6 * expected);
+        spline.noise_sigma * sigma[static_cast<size_t>(k)] * std::sqrt(hat(k, k));
+    EXPECT_NEAR(spline.value_sigma[static_cast<size_t>(k)], expected, 1e-6 * expected);
   }
 }
 
@@ -219,7 +218,7 @@ TEST(SmoothingSpline, StatesTheErrorOfItsValues) {
     if (spline.value.cols() != truth.cols()) continue;  // a sample beyond 4.5 sigma
     for (Eigen::Index k = 0; k < truth.cols(); ++k) {
       whitened += (spline.value.col(k) - truth.col(k)).squaredNorm() /
-                  std::pow(spline.value_sigma[static_cast<std::size_t>(k)], 2);
+                  std::pow(spline.value_sigma[static_cast<size_t>(k)], 2);
       count += 3;
     }
   }
@@ -240,7 +239,7 @@ TEST(SmoothingSpline, LeavesOutGrossOutliers) {
     Noise noise(5000 + seed);
     std::vector<bool> spoilt(200, false);
     for (int k = 0; k < 10; ++k) {  // 5 %, by 20 to 200 sigma in one coordinate
-      const auto which = static_cast<std::size_t>(200 * noise.uniform());
+      const auto which = static_cast<size_t>(200 * noise.uniform());
       spoilt[which] = true;
       samples(static_cast<Eigen::Index>(3 * noise.uniform()), static_cast<Eigen::Index>(which)) +=
           (noise.uniform() < 0.5 ? -1 : 1) * kSigma * (20 + 180 * noise.uniform());
@@ -250,7 +249,7 @@ TEST(SmoothingSpline, LeavesOutGrossOutliers) {
     const SmoothingSpline without = fit_smoothing_spline(time_s, clean);
 
     int missed = 0, refused = 0;
-    for (std::size_t k = 0; k < 200; ++k) {
+    for (size_t k = 0; k < 200; ++k) {
       if (spoilt[k] && !spline.outlier[k]) ++missed;
       if (!spoilt[k] && spline.outlier[k]) ++refused;
     }
@@ -258,7 +257,7 @@ TEST(SmoothingSpline, LeavesOutGrossOutliers) {
     EXPECT_LE(refused, 1);
     EXPECT_NEAR(spline.noise_sigma, without.noise_sigma, 0.05 * kSigma);
     double square = 0;
-    for (std::size_t k = 0; k < 200; ++k) {
+    for (size_t k = 0; k < 200; ++k) {
       if (spline.outlier[k]) continue;  // a gap, at the ends even an extrapolation
       square += (spline.position(time_s[k]) - without.position(time_s[k])).squaredNorm();
     }
@@ -278,9 +277,8 @@ TEST(SmoothingSpline, TakesNoKinkForOutliersAndRoundsItByLessThanASample) {
         fit_smoothing_spline(time_s, with_noise(truth, kSigma, 6000 + seed));
 
     EXPECT_LE(std::count(spline.outlier.begin(), spline.outlier.end(), true), 2);
-    for (std::size_t k = 0; k < time_s.size(); ++k) {
+    for (size_t k = 0; k < time_s.size(); ++k)
       EXPECT_LT((spline.position(time_s[k]) - path(time_s[k])).norm(), 0.010) << time_s[k];
-    }
   }
 }
 
@@ -314,7 +312,7 @@ TEST(SmoothingSpline, TakesNoFastMotionAfterARestForOutliers) {
 
       EXPECT_TRUE(spline.outlier[12] && spline.outlier[51]);
       EXPECT_LE(std::count(spline.outlier.begin(), spline.outlier.end(), true), 5);
-      for (std::size_t k = 1; k < 69; ++k) {
+      for (size_t k = 1; k < 69; ++k) {
         if (k == 12 || k == 51) continue;
         // The tolerance is 20 ms at 0.6 m/s, and what a curve through such samples adds.
         const Eigen::Vector3d truth = rest_then_motion(0.1 * static_cast<double>(k), axes);
@@ -333,7 +331,7 @@ TEST(SmoothingSpline, LeavesOutARowOfOutliersInATrackAtRest) {
 
     const SmoothingSpline spline = fit_smoothing_spline(time_s, samples);
 
-    for (std::size_t k = 0; k < 70; ++k)
+    for (size_t k = 0; k < 70; ++k)
       EXPECT_EQ(spline.outlier[k], k >= 30 && k < 38) << "seed " << seed << ", sample " << k;
   }
 }

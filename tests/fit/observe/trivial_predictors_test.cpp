@@ -27,7 +27,7 @@ constexpr int kHeldOutFrom = 5;
 std::vector<Eigen::MatrixXd> straight_tracks() {
   std::vector<Eigen::MatrixXd> tracks(2, Eigen::MatrixXd(2, 8));
   for (Eigen::Index f = 0; f < 8; ++f) {
-    const double t = kTime_s[static_cast<std::size_t>(f)];
+    const double t = kTime_s[static_cast<size_t>(f)];
     tracks[0].col(f) << 5 + t, 2 * t;
     tracks[1].col(f) << -3 * t, 7 + 0.5 * t;
   }
@@ -40,7 +40,7 @@ TEST(TrivialPredictors, FirstFrameStays) {
   const TrivialPrediction first = predict_first_frame(tracks, kHeldOutFrom);
 
   // The mean of the four squared speeds (1, 4, 9, 0.25) times t^2 is 3.5625 t^2.
-  for (std::size_t f = 0; f < 8; ++f) {
+  for (size_t f = 0; f < 8; ++f) {
     EXPECT_NEAR(first.rms_by_frame[f], std::sqrt(3.5625) * kTime_s[f], 1e-12);
     EXPECT_EQ(first.predicted[1].col(static_cast<Eigen::Index>(f)), Eigen::Vector2d(0, 7));
   }
@@ -87,11 +87,10 @@ TEST(TrivialPredictors, RigidMovesWithTheHeldPoints) {
   // The whole sheet is carried along: rigid is exact, also for a marker that comes into sight late.
   std::vector<Eigen::MatrixXd> tracks(3, Eigen::MatrixXd(2, 8));
   for (Eigen::Index f = 0; f < 8; ++f) {
-    const double t = kTime_s[static_cast<std::size_t>(f)];
+    const double t = kTime_s[static_cast<size_t>(f)];
     const Eigen::Vector2d carried(std::sin(3 * t), t * t);
-    for (std::size_t m = 0; m < 3; ++m) {
+    for (size_t m = 0; m < 3; ++m)
       tracks[m].col(f) = carried + Eigen::Vector2d(static_cast<double>(m), 1);
-    }
   }
   tracks[2].leftCols(2).setConstant(kNan);
 
@@ -129,7 +128,7 @@ TEST(TrivialPredictors, UseNothingOfTheHeldOutFrames) {
   auto other = tracks;
   for (Eigen::MatrixXd& track : other) track.rightCols(3).array() += 9;
 
-  for (std::size_t m = 0; m < 2; ++m) {
+  for (size_t m = 0; m < 2; ++m) {
     EXPECT_EQ(predict_first_frame(tracks, kHeldOutFrom).predicted[m],
               predict_first_frame(other, kHeldOutFrom).predicted[m]);
     EXPECT_EQ(predict_last_velocity(kTime_s, tracks, kHeldOutFrom).predicted[m].rightCols(3),
@@ -158,32 +157,28 @@ TEST(TrivialPredictors, HaveNoErrorWithoutHeldOutFrames) {
 
 /// Reads a table of the measured positions, as many frames as the recording has.
 template <class Tracks, class Position>
-std::vector<Eigen::MatrixXd> table(const Tracks& tracks, std::size_t markers, int coordinates,
+std::vector<Eigen::MatrixXd> table(const Tracks& tracks, size_t markers, int coordinates,
                                    const Position& position) {
   int frames = 0;
   for (const auto& row : tracks) frames = std::max(frames, row.frame + 1);
   std::vector<Eigen::MatrixXd> matrices(markers,
                                         Eigen::MatrixXd::Constant(coordinates, frames, kNan));
-  for (const auto& row : tracks) {
-    matrices[static_cast<std::size_t>(row.marker)].col(row.frame) = position(row);
-  }
+  for (const auto& row : tracks)
+    matrices[static_cast<size_t>(row.marker)].col(row.frame) = position(row);
   return matrices;
 }
 
-std::vector<double> frame_times(const Recording& recording, std::size_t frames) {
+std::vector<double> frame_times(const Recording& recording, size_t frames) {
   std::vector<double> time_s;
-  for (std::size_t f = 0; f < frames; ++f) {
-    time_s.push_back(recording.frame_time_s(static_cast<int>(f)));
-  }
+  for (size_t f = 0; f < frames; ++f) time_s.push_back(recording.frame_time_s(static_cast<int>(f)));
   return time_s;
 }
 
 /// Returns the tracks of the markers seen in all of `frames`; the others become all gaps.
 std::vector<Eigen::MatrixXd> seen_in(std::vector<Eigen::MatrixXd> tracks,
                                      const std::vector<Eigen::Index>& frames) {
-  for (Eigen::MatrixXd& track : tracks) {
+  for (Eigen::MatrixXd& track : tracks)
     if (!track(Eigen::all, frames).allFinite()) track.setConstant(kNan);
-  }
   return tracks;
 }
 
@@ -195,7 +190,7 @@ TEST(TrivialPredictors, ReproduceThePublishedNumbersOfABundledRecording) {
       std::filesystem::path(CLOTHFIT_SOURCE_DIR) / "data/recordings/swing_plain";
   const Recording recording = read_recording(folder);
   const int from = recording.held_out_from_frame.value();
-  const std::size_t markers = recording.markers.markers.size();
+  const size_t markers = recording.markers.markers.size();
   const auto tracks3d = table(read_tracks3d(recording.tracks3d.value(), recording.markers), markers,
                               3, [](const Position3d& row) { return row.position_m; });
   const auto tracks2d = table(read_tracks2d(recording.tracks2d.at("front"), recording.markers),

@@ -50,22 +50,20 @@ EvolutionOptions all_generations(int generations, unsigned long long seed) {
 }
 
 bool same_bytes(const EvolutionState& a, const EvolutionState& b) {
-  const auto equal_vectors = [](const double* x, const double* y, std::size_t n) {
+  const auto equal_vectors = [](const double* x, const double* y, size_t n) {
     return std::memcmp(x, y, n * sizeof(double)) == 0;
   };
   if (a.population.size() != b.population.size() || a.best_cost.size() != b.best_cost.size() ||
-      a.evaluations != b.evaluations) {
+      a.evaluations != b.evaluations)
     return false;
-  }
-  for (std::size_t k = 0; k < a.population.size(); ++k) {
+  for (size_t k = 0; k < a.population.size(); ++k) {
     const Individual& one = a.population[k];
     const Individual& other = b.population[k];
     if (one.origin != other.origin || one.parent_ranks != other.parent_ranks ||
         !equal_vectors(&one.cost, &other.cost, 1) ||
         !equal_vectors(one.values.data(), other.values.data(),
-                       static_cast<std::size_t>(one.values.size()))) {
+                       static_cast<size_t>(one.values.size())))
       return false;
-    }
   }
   return equal_vectors(a.best_cost.data(), b.best_cost.data(), a.best_cost.size());
 }
@@ -95,8 +93,8 @@ TEST(EvolutionaryStrategy, ReplacesTheWorseHalfByTheParentRulesOfThePaper) {
     std::set<int> kept_ranks;
     for (const Individual& individual : after.population) {
       ++count[individual.origin];
-      const auto parent = [&](std::size_t k) -> const Individual& {
-        return before.population[static_cast<std::size_t>(individual.parent_ranks.at(k))];
+      const auto parent = [&](size_t k) -> const Individual& {
+        return before.population[static_cast<size_t>(individual.parent_ranks.at(k))];
       };
       switch (individual.origin) {
         case Origin::kept:
@@ -119,13 +117,12 @@ TEST(EvolutionaryStrategy, ReplacesTheWorseHalfByTheParentRulesOfThePaper) {
           break;
         }
         case Origin::crossed: {
-          ASSERT_EQ(individual.parent_ranks.size(), static_cast<std::size_t>(parameter_count));
+          ASSERT_EQ(individual.parent_ranks.size(), static_cast<size_t>(parameter_count));
           crossover_parents.insert(individual.parent_ranks.begin(), individual.parent_ranks.end());
           for (int p = 0; p < parameter_count; ++p) {
             bool inherited = false;
-            for (std::size_t k = 0; k < individual.parent_ranks.size(); ++k) {
+            for (size_t k = 0; k < individual.parent_ranks.size(); ++k)
               inherited = inherited || individual.values(p) == parent(k).values(p);
-            }
             EXPECT_TRUE(inherited);
           }
           break;
@@ -296,10 +293,9 @@ TEST(EvolutionaryStrategy, GaussianMutationRefinesFurther) {
 
 TEST(EvolutionaryStrategy, FindsStiffnessesOnALogarithmicScaleThroughAnEllipsoid) {
   std::vector<SearchParameter> parameters;
-  for (int p = 0; p < 4; ++p) {
+  for (int p = 0; p < 4; ++p)
     parameters.push_back(
         {.name = std::to_string(p), .lower = 0.1, .upper = 1000, .log_scale = true});
-  }
   const Eigen::Vector4d truth(40, 6, 0.5, 300);
   const GenerationCost ellipsoid = one_by_one([&](const Eigen::VectorXd& k) {
     const Eigen::Array4d off = (k.array() / truth.array()).log();

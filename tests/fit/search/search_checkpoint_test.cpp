@@ -53,7 +53,7 @@ void expect_same(const EvolutionState& a, const EvolutionState& b) {
   EXPECT_EQ(a.evaluations, b.evaluations);
   EXPECT_EQ(bits_of(a.best_cost), bits_of(b.best_cost));
   ASSERT_EQ(a.population.size(), b.population.size());
-  for (std::size_t k = 0; k < a.population.size(); ++k) {
+  for (size_t k = 0; k < a.population.size(); ++k) {
     EXPECT_EQ(bits_of(a.population[k].values), bits_of(b.population[k].values));
     EXPECT_EQ(bits_of(a.population[k].cost), bits_of(b.population[k].cost));
     EXPECT_EQ(a.population[k].origin, b.population[k].origin);
@@ -80,7 +80,7 @@ void expect_same(const CmaState& a, const CmaState& b) {
   EXPECT_EQ(bits_of(a.recent_best), bits_of(b.recent_best));
   expect_same(a.so_far, b.so_far);
   ASSERT_EQ(a.optima.size(), b.optima.size());
-  for (std::size_t k = 0; k < a.optima.size(); ++k) expect_same(a.optima[k], b.optima[k]);
+  for (size_t k = 0; k < a.optima.size(); ++k) expect_same(a.optima[k], b.optima[k]);
   EXPECT_EQ(bits_of(a.best_cost), bits_of(b.best_cost));
   EXPECT_EQ(a.evaluations, b.evaluations);
 }
@@ -270,7 +270,7 @@ TEST(SearchCheckpoint, NamesTheLineOfAnyChangedBit) {
     ASSERT_NO_THROW(load_damaged());
 
     int line = 1;
-    for (std::size_t at = 0; at < whole.size(); ++at) {
+    for (size_t at = 0; at < whole.size(); ++at) {
       for (int bit = 0; bit < 8; ++bit) {
         SCOPED_TRACE(testing::Message() << name << ", byte " << at << ", bit " << bit);
         std::string damaged = whole;
@@ -289,23 +289,23 @@ TEST(SearchCheckpoint, NamesTheLineWhereAFileWasCutSwappedOrGoesOn) {
     SCOPED_TRACE(name);
     const std::string whole = read_text(folder / name);
     std::vector<std::string> lines;
-    for (std::size_t begin = 0; begin < whole.size();) {
-      const std::size_t end = whole.find('\n', begin) + 1;
+    for (size_t begin = 0; begin < whole.size();) {
+      const size_t end = whole.find('\n', begin) + 1;
       lines.push_back(whole.substr(begin, end - begin));
       begin = end;
     }
-    const auto line_name = [](std::size_t k) { return "damaged:" + std::to_string(k + 1) + ": "; };
+    const auto line_name = [](size_t k) { return "damaged:" + std::to_string(k + 1) + ": "; };
 
     int line = 1;
-    for (std::size_t size = 20; size < whole.size(); ++size) {
+    for (size_t size = 20; size < whole.size(); ++size) {
       if (whole[size - 1] == '\n') ++line;
       folder.write("damaged", whole.substr(0, size));
       expect_refused(folder, size < lines[0].size() ? "damaged:1: " : line_name(line - 1u),
                      load_damaged);
     }
-    for (std::size_t k = 1; k + 1 < lines.size(); ++k) {
+    for (size_t k = 1; k + 1 < lines.size(); ++k) {
       std::string dropped, twice, swapped;
-      for (std::size_t i = 0; i < lines.size(); ++i) {
+      for (size_t i = 0; i < lines.size(); ++i) {
         dropped += i == k ? "" : lines[i];
         twice += i == k ? lines[i] + lines[i] : lines[i];
         swapped += i == k ? lines[i + 1] : i == k + 1 ? lines[k] : lines[i];

@@ -27,11 +27,9 @@ double left_after(double time_step_s, int steps) {
 }
 
 TEST(Relaxation, TheArmsStressFallsAsTheSchemeHasIt) {
-  for (const int steps : {1, 10, 100}) {
-    for (const double h : {1e-4, 1e-2, 1.0}) {  // much longer steps than its time included
+  for (const int steps : {1, 10, 100})
+    for (const double h : {1e-4, 1e-2, 1.0})  // much longer steps than its time included
       EXPECT_NEAR(left_after(h, steps), std::pow(1 + h / kTime_s, -steps), 1e-13);
-    }
-  }
 }
 
 TEST(Relaxation, TheArmsStressFallsExponentiallyInTheLimitOfSmallSteps) {
@@ -39,9 +37,8 @@ TEST(Relaxation, TheArmsStressFallsExponentiallyInTheLimitOfSmallSteps) {
   double coarser = 0;
   for (const int steps : {50, 100, 200, 400}) {
     const double error = std::abs(left_after(2 * kTime_s / steps, steps) - exact);
-    if (coarser > 0) {  // first order
+    if (coarser > 0)  // first order
       EXPECT_NEAR(coarser / error, 2, 0.05) << steps;
-    }
     coarser = error;
   }
   EXPECT_LT(coarser, 0.01 * exact);

@@ -276,9 +276,8 @@ TEST(SpringForce, LanesKnowNothingOfEachOther) {
     const CrumpledState& s = states[static_cast<size_t>(l)];
     if (l == 3) {
       EXPECT_FALSE(force.lane(l).allFinite());
-    } else {
+    } else
       EXPECT_EQ(force.lane(l), spring_forces_n(mesh, s.springs, s.position_m, s.velocity_m_per_s));
-    }
   }
 }
 

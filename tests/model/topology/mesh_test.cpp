@@ -82,10 +82,9 @@ TEST(Mesh, SpringsOfTheFlatClothHaveTheFlatLengths) {
   const auto length = flat_lengths(mesh);
   const Eigen::Matrix3Xd flat = flat_positions(mesh);
 
-  for (size_t type = 0; type < kSpringTypes; ++type) {
+  for (size_t type = 0; type < kSpringTypes; ++type)
     for (const Spring& spring : net[type])
       EXPECT_NEAR((flat.col(spring.b) - flat.col(spring.a)).norm(), length[type], 1e-15);
-  }
   EXPECT_DOUBLE_EQ(length[structural_t], 0.5 / 4);
   EXPECT_DOUBLE_EQ(length[structural_s], 0.3 / 6);
 }

@@ -27,20 +27,17 @@ Eigen::Matrix2Xd random_points(int count, unsigned seed) {
 /// Returns material coordinates of the vertices, in the order of their indices.
 Eigen::Matrix2Xd vertex_points(int columns, int rows) {
   Eigen::Matrix2Xd points(2, columns * rows);
-  for (int i = 0; i < rows; ++i) {
-    for (int j = 0; j < columns; ++j) {
+  for (int i = 0; i < rows; ++i)
+    for (int j = 0; j < columns; ++j)
       points.col(i * columns + j) << j * kWidth_m / (columns - 1), i * kHeight_m / (rows - 1);
-    }
-  }
   return points;
 }
 
 template <class Shape>
 Eigen::Matrix3Xd sample(const Eigen::Matrix2Xd& points, const Shape& shape) {
   Eigen::Matrix3Xd positions(3, points.cols());
-  for (Eigen::Index p = 0; p < points.cols(); ++p) {
+  for (Eigen::Index p = 0; p < points.cols(); ++p)
     positions.col(p) = shape(points(0, p), points(1, p));
-  }
   return positions;
 }
 
@@ -252,14 +249,14 @@ TEST(Surface, LanesAgreeWithSingleRunsToTheLastBit) {
   const Eigen::MatrixXd fields = Eigen::MatrixXd::Random(lanes, columns * rows);
 
   Eigen::MatrixXd together(lanes, points.cols());
-  interpolate(surface, lanes, {fields.data(), static_cast<std::size_t>(fields.size())},
-              {together.data(), static_cast<std::size_t>(together.size())});
+  interpolate(surface, lanes, {fields.data(), static_cast<size_t>(fields.size())},
+              {together.data(), static_cast<size_t>(together.size())});
 
   for (int lane = 0; lane < lanes; ++lane) {
     const Eigen::VectorXd alone_in = fields.row(lane);
     Eigen::VectorXd alone(points.cols());
-    interpolate(surface, 1, {alone_in.data(), static_cast<std::size_t>(alone_in.size())},
-                {alone.data(), static_cast<std::size_t>(alone.size())});
+    interpolate(surface, 1, {alone_in.data(), static_cast<size_t>(alone_in.size())},
+                {alone.data(), static_cast<size_t>(alone.size())});
     EXPECT_EQ(alone, together.row(lane).transpose());
   }
 }

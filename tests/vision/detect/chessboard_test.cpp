@@ -47,18 +47,17 @@ TEST(Chessboard, NumbersCornersRowByRowWithoutMirroring) {
     SCOPED_TRACE(quarter);
     constexpr std::array kTurn = {-1, +cv::ROTATE_90_CLOCKWISE, +cv::ROTATE_180,
                                   +cv::ROTATE_90_COUNTERCLOCKWISE};
-    if (quarter == 0) {
+    if (quarter == 0)
       turned = upright.clone();
-    } else {
-      cv::rotate(upright, turned, kTurn[static_cast<std::size_t>(quarter)]);
-    }
+    else
+      cv::rotate(upright, turned, kTurn[static_cast<size_t>(quarter)]);
 
     const auto corners = find_chessboard(turned, board);
 
     ASSERT_TRUE(corners);
     ASSERT_EQ(corners->size(), 54U);
     // Neighbours in a row, and in a column, are one square apart; rows then columns turn as x, y.
-    for (std::size_t i = 0; i + 1 < 54; ++i) {
+    for (size_t i = 0; i + 1 < 54; ++i) {
       if (i % 9 != 8) {
         EXPECT_NEAR(((*corners)[i + 1] - (*corners)[i]).norm(), 20, 0.05);
       }
@@ -96,15 +95,13 @@ TEST(Chessboard, LiesWhereTheBundledStillsWereRendered) {
 
   std::vector<double> errors;
   cv::Mat grey;
-  for (std::size_t i = 0; stills->next(grey); ++i) {
+  for (size_t i = 0; stills->next(grey); ++i) {
     const auto corners = find_chessboard(grey, board);
     ASSERT_TRUE(corners) << stills->current_name();
     Eigen::Matrix4d world_from_board;
     for (int r = 0; r < 4; ++r) {
-      for (int c = 0; c < 4; ++c) {
-        world_from_board(r, c) =
-            boards[i][static_cast<std::size_t>(r)][static_cast<std::size_t>(c)];
-      }
+      for (int c = 0; c < 4; ++c)
+        world_from_board(r, c) = boards[i][static_cast<size_t>(r)][static_cast<size_t>(c)];
     }
     // The board's own axes start in its middle.
     std::vector<Eigen::Vector2d> expected;
@@ -117,9 +114,8 @@ TEST(Chessboard, LiesWhereTheBundledStillsWereRendered) {
     }
     for (const Eigen::Vector2d& corner : *corners) {
       double nearest = INFINITY;
-      for (const Eigen::Vector2d& place : expected) {
+      for (const Eigen::Vector2d& place : expected)
         nearest = std::min(nearest, (corner - place).norm());
-      }
       errors.push_back(nearest);
     }
   }

@@ -28,7 +28,7 @@ struct Errors {
   int corners = 0;
 
   void add(const TagDetection& found, const std::array<Eigen::Vector2d, 4>& truth) {
-    for (std::size_t c = 0; c < 4; ++c) {
+    for (size_t c = 0; c < 4; ++c) {
       const Eigen::Vector2d error = found.corner_px[c] - truth[c];
       mean += error;
       rms += error.squaredNorm() / 2;
@@ -94,9 +94,8 @@ TEST(TagDetector, NumbersCornersFromTheBottomLeftOfTheUprightTag) {
         EXPECT_LT(truth[0].x(), truth[1].x());
         EXPECT_GT(truth[0].y(), truth[3].y());
       }
-      for (std::size_t c = 0; c < 4; ++c) {
+      for (size_t c = 0; c < 4; ++c)
         EXPECT_LT((tag_3->corner_px[c] - truth[c]).norm(), 0.2) << "corner " << c;
-      }
     }
   }
 }
@@ -117,7 +116,7 @@ TEST(TagDetector, PutsPixelZeroAtTheCentreOfTheTopLeftPixel) {
 
   ASSERT_EQ(upright.size(), 1U);
   ASSERT_EQ(around.size(), 1U);
-  for (std::size_t c = 0; c < 4; ++c) {
+  for (size_t c = 0; c < 4; ++c) {
     const Eigen::Vector2d sum = upright[0].corner_px[c] + around[0].corner_px[c];
     EXPECT_NEAR(sum.x(), camera.width - 1, 0.02);
     EXPECT_NEAR(sum.y(), camera.height - 1, 0.02);

@@ -54,7 +54,9 @@ TEST(ImageSource, GivesTheSamePicturesFromAVideo) {
   const TemporaryFolder folder;
   const std::string file = (folder / "film.avi").string();
   cv::VideoWriter writer(file, cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 30, {64, 48}, false);
-  if (!writer.isOpened()) GTEST_SKIP() << "OpenCV writes no Motion JPEG here";
+  if (!writer.isOpened()) {
+    GTEST_SKIP() << "OpenCV writes no Motion JPEG here";
+  }
   for (int i = 0; i < 5; ++i) writer.write(plain_picture(40 * (i + 1)));
   writer.release();
 
@@ -64,7 +66,7 @@ TEST(ImageSource, GivesTheSamePicturesFromAVideo) {
   EXPECT_EQ(images->count(), 5);
   EXPECT_EQ(images->current_name(), "frame 4");
   ASSERT_EQ(found.size(), 5U);
-  for (std::size_t i = 0; i < 5; ++i) EXPECT_NEAR(found[i], 40 * (static_cast<double>(i) + 1), 2);
+  for (size_t i = 0; i < 5; ++i) EXPECT_NEAR(found[i], 40 * (static_cast<double>(i) + 1), 2);
 }
 
 TEST(ImageSource, RefusesWhatIsNotThere) {

@@ -31,7 +31,7 @@ double worst_error_px(const CameraParameters& camera) {
   double worst = 0;
   for (double v = -8.4; v < camera.image_height + 7; v += 3.71) {
     rays.row(u_px, v, direction);
-    for (std::size_t k = 0; k < u_px.size(); ++k) {
+    for (size_t k = 0; k < u_px.size(); ++k) {
       const Eigen::Vector3d along = direction[k].homogeneous();
       worst = std::max(worst, (*project(camera, along) - Eigen::Vector2d(u_px[k], v)).norm());
     }

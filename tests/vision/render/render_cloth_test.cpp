@@ -48,8 +48,8 @@ CornerErrors corner_errors(const CameraParameters& camera, int columns, const Sh
   for (const TrueMarker& marker : truth) errors.seen += marker.sight == MarkerSight::seen;
   for (const TagDetection& tag : TagDetector("tag36h11").detect(picture)) {
     EXPECT_TRUE(tag.refined);
-    for (std::size_t c = 0; c < 4; ++c) {
-      const TrueMarker& marker = truth.at(static_cast<std::size_t>(4 * tag.id) + c);
+    for (size_t c = 0; c < 4; ++c) {
+      const TrueMarker& marker = truth.at(static_cast<size_t>(4 * tag.id) + c);
       if (marker.sight != MarkerSight::seen) continue;
       const Eigen::Vector2d error_px = tag.corner_px[c] - marker.pixel_px;
       ++errors.found;
@@ -292,7 +292,7 @@ TEST(RenderCloth, GivesTheSameBytesOnOneThreadAndTwo) {
     })});
   }
   const RenderOptions options{.noise_levels = 2, .shot_levels = 0.02};
-  const auto render_with = [&](std::size_t threads) {
+  const auto render_with = [&](size_t threads) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
     return render_cloth(CameraRays(camera), instants, options, 9);
   };

@@ -37,14 +37,13 @@ TEST(SheetPrint, LaysEachCellOfATagBetweenItsCorners) {
 
   for (const int tag : {0, 5}) {
     const TagPattern pattern = printed_tag(*family, tag);
-    const Marker& bottom_right = markers.markers[static_cast<std::size_t>(4 * tag + 1)];
-    const Marker& top_left = markers.markers[static_cast<std::size_t>(4 * tag + 3)];
+    const Marker& bottom_right = markers.markers[static_cast<size_t>(4 * tag + 1)];
+    const Marker& top_left = markers.markers[static_cast<size_t>(4 * tag + 3)];
     const double cell_m = (bottom_right.s_m - top_left.s_m) / pattern.border_cells;
     const int margin = (pattern.total_cells - pattern.border_cells) / 2;
     for (int row = 0; row < pattern.total_cells; ++row) {
       for (int column = 0; column < pattern.total_cells; ++column) {
-        const double white =
-            pattern.white[static_cast<std::size_t>(row * pattern.total_cells + column)];
+        const double white = pattern.white[static_cast<size_t>(row * pattern.total_cells + column)];
         // The places are just inside two opposite corners of the cell.
         for (const double inside : {0.01, 0.99}) {
           EXPECT_EQ(print.reflectance({top_left.s_m + (column - margin + inside) * cell_m,
@@ -82,20 +81,17 @@ TEST(SheetPrint, TurnsATagWithItsCorners) {
 TEST(SheetPrint, FillsCirclesAroundDots) {
   const double width_m = 0.4, height_m = 0.2;
   MarkerSet markers{.kind = MarkerKind::dots, .family = "", .markers = {}, .index = {}};
-  for (const double s_m : {0.05, 0.2, 0.35}) {
+  for (const double s_m : {0.05, 0.2, 0.35})
     markers.markers.push_back({.name = "m", .s_m = s_m, .t_m = 0.1});
-  }
   PrintOptions options = kBlackAndWhite;
   options.dot_radius_m = 0.01;
   const SheetPrint print(markers, width_m, height_m, options);
 
   const double step_m = 0.0005;
   double ink_m2 = 0;
-  for (double t_m = step_m / 2; t_m < height_m; t_m += step_m) {
-    for (double s_m = step_m / 2; s_m < width_m; s_m += step_m) {
+  for (double t_m = step_m / 2; t_m < height_m; t_m += step_m)
+    for (double s_m = step_m / 2; s_m < width_m; s_m += step_m)
       ink_m2 += (1 - print.reflectance({s_m, t_m})) * step_m * step_m;
-    }
-  }
 
   EXPECT_EQ(print.reflectance({0.2 + 0.0099, 0.1}), 0);
   EXPECT_EQ(print.reflectance({0.2 + 0.0101, 0.1}), 1);
@@ -144,7 +140,7 @@ TEST(SheetPrint, RefusesWhatCannotBePrinted) {
   expect_refused("tag 4 has no marker at its corner 2",
                  print([](MarkerSet& m) { m.markers.erase(m.markers.begin() + 18); }));
   expect_refused("there is no tag 587 in tag36h11", print([](MarkerSet& m) {
-                   for (std::size_t c = 0; c < 4; ++c) m.markers[c].tag = 587;
+                   for (size_t c = 0; c < 4; ++c) m.markers[c].tag = 587;
                  }));
   expect_refused("corners of tag 0 are not a rectangle's",
                  print([](MarkerSet& m) { m.markers[2].s_m += 0.01; }));

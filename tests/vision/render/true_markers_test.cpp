@@ -43,9 +43,8 @@ TEST(TrueMarkers, SayWhichPartOfAFoldedClothHidesWhich) {
     const double x = s - 0.2;
     if (t < fold_m) return Eigen::Vector3d(x, 0, 0.1 - t);
     const double angle = (t - fold_m) / r;
-    if (angle < M_PI) {
+    if (angle < M_PI)
       return Eigen::Vector3d(x, -r + r * std::cos(angle), 0.1 - fold_m - r * std::sin(angle));
-    }
     return Eigen::Vector3d(x, -2 * r, 0.1 - fold_m + (t - fold_m - M_PI * r));
   });
   const CameraParameters camera = camera_before(2, 1000, 640, 480);

@@ -77,10 +77,9 @@ class DrawnRecording {
     recording_.markers_file = folder_ / "markers.csv";
     recording_.markers.kind = MarkerKind::apriltag;
     recording_.markers.family = "tag36h11";
-    for (int corner = 0; corner < 4; ++corner) {
+    for (int corner = 0; corner < 4; ++corner)
       recording_.markers.markers.push_back(
           {.name = "t7_" + std::to_string(corner), .s_m = 0, .t_m = 0, .tag = 7, .corner = corner});
-    }
     std::filesystem::create_directory(folder_ / "frames");
     recording_.cameras.push_back(
         {.name = "front", .file = {}, .images = folder_ / "frames", .calibration = {}});
@@ -136,19 +135,17 @@ TEST(Track, FindsTheBundledClothNearlyAsPlacedAndKnowsHowNearly) {
   for (const Position2d& row : result.tracks) {
     if (!row.rejected.empty()) continue;
     const std::string& name =
-        bundled.recording().markers.markers[static_cast<std::size_t>(row.marker)].name;
-    const TruePixel& place = truth.at({frames[static_cast<std::size_t>(row.frame)], name});
+        bundled.recording().markers.markers[static_cast<size_t>(row.marker)].name;
+    const TruePixel& place = truth.at({frames[static_cast<size_t>(row.frame)], name});
     const double error = (row.position_px - place.pixel_px).norm();
     chi2 += error * error / (2 * row.sigma_px * row.sigma_px);
     if (place.visible) errors.push_back(error);
   }
   int visible = 0;
-  for (const auto& [key, place] : truth) {
+  for (const auto& [key, place] : truth)
     if (key.second.starts_with("t") && place.visible &&
-        std::find(frames.begin(), frames.end(), key.first) != frames.end()) {
+        std::find(frames.begin(), frames.end(), key.first) != frames.end())
       ++visible;
-    }
-  }
   std::sort(errors.begin(), errors.end());
   const double count = static_cast<double>(errors.size());
   RecordProperty("chi2", std::to_string(chi2 / count));
@@ -170,7 +167,7 @@ TEST(Track, PlacesReferencePointsAndSaysHowWell) {
   ASSERT_EQ(result.reference.size(), 20U);
   double chi2 = 0;
   for (const ReferencePixel& found : result.reference) {
-    const ReferencePoint& point = truth.at(static_cast<std::size_t>(found.point));
+    const ReferencePoint& point = truth.at(static_cast<size_t>(found.point));
     const Eigen::Vector3d world(point.x_m, point.y_m, point.z_m);
     const Eigen::Vector2d expected = *project(camera, camera_from_world(camera) * world);
     EXPECT_LT((found.pixel_px - expected).norm(), 0.25) << point.name;
@@ -187,7 +184,7 @@ TEST(Track, GivesTheSameTwice) {
   const TrackResult again = track(bundled.recording(), bundled.camera(), {}, {});
 
   ASSERT_EQ(once.tracks.size(), again.tracks.size());
-  for (std::size_t i = 0; i < once.tracks.size(); ++i) {
+  for (size_t i = 0; i < once.tracks.size(); ++i) {
     EXPECT_EQ(once.tracks[i].frame, again.tracks[i].frame);
     EXPECT_EQ(once.tracks[i].marker, again.tracks[i].marker);
     EXPECT_EQ(once.tracks[i].position_px, again.tracks[i].position_px);
@@ -220,16 +217,14 @@ TEST(Track, ReportsEveryPictureInOrderAndStopsWhenTold) {
 TEST(Track, RejectsAJumpButNotSteadyMotion) {
   // The tag moves 25 px a frame to the right, except in frame 3, where it is 150 px ahead.
   DrawnRecording drawn;
-  for (int frame = 0; frame < 6; ++frame) {
+  for (int frame = 0; frame < 6; ++frame)
     drawn.add(drawn.draw(frame == 3 ? 125 : -100 + 25 * frame, 0));
-  }
 
   const TrackResult result = drawn.track_it();
 
   EXPECT_EQ(result.rejected, (std::map<std::string, int>{{"jump", 4}}));
-  for (const Position2d& row : result.tracks) {
+  for (const Position2d& row : result.tracks)
     EXPECT_EQ(row.rejected, row.frame == 3 ? "jump" : "") << "frame " << row.frame;
-  }
 }
 
 TEST(Track, RejectsATagThatIsReadTwice) {
@@ -326,9 +321,8 @@ TEST(Track, SaysWhatItLookedForAndWhatIsThereInstead) {
 
   DrawnRecording other_family;
   cv::Mat three = other_family.draw(-100, 0, 1, "tag25h9");
-  for (const int id : {2, 3}) {
+  for (const int id : {2, 3})
     cv::min(three, other_family.draw(id == 2 ? 0 : 100, 0, id, "tag25h9"), three);
-  }
   other_family.add(three);
   expect_error("the first picture shows tags 1 to 3 of tag25h9", [&] { other_family.track_it(); });
 

@@ -41,9 +41,9 @@ std::string tag_imbalance(const std::string& page) {
 std::string text_of(const std::string& page) {
   const std::string without_style = page.substr(page.find("</style>"));
   std::string text;
-  std::size_t from = 0;
+  size_t from = 0;
   while (true) {
-    const std::size_t uri = without_style.find("data:image", from);
+    const size_t uri = without_style.find("data:image", from);
     text += without_style.substr(from, uri - from);
     if (uri == std::string::npos) return text;
     from = without_style.find('"', uri);
@@ -63,9 +63,8 @@ TEST_P(FitPage, ClosesEveryElement) {
 
 TEST_P(FitPage, NeedsNothingFromOutside) {
   const std::regex reference("(href|src)=\"([^\"]*)\"");
-  for (std::sregex_iterator it(page_.begin(), page_.end(), reference), end; it != end; ++it) {
+  for (std::sregex_iterator it(page_.begin(), page_.end(), reference), end; it != end; ++it)
     EXPECT_EQ((*it)[2].str().rfind("data:", 0), 0U) << (*it)[2];
-  }
   EXPECT_THAT(page_, Not(HasSubstr("<script")));
   EXPECT_THAT(page_, Not(HasSubstr("<link")));
   EXPECT_THAT(page_, Not(HasSubstr("@import")));
@@ -120,9 +119,8 @@ TEST_P(FitPage, TellsEveryFigureInWords) {
 TEST_P(FitPage, HoldsWhatAReaderAsksFor) {
   for (const char* title : {"Parameters", "Errors", "Where and when it is off",
                             "Which parameters trade against each other", "Observations", "Model",
-                            "Search", "What the words mean", "Do it again"}) {
+                            "Search", "What the words mean", "Do it again"})
     EXPECT_THAT(page_, HasSubstr(std::string("<h2>") + title + "</h2>"));
-  }
   EXPECT_THAT(page_, HasSubstr("undetermined: sigma exceeds the value, p &lt; 1"));
   EXPECT_THAT(page_, HasSubstr("held out: no fit saw these frames"));
   EXPECT_THAT(page_, HasSubstr("clothfit fit &#39;a &amp; b&#39; --seed 7"));

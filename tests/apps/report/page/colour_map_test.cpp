@@ -10,7 +10,7 @@ namespace {
 
 /// Returns CIE lightness L* of "#rrggbb": how light the eye finds it.
 double lightness(const std::string& colour) {
-  const auto linear = [&](std::size_t at) {
+  const auto linear = [&](size_t at) {
     const double c = std::stoi(colour.substr(at, 2), nullptr, 16) / 255.0;
     return c <= 0.04045 ? c / 12.92 : std::pow((c + 0.055) / 1.055, 2.4);
   };
@@ -35,9 +35,8 @@ TEST(Viridis, ClampsToItsEnds) {
 }
 
 TEST(Diverging, StaysLightEnoughForDarkText) {
-  for (const double value : {-1.0, -0.5, 0.0, 0.5, 1.0}) {
+  for (const double value : {-1.0, -0.5, 0.0, 0.5, 1.0})
     EXPECT_GT(lightness(diverging(value)), 70) << value;
-  }
   EXPECT_EQ(diverging(0), "#ffffff");
 }
 

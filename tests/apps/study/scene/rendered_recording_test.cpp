@@ -40,7 +40,7 @@ std::vector<std::vector<Eigen::Vector2d>> projected(const SyntheticScene& scene,
                                                     const FitInput& input) {
   const std::vector<Marker>& markers = input.recording.markers.markers;
   Eigen::Matrix2Xd places(2, static_cast<Eigen::Index>(markers.size()));
-  for (std::size_t m = 0; m < markers.size(); ++m)
+  for (size_t m = 0; m < markers.size(); ++m)
     places.col(static_cast<Eigen::Index>(m)) << markers[m].s_m, markers[m].t_m;
   const Surface surface =
       make_surface(scene.truth_mesh, scene.truth_mesh, scene.size_m, scene.size_m, places);
@@ -82,8 +82,8 @@ TEST(RenderedRecording, HasItsMarkersWhereTheyTrulyAreWithinTheStatedSigma) {
   ASSERT_EQ(input.tracks2d.size(), 1u);
   for (const Position2d& row : input.tracks2d.at("camera1")) {
     if (!row.rejected.empty()) continue;
-    const auto m = static_cast<std::size_t>(row.marker);
-    const Eigen::Vector2d true_px = truth_px[static_cast<std::size_t>(row.frame)][m];
+    const auto m = static_cast<size_t>(row.marker);
+    const Eigen::Vector2d true_px = truth_px[static_cast<size_t>(row.frame)][m];
     const Eigen::Vector2d error_px = row.position_px - true_px;
     // The most of 1280 normal numbers are 3.4 sigma off; tags that bend add to it.
     EXPECT_LT(error_px.cwiseAbs().maxCoeff(), 6 * row.sigma_px)
@@ -113,7 +113,7 @@ TEST(RenderedRecording, IsTheSameForAnyNumberOfThreads) {
   pictures.width_px = 200;
   pictures.height_px = 150;
   pictures.instants = 3;
-  const auto with_threads = [&](std::size_t threads) {
+  const auto with_threads = [&](size_t threads) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
     return make_rendered_recording(scene, pictures, kSeed);
   };
