@@ -204,9 +204,8 @@ void add_camera(FitProblem& problem) {
 
 bool may_touch(const FitProblem& problem) {
   return problem.cloth.obstacle ||
-         std::ranges::any_of(problem.cloth.effect_descriptions, [](const EffectDescription& of) {
-           return of.name.starts_with("contact_");
-         });
+         std::ranges::any_of(problem.cloth.effect_descriptions,
+                             [](const EffectDescription& of) { return of.touches; });
 }
 
 void add_attitudes(const FitProblem& problem, const HeldLine& line,

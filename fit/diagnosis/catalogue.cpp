@@ -63,12 +63,11 @@ std::vector<EffectMode> modes_of(const EffectDescription& effect) {
 }
 
 /// Tells whether a recording has what an effect of motion acts on.
-bool acts_on(const Recording& recording, const std::string& effect) {
+bool acts_on(const Recording& recording, const EffectDescription& effect) {
   const auto driven = std::ranges::count_if(
       recording.held, [](const HeldPoint& point) { return point.motion != HeldMotion::fixed; });
-  if (effect == "support_offset") return driven > 0;
-  if (effect == "rigid_support") return driven == 2;
-  return true;
+  const auto [least, most] = effect.driven_points;
+  return driven >= least && driven <= most;
 }
 
 /// Returns the effects that a model has anyway.
@@ -127,17 +126,12 @@ ShapeCandidates shapes_around(const Hypothesis& hypothesis, double part) {
   return around;
 }
 
-bool is_empirical(const std::string& effect) {
-  return effect == "force_law" || effect == "tension_law";
-}
-
 std::vector<Hypothesis> empirical_hypotheses(const FitInput& input, const FitOptions& options) {
   const std::vector<std::string> present = present_effects(input, options);
   std::vector<Hypothesis> result;
   for (const EffectEntry& entry : effect_registry()) {
-    if (!is_empirical(entry.name) || std::ranges::find(present, entry.name) != present.end())
-      continue;
     const EffectDescription effect = entry.describe();
+    if (!effect.empirical || std::ranges::find(present, effect.name) != present.end()) continue;
     for (const EffectMode& mode : modes_of(effect))
       result.push_back({.effect = effect.name,
                         .mode = mode.name,
@@ -152,9 +146,10 @@ std::vector<ShapeCandidates> hypotheses_to_test(const FitInput& input, const Fit
                                                 double duration_s) {
   const std::vector<std::string> present = present_effects(input, options);
   std::vector<std::string> names;
-  for (const EffectEntry& entry : effect_registry())
-    if (!is_empirical(entry.name) && acts_on(input.recording, entry.name))
-      names.emplace_back(entry.name);
+  for (const EffectEntry& entry : effect_registry()) {
+    const EffectDescription effect = entry.describe();
+    if (!effect.empirical && acts_on(input.recording, effect)) names.push_back(effect.name);
+  }
   if (!follows_markers(input.recording))
     for (const MeasurementEffectEntry& entry : measurement_effect_registry())
       names.emplace_back(entry.name);

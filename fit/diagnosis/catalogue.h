@@ -29,12 +29,9 @@ bool is_over_cloth(const Hypothesis& hypothesis);
 /// part of the grid's spacing, as far as its range allows.
 ShapeCandidates shapes_around(const Hypothesis& hypothesis, double part);
 
-/// Tells whether an effect describes a force and names no cause for it. A proposed law is made of
-/// such effects (fit/diagnosis/proposed_law.h), and none is tested as a cause.
-bool is_empirical(const std::string& effect);
-
 /// Returns every mode of the empirical effects that a recording does not declare and `options` do
-/// not add.
+/// not add. A proposed law is made of such effects (fit/diagnosis/proposed_law.h), and none is
+/// tested as a cause.
 std::vector<Hypothesis> empirical_hypotheses(const FitInput& input, const FitOptions& options);
 
 /// Returns the hypotheses to test on a recording: the modes of all registered effects, with

@@ -14,8 +14,7 @@
 #include "fit/jobs/parallel.h"
 #include "fit/jobs/stop_token.h"
 #include "fit/uncertainty/uncertainty.h"
-#include "model/effects/force_law.h"
-#include "model/effects/tension_law.h"
+#include "model/effects/registry.h"
 
 namespace clothfit {
 namespace {
@@ -47,18 +46,23 @@ std::string number_text(double value, double sigma) {
   return fmt::format("{:.{}f}", value, -place);
 }
 
-/// Returns the left side of the formula that a coefficient stands in.
-std::string side_of(const LawCoefficient& one) {
-  if (one.effect == "tension_law") return "T / (k l0)";
-  return force_law::acts_on_area(one.parameter) ? "p" : "a";
+/// Returns the left sides of all empirical effects, in the catalogue's order.
+std::vector<std::string> law_sides() {
+  std::vector<std::string> sides;
+  for (const EffectEntry& entry : effect_registry())
+    for (const EffectParameter& parameter : entry.describe().parameters)
+      if (!parameter.law_side.empty() &&
+          std::ranges::find(sides, parameter.law_side) == sides.end())
+        sides.push_back(parameter.law_side);
+  return sides;
 }
 
 std::string formula_of(const std::vector<LawCoefficient>& coefficients) {
   std::string text;
-  for (const char* side : {"a", "p", "T / (k l0)"}) {
+  for (const std::string& side : law_sides()) {
     std::string sum;
     for (const LawCoefficient& one : coefficients) {
-      if (side_of(one) != side) continue;
+      if (one.side != side) continue;
       // A term may bring a sign of its own.
       const bool opposed = one.term.starts_with('-');
       const bool minus = (one.value < 0) != opposed;
@@ -252,7 +256,10 @@ class Pursuit {
         estimate_uncertainty(model.objective(0), values, {.loss = setup_.options.loss});
     for (size_t k = own_terms_; k < model.hypotheses.size(); ++k) {
       const Hypothesis& term = model.hypotheses[k];
+      const EffectDescription effect = describe_effect(term.effect);
       for (const std::string& parameter : term.amplitudes) {
+        const EffectParameter& coefficient =
+            *std::ranges::find(effect.parameters, parameter, &EffectParameter::name);
         const int p = space.index(term.effect + "." + parameter);
         const FitParameter& range = space.parameters[static_cast<size_t>(p)];
         const double least = 1e-6 * (range.upper - range.lower);
@@ -260,8 +267,8 @@ class Pursuit {
             {.effect = term.effect,
              .parameter = parameter,
              .unit = range.unit,
-             .term = term.effect == "force_law" ? force_law::term_text(parameter)
-                                                : tension_law::term_text(parameter),
+             .side = coefficient.law_side,
+             .term = coefficient.law_factor,
              .value = values[p],
              .sigma = uncertainty.usable ? uncertainty.sigma[p] : 0,
              .at_bound = values[p] < range.lower + least || values[p] > range.upper - least});

@@ -30,6 +30,8 @@ struct TermTrial {
 struct LawCoefficient {
   std::string effect, parameter;
   std::string unit;
+  std::string
+      side;  ///< the formula's left side: "a", a force per mass; "p", a pressure; "T / (k l0)"
   std::string term;  ///< what it multiplies
   double value = 0;
   double sigma = 0;       ///< as fits state it (fit/uncertainty/uncertainty.h)
@@ -37,7 +39,7 @@ struct LawCoefficient {
 };
 
 /// An empirical law for the residual of a model. It is a force per mass, a pressure, or a tension,
-/// and a sum of few terms (model/effects/force_law.h, tension_law.h).
+/// and a sum of few terms (model/effects/force_law.cpp, tension_law.cpp).
 struct ProposedLaw {
   std::vector<LawCoefficient> coefficients;  ///< none: no term predicts frames left out
   std::string formula;  ///< a line for each of force per mass a, pressure p, tension T

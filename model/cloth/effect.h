@@ -1,8 +1,10 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <limits>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "model/fabric/fabric.h"
@@ -28,6 +30,9 @@ struct EffectParameter {
   double upper = 0;
   double typical = 1;  ///< size of a change that matters, for scaling
   ParameterScale scale = ParameterScale::linear;
+  /// The place of an empirical effect's coefficient in the law that a diagnosis writes: the left
+  /// side, "a", and the factor, "-|v| v". Empty for all other parameters.
+  std::string law_side = {}, law_factor = {};
 };
 
 /// Says how the data are tested for an effect.
@@ -62,6 +67,10 @@ struct EffectDescription {
   std::vector<EffectParameter> parameters;
   EffectTest test = EffectTest::smooth;
   std::vector<EffectMode> modes = {};  ///< none: one mode, whose amplitudes are all parameters
+  bool empirical = false;              ///< it describes a force and names no cause for it
+  bool touches = false;                ///< it lets the cloth touch an obstacle
+  /// Held points that are driven, least and most, without which it does nothing.
+  std::pair<int, int> driven_points = {0, std::numeric_limits<int>::max()};
 };
 
 /// The state that an effect may look at: at the beginning of a step, in SI units, world.

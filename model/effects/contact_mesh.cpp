@@ -1,11 +1,14 @@
-#include "model/effects/contact_mesh.h"
-
 #include <ceres/jet.h>
 
 #include "model/effects/contact_law.h"
 #include "model/effects/lane_by_lane.h"
 #include "model/topology/obstacle.h"
 
+/// Keeps the cloth out of an obstacle of triangles: the cloth's `obstacle`
+/// (model/topology/obstacle.h). A vertex below its surface feels the force of contact_law.h towards
+/// the nearest point of the surface; a cloth without an obstacle feels nothing.
+///
+/// Parameters: stiffness (Pa/m), damping (Pa s/m), friction (ratio), neutral at 0.
 namespace clothfit::contact_mesh {
 namespace {
 
@@ -95,7 +98,8 @@ EffectDescription describe() {
   return {.name = "contact_mesh",
           .summary = "an obstacle of triangles that the cloth cannot pass",
           .parameters = Contact::parameters(),
-          .test = EffectTest::finite};
+          .test = EffectTest::finite,
+          .touches = true};
 }
 
 std::unique_ptr<Effect> make() {

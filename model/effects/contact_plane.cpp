@@ -1,8 +1,12 @@
-#include "model/effects/contact_plane.h"
-
 #include "model/effects/contact_law.h"
 #include "model/effects/vertex_law.h"
 
+/// Keeps the cloth on one side of a plane: floor, table, wall. A vertex at x is depth = offset - n
+/// . x below it and feels the force of contact_law.h.
+///
+/// Parameters: stiffness (Pa/m), damping (Pa s/m), friction (ratio), neutral at 0; n_x, n_y, n_z,
+/// whose direction is the plane's normal n, towards the free side; offset (m), the plane's distance
+/// from the origin along n. Where the plane lies matters only where stiffness or damping do.
 namespace clothfit::contact_plane {
 namespace {
 struct Law {
@@ -37,6 +41,7 @@ EffectDescription describe() {
       {.name = "n_z", .unit = "ratio", .neutral = 1, .lower = -1, .upper = 1, .typical = 0.02});
   effect.parameters.push_back(
       {.name = "offset", .unit = "m", .neutral = 0, .lower = -10, .upper = 10, .typical = 0.01});
+  effect.touches = true;
   return effect;
 }
 

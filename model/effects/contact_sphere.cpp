@@ -1,8 +1,11 @@
-#include "model/effects/contact_sphere.h"
-
 #include "model/effects/contact_law.h"
 #include "model/effects/vertex_law.h"
 
+/// Keeps the cloth out of a ball. A vertex at x is depth = radius - |x - centre| inside it and
+/// feels the force of contact_law.h along n = (x - centre) / |x - centre|.
+///
+/// Parameters: stiffness (Pa/m), damping (Pa s/m), friction (ratio), neutral at 0; centre_x,
+/// centre_y, centre_z, radius (m), which matter only where stiffness or damping do.
 namespace clothfit::contact_sphere {
 namespace {
 struct Law {
@@ -43,6 +46,7 @@ EffectDescription describe() {
                                .lower = 0.005,
                                .upper = 5,
                                .typical = 0.005});
+  effect.touches = true;
   return effect;
 }
 

@@ -1,5 +1,3 @@
-#include "model/effects/force_law.h"
-
 #include <algorithm>
 #include <cassert>
 #include <cmath>
@@ -8,6 +6,21 @@
 #include "model/effects/vector_parameter.h"
 #include "model/effects/vertex_law.h"
 
+/// Adds an empirical force on every vertex. One part goes with its mass m, the other with its area
+/// A along the surface's normal n; each is a sum of terms with a coefficient of its own,
+///
+///   F = m sum_k c_k a_k(v, place, height, time) + A sum_k c_k p_k(v, n, place)
+///
+/// a_k: drag -v, -|v| v, the same of the velocity v_t in the surface, and -v over the cloth's width
+/// and height; the unit vectors x, y, z, alone, times the height above the world's origin and times
+/// the recording's time. p_k: drag -v_n and -|v_n| v_n with v_n = (n . v) n; n, alone and over the
+/// cloth; (n . x) n and its like of y and z, the pressure of air that blows along them. "Over the
+/// cloth" means times 2 s / w - 1 or 2 t / h - 1, from -1 at one edge to 1 at the other.
+///
+/// The effect describes a force and names no cause. It is the dictionary of a sparse regression in
+/// the manner of [brunton2016], from which a diagnosis proposes a law
+/// (fit/diagnosis/proposed_law.h). Every coefficient is neutral at 0; those of the uniform drags
+/// are never negative, for still air takes energy and gives none. Ours; see docs/effects.
 namespace clothfit::force_law {
 namespace {
 
@@ -87,39 +100,44 @@ struct Law {
   }
 };
 
-/// A coefficient and its factor.
-struct Entry {
-  EffectParameter parameter;
-  const char* text;
-};
-
-std::vector<Entry> entries() {
+/// Returns the coefficients. Their factors are of a force per mass, a, or per area, p.
+std::vector<EffectParameter> parameters() {
   const auto of = [](const char* name, const char* unit, double lower, double upper, double typical,
-                     const char* text) {
-    return Entry{{.name = name, .unit = unit, .lower = lower, .upper = upper, .typical = typical},
-                 text};
+                     const char* side, const char* factor) {
+    return EffectParameter{.name = name,
+                           .unit = unit,
+                           .lower = lower,
+                           .upper = upper,
+                           .typical = typical,
+                           .law_side = side,
+                           .law_factor = factor};
   };
-  std::vector<Entry> all{
-      of("drag", "1/s", 0, 30, 0.1, "-v"),
-      of("drag_squared", "1/m", 0, 30, 0.1, "-|v| v"),
-      of("normal_drag", "Pa s/m", 0, 5, 0.02, "-(n.v) n"),
-      of("normal_drag_squared", "kg/m3", 0, 5, 0.05, "-|n.v| (n.v) n"),
-      of("tangential_drag", "1/s", 0, 30, 0.1, "-v_t"),
-      of("tangential_drag_squared", "1/m", 0, 30, 0.1, "-|v_t| v_t"),
-      of("drag_by_s", "1/s", -5, 5, 0.1, "-(2s/w - 1) v"),
-      of("drag_by_t", "1/s", -5, 5, 0.1, "-(2t/h - 1) v"),
+  std::vector<EffectParameter> all{
+      of("drag", "1/s", 0, 30, 0.1, "a", "-v"),
+      of("drag_squared", "1/m", 0, 30, 0.1, "a", "-|v| v"),
+      of("normal_drag", "Pa s/m", 0, 5, 0.02, "p", "-(n.v) n"),
+      of("normal_drag_squared", "kg/m3", 0, 5, 0.05, "p", "-|n.v| (n.v) n"),
+      of("tangential_drag", "1/s", 0, 30, 0.1, "a", "-v_t"),
+      of("tangential_drag_squared", "1/m", 0, 30, 0.1, "a", "-|v_t| v_t"),
+      of("drag_by_s", "1/s", -5, 5, 0.1, "a", "-(2s/w - 1) v"),
+      of("drag_by_t", "1/s", -5, 5, 0.1, "a", "-(2t/h - 1) v"),
   };
-  const auto add_vector = [&](const Entry& entry, const std::array<const char*, 3>& texts) {
-    const std::vector<EffectParameter> three = vector_parameter(entry.parameter);
-    for (size_t axis = 0; axis < 3; ++axis) all.push_back({three[axis], texts[axis]});
+  const auto add_vector = [&](const EffectParameter& each,
+                              const std::array<const char*, 3>& factors) {
+    std::vector<EffectParameter> three = vector_parameter(each);
+    for (size_t axis = 0; axis < 3; ++axis) {
+      three[axis].law_factor = factors[axis];
+      all.push_back(std::move(three[axis]));
+    }
   };
-  add_vector(of("push", "m/s2", -5, 5, 0.05, ""), {"x", "y", "z"});
-  all.push_back(of("normal_push", "Pa", -3, 3, 0.02, "n"));
-  all.push_back(of("normal_push_by_s", "Pa", -3, 3, 0.02, "(2s/w - 1) n"));
-  all.push_back(of("normal_push_by_t", "Pa", -3, 3, 0.02, "(2t/h - 1) n"));
-  add_vector(of("pressure", "Pa", -3, 3, 0.05, ""), {"(n.x) n", "(n.y) n", "(n.z) n"});
-  add_vector(of("push_by_height", "1/s2", -10, 10, 0.1, ""), {"height x", "height y", "height z"});
-  add_vector(of("push_by_time", "m/s3", -5, 5, 0.1, ""), {"time x", "time y", "time z"});
+  add_vector(of("push", "m/s2", -5, 5, 0.05, "a", ""), {"x", "y", "z"});
+  all.push_back(of("normal_push", "Pa", -3, 3, 0.02, "p", "n"));
+  all.push_back(of("normal_push_by_s", "Pa", -3, 3, 0.02, "p", "(2s/w - 1) n"));
+  all.push_back(of("normal_push_by_t", "Pa", -3, 3, 0.02, "p", "(2t/h - 1) n"));
+  add_vector(of("pressure", "Pa", -3, 3, 0.05, "p", ""), {"(n.x) n", "(n.y) n", "(n.z) n"});
+  add_vector(of("push_by_height", "1/s2", -10, 10, 0.1, "a", ""),
+             {"height x", "height y", "height z"});
+  add_vector(of("push_by_time", "m/s3", -5, 5, 0.1, "a", ""), {"time x", "time y", "time z"});
   assert(all.size() == coefficients);
   return all;
 }
@@ -132,8 +150,8 @@ EffectDescription describe() {
       .summary =
           "an empirical force, F = m sum c_k a_k + A sum c_k p_k of velocity, normal, place, "
           "height and time",
-      .parameters = {}};
-  for (Entry& entry : entries()) effect.parameters.push_back(std::move(entry.parameter));
+      .parameters = parameters(),
+      .empirical = true};
   // A vector is one mode, any other coefficient one by itself.
   for (size_t k = 0; k < coefficients;) {
     const std::string& name = effect.parameters[k].name;
@@ -153,16 +171,6 @@ EffectDescription describe() {
 
 std::unique_ptr<Effect> make() {
   return std::make_unique<VertexLawEffect<Law>>();
-}
-
-bool acts_on_area(const std::string& parameter) {
-  return parameter.starts_with("normal_") || parameter.starts_with("pressure_");
-}
-
-std::string term_text(const std::string& parameter) {
-  for (const Entry& entry : entries())
-    if (entry.parameter.name == parameter) return entry.text;
-  return parameter;
 }
 
 }  // namespace clothfit::force_law

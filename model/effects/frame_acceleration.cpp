@@ -1,8 +1,12 @@
-#include "model/effects/frame_acceleration.h"
-
 #include "model/effects/harmonic.h"
 #include "model/effects/vertex_law.h"
 
+/// Shakes the frame of the whole scene. The inertial force is F = -m a sin(2 pi (f t + phase)) on
+/// every vertex, supports at rest in the frame, t the recording's time (s).
+///
+/// Newton's second law in an accelerated frame. Parameters: a_x, a_y, a_z (m/s2), the frame's
+/// acceleration at the harmonic's height, neutral at 0; frequency f (Hz) and phase (turns), which
+/// matter only where a does.
 namespace clothfit::frame_acceleration {
 namespace {
 struct Law {

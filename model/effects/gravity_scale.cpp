@@ -1,7 +1,10 @@
-#include "model/effects/gravity_scale.h"
-
 #include "model/effects/vertex_law.h"
 
+/// Makes gravity stronger or weaker than stated: F = excess m g at every vertex. Parameter: excess
+/// (ratio), neutral at 0. Ours.
+///
+/// A clock that runs wrong looks the same: with still supports and free stiffness and damping,
+/// t -> a t maps g to a^2 g.
 namespace clothfit::gravity_scale {
 namespace {
 struct Law {

@@ -55,9 +55,9 @@ struct Harmonic {
 
   /// Says whether a mode's shapes are those of a harmonic. A small one at any phase is a sum of
   /// two: at phase 0 times the phase's cosine, and at a quarter turn times its sine.
-  static bool is_followed_by(const EffectMode& law) {
-    return law.shapes.size() == 2 && law.shapes[0].parameter == "frequency" &&
-           law.shapes[1].parameter == "phase";
+  static bool is_followed_by(const EffectMode& mode) {
+    return mode.shapes.size() == 2 && mode.shapes[0].parameter == "frequency" &&
+           mode.shapes[1].parameter == "phase";
   }
 };
 

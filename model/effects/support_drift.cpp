@@ -1,8 +1,9 @@
-#include "model/effects/support_drift.h"
-
 #include "model/effects/support_law.h"
 #include "model/effects/vector_parameter.h"
 
+/// Lets the held points drift, all alike, beside their known motion: shift(t) = velocity t, with t
+/// the recording's time (s). Parameters: velocity_x, velocity_y, velocity_z (m/s), neutral at 0.
+/// Ours.
 namespace clothfit::support_drift {
 namespace {
 struct Law {

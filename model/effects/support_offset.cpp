@@ -1,8 +1,14 @@
-#include "model/effects/support_offset.h"
-
 #include "model/effects/support_law.h"
 #include "model/effects/vector_parameter.h"
 
+/// Holds points that follow a motion beside the places it gives, all by the same constant:
+///
+///   shift = offset
+///
+/// at every time, the rest before the start included. A tracker may see a corner of the cloth
+/// beside its place in the clamp. A tool's path may lead elsewhere on the tool than to the clamp.
+/// Points that rest are held where the cloth started, and are not shifted. Parameters: offset_x,
+/// offset_y, offset_z (m), neutral at 0. Ours.
 namespace clothfit::support_offset {
 namespace {
 struct Law {
@@ -31,7 +37,8 @@ EffectDescription describe() {
                                           .neutral = 0,
                                           .lower = -0.05,
                                           .upper = 0.05,
-                                          .typical = 0.002})};
+                                          .typical = 0.002}),
+          .driven_points = {1, std::numeric_limits<int>::max()}};
 }
 
 std::unique_ptr<Effect> make() {

@@ -1,10 +1,22 @@
-#include "model/effects/tension_law.h"
-
 #include <algorithm>
 
 #include "model/cloth/network_bound.h"
 #include "model/effects/spring_law.h"
 
+/// Adds an empirical tension inside the springs: beyond k (l - l0) + c dl/dt,
+///
+///   tension += k l0 (c e^2 + cr |e'| e')
+///
+/// with e = (l - l0) / l0 the elongation and e' = (dl/dt) / l0 its rate. c is one of two numbers,
+/// stretched where e > 0 and compressed where e < 0. The warp (structural springs along t), the
+/// weft (along s) and the shear springs have numbers of their own. Forces are along the springs, so
+/// momentum and angular momentum stay. Beyond |e| = 0.05 and |e'| = 10/s each term goes straight on
+/// along its tangent, because no time step follows a stiffness without bound. Within the
+/// coefficients' bounds the stiffness is 0.1 to 5 times the springs'.
+///
+/// The effect describes a tension and names no cause. With force_law it is the dictionary from
+/// which a diagnosis proposes a law (fit/diagnosis/proposed_law.h). Every coefficient is neutral at
+/// 0. Ours; see docs/effects.
 namespace clothfit::tension_law {
 namespace {
 
@@ -94,7 +106,8 @@ EffectDescription describe() {
   EffectDescription effect{
       .name = "tension_law",
       .summary = "an empirical tension, T = k l0 (c e^2 + cr |e'| e') by groups of springs",
-      .parameters = {}};
+      .parameters = {},
+      .empirical = true};
   for (const Entry& entry : kEntries) {
     for (const char* group : kGroupNames) {
       const std::string name = std::string(group) + "_" + entry.name;
@@ -102,7 +115,9 @@ EffectDescription describe() {
                                    .unit = entry.unit,
                                    .lower = entry.lower,
                                    .upper = entry.upper,
-                                   .typical = entry.typical});
+                                   .typical = entry.typical,
+                                   .law_side = "T / (k l0)",
+                                   .law_factor = entry.before + std::string(group) + entry.after});
       effect.modes.push_back({.name = name, .amplitudes = {name}, .shapes = {}});
     }
   }
@@ -111,14 +126,6 @@ EffectDescription describe() {
 
 std::unique_ptr<Effect> make() {
   return std::make_unique<SpringLawEffect<Law>>();
-}
-
-std::string term_text(const std::string& parameter) {
-  for (const Entry& entry : kEntries)
-    for (const char* group : kGroupNames)
-      if (parameter == std::string(group) + "_" + entry.name)
-        return entry.before + std::string(group) + entry.after;
-  return parameter;
 }
 
 }  // namespace clothfit::tension_law

@@ -1,7 +1,9 @@
-#include "model/effects/viscous_damping.h"
-
 #include "model/effects/vertex_law.h"
 
+/// Damps viscously by the surrounding air: F = -rate m v at every vertex.
+///
+/// Source: the founding paper's F = -C v [louchet1995, section 2.2] with C = rate m, an amplitude
+/// per mass, so that it survives a change of mesh. Parameter: rate (1/s), neutral at 0.
 namespace clothfit::viscous_damping {
 namespace {
 

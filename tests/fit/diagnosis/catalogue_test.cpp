@@ -126,7 +126,7 @@ TEST(HypothesesToTest, AreThoseOfEffectsThatAreNotThereAlready) {
 TEST(HypothesesToTest, AreNoneOfThoseThatNameNoCause) {
   FitInput input = synthetic_input({});
   for (const ShapeCandidates& mode : hypotheses_to_test(input, {}, 0.5))
-    EXPECT_FALSE(is_empirical(mode.front().effect)) << mode.front().title();
+    EXPECT_FALSE(describe_effect(mode.front().effect).empirical) << mode.front().title();
 
   const auto proposed = [&] {
     std::vector<std::string> titles;

@@ -1,5 +1,4 @@
 // Checks that a creeping camera is found where it was planted.
-#include "fit/measurement_effects/camera_drift.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,4 @@
 // Checks that a shaking camera is found where it was planted.
-#include "fit/measurement_effects/camera_shake.h"
 
 #include <gtest/gtest.h>
 

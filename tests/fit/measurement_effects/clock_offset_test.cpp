@@ -1,5 +1,4 @@
 // Checks that a late clock is found where it was planted, and told from everything else.
-#include "fit/measurement_effects/clock_offset.h"
 
 #include <gtest/gtest.h>
 

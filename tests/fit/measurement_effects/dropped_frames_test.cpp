@@ -1,5 +1,4 @@
 // Checks that lost frames are found where they were, as many as there were.
-#include "fit/measurement_effects/dropped_frames.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,4 @@
 // Checks that a wrong focal length is found where it was planted.
-#include "fit/measurement_effects/focal_error.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,4 @@
 // Checks that a wrong frame rate is found where it was planted.
-#include "fit/measurement_effects/frame_rate_error.h"
 
 #include <gtest/gtest.h>
 

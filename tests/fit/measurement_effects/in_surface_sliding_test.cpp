@@ -1,5 +1,4 @@
 // Checks that a pattern's sliding over the cloth is found where it was planted.
-#include "fit/measurement_effects/in_surface_sliding.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,4 @@
 // Checks that a lens that bends more than stated is found where it was planted.
-#include "fit/measurement_effects/lens_distortion.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,4 @@
 // Checks that a wrong place of the pattern is found where it was planted.
-#include "fit/measurement_effects/marker_placement.h"
 
 #include <gtest/gtest.h>
 

@@ -32,15 +32,15 @@ TEST(MeasurementEffectRegistry, IsSortedAndNamesWhatItDescribes) {
 TEST(MeasurementEffectRegistry, MakesEveryLawOfItsEffectsParametersWithinTheirRanges) {
   for (const MeasurementEffectEntry& entry : measurement_effect_registry()) {
     const EffectDescription effect = entry.describe();
-    std::set<std::string> in_no_law;
-    for (const EffectParameter& parameter : effect.parameters) in_no_law.insert(parameter.name);
+    std::set<std::string> in_no_mode;
+    for (const EffectParameter& parameter : effect.parameters) in_no_mode.insert(parameter.name);
     bool has_shapes = false;
-    for (const EffectMode& law : effect.modes) {
-      SCOPED_TRACE(effect.name + " " + law.name);
-      EXPECT_FALSE(law.amplitudes.empty());
-      for (const std::string& amplitude : law.amplitudes)
-        EXPECT_EQ(in_no_law.erase(amplitude), 1u) << amplitude;
-      for (const ShapeGrid& shape : law.shapes) {
+    for (const EffectMode& mode : effect.modes) {
+      SCOPED_TRACE(effect.name + " " + mode.name);
+      EXPECT_FALSE(mode.amplitudes.empty());
+      for (const std::string& amplitude : mode.amplitudes)
+        EXPECT_EQ(in_no_mode.erase(amplitude), 1u) << amplitude;
+      for (const ShapeGrid& shape : mode.shapes) {
         has_shapes = true;
         const auto found =
             std::ranges::find(effect.parameters, shape.parameter, &EffectParameter::name);
@@ -52,9 +52,9 @@ TEST(MeasurementEffectRegistry, MakesEveryLawOfItsEffectsParametersWithinTheirRa
         }
       }
     }
-    for (const EffectMode& law : effect.modes)
-      for (const ShapeGrid& shape : law.shapes) in_no_law.erase(shape.parameter);
-    EXPECT_TRUE(effect.modes.empty() || in_no_law.empty()) << effect.name;
+    for (const EffectMode& mode : effect.modes)
+      for (const ShapeGrid& shape : mode.shapes) in_no_mode.erase(shape.parameter);
+    EXPECT_TRUE(effect.modes.empty() || in_no_mode.empty()) << effect.name;
     EXPECT_EQ(effect.test == EffectTest::profiled, has_shapes) << effect.name;
   }
 }

@@ -1,5 +1,4 @@
 // Checks that a picture's reading row by row is found where it was planted.
-#include "fit/measurement_effects/rolling_shutter.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,4 @@
 // Checks that a scale of the measurement is found where it was planted.
-#include "fit/measurement_effects/scale.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,4 @@
 // Checks that smoothing of the tracks is found where it was planted.
-#include "fit/measurement_effects/temporal_smoothing.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,4 @@
 // Checks that a wrong "down" is found where it was planted, and as gravity that is tilted.
-#include "fit/measurement_effects/world_tilt.h"
 
 #include <gtest/gtest.h>
 

@@ -1,7 +1,5 @@
 // Checks the inertia of air along the surface's normal.
 
-#include "model/effects/added_air_mass.h"
-
 #include <gtest/gtest.h>
 
 #include "model/effects/registry.h"

@@ -1,7 +1,5 @@
 // Checks warp against weft. Not checked here: the fabric's own stiffnesses (fabric_test.cpp).
 
-#include "model/effects/anisotropy.h"
-
 #include <gtest/gtest.h>
 
 #include "tests/model/spring_rig.h"

@@ -1,8 +1,6 @@
 // Checks the bending stiffness of a plate. Not checked here: that a whole cloth moves alike on
 // several meshes (mesh_refinement_test.cpp).
 
-#include "model/effects/bending_energy.h"
-
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
@@ -109,7 +107,7 @@ TEST(BendingEnergy, OfATwistedSheetIsTheStiffnessTimesItsTwistSquared) {
 double sag_m(int rows, double load_n_per_m2) {
   const Mesh mesh{.columns = 3, .rows = rows, .width_m = 0.1, .height_m = 0.4};
   const Cloth cloth = Cloth::of(mesh, masses_by_area(mesh, 0.01));
-  const auto effect = bending_energy::make();
+  const auto effect = find_effect("bending_energy", "").make();
   const EffectMap map(*effect, cloth, 1, EffectDeed::add_force);
   const Eigen::Matrix3Xd flat = flat_positions(mesh);
   const Eigen::MatrixXd jacobian =

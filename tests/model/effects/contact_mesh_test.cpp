@@ -1,8 +1,6 @@
 // Checks contact with an obstacle of triangles. Not checked here: the search for the nearest part
 // (obstacle_test.cpp), friction and damping (contact_plane_test.cpp).
 
-#include "model/effects/contact_mesh.h"
-
 #include <gtest/gtest.h>
 
 #include "model/cloth/stability.h"

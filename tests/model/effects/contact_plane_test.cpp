@@ -1,7 +1,5 @@
 // Checks contact with a plane, and the law of contact that all obstacles share (contact_law.h).
 
-#include "model/effects/contact_plane.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -1,7 +1,5 @@
 // Checks contact with a ball. Not checked here: friction and damping (contact_plane_test.cpp).
 
-#include "model/effects/contact_sphere.h"
-
 #include <gtest/gtest.h>
 
 #include "tests/model/cloth_with_effect.h"

@@ -1,12 +1,11 @@
 // Checks an empirical force per mass.
 
-#include "model/effects/force_law.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <map>
 
+#include "model/effects/registry.h"
 #include "tests/model/cloth_with_effect.h"
 
 namespace clothfit {
@@ -14,7 +13,7 @@ namespace {
 
 std::vector<double> coefficients(const std::map<std::string, double>& named) {
   std::vector<double> values;
-  for (const EffectParameter& parameter : force_law::describe().parameters) {
+  for (const EffectParameter& parameter : find_effect("force_law", "").describe().parameters) {
     const auto found = named.find(parameter.name);
     values.push_back(found != named.end() ? found->second : 0);
   }
@@ -47,7 +46,7 @@ TEST(ForceLaw, KeepsTheContractOfEffects) {
 TEST(ForceLaw, IsTheSumOfItsTerms) {
   Uniform uniform(1);
   const CrumpledCloth cloth(1);
-  const EffectDescription effect = force_law::describe();
+  const EffectDescription effect = find_effect("force_law", "").describe();
   const std::vector<double> all = effect_contract::random_parameters(effect, uniform);
 
   Eigen::Matrix3Xd sum = Eigen::Matrix3Xd::Zero(3, 36);
@@ -139,22 +138,28 @@ TEST(ForceLaw, OverTheClothAndWithTheHeightRunsInStraightLines) {
 }
 
 TEST(ForceLaw, NamesWhatEachCoefficientMultiplies) {
-  EXPECT_EQ(force_law::term_text("drag_squared"), "-|v| v");
-  for (const EffectParameter& parameter : force_law::describe().parameters)
-    EXPECT_NE(force_law::term_text(parameter.name), parameter.name);
+  const std::vector<EffectParameter> parameters =
+      find_effect("force_law", "").describe().parameters;
+  const auto squared = std::ranges::find(parameters, "drag_squared", &EffectParameter::name);
+  ASSERT_NE(squared, parameters.end());
+  EXPECT_EQ(squared->law_side + " = " + squared->law_factor, "a = -|v| v");
+  for (const EffectParameter& parameter : parameters) {
+    EXPECT_FALSE(parameter.law_side.empty()) << parameter.name;
+    EXPECT_FALSE(parameter.law_factor.empty()) << parameter.name;
+  }
 }
 
 TEST(ForceLaw, AsksForEachCoefficientOnceAVectorAsOne) {
-  const EffectDescription effect = force_law::describe();
+  const EffectDescription effect = find_effect("force_law", "").describe();
   std::vector<std::string> asked;
-  for (const EffectMode& law : effect.modes)
-    asked.insert(asked.end(), law.amplitudes.begin(), law.amplitudes.end());
+  for (const EffectMode& mode : effect.modes)
+    asked.insert(asked.end(), mode.amplitudes.begin(), mode.amplitudes.end());
 
   std::vector<std::string> names;
   for (const EffectParameter& parameter : effect.parameters) names.push_back(parameter.name);
   EXPECT_EQ(asked, names);
-  EXPECT_EQ(std::ranges::count_if(effect.modes,
-                                  [](const EffectMode& law) { return law.amplitudes.size() == 3; }),
+  EXPECT_EQ(std::ranges::count_if(
+                effect.modes, [](const EffectMode& mode) { return mode.amplitudes.size() == 3; }),
             4);
 }
 

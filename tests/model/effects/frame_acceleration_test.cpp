@@ -1,7 +1,5 @@
 // Checks a frame that shakes.
 
-#include "model/effects/frame_acceleration.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -1,7 +1,5 @@
 // Checks gravity of another strength.
 
-#include "model/effects/gravity_scale.h"
-
 #include <gtest/gtest.h>
 
 #include "tests/model/cloth_with_effect.h"

@@ -1,7 +1,5 @@
 // Checks gravity in another direction.
 
-#include "model/effects/gravity_tilt.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>

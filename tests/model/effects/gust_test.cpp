@@ -1,7 +1,5 @@
 // Checks wind with one harmonic. Not checked here: drag, which wind has.
 
-#include "model/effects/gust.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>

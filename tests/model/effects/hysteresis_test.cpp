@@ -1,11 +1,10 @@
 // Checks dry friction inside the fabric.
 
-#include "model/effects/hysteresis.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 
+#include "model/effects/registry.h"
 #include "tests/model/spring_rig.h"
 
 namespace clothfit {
@@ -82,7 +81,7 @@ TEST(Hysteresis, WhereItSticksItIsNoStifferThanItsRatesSay) {
   // all slips.
   Uniform uniform(1);
   const Cloth cloth = square_cloth(6);
-  const auto effect = hysteresis::make();
+  const auto effect = find_effect("hysteresis", "").make();
   const std::vector<double> parameters{2.0, 0.1};
   const Eigen::Matrix3Xd p = crumpled(cloth.mesh, 0.02, uniform);
 

@@ -1,8 +1,6 @@
 // Checks natural lengths other than the stated ones. Not checked here: springs at ease at their
 // natural length (step_test.cpp), and that fits find a size again (no test does).
 
-#include "model/effects/natural_size.h"
-
 #include <gtest/gtest.h>
 
 #include "tests/model/spring_rig.h"

@@ -1,7 +1,5 @@
 // Checks mass that is not spread as stated.
 
-#include "model/effects/nonuniform_mass.h"
-
 #include <gtest/gtest.h>
 
 #include <numbers>

@@ -1,7 +1,5 @@
 // Checks stiffness that varies over the cloth.
 
-#include "model/effects/nonuniform_stiffness.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -45,8 +43,9 @@ TEST(NonuniformStiffness, AStripWithAGradientStretchesByTheIntegralOfItsComplian
   double coarser = 0;
   for (const int rows : {9, 17, 33, 65}) {
     const double error = std::abs(stretch_m({.gradient_t = g}, rows) - exact);
-    if (coarser > 0)  // the midpoint rule's order
+    if (coarser > 0) {  // the midpoint rule's order
       EXPECT_NEAR(coarser / error, 4, 0.2) << rows;
+    }
     coarser = error;
   }
   EXPECT_LT(coarser, 1e-4 * exact);

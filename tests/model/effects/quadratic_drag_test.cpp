@@ -1,7 +1,5 @@
 // Checks drag with the square of the speed.
 
-#include "model/effects/quadratic_drag.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -37,15 +37,15 @@ TEST(EffectRegistry, EveryLawIsMadeOfItsEffectsParametersWithinTheirRanges) {
     const auto parameter = [&](const std::string& name) {
       return std::ranges::find(effect.parameters, name, &EffectParameter::name);
     };
-    for (const EffectMode& law : effect.modes) {
-      SCOPED_TRACE(effect.name + " " + law.name);
-      EXPECT_FALSE(law.amplitudes.empty());
-      for (const std::string& amplitude : law.amplitudes)
+    for (const EffectMode& mode : effect.modes) {
+      SCOPED_TRACE(effect.name + " " + mode.name);
+      EXPECT_FALSE(mode.amplitudes.empty());
+      for (const std::string& amplitude : mode.amplitudes)
         EXPECT_NE(parameter(amplitude), effect.parameters.end()) << amplitude;
-      for (const ShapeGrid& shape : law.shapes) {
+      for (const ShapeGrid& shape : mode.shapes) {
         const auto found = parameter(shape.parameter);
         ASSERT_NE(found, effect.parameters.end()) << shape.parameter;
-        EXPECT_THAT(law.amplitudes, Not(Contains(shape.parameter)));
+        EXPECT_THAT(mode.amplitudes, Not(Contains(shape.parameter)));
         EXPECT_FALSE(shape.values.empty());
         if (shape.per_duration) continue;
         for (const double value : shape.values) {

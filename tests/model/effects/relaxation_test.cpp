@@ -1,7 +1,5 @@
 // Checks stress that relaxes.
 
-#include "model/effects/relaxation.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -37,8 +35,9 @@ TEST(Relaxation, TheArmsStressFallsExponentiallyInTheLimitOfSmallSteps) {
   double coarser = 0;
   for (const int steps : {50, 100, 200, 400}) {
     const double error = std::abs(left_after(2 * kTime_s / steps, steps) - exact);
-    if (coarser > 0)  // first order
+    if (coarser > 0) {  // first order
       EXPECT_NEAR(coarser / error, 2, 0.05) << steps;
+    }
     coarser = error;
   }
   EXPECT_LT(coarser, 0.01 * exact);

@@ -1,8 +1,6 @@
 // Checks a cloth whose rest shape is curved. Not checked here: the bending stiffness that balances
 // it (bending_energy_test.cpp).
 
-#include "model/effects/rest_curvature.h"
-
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
@@ -65,7 +63,7 @@ TEST(RestCurvature, ItsForceIsMinusTheEnergysGradient) {
 
 TEST(RestCurvature, IsNoStifferThanItsRatesSay) {
   const Cloth cloth = square_cloth(9);
-  const auto effect = rest_curvature::make();
+  const auto effect = find_effect("rest_curvature", "").make();
   const std::vector<double> moments_n{8e-3, -5e-3};
   const double bound = effect->rates(cloth, {}, moments_n).frequency2_per_s2;
   for (const unsigned seed : {1u, 2u, 3u}) {

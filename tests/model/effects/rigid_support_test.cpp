@@ -1,7 +1,5 @@
 // Checks two driven supports on one rigid body.
 
-#include "model/effects/rigid_support.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -1,8 +1,6 @@
 // Checks contact of the cloth with itself. Not checked here: the search for pairs
 // (near_pairs_test.cpp).
 
-#include "model/effects/self_contact.h"
-
 #include <gtest/gtest.h>
 
 #include <numbers>

@@ -1,8 +1,6 @@
 // Checks damping along the springs beyond the common one. Not checked here: the common one
 // (cloth_sweep_test.cpp).
 
-#include "model/effects/spring_damping.h"
-
 #include <gtest/gtest.h>
 
 #include "tests/model/spring_rig.h"

@@ -1,7 +1,5 @@
 // Checks a tension curve that is not straight.
 
-#include "model/effects/stiffening.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>

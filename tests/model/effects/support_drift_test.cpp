@@ -1,7 +1,5 @@
 // Checks supports that drift.
 
-#include "model/effects/support_drift.h"
-
 #include <gtest/gtest.h>
 
 #include "tests/model/cloth_with_effect.h"

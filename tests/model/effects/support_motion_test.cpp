@@ -1,7 +1,5 @@
 // Checks supports that move to and fro.
 
-#include "model/effects/support_motion.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -1,7 +1,5 @@
 // Checks supports beside the places of their motion.
 
-#include "model/effects/support_offset.h"
-
 #include <gtest/gtest.h>
 
 #include "model/integrate/relax.h"

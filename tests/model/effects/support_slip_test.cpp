@@ -1,7 +1,5 @@
 // Checks supports that creep where the cloth pulls.
 
-#include "model/effects/support_slip.h"
-
 #include <gtest/gtest.h>
 
 #include "tests/model/cloth_with_effect.h"

@@ -1,12 +1,13 @@
 // Checks an empirical tension. That it keeps momentum and angular momentum is part of the contract
 // of internal effects (effect_contract.h).
 
-#include "model/effects/tension_law.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <map>
+#include <string>
 
+#include "model/effects/registry.h"
 #include "tests/model/spring_rig.h"
 
 namespace clothfit {
@@ -49,7 +50,8 @@ TEST(TensionLaw, GoesStraightOnWhereTheSquaresEnd) {
 }
 
 TEST(TensionLaw, LeavesATenthToFiveTimesTheStiffnessWithinItsBounds) {
-  const std::vector<EffectParameter> parameters = tension_law::describe().parameters;
+  const std::vector<EffectParameter> parameters =
+      find_effect("tension_law", "").describe().parameters;
   for (const double stretched : {parameters[0].lower, parameters[0].upper})
     for (const double compressed : {parameters[3].lower, parameters[3].upper})
       for (double e = -0.5; e < 0.5; e += 0.01) {
@@ -65,16 +67,21 @@ TEST(TensionLaw, ActsOnItsOwnSpringsOnly) {
   // A ribbon's springs that pull are its warp.
   for (size_t k = 0; k < 9; ++k) {
     std::vector<double> one(9, 0);
-    one[k] = tension_law::describe().parameters[k].typical;
+    one[k] = find_effect("tension_law", "").describe().parameters[k].typical;
     DrivenRibbon ribbon(2, kLinear_n_per_m, "tension_law", one);
     EXPECT_EQ(ribbon.tension_n(k == 3 ? -0.05 : 0.05, 1, 1e-3) != 0, k % 3 == 0)
-        << tension_law::describe().parameters[k].name;
+        << find_effect("tension_law", "").describe().parameters[k].name;
   }
 }
 
 TEST(TensionLaw, NamesWhatEachCoefficientMultiplies) {
-  EXPECT_EQ(tension_law::term_text("warp_stretched"), "e_warp^2 (e > 0)");
-  EXPECT_EQ(tension_law::term_text("shear_rate_squared"), "|e'| e'_shear");
+  std::map<std::string, std::string> factor;
+  for (const EffectParameter& parameter : find_effect("tension_law", "").describe().parameters) {
+    EXPECT_EQ(parameter.law_side, "T / (k l0)");
+    factor[parameter.name] = parameter.law_factor;
+  }
+  EXPECT_EQ(factor["warp_stretched"], "e_warp^2 (e > 0)");
+  EXPECT_EQ(factor["shear_rate_squared"], "|e'| e'_shear");
 }
 
 }  // namespace

@@ -1,8 +1,6 @@
 // Checks viscous damping by the air. Not checked here: that time steps are chosen with it in mind
 // (stability_test.cpp).
 
-#include "model/effects/viscous_damping.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -1,7 +1,5 @@
 // Checks wind and drag along the surface's normal.
 
-#include "model/effects/wind.h"
-
 #include <gtest/gtest.h>
 
 #include "model/effects/registry.h"
