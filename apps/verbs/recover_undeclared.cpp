@@ -6,45 +6,42 @@
 #include "apps/report/study/undeclared_tables.h"
 #include "apps/terminal/csv_table.h"
 #include "apps/terminal/exit_code.h"
-#include "apps/terminal/interrupt.h"
 #include "apps/terminal/progress_line.h"
 #include "apps/terminal/text_table.h"
+#include "apps/verbs/resumable_run.h"
 #include "apps/verbs/verb.h"
 #include "data/input_error.h"
-#include "data/output_folder.h"
 #include "data/text_file.h"
 #include "fit/problem/effects_of.h"
 
 namespace clothfit {
 namespace {
 
-namespace fs = std::filesystem;
-
 /// Returns the library's modes, or those asked for. An effect stands for all its modes in the
 /// library, else for its own; a mode stands for itself.
-std::vector<HiddenLaw> laws_asked_for(const std::vector<std::string>& asked,
-                                      ObservationKind observations) {
-  const std::vector<HiddenLaw> library = hidden_laws(observations);
+std::vector<HiddenMode> modes_asked_for(const std::vector<std::string>& asked,
+                                        ObservationKind observations) {
+  const std::vector<HiddenMode> library = hidden_modes(observations);
   if (asked.empty()) return library;
-  std::vector<HiddenLaw> result;
+  std::vector<HiddenMode> result;
   for (const std::string& text : asked) {
     const size_t colon = text.find(':');
     const std::string effect = text.substr(0, colon);
-    const std::string law = colon == std::string::npos ? "" : text.substr(colon + 1);
+    const std::string mode = colon == std::string::npos ? "" : text.substr(colon + 1);
     const EffectDescription described = describe_effect(effect);
-    std::vector<HiddenLaw> own;
-    for (const HiddenLaw& known : library)
-      if (known.effect == effect && law.empty()) own.push_back(known);
+    std::vector<HiddenMode> own;
+    for (const HiddenMode& known : library)
+      if (known.effect == effect && mode.empty()) own.push_back(known);
     std::string names;
     for (const EffectMode& known : described.modes) {
       names += (names.empty() ? "" : ", ") + known.name;
-      if (own.empty() && (law.empty() || known.name == law)) own.push_back({effect, known.name});
-      if (own.size() == 1 && !law.empty()) break;
+      if (own.empty() && (mode.empty() || known.name == mode)) own.push_back({effect, known.name});
+      if (own.size() == 1 && !mode.empty()) break;
     }
-    if (described.modes.empty() && own.empty() && law.empty()) own.push_back({effect, ""});
+    if (described.modes.empty() && own.empty() && mode.empty()) own.push_back({effect, ""});
     if (own.empty())
-      throw InputError("--hidden", fmt::format("{} has no law '{}'", effect, law),
-                       names.empty() ? "no law: it has but one" : "one of " + names);
+      throw InputError("--hidden", fmt::format("{} has no mode '{}'", effect, mode),
+                       names.empty() ? "no mode: it has but one" : "one of " + names);
     result.insert(result.end(), own.begin(), own.end());
   }
   return result;
@@ -65,7 +62,7 @@ UndeclaredOptions options_of(const UndeclaredFlags& flags, const UndeclaredRun& 
                  : flags.pairs    ? Hide::pairs
                  : flags.withhold ? Hide::withheld
                                   : Hide::one;
-  if (!flags.clean) options.laws = laws_asked_for(flags.hidden, run.fit.observations);
+  if (!flags.clean) options.modes = modes_asked_for(flags.hidden, run.fit.observations);
   options.draw = {.least = flags.least_sigmas, .most = flags.most_sigmas};
   options.most_mimicked = flags.most_mimicked;
   options.trials = run.trials;
@@ -111,41 +108,28 @@ void add_undeclared_options(Verb verb, UndeclaredFlags& flags) {
   add("--refits", flags.refits, "As in clothfit diagnose");
 }
 
-int run_undeclared(const UndeclaredFlags& flags, const UndeclaredRun& run) {
-  const UndeclaredOptions options = options_of(flags, run);
+int run_undeclared(const UndeclaredFlags& flags, const UndeclaredRun& asked) {
+  const UndeclaredOptions options = options_of(flags, asked);
   options.validate();
-  OutputFolder out(out_folder(run.out, "recover"));
-  const fs::path journal_file =
-      run.journal.empty() ? fs::path(out.final_path().string() + ".journal") : run.journal;
-  Journal journal(journal_file, options.key(),
-                  run.resume ? JournalStart::resume : JournalStart::fresh);
+  ResumableRun run(asked.out, "recover", asked.journal, "trials");
+  Journal journal(run.journal(), options.key(),
+                  asked.resume ? JournalStart::resume : JournalStart::fresh);
   UndeclaredResult result;
   {
     ProgressLine line;
     result = recover_undeclared(options, &journal, watch(line));
   }
-  if (result.stop == ExecuteStop::cancelled || interrupted()) {
-    fmt::print(stderr, "{} of {} trials are kept in {}; the same command with --resume goes on\n",
-               journal.finished().size(), options.count(), shown_path(journal_file));
-    throw Cancelled();
-  }
-  const auto csv = [&](const Table& table, const char* name) {
-    write_csv_table(table.header, table.rows, out.path() / name);
-  };
-  const auto print = [](const Table& table) {
-    fmt::print("{}\n", text_table(table.header, table.rows));
-  };
+  if (result.stop == ExecuteStop::cancelled) run.cancel();
   const Table confusion = confusion_table(result);
-  csv(undeclared_trials_table(result), "trials.csv");
-  csv(undeclared_effects_table(result), "effects.csv");
-  csv(confusion, "confusion.csv");
-  write_text(undeclared_page_html(options, result, run.command), out.path() / "report.html");
-  out.publish();
-  if (run.journal.empty()) fs::remove(journal_file);
-  print(short_undeclared_trials_table(result));
-  print(confusion);
-  print(short_undeclared_effects_table(result));
-  fmt::print("Report: {}\n", shown_path(out.final_path() / "report.html"));
+  write_csv_table(undeclared_trials_table(result), run.folder() / "trials.csv");
+  write_csv_table(undeclared_effects_table(result), run.folder() / "effects.csv");
+  write_csv_table(confusion, run.folder() / "confusion.csv");
+  write_text(undeclared_page_html(options, result, asked.command), run.folder() / "report.html");
+  run.publish();
+  for (const Table& table :
+       {short_undeclared_trials_table(result), confusion, short_undeclared_effects_table(result)})
+    fmt::print("{}\n", text_table(table));
+  run.print_report_path();
   return kExitGood;
 }
 

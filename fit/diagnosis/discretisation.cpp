@@ -48,7 +48,7 @@ FittedModel lead_to_mesh(const DiagnosisSetup& other, const FittedModel& model, 
       part.borrowed = true;
     }
     stage.unrefined = stage.unrefined && part.linear.usable;
-    if (share < 1) stage.least_decrease += kRough * objective.residual_count();
+    if (share < 1) stage.least_decrease += kUnrefinedDecrease * objective.residual_count();
   }
   refine_model(fitted, other, stage, progress);
   return fitted;

@@ -50,7 +50,7 @@ FittedModel refined_over(const DiagnosisSetup& setup, FittedModel& whole, const 
     stage.rounds = 1;
     stage.least_decrease = 0;
     for (size_t n = 0; n < fitted.parts.size(); ++n)
-      stage.least_decrease += kRough * fitted.objective(n).residual_count();
+      stage.least_decrease += kUnrefinedDecrease * fitted.objective(n).residual_count();
   }
   for (size_t n = 0; n < fitted.parts.size(); ++n) {
     PooledPart& part = fitted.parts[n];

@@ -176,14 +176,15 @@ std::optional<Eigen::VectorXd> mesh_direction(FitProblem other, const FittedMode
   part.borrowed = true;
   if (!part.linear.usable) return std::nullopt;
   const FitProblem* problem = &other;
-  const PooledFit fitted = fit_pooled({&problem, 1}, {part},
-                                      {.iterations = 12,
-                                       .rounds = 1,
-                                       .least_decrease = kRough * objective.residual_count(),
-                                       .kept_within = 0.02,
-                                       .updated_within = 0.1,
-                                       .unrefined = true},
-                                      {});
+  const PooledFit fitted =
+      fit_pooled({&problem, 1}, {part},
+                 {.iterations = 12,
+                  .rounds = 1,
+                  .least_decrease = kUnrefinedDecrease * objective.residual_count(),
+                  .kept_within = 0.02,
+                  .updated_within = 0.1,
+                  .unrefined = true},
+                 {});
   if (!fitted.usable) return std::nullopt;
   return factor * fitted.parts.front().linear.residual;
 }

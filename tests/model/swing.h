@@ -52,27 +52,27 @@ inline Swing swing_under(const EffectEntry& entry, Uniform& uniform) {
 }
 
 /// An effect that a cloth may come to have, with its amplitude.
-struct EmergingLaw {
+struct EmergingParameter {
   const char* effect;
   const char* amplitude;
 };
 
-/// The way from neutral along a law's amplitude for two cloths. One does not have the effect. The
+/// The way from neutral along an amplitude for two cloths. One does not have the effect. The
 /// other is the same cloth with the effect behind its own ones, at its neutral values.
 struct TwoWays {
   Direction emerging, present;
   Cloth cloth;       ///< the one that has the effect
   ParameterSet set;  ///< its own
 
-  TwoWays(const Cloth& without, const ParameterSet& own, const EmergingLaw& law)
+  TwoWays(const Cloth& without, const ParameterSet& own, const EmergingParameter& parameter)
       : cloth(without), set(own) {
-    add_effect(cloth, law.effect, "test");
+    add_effect(cloth, parameter.effect, "test");
     const EffectDescription& effect = cloth.effect_descriptions.back();
     set.effects.push_back(effect_contract::neutral(effect));
     for (const std::vector<double>& values : set.effects)
       present.effects.emplace_back(values.size(), 0.0);
     const auto amplitude =
-        std::ranges::find(effect.parameters, law.amplitude, &EffectParameter::name);
+        std::ranges::find(effect.parameters, parameter.amplitude, &EffectParameter::name);
     const auto p = static_cast<size_t>(amplitude - effect.parameters.begin());
     present.effects.back()[p] = 1;
     emerging.emerging = EmergingEffect{.effect = cloth.effects.back(),

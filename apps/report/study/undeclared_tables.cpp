@@ -57,7 +57,7 @@ Table undeclared_trials_table(const UndeclaredResult& result) {
     const bool usable = trial.usable();
     table.rows.push_back(
         {std::to_string(n),
-         joined(trial, [](const HiddenInTrial& h) { return h.law.title(); }),
+         joined(trial, [](const HiddenInTrial& h) { return h.mode.title(); }),
          joined(trial,
                 [](const HiddenInTrial& h) {
                   std::string text;
@@ -103,8 +103,9 @@ Table short_undeclared_trials_table(const UndeclaredResult& result) {
               .rows = {}};
   for (const UndeclaredTrial& trial : result.trials)
     table.rows.push_back(
-        {trial.hidden.empty() ? "nothing"
-                              : joined(trial, [](const HiddenInTrial& h) { return h.law.title(); }),
+        {trial.hidden.empty()
+             ? "nothing"
+             : joined(trial, [](const HiddenInTrial& h) { return h.mode.title(); }),
          trial.hidden.empty()
              ? "-"
              : joined(trial, [](const HiddenInTrial& h) { return significant(h.sigmas, 2); }),

@@ -12,10 +12,10 @@ const RecordingInformation& Release::information() const {
   return *information_;
 }
 
-const std::vector<std::vector<Eigen::MatrixXd>>& Release::projected_laws() const {
+const std::vector<std::vector<Eigen::MatrixXd>>& Release::projected_modes() const {
   const RecordingInformation& own = information();
-  std::call_once(has_laws_, [&] { laws_ = clothfit::projected_laws(own); });
-  return laws_;
+  std::call_once(has_modes_, [&] { modes_ = clothfit::projected_modes(own); });
+  return modes_;
 }
 
 std::shared_ptr<const Release> Releases::at(std::uint64_t seed) {

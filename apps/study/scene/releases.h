@@ -6,7 +6,7 @@
 #include <mutex>
 #include <vector>
 
-#include "apps/study/scene/hidden_law.h"
+#include "apps/study/scene/hidden_mode.h"
 
 namespace clothfit {
 
@@ -19,15 +19,15 @@ class Release {
 
   std::uint64_t seed() const { return seed_; }
   const RecordingInformation& information() const;
-  const std::vector<std::vector<Eigen::MatrixXd>>& projected_laws() const;
+  const std::vector<std::vector<Eigen::MatrixXd>>& projected_modes() const;
 
  private:
   const SyntheticScene& scene_;
   const FitOptions& fit_;
   std::uint64_t seed_;
-  mutable std::once_flag has_information_, has_laws_;
+  mutable std::once_flag has_information_, has_modes_;
   mutable std::unique_ptr<RecordingInformation> information_;
-  mutable std::vector<std::vector<Eigen::MatrixXd>> laws_;
+  mutable std::vector<std::vector<Eigen::MatrixXd>> modes_;
 };
 
 /// The releases that were asked for last: each is some tens of megabytes.

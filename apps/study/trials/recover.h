@@ -57,7 +57,7 @@ std::map<std::string, double> bound_sigmas(const SyntheticRecording& recording,
                                            const FitOptions& options);
 
 struct RecoverTrial {
-  FitStop stop = FitStop::diverged;
+  FitStop stop = FitStop::not_run;
   std::string message;
   std::vector<RecoveredParameter> parameters;  ///< empty where there was no fit
   int rejected = 0;                            ///< observations that the fit left out
@@ -95,7 +95,7 @@ struct RecoverySummary {
 };
 
 struct RecoverResult {
-  ExecuteStop stop = ExecuteStop::finished;
+  ExecuteStop stop = ExecuteStop::not_run;
   std::string message;
   std::vector<RecoverTrial> trials;
   std::vector<RecoverySummary> parameters;

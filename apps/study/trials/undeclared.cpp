@@ -34,21 +34,21 @@ enum UndeclaredSeries : int { kPartner = 320, kReleases };
 /// The hidden modes of a trial, with the release that shows them.
 struct Setting {
   std::uint64_t release = 0;
-  std::vector<DrawnLaw> laws;
+  std::vector<DrawnMode> modes;
   std::vector<std::vector<std::string>> right;
   double mimicked = kNothingHidden;
 };
 
 /// Returns a trial's modes. The second of a pair is one of any other effect.
-std::vector<HiddenLaw> laws_of_trial(const UndeclaredOptions& options, int index,
-                                     std::uint64_t seed) {
+std::vector<HiddenMode> modes_of_trial(const UndeclaredOptions& options, int index,
+                                       std::uint64_t seed) {
   if (options.hide == UndeclaredOptions::Hide::nothing) return {};
-  const auto laws = static_cast<int>(options.laws.size());
-  std::vector<HiddenLaw> result{options.laws[static_cast<size_t>(index % laws)]};
+  const auto modes = static_cast<int>(options.modes.size());
+  std::vector<HiddenMode> result{options.modes[static_cast<size_t>(index % modes)]};
   if (options.hide == UndeclaredOptions::Hide::pairs) {
-    std::vector<HiddenLaw> others;
-    for (const HiddenLaw& law : options.laws)
-      if (law.effect != result.front().effect) others.push_back(law);
+    std::vector<HiddenMode> others;
+    for (const HiddenMode& mode : options.modes)
+      if (mode.effect != result.front().effect) others.push_back(mode);
     Draws draws(seed, kPartner, 0);
     result.push_back(others[static_cast<size_t>(draws.index(static_cast<int>(others.size())))]);
   }
@@ -57,9 +57,9 @@ std::vector<HiddenLaw> laws_of_trial(const UndeclaredOptions& options, int index
 
 bool markers_stay_on_cloth(const UndeclaredOptions& options,
                            const RecordingInformation& information,
-                           std::span<const DrawnLaw> laws) {
+                           std::span<const DrawnMode> modes) {
   SyntheticScene scene = options.scene;
-  for (const DrawnLaw& drawn : laws) scene.hidden.push_back(hidden_effect(drawn));
+  for (const DrawnMode& drawn : modes) scene.hidden.push_back(hidden_effect(drawn));
   return HiddenMeasurement(scene, information.recording.input.recording).markers_stay_on_cloth();
 }
 
@@ -67,44 +67,44 @@ bool markers_stay_on_cloth(const UndeclaredOptions& options,
 /// it, or puts markers beside the cloth. `mimicked` is lowered to how well others mimic a withheld
 /// one.
 std::optional<Setting> draw_setting(const UndeclaredOptions& options,
-                                    const std::vector<HiddenLaw>& laws, std::uint64_t seed,
+                                    const std::vector<HiddenMode>& modes, std::uint64_t seed,
                                     std::uint64_t release_seed, Releases& releases,
                                     double& mimicked) {
-  Setting setting{.release = release_seed, .laws = {}, .right = {}};
-  if (laws.empty()) return setting;
+  Setting setting{.release = release_seed, .modes = {}, .right = {}};
+  if (modes.empty()) return setting;
   const std::shared_ptr<const Release> release = releases.at(release_seed);
   const RecordingInformation& information = release->information();
   std::vector<std::uint64_t> seeds;
-  for (size_t n = 0; n < laws.size(); ++n) {
+  for (size_t n = 0; n < modes.size(); ++n) {
     // A pattern of markers that reaches the edges can shrink only: other directions are drawn
     // again.
-    for (int k = 0; k < kDirections && setting.laws.size() == n; ++k) {
+    for (int k = 0; k < kDirections && setting.modes.size() == n; ++k) {
       seeds.resize(n);
       seeds.push_back(derived_seed(seed, static_cast<int>(n) + 2 * k));
-      DrawnLaw drawn = draw_law(information, laws[n], options.draw, seeds.back());
+      DrawnMode drawn = draw_mode(information, modes[n], options.draw, seeds.back());
       if (drawn.amplitude.size() == 0) return std::nullopt;
       if (markers_stay_on_cloth(options, information, {&drawn, 1}))
-        setting.laws.push_back(std::move(drawn));
+        setting.modes.push_back(std::move(drawn));
     }
-    if (setting.laws.size() == n) return std::nullopt;
+    if (setting.modes.size() == n) return std::nullopt;
   }
-  if (laws.size() == 2) {
+  if (modes.size() == 2) {
     // Each has to be seen beside the other, so that the other's direction is nobody's evidence.
-    const Eigen::VectorXd first = setting.laws[0].projected, second = setting.laws[1].projected;
+    const Eigen::VectorXd first = setting.modes[0].projected, second = setting.modes[1].projected;
     if (std::abs(first.dot(second)) > kTold) return std::nullopt;
-    setting.laws[0] = draw_law(information, laws[0], options.draw, seeds[0], second);
-    setting.laws[1] = draw_law(information, laws[1], options.draw, seeds[1], first);
-    for (DrawnLaw& drawn : setting.laws)
+    setting.modes[0] = draw_mode(information, modes[0], options.draw, seeds[0], second);
+    setting.modes[1] = draw_mode(information, modes[1], options.draw, seeds[1], first);
+    for (DrawnMode& drawn : setting.modes)
       if (drawn.amplitude.size() == 0) return std::nullopt;
-    setting.laws[0].projected = first;
-    setting.laws[1].projected = second;
+    setting.modes[0].projected = first;
+    setting.modes[1].projected = second;
   }
-  if (!markers_stay_on_cloth(options, information, setting.laws)) return std::nullopt;
-  for (const DrawnLaw& drawn : setting.laws)
-    setting.right.push_back(right_class(information, drawn, release->projected_laws()));
+  if (!markers_stay_on_cloth(options, information, setting.modes)) return std::nullopt;
+  for (const DrawnMode& drawn : setting.modes)
+    setting.right.push_back(right_class(information, drawn, release->projected_modes()));
   if (options.hide == UndeclaredOptions::Hide::withheld) {
     setting.mimicked =
-        mimicked_by_others(information, setting.laws.front(), release->projected_laws(),
+        mimicked_by_others(information, setting.modes.front(), release->projected_modes(),
                            options.diagnosis.most_effects);
     mimicked = std::fmin(mimicked, setting.mimicked);
     if (setting.mimicked >= options.most_mimicked) return std::nullopt;
@@ -127,16 +127,16 @@ const ParameterEstimate* estimate_of(const FitResult& result, const std::string&
 /// Compares the amplitudes of a hidden mode, accepted at its own, with the truth. Their ratio is as
 /// the recording sees them, by the derivatives at the found shape. So a wave's other sign half a
 /// turn later is the same.
-void compare_amplitudes(const RecordingInformation& information, const DrawnLaw& drawn,
+void compare_amplitudes(const RecordingInformation& information, const DrawnMode& drawn,
                         const FitResult& result, HiddenInTrial& hidden) {
-  const EffectDescription effect = describe_effect(drawn.term.effect);
-  Hypothesis found = drawn.term;
+  const EffectDescription effect = describe_effect(drawn.hypothesis.effect);
+  Hypothesis found = drawn.hypothesis;
   for (auto& [name, value] : found.shape)
     if (const ParameterEstimate* estimate = estimate_of(result, found.effect, name))
       value = estimate->value;
   Eigen::VectorXd amount = Eigen::VectorXd::Zero(drawn.amplitude.size());
   for (Eigen::Index k = 0; k < amount.size(); ++k) {
-    const std::string& name = drawn.term.amplitudes[static_cast<size_t>(k)];
+    const std::string& name = drawn.hypothesis.amplitudes[static_cast<size_t>(k)];
     const ParameterEstimate* estimate = estimate_of(result, found.effect, name);
     if (estimate == nullptr || estimate->state == ParameterState::undetermined) continue;
     const double neutral =
@@ -147,7 +147,7 @@ void compare_amplitudes(const RecordingInformation& information, const DrawnLaw&
                             .estimate = estimate->value,
                             .sigma = estimate->sigma});
   }
-  const std::array<Hypothesis, 2> terms{found, drawn.term};
+  const std::array<Hypothesis, 2> terms{found, drawn.hypothesis};
   const std::vector<Columns> columns = hypothesis_derivatives(information.model, terms);
   if (hidden.found.empty() || columns[0].empty() || columns[1].empty()) return;
   const Eigen::VectorXd seen = information.projection.columns({columns[0].front() * amount});
@@ -173,7 +173,7 @@ double fitted_rms(const FitReport& report) {
 /// Returns the held-out error of a fit with the hidden modes and their shapes declared. It starts
 /// from the truth, on the mesh that was analysed.
 double error_with_truth(const FitInput& input, const UndeclaredOptions& options,
-                        const std::vector<DrawnLaw>& laws, const Diagnosis& diagnosis,
+                        const std::vector<DrawnMode>& modes, const Diagnosis& diagnosis,
                         const std::map<std::string, double>& truth) {
   FitOptions told = options.diagnosis.fit;
   told.mesh_columns = diagnosis.columns;
@@ -182,13 +182,13 @@ double error_with_truth(const FitInput& input, const UndeclaredOptions& options,
   for (auto& [name, value] : *told.start)
     if (const auto known = truth.find(name); known != truth.end()) value = known->second;
   std::vector<Hypothesis> terms;
-  for (const DrawnLaw& drawn : laws) {
-    terms.push_back(drawn.term);
+  for (const DrawnMode& drawn : modes) {
+    terms.push_back(drawn.hypothesis);
     const HiddenEffect hidden = hidden_effect(drawn);
     const EffectDescription effect = describe_effect(hidden.name);
     for (size_t p = 0; p < effect.parameters.size(); ++p) {
       const std::string& name = effect.parameters[p].name;
-      const auto& amplitudes = drawn.term.amplitudes;
+      const auto& amplitudes = drawn.hypothesis.amplitudes;
       if (std::ranges::find(amplitudes, name) != amplitudes.end())
         (*told.start)[hidden.name + "." + name] = hidden.values[p];
     }
@@ -207,7 +207,7 @@ void name_hidden(UndeclaredTrial& trial) {
     for (const bool own : {true, false})
       for (size_t k = 0; k < used.size() && !hidden.named; ++k) {
         const std::string& effect = trial.accepted_effects[k];
-        const bool counts = own ? effect == hidden.law.effect
+        const bool counts = own ? effect == hidden.mode.effect
                                 : std::ranges::find(hidden.right, effect) != hidden.right.end();
         if (!used[k] && counts) used[k] = hidden.named = true;
       }
@@ -235,7 +235,7 @@ std::string to_string(UndeclaredOptions::Hide hide) {
 }
 
 int UndeclaredOptions::count() const {
-  return hide == Hide::nothing ? trials : trials * static_cast<int>(laws.size());
+  return hide == Hide::nothing ? trials : trials * static_cast<int>(modes.size());
 }
 
 void UndeclaredOptions::validate() const {
@@ -252,24 +252,24 @@ void UndeclaredOptions::validate() const {
           "--mesh", "at least 3 vertices a side");
   require(scene.held_out_from > 0, "--fitted", "frames to judge by");
   if (hide == Hide::nothing) return;
-  require(!laws.empty(), "--hidden", "an effect");
+  require(!modes.empty(), "--hidden", "an effect");
   const bool of_pixels = diagnosis.fit.observations == ObservationKind::tracks2d;
-  for (const HiddenLaw& law : laws) {
-    const MeasurementEffectEntry* entry = measurement_effect_named(law.effect);
+  for (const HiddenMode& mode : modes) {
+    const MeasurementEffectEntry* entry = measurement_effect_named(mode.effect);
     if (entry != nullptr && entry->make()->needs_camera() && !of_pixels)
-      throw InputError("--hidden", law.effect + " says nothing of 3D tracks",
+      throw InputError("--hidden", mode.effect + " says nothing of 3D tracks",
                        "an effect that they show", "add --observations tracks2d");
   }
   if (hide == Hide::pairs)
     require(std::ranges::any_of(
-                laws, [&](const HiddenLaw& law) { return law.effect != laws.front().effect; }),
+                modes, [&](const HiddenMode& mode) { return mode.effect != modes.front().effect; }),
             "--hidden", "two effects or more, for pairs");
 }
 
 std::string UndeclaredOptions::key() const {
   std::string hidden;
   if (hide != Hide::nothing)
-    for (const HiddenLaw& law : laws) hidden += (hidden.empty() ? "" : ", ") + law.title();
+    for (const HiddenMode& mode : modes) hidden += (hidden.empty() ? "" : ", ") + mode.title();
   JournalKey key("undeclared/5");
   key.add("seed", seed).add("hide", to_string(hide)).add("hidden", hidden);
   key.add("most_mimicked", most_mimicked);
@@ -285,8 +285,8 @@ std::string UndeclaredOptions::key() const {
 
 bool UndeclaredTrial::right_first() const {
   if (hidden.empty()) return accepted.empty();
-  return !accepted_effects.empty() && std::ranges::any_of(hidden, [&](const HiddenInTrial& law) {
-    return std::ranges::find(law.right, accepted_effects.front()) != law.right.end();
+  return !accepted_effects.empty() && std::ranges::any_of(hidden, [&](const HiddenInTrial& mode) {
+    return std::ranges::find(mode.right, accepted_effects.front()) != mode.right.end();
   });
 }
 
@@ -302,14 +302,14 @@ UndeclaredTrial undeclared_once(const UndeclaredOptions& options, int index, std
                         .with_truth = kNothingHidden,
                         .noise = kNothingHidden,
                         .with_law = kNothingHidden};
-  const std::vector<HiddenLaw> laws = laws_of_trial(options, index, seed);
-  for (const HiddenLaw& law : laws) trial.hidden.push_back({.law = law});
+  const std::vector<HiddenMode> modes = modes_of_trial(options, index, seed);
+  for (const HiddenMode& mode : modes) trial.hidden.push_back({.mode = mode});
   std::optional<Setting> setting;
-  const int round = laws.empty() ? index : index / static_cast<int>(options.laws.size());
+  const int round = modes.empty() ? index : index / static_cast<int>(options.modes.size());
   const bool withheld = options.hide == UndeclaredOptions::Hide::withheld;
   trial.mimicked = kNothingHidden;
   for (int n = 0; n < (withheld ? kWithheldDraws : kDraws) && !setting; ++n)
-    setting = draw_setting(options, laws, derived_seed(seed, n),
+    setting = draw_setting(options, modes, derived_seed(seed, n),
                            derived_seed(derived_seed(options.seed, kReleases), kDraws * round + n),
                            releases, trial.mimicked);
   if (!setting) {
@@ -320,10 +320,10 @@ UndeclaredTrial undeclared_once(const UndeclaredOptions& options, int index, std
   }
   trial.mimicked = setting->mimicked;
   SyntheticScene scene = options.scene;
-  for (size_t n = 0; n < laws.size(); ++n) {
-    const DrawnLaw& drawn = setting->laws[n];
+  for (size_t n = 0; n < modes.size(); ++n) {
+    const DrawnMode& drawn = setting->modes[n];
     scene.hidden.push_back(hidden_effect(drawn));
-    trial.hidden[n].shape = drawn.term.shape;
+    trial.hidden[n].shape = drawn.hypothesis.shape;
     trial.hidden[n].sigmas = drawn.sigmas;
     trial.hidden[n].right = setting->right[n];
     trial.hidden[n].amplitude_ratio = kNothingHidden;
@@ -336,7 +336,7 @@ UndeclaredTrial undeclared_once(const UndeclaredOptions& options, int index, std
   own.diagnosis.fit.threads = 1;  // trials run side by side
   own.diagnosis.separate = false;
   if (withheld)
-    own.diagnosis.without.push_back(laws.front().effect);
+    own.diagnosis.without.push_back(modes.front().effect);
   else
     own.diagnosis.law_terms = 0;  // nobody asks for it where the hidden effect is known
   const auto diagnosis_began = std::chrono::steady_clock::now();
@@ -362,16 +362,17 @@ UndeclaredTrial undeclared_once(const UndeclaredOptions& options, int index, std
   trial.before_fitted = fitted_rms(diagnosis.base());
   trial.after_fitted = fitted_rms(diagnosis.found());
   trial.noise = diagnosis.base().result.errors.front().noise;
-  for (size_t n = 0; n < laws.size(); ++n) {
+  for (size_t n = 0; n < modes.size(); ++n) {
     const bool same_mode =
-        std::ranges::find(trial.accepted, setting->laws[n].term.title()) != trial.accepted.end();
+        std::ranges::find(trial.accepted, setting->modes[n].hypothesis.title()) !=
+        trial.accepted.end();
     if (same_mode)
-      compare_amplitudes(releases.at(setting->release)->information(), setting->laws[n],
+      compare_amplitudes(releases.at(setting->release)->information(), setting->modes[n],
                          diagnosis.found().result, trial.hidden[n]);
   }
-  if (!laws.empty())
+  if (!modes.empty())
     trial.with_truth =
-        error_with_truth(recording.input, own, setting->laws, diagnosis, recording.truth);
+        error_with_truth(recording.input, own, setting->modes, diagnosis, recording.truth);
   return trial;
 }
 

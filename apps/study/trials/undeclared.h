@@ -24,8 +24,8 @@ struct UndeclaredOptions {
   SyntheticScene scene;
   DiagnoseOptions diagnosis;
   Hide hide = Hide::one;
-  std::vector<HiddenLaw> laws;  ///< hidden in turn; the second of a pair is drawn from them
-  int trials = 20;              ///< for each mode, or in all where nothing is hidden
+  std::vector<HiddenMode> modes;  ///< hidden in turn; the second of a pair is drawn from them
+  int trials = 20;                ///< for each mode, or in all where nothing is hidden
   DrawOptions draw;
   /// The squared multiple correlation of a withheld mode with all others must be below this.
   double most_mimicked = 0.25;
@@ -45,7 +45,7 @@ UndeclaredTrial undeclared_once(const UndeclaredOptions& options, int index, std
                                 Releases& releases);
 
 struct UndeclaredResult {
-  ExecuteStop stop = ExecuteStop::finished;
+  ExecuteStop stop = ExecuteStop::not_run;
   std::string message;
   std::vector<UndeclaredTrial> trials;
 };

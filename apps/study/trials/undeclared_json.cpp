@@ -12,10 +12,10 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 Json json_of(const HiddenInTrial& hidden) {
-  Json json{{"effect", hidden.law.effect}, {"law", hidden.law.law},
-            {"shape", hidden.shape},       {"sigmas", hidden.sigmas},
-            {"right", hidden.right},       {"named", hidden.named},
-            {"found", Json::array()},      {"ratio", json_number(hidden.amplitude_ratio)}};
+  Json json{{"effect", hidden.mode.effect}, {"law", hidden.mode.mode},
+            {"shape", hidden.shape},        {"sigmas", hidden.sigmas},
+            {"right", hidden.right},        {"named", hidden.named},
+            {"found", Json::array()},       {"ratio", json_number(hidden.amplitude_ratio)}};
   for (const FoundAmplitude& found : hidden.found)
     json["found"].push_back({found.name, json_number(found.truth), json_number(found.estimate),
                              json_number(found.sigma)});
@@ -23,7 +23,7 @@ Json json_of(const HiddenInTrial& hidden) {
 }
 
 HiddenInTrial hidden_of(const Json& json) {
-  HiddenInTrial hidden{.law = {json.at("effect"), json.at("law")},
+  HiddenInTrial hidden{.mode = {json.at("effect"), json.at("law")},
                        .shape = json.at("shape").get<std::map<std::string, double>>(),
                        .sigmas = json.at("sigmas"),
                        .right = json.at("right").get<std::vector<std::string>>(),

@@ -12,7 +12,7 @@ namespace {
 std::string hidden_title(const UndeclaredTrial& trial) {
   std::string title;
   for (const HiddenInTrial& hidden : trial.hidden)
-    title += (title.empty() ? "" : " + ") + hidden.law.title();
+    title += (title.empty() ? "" : " + ") + hidden.mode.title();
   return title.empty() ? "nothing" : title;
 }
 
@@ -37,6 +37,8 @@ void add(UndeclaredSummary& summary, const UndeclaredTrial& trial) {
       break;
     case DiagnosisVerdict::unexplained:
       ++summary.unexplained;
+      break;
+    case DiagnosisVerdict::not_reached:
       break;
   }
   const bool structure = trial.verdict == DiagnosisVerdict::partly_explained ||
@@ -95,7 +97,7 @@ std::vector<UndeclaredSummary> undeclared_summaries(const UndeclaredResult& resu
     add(all, trial);
     if (trial.hidden.empty()) add(row_of("nothing"), trial);
     for (const HiddenInTrial& hidden : trial.hidden) {
-      UndeclaredSummary& row = row_of(hidden.law.title());
+      UndeclaredSummary& row = row_of(hidden.mode.title());
       add(row, trial);
       if (!trial.usable()) continue;
       add(row, hidden);

@@ -18,7 +18,7 @@ struct FoundAmplitude {
 
 /// One mode that a trial hid.
 struct HiddenInTrial {
-  HiddenLaw law;
+  HiddenMode mode;
   std::map<std::string, double> shape;
   double sigmas = 0;
   std::vector<std::string> right;  ///< effects that count as it
@@ -33,9 +33,9 @@ struct UndeclaredTrial {
   std::string refused;
   std::vector<HiddenInTrial> hidden;
   double mimicked = 0;  ///< squared multiple correlation with all other effects; where withheld
-  FitStop stop = FitStop::diverged;
+  FitStop stop = FitStop::not_run;
   std::string message;
-  DiagnosisVerdict verdict = DiagnosisVerdict::adequate;
+  DiagnosisVerdict verdict = DiagnosisVerdict::not_reached;
   std::vector<std::string> accepted;  ///< modes' titles, in order
   std::vector<std::string> accepted_effects;
   /// rms over coordinates of held-out frames (m or px), and the noise. The models are the declared
@@ -46,9 +46,7 @@ struct UndeclaredTrial {
   double before_fitted = 0, after_fitted = 0;
   double drawing_seconds = 0, seconds = 0;  ///< the only numbers that differ from run to run
 
-  bool usable() const {
-    return refused.empty() && stop != FitStop::diverged && stop != FitStop::cancelled;
-  }
+  bool usable() const { return refused.empty() && is_usable(stop); }
   /// Says whether the first accepted effect counts as a hidden one. For clean recordings it says
   /// whether nothing was accepted.
   bool right_first() const;

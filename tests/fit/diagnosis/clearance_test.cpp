@@ -31,7 +31,7 @@ FittedModel model_with(const Hypothesis& hypothesis, const SyntheticCloth& cloth
 }
 
 const FittedModel& of_drag() {
-  static const FittedModel model = model_with(drag_term(), {.drag_rate_per_s = 0.5});
+  static const FittedModel model = model_with(drag_hypothesis(), {.drag_rate_per_s = 0.5});
   return model;
 }
 
@@ -188,7 +188,7 @@ TEST(RiseWithoutLast, IsThatOfAFitWithout) {
   const FitInput input = synthetic_input(cloth);
   const DiagnosisSetup setup{
       .inputs = {&input, 1}, .options = kClearanceOptions, .columns = 9, .rows = 9};
-  FittedModel with = true_model(setup, cloth, {drag_term()});
+  FittedModel with = true_model(setup, cloth, {drag_hypothesis()});
   with.parts.front().linear = {};  // so that time steps are as those of the other fit
   refine_model(with, setup, {}, {});
   FittedModel without = with_hypotheses(setup, with, {}, {});

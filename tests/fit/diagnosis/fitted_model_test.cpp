@@ -15,7 +15,7 @@ TEST(FittedModel, CanBeRestoredFromItsPlainData) {
   const FitInput input = synthetic_input(kSaved);
   const FitOptions options;
   const DiagnosisSetup setup{.inputs = {&input, 1}, .options = options, .columns = 5, .rows = 5};
-  FittedModel model = shortened(true_model(setup, kSaved, {drag_term()}), 0.9);
+  FittedModel model = shortened(true_model(setup, kSaved, {drag_hypothesis()}), 0.9);
   linearise_model(model);
 
   FittedModel again = restored(setup, model.fit());

@@ -248,7 +248,7 @@ TEST(FreeForces, DoNotKeepASearchFromTheFirstOfTwoHiddenEffects) {
   const FitInput input = synthetic_input(cloth);
   const DiagnosisSetup setup = setup_of({&input, 1}, 5);
   const Hypothesis clock{.effect = "clock_offset", .mode = "", .amplitudes = {"time"}};
-  const SearchOptions options{.hypotheses = {{drag_term()}, {clock}},
+  const SearchOptions options{.hypotheses = {{drag_hypothesis()}, {clock}},
                               .beam_width = 1,
                               .refits = 2,
                               .most_effects = 2,

@@ -209,7 +209,7 @@ TEST(HypothesisDerivatives, AreNoneOfAnEffectThatCannotAct) {
   const Hypothesis focal{.effect = "focal_error", .mode = "", .amplitudes = {"excess"}};
 
   const std::vector<Columns> in_space = hypothesis_derivatives(
-      true_model(asked_setup({&input, 1}), kAskedCloth), std::vector{drag_term(), focal});
+      true_model(asked_setup({&input, 1}), kAskedCloth), std::vector{drag_hypothesis(), focal});
   const std::vector<Columns> in_pixels = hypothesis_derivatives(
       true_model(asked_setup({&input, 1}, kAskedInPixels), kAskedCloth), {&focal, 1});
 
@@ -247,7 +247,7 @@ TEST(HypothesisDerivatives, OfTheMeasurementAreEachRecordingsOwn) {
   cloth.seed = 2;
   inputs.push_back(synthetic_input(cloth));
   const std::vector<Hypothesis> hypotheses{
-      drag_term(), {.effect = "clock_offset", .mode = "", .amplitudes = {"time"}}};
+      drag_hypothesis(), {.effect = "clock_offset", .mode = "", .amplitudes = {"time"}}};
   const auto columns_of = [&](std::span<const FitInput> some) {
     return hypothesis_derivatives(true_model(asked_setup(some), kAskedCloth), hypotheses);
   };

@@ -64,7 +64,7 @@ TEST(PlantsOf, AreOneOfEachEffectAboveItsLimitThoseSeenBestFirst) {
                             .unit = {"rad", "rad"},
                             .limit = Eigen::Vector2d(4e-3, 2e-3),
                             .found = {}};
-  const DetectionLimit drag{.hypothesis = drag_term(),
+  const DetectionLimit drag{.hypothesis = drag_hypothesis(),
                             .parameter = {"rate"},
                             .unit = {"1/s"},
                             .limit = Eigen::VectorXd::Constant(1, 1e-6),
@@ -80,7 +80,7 @@ TEST(PlantsOf, AreOneOfEachEffectAboveItsLimitThoseSeenBestFirst) {
 
 TEST(PlantsOf, StayWithinTheRangeOfTheirParameter) {
   const auto planted = [](double limit) {
-    return plants_of({{.hypothesis = drag_term(),
+    return plants_of({{.hypothesis = drag_hypothesis(),
                        .parameter = {"rate"},
                        .unit = {"1/s"},
                        .limit = Eigen::VectorXd::Constant(1, limit),

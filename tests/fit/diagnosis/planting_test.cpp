@@ -40,7 +40,7 @@ TEST(Planting, FindsThePlantedDragOnATwinAndNothingOnATwinWithoutIt) {
   const DiagnosisSetup setup{
       .inputs = {&input, 1}, .options = kPlantingOptions, .columns = 5, .rows = 5};
   const FittedModel model = true_model(setup, cloth);
-  const Plant drag{.hypothesis = drag_term(), .parameter = "rate", .beyond_neutral = 0.8};
+  const Plant drag{.hypothesis = drag_hypothesis(), .parameter = "rate", .beyond_neutral = 0.8};
 
   const PlantOutcome planted = search_twins(setup, model, drag, few_hypotheses(input), 5, {});
   ASSERT_TRUE(planted.ran) << planted.why_not;
@@ -58,7 +58,7 @@ TEST(Planting, FindsNothingOnATwinOfWhatTheModelHas) {
   const FitInput input = synthetic_input(cloth);
   const DiagnosisSetup setup{
       .inputs = {&input, 1}, .options = kPlantingOptions, .columns = 5, .rows = 5};
-  const FittedModel model = true_model(setup, cloth, {drag_term()});
+  const FittedModel model = true_model(setup, cloth, {drag_hypothesis()});
 
   SearchOptions options = few_hypotheses(input);
   std::erase_if(options.hypotheses, [](const ShapeCandidates& mode) {

@@ -32,7 +32,7 @@ struct TwoAccepted {
 };
 
 TEST(Prune, DropsWhatALaterHypothesisMakesNeedless) {
-  TwoAccepted two(kNeedless, drag_term());
+  TwoAccepted two(kNeedless, drag_hypothesis());
   prune(two.search, two.entry);
 
   ASSERT_EQ(two.entry.accepted.size(), 1u);
@@ -45,7 +45,7 @@ TEST(Prune, DropsWhatALaterHypothesisMakesNeedless) {
 }
 
 TEST(Prune, KeepsTheLastOneUnlessTheEntryHasChangedItsBasin) {
-  TwoAccepted two(drag_term(), kNeedless);
+  TwoAccepted two(drag_hypothesis(), kNeedless);
   prune(two.search, two.entry);
   EXPECT_EQ(two.entry.accepted.size(), 2u);
 
@@ -56,7 +56,7 @@ TEST(Prune, KeepsTheLastOneUnlessTheEntryHasChangedItsBasin) {
 }
 
 TEST(Prune, KeepsWhatMadeUpForAnotherOnCredit) {
-  TwoAccepted two(drag_term(), kNeedless);
+  TwoAccepted two(drag_hypothesis(), kNeedless);
   two.entry.basin = BasinOrigin::changed;
   two.entry.accepted.front().trial.on_credit = true;
   prune(two.search, two.entry);

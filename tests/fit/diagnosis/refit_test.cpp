@@ -26,7 +26,7 @@ const FitOptions kRefitOptions = [] {
 void expect_optimum(const FittedModel& found, const DiagnosisSetup& setup,
                     const SyntheticCloth& cloth) {
   ASSERT_TRUE(found.usable());
-  FittedModel near = true_model(setup, cloth, {drag_term()});
+  FittedModel near = true_model(setup, cloth, {drag_hypothesis()});
   refine_model(near, setup, {}, {});
   ASSERT_TRUE(near.usable());
   // Time steps are chosen again, and change chi-square by a little of its scatter.
@@ -41,7 +41,7 @@ TEST(IdentifiedFromScratch, IsTheOptimumWhateverIsKnown) {
   const DiagnosisSetup setup{
       .inputs = {&input, 1}, .options = kRefitOptions, .columns = 9, .rows = 9};
 
-  const FittedModel identified = identified_from_scratch(setup, {drag_term()}, {});
+  const FittedModel identified = identified_from_scratch(setup, {drag_hypothesis()}, {});
 
   ASSERT_NO_FATAL_FAILURE(expect_optimum(identified, setup, cloth));
   ASSERT_EQ(identified.hypotheses.size(), 1u);
@@ -55,7 +55,7 @@ TEST(IdentifiedFromScratch, IsOfAllRecordings) {
   inputs.push_back(synthetic_input(cloth));
   const DiagnosisSetup setup{.inputs = inputs, .options = kRefitOptions, .columns = 9, .rows = 9};
 
-  const FittedModel identified = identified_from_scratch(setup, {drag_term()}, {});
+  const FittedModel identified = identified_from_scratch(setup, {drag_hypothesis()}, {});
 
   ASSERT_NO_FATAL_FAILURE(expect_optimum(identified, setup, cloth));
   const std::vector<NamedValues> values = identified.values();
@@ -80,7 +80,7 @@ TEST(RaceOnMesh, LeavesWhatIsNotFarBehindAndRuns) {
   DiagnosisSetup coarse = setup;
   coarse.columns = coarse.rows = 7;
   const Hypothesis drift{.effect = "support_drift", .mode = "", .amplitudes = {"velocity_x"}};
-  const FittedModel with_drag = true_model(coarse, cloth, {drag_term()});
+  const FittedModel with_drag = true_model(coarse, cloth, {drag_hypothesis()});
   const FittedModel with_drift = true_model(coarse, cloth, {drift});
   FittedModel lost = with_drag;
   lost.parts.front().values.setConstant(std::numeric_limits<double>::quiet_NaN());
@@ -104,7 +104,7 @@ TEST(WithHypotheses, HandsOnWhatTheModelIsExpectedToErrBy) {
   PooledPart& part = model.parts.front();
   part.correction = Eigen::VectorXd::LinSpaced(part.linear.residual.size(), 0, 1);
 
-  const FittedModel with_drag = with_hypotheses(setup, model, {drag_term()}, {});
+  const FittedModel with_drag = with_hypotheses(setup, model, {drag_hypothesis()}, {});
   EXPECT_EQ(with_drag.parts.front().correction, part.correction);
   // A hypothesis at neutral changes nothing.
   EXPECT_LT((with_drag.residual() - model.residual()).norm(), 1e-9 * model.residual().norm());
@@ -120,7 +120,7 @@ TEST(WithHypotheses, WithoutTheOnlyOneIsTheModelBeforeIt) {
   const FitInput input = synthetic_input(cloth);
   const DiagnosisSetup setup{
       .inputs = {&input, 1}, .options = kRefitOptions, .columns = 9, .rows = 9};
-  const FittedModel with_drag = true_model(setup, cloth, {drag_term()});
+  const FittedModel with_drag = true_model(setup, cloth, {drag_hypothesis()});
 
   FittedModel without = with_hypotheses(setup, with_drag, {}, {});
   EXPECT_TRUE(without.hypotheses.empty());

@@ -36,7 +36,7 @@ TEST(Score, PredictsASmallDragAndItsSigma) {
   ASSERT_TRUE(model.usable());
   const ModelProjection projection(model, kScoreOptions.loss);
 
-  const std::vector<Score> scores = score_hypotheses(model, projection, {{drag_term()}}, {});
+  const std::vector<Score> scores = score_hypotheses(model, projection, {{drag_hypothesis()}}, {});
 
   ASSERT_EQ(scores.size(), 1u);
   EXPECT_NEAR(scores[0].amplitude[0], 0.05, 4 * scores[0].sigma[0]);
@@ -75,7 +75,7 @@ TEST(Score, SharesThePhysicsOfTwoRecordingsAndNotTheirClocks) {
   const auto scores_of = [&](std::span<const FitInput> some) {
     const FittedModel model = true_model(score_setup(some), cloth);
     return score_hypotheses(model, ModelProjection(model, kScoreOptions.loss),
-                            {{drag_term()}, {clock}}, {});
+                            {{drag_hypothesis()}, {clock}}, {});
   };
 
   const std::vector<Score> one = scores_of({inputs.data(), 1}), two = scores_of(inputs);

@@ -95,7 +95,7 @@ TEST(SearchHypotheses, ChoosesAHypothesisForAGrosslyMisfittingModelOnACoarserMes
   const DiagnosisSetup setup{.inputs = {&input, 1}, .options = options, .columns = 13, .rows = 13};
   const FittedModel base = grossly_misfitting(setup, found_without_air(setup, cloth));
 
-  const SearchResult found = search_hypotheses(setup, base, only(drag_term()), {});
+  const SearchResult found = search_hypotheses(setup, base, only(drag_hypothesis()), {});
 
   ASSERT_EQ(found.accepted.size(), 1u);
   EXPECT_NEAR(found.model.values().front().at("viscous_damping.rate"), 3, 0.1);
@@ -137,7 +137,7 @@ TEST(SearchHypotheses, CreditsAHypothesisWithWhatItExplainsAndNotWithTheBasin) {
   const FittedModel base = stiffer(setup, cloth);
   ASSERT_TRUE(base.usable());
 
-  const SearchResult found = search_hypotheses(setup, base, only(drag_term()), {});
+  const SearchResult found = search_hypotheses(setup, base, only(drag_hypothesis()), {});
 
   ASSERT_EQ(found.accepted.size(), 1u);
   const Trial& drag = found.accepted.front().trial;

@@ -122,7 +122,7 @@ TEST(HypothesisDistance, IsWhatLeastSquaresLeave) {
   SCOPED_TRACE(kSeed);
   const FitInput input = synthetic_input({});
   const DiagnosisSetup setup = setup_of(input, kInSpace);
-  FittedModel both = model_with(setup, {kWind, drag_term()});
+  FittedModel both = model_with(setup, {kWind, drag_hypothesis()});
   PooledPart& part = both.parts.front();
   const ParameterSpace& space = both.problems.front()->space;
   part.values[space.index("viscous_damping.rate")] = 0;
@@ -143,7 +143,7 @@ TEST(HypothesisDistance, IsWhatLeastSquaresLeave) {
   const Eigen::VectorXd coefficients = others.colPivHouseholderQr().solve(change);
   const double expected = (change - others * coefficients).norm();
 
-  const double found = hypothesis_distance(model_with(setup, {kWind}), kWind, drag_term());
+  const double found = hypothesis_distance(model_with(setup, {kWind}), kWind, drag_hypothesis());
 
   EXPECT_GT(expected, 1);
   // Time steps are those of either model's own stability, and the derivative is a difference.
@@ -155,7 +155,7 @@ TEST(HypothesisDistance, IsNoneAlongWhatTheDiscretisationMayErrBy) {
   const FitInput input = synthetic_input({});
   FittedModel model = model_with(setup_of(input, kInSpace), {kWind});
   PooledPart& part = model.parts.front();
-  EXPECT_GT(hypothesis_distance(model, kWind, drag_term()), 2);
+  EXPECT_GT(hypothesis_distance(model, kWind, drag_hypothesis()), 2);
 
   const ParameterSpace& space = model.problems.front()->space;
   const Eigen::VectorXd slope = space.value_by_coordinate(part.values);
@@ -166,7 +166,7 @@ TEST(HypothesisDistance, IsNoneAlongWhatTheDiscretisationMayErrBy) {
   }
 
   // A length v along a direction of standard deviation v leaves v / sqrt(1 + v^2).
-  EXPECT_LT(hypothesis_distance(model, kWind, drag_term()), 1);
+  EXPECT_LT(hypothesis_distance(model, kWind, drag_hypothesis()), 1);
 }
 
 TEST(HypothesisDistance, IsOfNoHypothesisThatCannotAct) {
@@ -191,7 +191,7 @@ TEST(Candidates, TellWhatIsTheSameByConstructionOnlyWhereSupportsMove) {
        {Case{kGravityTilt, kWorldTilt, 1e-3}, Case{kGravityScale, kFrameRate, 1}}) {
     SCOPED_TRACE(of.hypothesis.title());
     const FittedModel model = model_with(setup_of(input, kInSpace), {of.hypothesis});
-    EXPECT_GT(hypothesis_distance(model, of.hypothesis, drag_term()), 5);
+    EXPECT_GT(hypothesis_distance(model, of.hypothesis, drag_hypothesis()), 5);
     EXPECT_LT(hypothesis_distance(model, of.hypothesis, of.other), of.same);
 
     const std::set<CandidateKind> still{CandidateKind::duration, CandidateKind::frame_rate,
@@ -216,7 +216,7 @@ TEST(Candidates, OfMoreFramesOrCamerasTellNoWorse) {
   for (const FitOptions* options : {&kInSpace, &kInPixels}) {
     const bool in_pixels = options == &kInPixels;
     for (const auto& [hypothesis, other] : {std::pair(kWind, kGust), std::pair(kWind, kWindDrag),
-                                            std::pair(drag_term(), kWindDrag)}) {
+                                            std::pair(drag_hypothesis(), kWindDrag)}) {
       SCOPED_TRACE(hypothesis.title() + " and " + other.title() + (in_pixels ? ", pixels" : ""));
       const FittedModel model = model_with(setup_of(input, *options), {hypothesis});
       const double now = hypothesis_distance(model, hypothesis, other);
@@ -241,10 +241,10 @@ TEST(SeparatingRecordings, AreTheBestOfEachKindBesideTheNumberOfThePresentOne) {
   SCOPED_TRACE(kSeed);
   const FitInput input = synthetic_input({});
   const DiagnosisSetup setup = setup_of(input, kInSpace);
-  const FittedModel model = model_with(setup, {kGravityScale, drag_term()});
+  const FittedModel model = model_with(setup, {kGravityScale, drag_hypothesis()});
   const std::vector<AcceptedEffect> accepted{
-      {.trial = {.hypothesis = drag_term()}, .alike = {kWindDrag}},
-      {.trial = {.hypothesis = kGravityScale}, .alike = {kFrameRate, drag_term()}}};
+      {.trial = {.hypothesis = drag_hypothesis()}, .alike = {kWindDrag}},
+      {.trial = {.hypothesis = kGravityScale}, .alike = {kFrameRate, drag_hypothesis()}}};
 
   const std::vector<std::vector<Separation>> found =
       separating_recordings(setup, model, accepted, {});

@@ -30,7 +30,7 @@ Shortlist list_of(double drag_rate_per_s) {
   const FitInput input = synthetic_input(cloth);
   const FitOptions fit;
   const DiagnosisSetup setup{.inputs = {&input, 1}, .options = fit, .columns = 7, .rows = 7};
-  const SearchOptions options{.hypotheses = {{kTiltListed}, {drag_term()}}};
+  const SearchOptions options{.hypotheses = {{kTiltListed}, {drag_hypothesis()}}};
   const SearchContext search(setup, options, {});
   FittedModel model = true_model(setup, cloth);
   refine_model(model, setup, {}, {});
@@ -60,8 +60,8 @@ TEST(Shortlist, IsOfFewFramesWhereTheFitOverAllIsBiased) {
 TEST(Shortlist, MergesAveragedScoresIntoAll) {
   Shortlist list;
   list.scores = {{.hypothesis = kTiltListed, .share = 0.2},
-                 {.hypothesis = drag_term(), .share = 0.1}};
-  list.best = {{.hypothesis = drag_term(), .share = 0.5}};
+                 {.hypothesis = drag_hypothesis(), .share = 0.1}};
+  list.best = {{.hypothesis = drag_hypothesis(), .share = 0.5}};
 
   const std::vector<Score> merged = list.merged();
   ASSERT_EQ(merged.size(), 2u);

@@ -59,7 +59,7 @@ std::vector<std::string> asked(const Trial& trial) {
 
 TEST(TryHypothesis, PassesTheHiddenEffectByEveryCriterion) {
   Scene scene;
-  const Trial trial = scene.of(drag_term(), 30);
+  const Trial trial = scene.of(drag_hypothesis(), 30);
 
   EXPECT_TRUE(trial.passed()) << trial.refusal();
   EXPECT_EQ(trial.refusal(), "");
@@ -73,13 +73,13 @@ TEST(TryHypothesis, PassesTheHiddenEffectByEveryCriterion) {
 
 TEST(TryHypothesis, AsksNoFurtherThanTheFirstCriterionThatIsNotPassed) {
   Scene scene;
-  const Trial broken_promise = scene.of(drag_term(), 1e9);
+  const Trial broken_promise = scene.of(drag_hypothesis(), 1e9);
   EXPECT_EQ(asked(broken_promise), (std::vector<std::string>{"fitted", "decrease"}));
   EXPECT_FALSE(broken_promise.passed());
   EXPECT_TRUE(std::isnan(broken_promise.cross_validated));
   EXPECT_EQ(broken_promise.criteria.back().threshold, kCriteria.predicted_share * 1e9);
 
-  const Trial failed = scene.of(FittedModel{}, drag_term(), 30);
+  const Trial failed = scene.of(FittedModel{}, drag_hypothesis(), 30);
   EXPECT_EQ(asked(failed), std::vector<std::string>{"fitted"});
   EXPECT_TRUE(std::isnan(failed.decrease));
 }
@@ -88,7 +88,7 @@ TEST(TryHypothesis, RefusesWhatTakesTooLittleToBeWorthAName) {
   Scene scene;
   // A model that explains a million times what is there leaves little that is worth a name.
   scene.search.base_chi_square = 1e12;
-  const Trial trial = scene.of(drag_term(), 30);
+  const Trial trial = scene.of(drag_hypothesis(), 30);
   EXPECT_EQ(trial.criteria.back().name, "worth_naming");
   EXPECT_FALSE(trial.passed());
 }

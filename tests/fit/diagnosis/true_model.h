@@ -13,7 +13,7 @@
 namespace clothfit {
 
 /// Returns the air's drag, which a synthetic cloth may have and its recording does not declare.
-inline Hypothesis drag_term() {
+inline Hypothesis drag_hypothesis() {
   return {.effect = "viscous_damping", .mode = "", .amplitudes = {"rate"}};
 }
 

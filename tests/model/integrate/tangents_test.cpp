@@ -118,17 +118,17 @@ TEST(Tangents, AgreeWithCentralDifferencesUnderEveryEffect) {
 
 TEST(Tangents, AlongAnEmergingEffectAreThoseOfAClothThatHasItAtItsNeutralValues) {
   // The modes are forces, also with a memory; inertia; supports. More than go side by side.
-  constexpr EmergingLaw kLaws[] = {{"wind", "q_x"},
-                                   {"wind", "c"},
-                                   {"viscous_damping", "rate"},
-                                   {"frame_acceleration", "a_y"},
-                                   {"gravity_tilt", "about_x"},
-                                   {"relaxation", "ratio"},
-                                   {"hysteresis", "ratio"},
-                                   {"nonuniform_mass", "hem_bottom"},
-                                   {"nonuniform_mass", "gradient_s"},
-                                   {"added_air_mass", "mu"},
-                                   {"support_motion", "amplitude_x"}};
+  constexpr EmergingParameter kEmerging[] = {{"wind", "q_x"},
+                                             {"wind", "c"},
+                                             {"viscous_damping", "rate"},
+                                             {"frame_acceleration", "a_y"},
+                                             {"gravity_tilt", "about_x"},
+                                             {"relaxation", "ratio"},
+                                             {"hysteresis", "ratio"},
+                                             {"nonuniform_mass", "hem_bottom"},
+                                             {"nonuniform_mass", "gradient_s"},
+                                             {"added_air_mass", "mu"},
+                                             {"support_motion", "amplitude_x"}};
   Uniform uniform(1);
   const Swing plain(uniform);
   Swing windy = plain;
@@ -136,14 +136,14 @@ TEST(Tangents, AlongAnEmergingEffectAreThoseOfAClothThatHasItAtItsNeutralValues)
   windy.set.effects = {{0.1, 0.2, -0.3, 0.4}};
   // At steps shorter than that, forces are carried on between.
   for (const double time_step_s : {kEmergingInterval_s, kEmergingInterval_s / 2}) {
-    // The small change that stands for a derivative errs by 1e-5 of the law's curvature.
+    // The small change that stands for a derivative errs by 1e-5 of the curvature.
     const double tolerance = time_step_s < kEmergingInterval_s ? 1e-2 : 1e-4;
     for (const Swing* swing : {&plain, static_cast<const Swing*>(&windy)}) {
       Schedule schedule = swing->schedule;
       schedule.time_step_s = time_step_s;
       std::vector<Direction> directions;
-      for (const EmergingLaw& law : kLaws)
-        directions.push_back(TwoWays(swing->cloth, swing->set, law).emerging);
+      for (const EmergingParameter& parameter : kEmerging)
+        directions.push_back(TwoWays(swing->cloth, swing->set, parameter).emerging);
 
       const TangentResult result =
           simulate_with_tangents(swing->cloth, swing->set, directions, schedule);
@@ -152,9 +152,9 @@ TEST(Tangents, AlongAnEmergingEffectAreThoseOfAClothThatHasItAtItsNeutralValues)
                 simulate(swing->cloth, {&swing->set, 1}, schedule).front().position_m);
       for (size_t d = 0; d < directions.size(); ++d) {
         SCOPED_TRACE(testing::Message()
-                     << kLaws[d].effect << '.' << kLaws[d].amplitude << ", "
+                     << kEmerging[d].effect << '.' << kEmerging[d].amplitude << ", "
                      << swing->cloth.effects.size() << " effects, steps of " << time_step_s);
-        const TwoWays with(swing->cloth, swing->set, kLaws[d]);
+        const TwoWays with(swing->cloth, swing->set, kEmerging[d]);
         const TangentResult expected =
             simulate_with_tangents(with.cloth, with.set, {&with.present, 1}, schedule);
         for (size_t f = 1; f < schedule.frame_time_s.size(); ++f) {

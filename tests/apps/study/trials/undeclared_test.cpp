@@ -57,7 +57,7 @@ UndeclaredOptions small_undeclared_study() {
   options.diagnosis.without = all_but({"viscous_damping", "gravity_scale", "scale"});
   options.diagnosis.beam_width = 1;
   options.diagnosis.refits = 3;
-  options.laws = {{"viscous_damping", ""}};
+  options.modes = {{"viscous_damping", ""}};
   options.trials = 1;
   options.seed = 21;
   options.threads = 1;
@@ -180,10 +180,10 @@ TEST(TrueSight, RefusesMarkersBesideTheCloth) {
   }
 }
 
-TEST(HiddenLaw, AmountsToAsManySigmasAsItSays) {
+TEST(HiddenMode, AmountsToAsManySigmasAsItSays) {
   const RecordingInformation information = recording_information(small_scene(), small_fit(), 7);
-  const DrawnLaw drawn =
-      draw_law(information, {"viscous_damping", ""}, {.least = 8, .most = 50}, 7);
+  const DrawnMode drawn =
+      draw_mode(information, {"viscous_damping", ""}, {.least = 8, .most = 50}, 7);
 
   // The Cramer-Rao bound of a fit that has it free is another way to its sigma.
   FitOptions with_drag = small_fit();
@@ -196,27 +196,27 @@ TEST(HiddenLaw, AmountsToAsManySigmasAsItSays) {
   EXPECT_NEAR(drawn.projected.norm(), 1, 1e-9);
 }
 
-TEST(HiddenLaw, IsRefusedWhereItsBoundsKeepItFromBeingSeen) {
+TEST(HiddenMode, IsRefusedWhereItsBoundsKeepItFromBeingSeen) {
   const RecordingInformation information = recording_information(small_scene(), small_fit(), 7);
-  const DrawnLaw drawn =
-      draw_law(information, {"viscous_damping", ""}, {.least = 1e7, .most = 1e8}, 7);
+  const DrawnMode drawn =
+      draw_mode(information, {"viscous_damping", ""}, {.least = 1e7, .most = 1e8}, 7);
   EXPECT_EQ(drawn.amplitude.size(), 0);
 }
 
-TEST(HiddenLaw, SharesItsClassWithItsTwin) {
+TEST(HiddenMode, SharesItsClassWithItsTwin) {
   // With still supports and free stiffness and damping a fast clock is exactly stronger gravity.
   const RecordingInformation information = recording_information(small_scene(), small_fit(), 7);
-  const DrawnLaw drawn =
-      draw_law(information, {"frame_rate_error", ""}, {.least = 8, .most = 50}, 7);
+  const DrawnMode drawn =
+      draw_mode(information, {"frame_rate_error", ""}, {.least = 8, .most = 50}, 7);
 
-  const auto right = right_class(information, drawn, projected_laws(information));
+  const auto right = right_class(information, drawn, projected_modes(information));
 
   EXPECT_NE(std::ranges::find(right, "frame_rate_error"), right.end());
   EXPECT_NE(std::ranges::find(right, "gravity_scale"), right.end());
   EXPECT_EQ(std::ranges::find(right, "nonuniform_stiffness"), right.end());
 }
 
-TEST(LawDerivatives, SquaredMultipleCorrelationIsThatOfLeastSquares) {
+TEST(ModeDerivatives, SquaredMultipleCorrelationIsThatOfLeastSquares) {
   Eigen::MatrixXd columns(3, 2);
   columns << 1, 2, 0, 0, 0, 1e-6;
   // In the plane of the first and third axis lie 9 + 16 of 9 + 4 + 16.
@@ -233,7 +233,7 @@ TEST(Rate, HasExactBounds) {
 }
 
 TEST(UndeclaredSummaries, CountLawsThatHalveTheErrorWhereAnEffectWasWithheld) {
-  UndeclaredTrial trial{.hidden = {{.law = {"viscous_damping", ""}}},
+  UndeclaredTrial trial{.hidden = {{.mode = {"viscous_damping", ""}}},
                         .mimicked = 0.2,
                         .stop = FitStop::converged,
                         .verdict = DiagnosisVerdict::unexplained,

@@ -1,4 +1,4 @@
-#include "apps/study/scene/hidden_law.h"
+#include "apps/study/scene/hidden_mode.h"
 
 #include <algorithm>
 #include <cmath>
@@ -21,13 +21,13 @@ constexpr double kSame = 0.9;  ///< multiple correlation of modes that cannot be
 constexpr double kStabilityMargin = 1.5;  ///< as fits leave it
 
 /// Series of draws under a trial's seed.
-enum HiddenLawSeries : int { kShape = 300, kDirection, kSize };
+enum HiddenModeSeries : int { kShape = 300, kDirection, kSize };
 
-const ShapeCandidates* shapes_of(const RecordingInformation& information, const HiddenLaw& law) {
-  const auto found = std::ranges::find_if(information.laws, [&](const ShapeCandidates& shapes) {
-    return shapes.front().effect == law.effect && shapes.front().mode == law.law;
+const ShapeCandidates* shapes_of(const RecordingInformation& information, const HiddenMode& mode) {
+  const auto found = std::ranges::find_if(information.modes, [&](const ShapeCandidates& shapes) {
+    return shapes.front().effect == mode.effect && shapes.front().mode == mode.mode;
   });
-  return found == information.laws.end() ? nullptr : &*found;
+  return found == information.modes.end() ? nullptr : &*found;
 }
 
 const EffectParameter& parameter_of(const EffectDescription& effect, const std::string& name) {
@@ -51,8 +51,8 @@ void start_at_truth(const SyntheticScene& scene, std::uint64_t seed, FitProblem&
 
 }  // namespace
 
-std::vector<HiddenLaw> hidden_laws(ObservationKind observations) {
-  std::vector<HiddenLaw> laws = {
+std::vector<HiddenMode> hidden_modes(ObservationKind observations) {
+  std::vector<HiddenMode> modes = {
       {"bending_energy", ""},
       {"frame_acceleration", ""},
       {"gravity_tilt", ""},
@@ -77,11 +77,11 @@ std::vector<HiddenLaw> hidden_laws(ObservationKind observations) {
       {"temporal_smoothing", ""},
   };
   if (observations == ObservationKind::tracks2d) {
-    laws.push_back({"focal_error", ""});
-    laws.push_back({"lens_distortion", ""});
-    laws.push_back({"rolling_shutter", ""});
+    modes.push_back({"focal_error", ""});
+    modes.push_back({"lens_distortion", ""});
+    modes.push_back({"rolling_shutter", ""});
   }
-  return laws;
+  return modes;
 }
 
 RecordingInformation recording_information(const SyntheticScene& scene, const FitOptions& fit,
@@ -112,21 +112,21 @@ RecordingInformation recording_information(const SyntheticScene& scene, const Fi
   if (!model.usable())
     throw InputError("recover", "the scene has no derivatives", "a calmer motion",
                      "shorten it with --seconds, or raise the stiffness");
-  std::vector<ShapeCandidates> laws = hypotheses_to_test(recording.input, fit, duration_s);
+  std::vector<ShapeCandidates> modes = hypotheses_to_test(recording.input, fit, duration_s);
   ModelProjection projection(model, Loss::squared);
   return {.recording = std::move(recording),
-          .laws = std::move(laws),
+          .modes = std::move(modes),
           .model = std::move(model),
           .projection = std::move(projection)};
 }
 
-DrawnLaw draw_law(const RecordingInformation& information, const HiddenLaw& law,
-                  const DrawOptions& options, std::uint64_t seed, const Eigen::MatrixXd& beside) {
-  const ShapeCandidates* shapes = shapes_of(information, law);
+DrawnMode draw_mode(const RecordingInformation& information, const HiddenMode& mode,
+                    const DrawOptions& options, std::uint64_t seed, const Eigen::MatrixXd& beside) {
+  const ShapeCandidates* shapes = shapes_of(information, mode);
   if (shapes == nullptr) return {};
-  DrawnLaw drawn{.term = shapes->front(), .amplitude = {}, .projected = {}};
+  DrawnMode drawn{.hypothesis = shapes->front(), .amplitude = {}, .projected = {}};
   int place = 0;
-  for (auto& [name, value] : drawn.term.shape) {
+  for (auto& [name, value] : drawn.hypothesis.shape) {
     double least = value, most = value;
     for (const Hypothesis& term : *shapes) {
       least = std::min(least, term.shape.at(name));
@@ -135,18 +135,19 @@ DrawnLaw draw_law(const RecordingInformation& information, const HiddenLaw& law,
     value = between(least, most, Draws(seed, kShape, place++).uniform());
   }
 
-  const EffectDescription effect = describe_effect(law.effect);
-  const auto count = static_cast<Eigen::Index>(drawn.term.amplitudes.size());
+  const EffectDescription effect = describe_effect(mode.effect);
+  const auto count = static_cast<Eigen::Index>(drawn.hypothesis.amplitudes.size());
   Eigen::VectorXd direction(count);
   Draws draws(seed, kDirection, 0);
   for (Eigen::Index k = 0; k < count; ++k) {
-    const EffectParameter& p = parameter_of(effect, drawn.term.amplitudes[static_cast<size_t>(k)]);
+    const EffectParameter& p =
+        parameter_of(effect, drawn.hypothesis.amplitudes[static_cast<size_t>(k)]);
     double along = draws.normal();
     if (p.lower >= p.neutral) along = std::abs(along);
     if (p.upper <= p.neutral) along = -std::abs(along);
     direction[k] = p.typical * along;
   }
-  const Columns columns = hypothesis_derivatives(information.model, {&drawn.term, 1}).front();
+  const Columns columns = hypothesis_derivatives(information.model, {&drawn.hypothesis, 1}).front();
   if (columns.empty()) return {};
   Eigen::VectorXd projected = information.projection.columns({columns.front() * direction});
   if (beside.cols() > 0) projected -= beside * PivotedQr(beside).solve(projected);
@@ -155,7 +156,8 @@ DrawnLaw draw_law(const RecordingInformation& information, const HiddenLaw& law,
 
   double reach = std::numeric_limits<double>::infinity();
   for (Eigen::Index k = 0; k < count; ++k) {
-    const EffectParameter& p = parameter_of(effect, drawn.term.amplitudes[static_cast<size_t>(k)]);
+    const EffectParameter& p =
+        parameter_of(effect, drawn.hypothesis.amplitudes[static_cast<size_t>(k)]);
     const double end = (direction[k] > 0 ? p.upper : p.lower) - p.neutral;
     if (direction[k] != 0) reach = std::min(reach, end / direction[k]);
   }
@@ -167,13 +169,14 @@ DrawnLaw draw_law(const RecordingInformation& information, const HiddenLaw& law,
   return drawn;
 }
 
-HiddenEffect hidden_effect(const DrawnLaw& drawn) {
-  HiddenEffect hidden{.name = drawn.term.effect, .values = {}};
+HiddenEffect hidden_effect(const DrawnMode& drawn) {
+  HiddenEffect hidden{.name = drawn.hypothesis.effect, .values = {}};
   for (const EffectParameter& parameter : describe_effect(hidden.name).parameters) {
     double value = parameter.neutral;
-    if (const auto shape = drawn.term.shape.find(parameter.name); shape != drawn.term.shape.end())
+    if (const auto shape = drawn.hypothesis.shape.find(parameter.name);
+        shape != drawn.hypothesis.shape.end())
       value = shape->second;
-    const auto& amplitudes = drawn.term.amplitudes;
+    const auto& amplitudes = drawn.hypothesis.amplitudes;
     if (const auto at = std::ranges::find(amplitudes, parameter.name); at != amplitudes.end())
       value += drawn.amplitude[at - amplitudes.begin()];
     hidden.values.push_back(value);
@@ -181,39 +184,41 @@ HiddenEffect hidden_effect(const DrawnLaw& drawn) {
   return hidden;
 }
 
-std::vector<std::vector<Eigen::MatrixXd>> projected_laws(const RecordingInformation& information) {
+std::vector<std::vector<Eigen::MatrixXd>> projected_modes(const RecordingInformation& information) {
   std::vector<Hypothesis> all;
-  for (const ShapeCandidates& law : information.laws) all.insert(all.end(), law.begin(), law.end());
+  for (const ShapeCandidates& mode : information.modes)
+    all.insert(all.end(), mode.begin(), mode.end());
   const std::vector<Columns> derivatives = hypothesis_derivatives(information.model, all);
   std::vector<std::vector<Eigen::MatrixXd>> result;
   size_t n = 0;
-  for (const ShapeCandidates& law : information.laws) {
+  for (const ShapeCandidates& mode : information.modes) {
     std::vector<Eigen::MatrixXd>& shapes = result.emplace_back();
-    for (size_t k = 0; k < law.size(); ++k, ++n)
+    for (size_t k = 0; k < mode.size(); ++k, ++n)
       shapes.push_back(derivatives[n].empty() ? Eigen::MatrixXd()
                                               : information.projection.columns(derivatives[n]));
   }
   return result;
 }
 
-std::vector<std::string> right_class(const RecordingInformation& information, const DrawnLaw& drawn,
+std::vector<std::string> right_class(const RecordingInformation& information,
+                                     const DrawnMode& drawn,
                                      const std::vector<std::vector<Eigen::MatrixXd>>& projected) {
-  std::set<std::string> effects{drawn.term.effect};
-  for (size_t n = 0; n < information.laws.size(); ++n)
+  std::set<std::string> effects{drawn.hypothesis.effect};
+  for (size_t n = 0; n < information.modes.size(); ++n)
     for (const Eigen::MatrixXd& columns : projected[n])
       if (squared_multiple_correlation(drawn.projected, columns) > kSame * kSame)
-        effects.insert(information.laws[n].front().effect);
+        effects.insert(information.modes[n].front().effect);
   return {effects.begin(), effects.end()};
 }
 
-double mimicked_by_others(const RecordingInformation& information, const DrawnLaw& drawn,
+double mimicked_by_others(const RecordingInformation& information, const DrawnMode& drawn,
                           const std::vector<std::vector<Eigen::MatrixXd>>& projected, int most) {
   // Forward selection removes the chosen modes from the hidden one's derivatives and all others'.
   Eigen::VectorXd left = drawn.projected;
   std::vector<Eigen::MatrixXd> others;
   for (size_t n = 0; n < projected.size(); ++n)
     for (const Eigen::MatrixXd& columns : projected[n])
-      if (information.laws[n].front().effect != drawn.term.effect && columns.cols() > 0)
+      if (information.modes[n].front().effect != drawn.hypothesis.effect && columns.cols() > 0)
         others.push_back(columns);
   const double all = left.squaredNorm();
   for (int taken = 0; taken < most; ++taken) {
