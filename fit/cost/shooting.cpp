@@ -9,7 +9,6 @@
 #include <utility>
 
 #include "data/algebra/dense_factors.h"
-#include "data/input_error.h"
 #include "fit/cost/huber.h"
 #include "fit/observe/node_weights.h"
 #include "fit/problem/parameterised_model.h"
@@ -71,19 +70,13 @@ ShootingObjective::ShootingObjective(const FitProblem& problem, int frames, cons
       held_move_(held_move(problem.cloth, held_weights_)) {
   const Mesh& mesh = problem.cloth.mesh;
   const std::vector<int>& first = windows_.first_frame;
-  const auto guesses = static_cast<size_t>(windows_.count());
-  const bool rising = std::ranges::adjacent_find(first, std::greater_equal<>()) == first.end();
-  if (frames < 1 || frames > problem.frames() || first.empty() || first.front() != 0 || !rising ||
-      first.back() >= frames || windows_.position_m.size() != guesses ||
-      windows_.velocity_m_per_s.size() != guesses)
-    throw InputError("shooting", "the windows do not fit the frames",
-                     "rising first frames from 0, a guess for each");
-  if (windows_.nodes < 2 || windows_.nodes > std::min(mesh.columns, mesh.rows))
-    throw InputError("shooting",
-                     std::to_string(windows_.nodes) + " nodes a side correct a window's state",
-                     "2 to the mesh's vertices a side");
-  if (!(continuity.position_m > 0 && continuity.velocity_m_per_s > 0))
-    throw InputError("shooting", "the continuity's sigma is not positive", "more than 0");
+  assert(frames >= 1 && frames <= problem.frames());
+  assert(!first.empty() && first.front() == 0 && first.back() < frames);
+  assert(std::ranges::adjacent_find(first, std::greater_equal<>()) == first.end());
+  assert(windows_.position_m.size() == static_cast<size_t>(windows_.count()));
+  assert(windows_.velocity_m_per_s.size() == static_cast<size_t>(windows_.count()));
+  assert(windows_.nodes >= 2 && windows_.nodes <= std::min(mesh.columns, mesh.rows));
+  assert(continuity.position_m > 0 && continuity.velocity_m_per_s > 0);
   basis_ = node_weights(mesh, windows_.nodes, flat_positions(mesh).topRows<2>());
   to_nodes_ = SymmetricFactors(basis_.transpose() * basis_).solve(basis_.transpose());
   corrections_ = no_corrections();

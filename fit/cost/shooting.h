@@ -50,7 +50,7 @@ class ShootingObjective final : public Objective {
   /// at 3 nodes^2 + 3 k + c (m/s). The first window's are empty.
   using Corrections = std::vector<Eigen::VectorXd>;
 
-  /// Throws InputError for windows that do not fit the frames or the mesh.
+  /// The windows must fit the frames and the mesh.
   ShootingObjective(const FitProblem& problem, int frames, const TimeSteps& steps,
                     ShootingWindows windows, const Continuity& continuity);
 

@@ -181,6 +181,8 @@ std::string to_string(DiagnosisVerdict verdict) {
       return "partly_explained";
     case DiagnosisVerdict::unexplained:
       return "unexplained";
+    case DiagnosisVerdict::not_reached:
+      return "not_reached";
   }
   return "";
 }

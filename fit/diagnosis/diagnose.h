@@ -24,14 +24,15 @@ enum class DiagnosisVerdict {
   adequate,          ///< nothing is missing that this recording could show
   explained,         ///< something was accepted, and the residual looks like noise
   partly_explained,  ///< something was accepted, and structure remains
-  unexplained        ///< structure, and nothing that explains it
+  unexplained,       ///< structure, and nothing that explains it
+  not_reached        ///< the diagnosis did not come to an end
 };
 std::string to_string(DiagnosisVerdict verdict);
 
 struct Diagnosis {
   FitStop stop = FitStop::not_run;
   std::string message;
-  DiagnosisVerdict verdict = DiagnosisVerdict::adequate;
+  DiagnosisVerdict verdict = DiagnosisVerdict::not_reached;
   DiagnosisCriteria criteria;
   /// The fitted recordings, then those held out. Each report is of the fit of all on the mesh that
   /// was analysed (report_at). For a single recording on its own mesh `before` is its own fit. That

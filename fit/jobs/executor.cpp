@@ -13,7 +13,6 @@
 #include <mutex>
 #include <optional>
 
-#include "data/input_error.h"
 #include "fit/jobs/draws.h"
 
 namespace clothfit {
@@ -59,6 +58,7 @@ class Run {
       result.message +=
           fmt::format(", {} of them from {}", result.resumed, journal_->file().string());
     if (performed_ == left()) {
+      result.stop = ExecuteStop::finished;
       result.payloads = std::move(payloads_);
     } else {
       result.stop = ExecuteStop::cancelled;
@@ -114,15 +114,9 @@ class Run {
 
 }  // namespace
 
-void ExecuteOptions::validate() const {
-  if (threads < 0)
-    throw InputError("threads", "threads = " + std::to_string(threads),
-                     "0 (as many as the machine has), or 1 on");
-}
-
 ExecuteResult execute(int count, const Work& work, const ExecuteOptions& options, Journal* journal,
                       const ProgressCallback& progress) {
-  options.validate();
+  assert(options.threads >= 0);
   assert(count >= 0);
   using tbb::global_control;
   const int threads = options.threads > 0 ? options.threads : tbb::info::default_concurrency();

@@ -19,13 +19,12 @@ struct ExecuteOptions {
   int threads = 0;              ///< >= 0; 0: as many as the machine has
   unsigned long long seed = 1;  ///< seed of the run
   std::string unit = "trials";  ///< name of the pieces in progress reports
-  void validate() const;        ///< throws InputError
 };
 
-enum class ExecuteStop { finished, cancelled };
+enum class ExecuteStop { not_run, finished, cancelled };
 
 struct ExecuteResult {
-  ExecuteStop stop = ExecuteStop::finished;
+  ExecuteStop stop = ExecuteStop::not_run;
   std::string message;  ///< one line for a person
   /// Payloads by index. Empty when cancelled, because chance then decides which pieces are
   /// finished; these are in the journal.

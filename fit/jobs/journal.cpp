@@ -40,7 +40,7 @@ int open_locked(const std::filesystem::path& file, JournalStart start) {
   const int descriptor = open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | fresh_only, 0666);
   if (descriptor < 0 && errno == EEXIST && fresh_only != 0)
     throw InputError(file.string(), "exists", "a new file, for this run starts from scratch",
-                     "give --resume to go on with it, or remove it");
+                     "go on with it by JournalStart::resume, or remove it");
   if (descriptor < 0) refuse(file, "cannot be opened", errno);
   struct stat status {};
   if (fstat(descriptor, &status) != 0 || !S_ISREG(status.st_mode)) {

@@ -24,7 +24,7 @@ bool evenly_spaced(const std::vector<double>& time_s, size_t f, double tolerance
 }
 
 /// Returns the median of the first `count` of rising values.
-double median(const std::vector<double>& sorted, size_t count) {
+double median_of_first(const std::vector<double>& sorted, size_t count) {
   return (sorted[(count - 1) / 2] + sorted[count / 2]) / 2;
 }
 
@@ -35,7 +35,7 @@ double median(const std::vector<double>& sorted, size_t count) {
 double robust_sigma(const std::vector<double>& sorted) {
   size_t count = sorted.size();
   while (true) {
-    const double middle = median(sorted, count);
+    const double middle = median_of_first(sorted, count);
     const auto end = std::upper_bound(sorted.begin(), sorted.end(), kBeyond * kMadToSigma * middle);
     const auto within = static_cast<size_t>(end - sorted.begin());
     if (within >= count) return kMedianToSigma * middle;

@@ -9,7 +9,6 @@
 #include <string>
 #include <utility>
 
-#include "data/input_error.h"
 #include "data/median.h"
 
 namespace clothfit {
@@ -398,19 +397,15 @@ std::array<Eigen::VectorXd, 3> evaluate(const SmoothingSpline& spline, double ti
 
 }  // namespace
 
-void SmoothingSplineOptions::validate() const {
-  if (smoothing && !(*smoothing > 0 && std::isfinite(*smoothing)))
-    throw InputError("smoothing", "smoothing = " + std::to_string(*smoothing), "a number > 0");
-  if (!(reject_beyond > 0))
-    throw InputError("reject_beyond", "reject_beyond = " + std::to_string(reject_beyond),
-                     "robust standard deviations, > 0");
+bool SmoothingSplineOptions::valid() const {
+  return (!smoothing || (*smoothing > 0 && std::isfinite(*smoothing))) && reject_beyond > 0;
 }
 
 SmoothingSpline fit_smoothing_spline(const std::vector<double>& time_s,
                                      const Eigen::MatrixXd& samples,
                                      const std::vector<double>& sigma,
                                      const SmoothingSplineOptions& options) {
-  options.validate();
+  assert(options.valid());
   const Eigen::Index n = samples.cols();
   assert(n >= 1 && time_s.size() == static_cast<size_t>(n));
   assert(sigma.empty() || sigma.size() == time_s.size());

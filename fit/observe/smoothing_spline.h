@@ -35,7 +35,7 @@ struct SmoothingSplineOptions {
       std::nullopt;            ///< lambda, > 0; chosen from the data when absent
   bool robust = true;          ///< look for outliers; at least 8 samples are needed for that
   double reject_beyond = 4.5;  ///< > 0; of normal noise, 1 in 150 000 lies beyond 4.5
-  void validate() const;       ///< throws InputError
+  bool valid() const;
 };
 
 /// A smoothed track with d coordinates. Straight beyond its ends.

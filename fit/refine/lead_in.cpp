@@ -34,9 +34,10 @@ LeadIn by_shooting(const FitProblem& problem, const FitOptions& options,
 LeadIn by_states(const FitProblem& problem, const FitOptions& options, const Eigen::VectorXd& start,
                  const ProgressCallback& progress) {
   if (problem.observations.front().camera)
-    throw InputError("--cost " + to_string(options.cost), "the recording is observed in pixels",
-                     "3D tracks: the cost predicts positions and velocities in space",
-                     "use --cost shooting, whose windows find their states from pixels");
+    throw InputError(
+        "FitOptions::cost = " + to_string(options.cost), "the recording is observed in pixels",
+        "3D tracks: the cost predicts positions and velocities in space",
+        "use FitOptions::cost = shooting, whose windows find their states from pixels");
   const TrackStates tracks = recorded_states_of_tracks(problem);
   const RefineResult result = refine(
       problem,

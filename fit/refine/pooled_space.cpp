@@ -1,6 +1,7 @@
 #include "fit/refine/pooled_space.h"
 
 #include <algorithm>
+#include <cassert>
 
 #include "data/algebra/dense_factors.h"
 #include "data/input_error.h"
@@ -9,7 +10,7 @@ namespace clothfit {
 
 PooledSpace::PooledSpace(std::span<const FitProblem* const> problems)
     : problems_(problems.begin(), problems.end()), places_(problems.size()) {
-  if (problems.empty()) throw InputError("pooled fit", "there are no recordings", "at least one");
+  assert(!problems.empty());
   for (const FitParameter& parameter : problems.front()->space.parameters) {
     if (!is_physical(parameter.role)) continue;
     std::vector<int> indices;

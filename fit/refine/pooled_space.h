@@ -21,8 +21,8 @@ struct Quadratic {
 /// then those of each recording in turn.
 class PooledSpace {
  public:
-  /// The problems must outlive the space. Throws InputError unless they are at least one and have
-  /// the same parameters of the physics.
+  /// The problems, at least one, must outlive the space. Throws InputError unless they have the
+  /// same parameters of the physics.
   explicit PooledSpace(std::span<const FitProblem* const> problems);
 
   int size() const { return size_; }

@@ -8,7 +8,6 @@
 #include <sstream>
 
 #include "data/algebra/dense_factors.h"
-#include "data/input_error.h"
 #include "fit/jobs/draws.h"
 
 namespace clothfit {
@@ -152,6 +151,9 @@ std::optional<CmaStop> stop_reason(const CmaOptions& options, const CmaState& st
 std::string message_of(CmaStop stop, const CmaState& state) {
   std::ostringstream text;
   switch (stop) {
+    case CmaStop::not_run:
+      text << "not run";
+      break;
     case CmaStop::cost_below:
       text << "the cost is as low as asked";
       break;
@@ -177,21 +179,10 @@ int CmaOptions::first_population(int parameters) const {
   return 4 + static_cast<int>(std::floor(3 * std::log(parameters)));
 }
 
-void CmaOptions::validate() const {
-  const auto require = [](bool good, const char* name, const auto& value, const char* expected) {
-    if (good) return;
-    std::ostringstream text;
-    text << value;
-    throw InputError("search", std::string(name) + " = " + text.str(), expected);
-  };
-  require(population == 0 || population >= 4, "population", population, "0 (the default), or 4 on");
-  require(initial_step > 0 && std::isfinite(initial_step), "initial_step", initial_step,
-          "a share of the ranges above 0");
-  require(restarts >= 0, "restarts", restarts, "0 or more");
-  require(growth >= 1 && growth <= 10, "growth", growth, "a factor from 1 to 10");
-  require(most_evaluations >= 1, "most_evaluations", most_evaluations, "1 or more");
-  require(cost_tolerance >= 0 && step_tolerance >= 0, "tolerance",
-          std::min(cost_tolerance, step_tolerance), "0 or more");
+bool CmaOptions::valid() const {
+  return (population == 0 || population >= 4) && initial_step > 0 && std::isfinite(initial_step) &&
+         restarts >= 0 && growth >= 1 && growth <= 10 && most_evaluations >= 1 &&
+         cost_tolerance >= 0 && step_tolerance >= 0;
 }
 
 const CmaOptimum& CmaState::best() const {
@@ -210,7 +201,7 @@ double diversity(const CmaState& state) {
 
 CmaState start_cma(const std::vector<SearchParameter>& parameters, const CmaOptions& options,
                    const Eigen::VectorXd& given) {
-  options.validate();
+  assert(options.valid());
   require_ranges(parameters);
   const auto n = static_cast<Eigen::Index>(parameters.size());
   assert(given.size() == 0 || given.size() == n);
@@ -282,7 +273,7 @@ CmaState next_cma_generation(const std::vector<SearchParameter>& parameters,
 CmaResult search_by_cma(const std::vector<SearchParameter>& parameters, const CmaOptions& options,
                         const GenerationCost& cost, CmaState state,
                         const ProgressCallback& progress, const CmaWatcher& after_generation) {
-  options.validate();
+  assert(options.valid());
   require_ranges(parameters);
   CmaResult result;
   std::optional<CmaStop> stop = stop_reason(options, state);

@@ -34,7 +34,7 @@ struct CmaOptions {
   unsigned long long seed = 1;
 
   int first_population(int parameters) const;
-  void validate() const;  ///< throws InputError
+  bool valid() const;  ///< what a search asks of them
 };
 
 /// The reason why one run ended.
@@ -88,10 +88,10 @@ CmaState start_cma(const std::vector<SearchParameter>& parameters, const CmaOpti
 CmaState next_cma_generation(const std::vector<SearchParameter>& parameters,
                              const CmaOptions& options, const GenerationCost& cost, CmaState state);
 
-enum class CmaStop { cost_below, most_evaluations, restarts_used, cancelled };
+enum class CmaStop { not_run, cost_below, most_evaluations, restarts_used, cancelled };
 
 struct CmaResult {
-  CmaStop stop = CmaStop::restarts_used;
+  CmaStop stop = CmaStop::not_run;
   std::string message;  ///< one line for a person
   CmaState state;       ///< resume from here
   bool usable() const;  ///< at least one finite cost
@@ -103,7 +103,7 @@ using CmaWatcher = std::function<void(const CmaState&)>;
 /// Makes generations until a stopping rule holds. `state` is a start or a saved state, which leads
 /// to the same end as a search that was not interrupted. After each generation `after_generation`,
 /// when given, receives the state, then `progress`, when given, is told. Throws InputError for
-/// options or ranges that make no sense.
+/// ranges that make no sense.
 CmaResult search_by_cma(const std::vector<SearchParameter>& parameters, const CmaOptions& options,
                         const GenerationCost& cost, CmaState state,
                         const ProgressCallback& progress = {},

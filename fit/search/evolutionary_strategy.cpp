@@ -8,7 +8,6 @@
 #include <sstream>
 #include <utility>
 
-#include "data/input_error.h"
 #include "fit/jobs/draws.h"
 
 namespace clothfit {
@@ -126,6 +125,9 @@ std::string describe(EvolutionStop stop, const EvolutionOptions& options,
                      const EvolutionState& state) {
   std::string text;
   switch (stop) {
+    case EvolutionStop::not_run:
+      text = "not run";
+      break;
     case EvolutionStop::reached_generations:
       text = "reached the last generation";
       break;
@@ -163,31 +165,12 @@ int EvolutionOptions::mutation_parent_count() const {
   return std::max(1, share_of(population, mutation_parents));
 }
 
-void EvolutionOptions::validate() const {
-  const auto say = [](const char* name, double value) {
-    return std::string(name) + " = " + number(value);
-  };
-  if (population < 2)
-    throw InputError("population", "population = " + std::to_string(population),
-                     "at least 2 individuals", "the founding paper has 100");
-  if (generations < 1)
-    throw InputError("generations", "generations = " + std::to_string(generations), "at least 1");
-  for (const auto& [name, share] :
-       {std::pair{"kept", kept}, {"mutated", mutated}, {"mutation_parents", mutation_parents}})
-    if (!(share >= 0 && share <= 1))
-      throw InputError(name, say(name, share), "a share of the population, 0 to 1");
-  if (kept + mutated > 1 + 1e-12 || kept_count() >= population)
-    throw InputError("kept", say("kept", kept) + " and " + say("mutated", mutated),
-                     "together at most 1, and someone new in each generation");
-  if (!(mutation_step > 0) || !std::isfinite(mutation_step))
-    throw InputError("mutation_step", say("mutation_step", mutation_step),
-                     "a share of the range, > 0");
-  if (gain_window < 1)
-    throw InputError("gain_window", "gain_window = " + std::to_string(gain_window),
-                     "at least 1 generation");
-  if (!(least_gain >= 0))
-    throw InputError("least_gain", say("least_gain", least_gain), "a share of the cost, >= 0");
-  if (std::isnan(cost_below)) throw InputError("cost_below", "not a number", "a cost");
+bool EvolutionOptions::valid() const {
+  const auto is_share = [](double share) { return share >= 0 && share <= 1; };
+  return population >= 2 && generations >= 1 && is_share(kept) && is_share(mutated) &&
+         is_share(mutation_parents) && kept + mutated <= 1 + 1e-12 && kept_count() < population &&
+         mutation_step > 0 && std::isfinite(mutation_step) && gain_window >= 1 && least_gain >= 0 &&
+         !std::isnan(cost_below);
 }
 
 bool EvolutionResult::usable() const {
@@ -197,7 +180,7 @@ bool EvolutionResult::usable() const {
 EvolutionState first_generation(const std::vector<SearchParameter>& parameters,
                                 const EvolutionOptions& options, const GenerationCost& cost,
                                 const std::vector<Eigen::VectorXd>& given) {
-  options.validate();
+  assert(options.valid());
   require_ranges(parameters);
   assert(static_cast<int>(given.size()) <= options.population);
 
@@ -257,7 +240,7 @@ EvolutionResult resume_evolution(const std::vector<SearchParameter>& parameters,
                                  const EvolutionOptions& options, const GenerationCost& cost,
                                  EvolutionState state, const ProgressCallback& progress,
                                  const EvolutionWatcher& after_generation) {
-  options.validate();
+  assert(options.valid());
   require_ranges(parameters);
   assert(!state.population.empty());
 

@@ -57,7 +57,7 @@ struct EvolutionOptions {
   int mutated_count() const;
   int crossed_count() const { return population - kept_count() - mutated_count(); }
   int mutation_parent_count() const;
-  void validate() const;  ///< throws InputError
+  bool valid() const;  ///< what a search asks of them
 };
 
 /// The origin of an individual in its generation.
@@ -100,6 +100,7 @@ EvolutionState next_generation(const std::vector<SearchParameter>& parameters,
                                const EvolutionState& state);
 
 enum class EvolutionStop {
+  not_run,
   reached_generations,
   cost_below,  ///< the best cost is as low as asked
   no_gain,     ///< the best cost hardly falls any more
@@ -107,7 +108,7 @@ enum class EvolutionStop {
 };
 
 struct EvolutionResult {
-  EvolutionStop stop = EvolutionStop::reached_generations;
+  EvolutionStop stop = EvolutionStop::not_run;
   std::string message;   ///< one line for a person
   EvolutionState state;  ///< the last generation, ranked; resume from here
   bool usable() const;   ///< at least one finite cost
@@ -118,8 +119,8 @@ struct EvolutionResult {
 using EvolutionWatcher = std::function<void(const EvolutionState&)>;
 
 /// Makes generations until a stopping rule holds. After each generation `after_generation`, when
-/// given, receives the state, then `progress`, when given, is told. Throws InputError for options
-/// or ranges that make no sense.
+/// given, receives the state, then `progress`, when given, is told. Throws InputError for ranges
+/// that make no sense.
 EvolutionResult evolve(const std::vector<SearchParameter>& parameters,
                        const EvolutionOptions& options, const GenerationCost& cost,
                        const ProgressCallback& progress = {},

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cassert>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -9,7 +10,6 @@
 #include <vector>
 
 #include "data/algebra/dense_factors.h"
-#include "data/input_error.h"
 #include "fit/jobs/draws.h"
 
 namespace clothfit {
@@ -41,8 +41,7 @@ double quantile(const std::vector<double>& sorted, double share) {
 }
 
 ChangeIntervals quantiles(const Eigen::MatrixXd& numbers, double level) {
-  if (!(level > 0 && level < 1))
-    throw InputError("level", std::to_string(level), "above 0 and below 1");
+  assert(level > 0 && level < 1);
   ChangeIntervals ends{Eigen::VectorXd::Constant(numbers.rows(), kNothing),
                        Eigen::VectorXd::Constant(numbers.rows(), kNothing)};
   for (Eigen::Index i = 0; i < numbers.rows(); ++i) {
@@ -59,11 +58,8 @@ ChangeIntervals quantiles(const Eigen::MatrixXd& numbers, double level) {
 
 }  // namespace
 
-void BootstrapOptions::validate() const {
-  if (replicates < kLeastReplicates)
-    throw InputError("bootstrap", std::to_string(replicates) + " replicates",
-                     "at least " + std::to_string(kLeastReplicates),
-                     "fewer do not reach the ends of a 90 % interval");
+bool BootstrapOptions::valid() const {
+  return replicates >= kLeastReplicates;
 }
 
 Eigen::VectorXd block_weights(const BootstrapOptions& options, int blocks, int replicate) {
@@ -81,7 +77,7 @@ Eigen::VectorXd block_weights(const BootstrapOptions& options, int blocks, int r
 
 Bootstrap bootstrap_linearised(const LinearisedFit& fit, const Eigen::VectorXi& block,
                                const BootstrapOptions& options) {
-  options.validate();
+  assert(options.valid());
   const BlockSums sums = sum_over_blocks(fit, block);
   const int p = sums.coordinates(), blocks = sums.blocks();
   Bootstrap result;

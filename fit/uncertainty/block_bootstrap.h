@@ -22,7 +22,7 @@ struct BootstrapOptions {
   int replicates = 999;  ///< >= 19; the ends of a 90 % interval scatter by 5 % of it at 999
   unsigned long long seed = 1;
 
-  void validate() const;  ///< throws InputError
+  bool valid() const;  ///< enough replicates
 };
 
 /// Returns the numbers of the blocks in one replicate. They depend on (seed, replicate) and the
@@ -41,7 +41,7 @@ struct Bootstrap {
 };
 
 /// Takes one Gauss-Newton step per replicate from the optimum at hand. `block` is as for
-/// sum_over_blocks(). Throws InputError as that does, and for options that make no sense.
+/// sum_over_blocks(). Throws InputError as that does.
 Bootstrap bootstrap_linearised(const LinearisedFit& fit, const Eigen::VectorXi& block,
                                const BootstrapOptions& options);
 

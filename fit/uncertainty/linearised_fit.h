@@ -15,8 +15,7 @@ struct LinearisedFit {
 
   int residuals() const { return static_cast<int>(residual.size()); }
   int coordinates() const { return static_cast<int>(jacobian.cols()); }
-  /// Throws InputError where sizes do not fit together, there is nothing, or numbers are not
-  /// finite.
+  /// Throws InputError for numbers that are not finite. Sizes must fit together.
   void validate() const;
 };
 
@@ -33,8 +32,8 @@ struct BlockSums {
 };
 
 /// Sums each block's part of the normal equations. `block` gives each residual the index of its
-/// block, 0 ... largest, each in use. Throws InputError otherwise, for fewer than two blocks, and
-/// for a fit that does not validate.
+/// block, 0 ... largest, each in use. Throws InputError for fewer than two blocks, and for
+/// numbers that are not finite.
 BlockSums sum_over_blocks(const LinearisedFit& fit, const Eigen::VectorXi& block);
 
 }  // namespace clothfit

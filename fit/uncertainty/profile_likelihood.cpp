@@ -2,10 +2,9 @@
 
 #include <algorithm>
 #include <boost/math/distributions/chi_squared.hpp>
+#include <cassert>
 #include <cmath>
 #include <string>
-
-#include "data/input_error.h"
 
 namespace clothfit {
 
@@ -113,15 +112,9 @@ FoundEnd find_end(RootOfRise& rise, double best, int direction, double room, dou
 
 }  // namespace
 
-void ProfileOptions::validate(double best) const {
-  if (!(level > 0 && level < 1))
-    throw InputError("level", std::to_string(level), "above 0 and below 1");
-  if (!(lower <= best && best <= upper && lower < upper))
-    throw InputError("profile", "an optimum outside its range", "lower <= optimum <= upper");
-  if (!(sigma > 0 && std::isfinite(sigma) && residual_variance > 0 && tolerance > 0))
-    throw InputError("profile", "sigma, residual variance or tolerance not above 0", "above 0");
-  if (most_evaluations < 3)
-    throw InputError("profile", std::to_string(most_evaluations) + " evaluations", "at least 3");
+bool ProfileOptions::valid(double best) const {
+  return level > 0 && level < 1 && lower <= best && best <= upper && lower < upper && sigma > 0 &&
+         std::isfinite(sigma) && residual_variance > 0 && tolerance > 0 && most_evaluations >= 3;
 }
 
 bool ProfileInterval::preferable() const {
@@ -132,9 +125,7 @@ bool ProfileInterval::preferable() const {
 
 ProfileInterval profile_interval(const ProfilePoint& best, const ProfiledCost& cost,
                                  const ProfileOptions& options) {
-  if (!best.usable || !std::isfinite(best.cost) || !std::isfinite(best.value))
-    throw InputError("profile", "a best point without a cost", "the optimum and its cost");
-  options.validate(best.value);
+  assert(best.usable && std::isfinite(best.cost) && options.valid(best.value));
   const double target =
       std::sqrt(boost::math::quantile(boost::math::chi_squared(1), options.level));
   // Sigma is for a variance of 1, as the Hessian gives it.

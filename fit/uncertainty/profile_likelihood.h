@@ -28,7 +28,8 @@ struct ProfileOptions {
   double tolerance = 1e-3;    ///< of an end, as a share of its distance
   int most_evaluations = 30;  ///< for each end
 
-  void validate(double best) const;  ///< throws InputError
+  /// Says whether they make sense around the optimum `best`.
+  bool valid(double best) const;
 };
 
 enum class ProfileEnd {
@@ -56,8 +57,8 @@ struct ProfileInterval {
 /// Finds both ends of the likelihood-ratio interval [bates1988]. In it the profiled cost is below
 /// the optimum's by less than residual_variance times half the quantile of chi-square with one
 /// degree of freedom. On each side the end is the nearest one that the steps meet from the optimum
-/// outward. A profile with several basins may go on beyond it. Throws InputError for options that
-/// make no sense and a best point that is not usable.
+/// outward. A profile with several basins may go on beyond it. `best` must be
+/// usable, and the options valid for it.
 ProfileInterval profile_interval(const ProfilePoint& best, const ProfiledCost& cost,
                                  const ProfileOptions& options);
 

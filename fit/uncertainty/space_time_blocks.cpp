@@ -2,11 +2,9 @@
 
 #include <algorithm>
 #include <array>
+#include <cassert>
 #include <cmath>
-#include <string>
 #include <vector>
-
-#include "data/input_error.h"
 
 namespace clothfit {
 
@@ -24,11 +22,6 @@ struct Extent {
     return std::min(count - 1, static_cast<int>((place - least) / length * count));
   }
 };
-
-void require_positive(const BlockCounts& counts) {
-  if (std::min({counts.along_s, counts.along_t, counts.in_time}) < 1)
-    throw InputError("blocks", "a number of blocks below 1", "1 or more along s, t and time");
-}
 
 /// Means of one component of the residuals over the cells of a grid.
 struct CellMeans {
@@ -82,21 +75,15 @@ int range_in_cells(const std::vector<CellMeans>& components, size_t direction) {
 
 }  // namespace
 
-void ObservationPlaces::validate() const {
+bool ObservationPlaces::valid() const {
   const auto n = s_m.size();
-  if (n == 0 || t_m.size() != n || time_s.size() != n || component.size() != n)
-    throw InputError("places of observations", "lists of different lengths, or none",
-                     "s, t, time and component for each residual");
-  if (!s_m.allFinite() || !t_m.allFinite() || !time_s.allFinite())
-    throw InputError("places of observations", "a place that is not finite", "metres and seconds");
-  if (component.minCoeff() < 0 || component.maxCoeff() > 2)
-    throw InputError("places of observations", "a component that is not 0, 1 or 2",
-                     "which coordinate of its observation a residual is");
+  return n > 0 && t_m.size() == n && time_s.size() == n && component.size() == n &&
+         s_m.allFinite() && t_m.allFinite() && time_s.allFinite() && component.minCoeff() >= 0 &&
+         component.maxCoeff() <= 2;
 }
 
 SpaceTimeBlocks space_time_blocks(const ObservationPlaces& places, const BlockCounts& counts) {
-  places.validate();
-  require_positive(counts);
+  assert(places.valid() && counts.valid());
   const Extent s = Extent::of(places.s_m), t = Extent::of(places.t_m),
                time = Extent::of(places.time_s);
 
@@ -120,10 +107,7 @@ SpaceTimeBlocks space_time_blocks(const ObservationPlaces& places, const BlockCo
 CorrelationRanges correlation_ranges(const ObservationPlaces& places,
                                      const Eigen::VectorXd& residual) {
   constexpr std::array<int, 3> kCells{8, 8, 32};
-  places.validate();
-  if (residual.size() != places.s_m.size() || !residual.allFinite())
-    throw InputError("residuals", std::to_string(residual.size()) + " of them, or not finite",
-                     "one for each of " + std::to_string(places.s_m.size()) + " places");
+  assert(places.valid() && residual.size() == places.s_m.size() && residual.allFinite());
   const Extent s = Extent::of(places.s_m), t = Extent::of(places.t_m),
                time = Extent::of(places.time_s);
 
@@ -151,15 +135,9 @@ CorrelationRanges correlation_ranges(const ObservationPlaces& places,
 
 BlockCounts choose_block_counts(const ObservationPlaces& places, const Eigen::VectorXd& residual,
                                 const BlockLimits& limits) {
-  require_positive(limits.least);
-  const auto ordered = [](int least, int most) {
-    if (least > most)
-      throw InputError("blocks", "a least number of blocks above the largest", "least <= most");
-  };
-  ordered(limits.least.along_s, limits.most.along_s);
-  ordered(limits.least.along_t, limits.most.along_t);
-  ordered(limits.least.in_time, limits.most.in_time);
-
+  assert(limits.least.valid() && limits.least.along_s <= limits.most.along_s &&
+         limits.least.along_t <= limits.most.along_t &&
+         limits.least.in_time <= limits.most.in_time);
   const CorrelationRanges ranges = correlation_ranges(places, residual);
   const auto count = [](const Eigen::VectorXd& along, double range, int least, int most) {
     const double length = Extent::of(along).length;

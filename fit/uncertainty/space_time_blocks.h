@@ -10,14 +10,15 @@ struct ObservationPlaces {
   Eigen::VectorXd time_s;     ///< of the frame
   Eigen::VectorXi component;  ///< which coordinate of its observation a residual is, 0 ... 2
 
-  /// Throws InputError where sizes differ, there is nothing, or numbers make no sense.
-  void validate() const;
+  /// Says whether there is a finite place for each of at least one residual.
+  bool valid() const;
 };
 
 /// Numbers of parts of equal length into which each direction is cut.
 struct BlockCounts {
   int along_s = 1, along_t = 1;  ///< >= 1
   int in_time = 1;               ///< >= 1
+  bool valid() const { return along_s >= 1 && along_t >= 1 && in_time >= 1; }
 };
 
 /// A partition of residuals into blocks that are cuboids over the cloth and time.
@@ -26,8 +27,8 @@ struct SpaceTimeBlocks {
   int count = 0;          ///< blocks with at least one residual; empty ones have no index
 };
 
-/// Cuts what the places span, from the least to the largest in each direction. Throws InputError
-/// for counts below 1 and places that do not validate.
+/// Cuts what the places span, from the least to the largest in each direction. Counts and
+/// places must be valid.
 SpaceTimeBlocks space_time_blocks(const ObservationPlaces& places, const BlockCounts& counts);
 
 /// The distance, in each direction, from which on two residuals tell nothing of each other. It is

@@ -387,16 +387,22 @@ class Frames {
   Frames(const Cloth& cloth, const ParameterSet& set) : cloth_(cloth), set_(set) {}
   void add(const LaneState<SingleLane>& state) {
     Eigen::Matrix3Xd now = state.position_m.lane(0);
-    if (result_.usable() && left_the_scene(now, set_.start_position_m, cloth_.mesh)) {
+    if (is_running() && left_the_scene(now, set_.start_position_m, cloth_.mesh)) {
       result_.reason = StopReason::diverged;
       result_.diverged_frame = static_cast<int>(result_.position_m.size());
     }
-    if (!result_.usable()) now.setConstant(NAN);
+    if (!is_running()) now.setConstant(NAN);
     result_.position_m.push_back(std::move(now));
   }
-  SimulateResult& result() { return result_; }
+  /// Returns the run, which is over. Call it once.
+  SimulateResult take_result() {
+    if (is_running()) result_.reason = StopReason::reached_end;
+    return std::move(result_);
+  }
 
  private:
+  bool is_running() const { return result_.reason == StopReason::not_run; }
+
   const Cloth& cloth_;
   const ParameterSet& set_;
   SimulateResult result_;
@@ -413,7 +419,7 @@ SimulateResult simulate_with_fields(const Cloth& cloth, const ParameterSet& para
     run.forward(step);
     if (step.ends_frame) frames.add(run.state());
   }
-  return std::move(frames.result());
+  return frames.take_result();
 }
 
 GradientResult simulate_with_gradient(const Cloth& cloth, const ParameterSet& parameters,
@@ -437,7 +443,7 @@ GradientResult simulate_with_gradient(const Cloth& cloth, const ParameterSet& pa
     if (steps[n].ends_frame) frames.add(run.state());
   }
   GradientResult result;
-  result.run = std::move(frames.result());
+  result.run = frames.take_result();
   if (!result.run.usable()) return result;
 
   std::vector<Eigen::Matrix3Xd> by_position;

@@ -116,6 +116,9 @@ std::vector<SimulateResult> simulate(const Cloth& cloth, std::span<const Paramet
   std::vector<SimulateResult> results(parameters.size());
   const size_t frames = schedule.frame_time_s.size();
   const bool limited = cloth.strain_limit.mode != StrainLimitMode::off;
+  const auto is_running = [](const SimulateResult& result) {
+    return result.reason == StopReason::not_run;
+  };
   const auto run_group = [&]<class L>(std::span<const ParameterSet> group, size_t first) {
     LaneRun<L> run(cloth, group);
     for (size_t l = 0; l < group.size(); ++l) results[first + l].position_m.reserve(frames);
@@ -127,21 +130,21 @@ std::vector<SimulateResult> simulate(const Cloth& cloth, std::span<const Paramet
       for (size_t l = 0; l < group.size(); ++l) {
         SimulateResult& result = results[first + l];
         Eigen::Matrix3Xd now = run.state().position_m.lane(static_cast<int>(l));
-        if (result.usable() && left_the_scene(now, group[l].start_position_m, cloth.mesh)) {
+        if (is_running(result) && left_the_scene(now, group[l].start_position_m, cloth.mesh)) {
           result.reason = StopReason::diverged;
           result.diverged_frame = static_cast<int>(frame);
         }
-        if (!result.usable()) now.setConstant(NAN);
-        if (limited && frame > 0 && result.usable()) {
+        if (!is_running(result)) now.setConstant(NAN);
+        if (limited && frame > 0 && is_running(result)) {
           result.largest_excess =
               std::max(result.largest_excess, largest_excess(cloth, group[l].springs, now));
           result.unmet_steps = run.unmet_steps(static_cast<int>(l));
         }
-        any_alive = any_alive || result.usable();
+        any_alive = any_alive || is_running(result);
         result.position_m.push_back(std::move(now));
         if (schedule.velocities) {
           result.velocity_m_per_s.push_back(run.state().velocity_m_per_s.lane(static_cast<int>(l)));
-          if (!result.usable()) result.velocity_m_per_s.back().setConstant(NAN);
+          if (!is_running(result)) result.velocity_m_per_s.back().setConstant(NAN);
         }
       }
       const bool stop = after_frame && frame + 1 < frames && !after_frame(static_cast<int>(frame));
@@ -149,12 +152,14 @@ std::vector<SimulateResult> simulate(const Cloth& cloth, std::span<const Paramet
       const Eigen::Matrix3Xd none = Eigen::Matrix3Xd::Constant(3, cloth.mesh.vertex_count(), NAN);
       for (size_t l = 0; l < group.size(); ++l) {
         SimulateResult& result = results[first + l];
-        if (result.usable() && frame + 1 < frames) result.reason = StopReason::cancelled;
+        if (is_running(result) && frame + 1 < frames) result.reason = StopReason::cancelled;
         result.position_m.resize(frames, none);
         if (schedule.velocities) result.velocity_m_per_s.resize(frames, none);
       }
       break;
     }
+    for (size_t l = 0; l < group.size(); ++l)
+      if (is_running(results[first + l])) results[first + l].reason = StopReason::reached_end;
   };
   if (precision == Precision::exact)
     for_lane_groups<ExactLanes>(parameters, run_group);

@@ -18,10 +18,10 @@ struct Schedule {
   int substeps(int frame) const;
 };
 
-enum class StopReason { reached_end, diverged, cancelled };
+enum class StopReason { not_run, reached_end, diverged, cancelled };
 
 struct SimulateResult {
-  StopReason reason = StopReason::reached_end;
+  StopReason reason = StopReason::not_run;
   int diverged_frame = -1;  ///< first frame that is not finite or left the scene
   /// Measures of how well the strain limit was kept; 0 without one.
   double largest_excess = 0;  ///< elongation beyond the critical one, of any spring at any frame

@@ -40,9 +40,10 @@ TangentResult run_chunk(const Cloth& cloth, const ParameterSet& set,
   TangentResult result;
   result.position_tangent.resize(directions.size());
   if (schedule.velocities) result.velocity_tangent.resize(directions.size());
+  const auto is_running = [&] { return result.run.reason == StopReason::not_run; };
   const size_t frames = schedule.frame_time_s.size();
   for (size_t frame = 0; frame < frames; ++frame) {
-    if (frame > 0 && result.run.usable()) {
+    if (frame > 0 && is_running()) {
       const double from_s = schedule.frame_time_s[frame - 1];
       const int steps = schedule.substeps(static_cast<int>(frame));
       const double h = (schedule.frame_time_s[frame] - from_s) / steps;
@@ -52,21 +53,21 @@ TangentResult run_chunk(const Cloth& cloth, const ParameterSet& set,
       }
     }
     Eigen::Matrix3Xd now = state.value.position_m.lane(0);
-    if (result.run.usable() && left_the_scene(now, set.start_position_m, cloth.mesh)) {
+    if (is_running() && left_the_scene(now, set.start_position_m, cloth.mesh)) {
       result.run.reason = StopReason::diverged;
       result.run.diverged_frame = static_cast<int>(frame);
     }
-    if (!result.run.usable()) now.setConstant(NAN);
+    if (!is_running()) now.setConstant(NAN);
     result.run.position_m.push_back(std::move(now));
     for (size_t d = 0; d < directions.size(); ++d) {
       Eigen::Matrix3Xd tangent =
           state.tangent[d / kLanes].position_m.lane(static_cast<int>(d % kLanes));
-      if (!result.run.usable()) tangent.setConstant(NAN);
+      if (!is_running()) tangent.setConstant(NAN);
       result.position_tangent[d].push_back(std::move(tangent));
     }
     if (!schedule.velocities) continue;
     const auto kept = [&](Eigen::Matrix3Xd values) {
-      if (!result.run.usable()) values.setConstant(NAN);
+      if (!is_running()) values.setConstant(NAN);
       return values;
     };
     result.run.velocity_m_per_s.push_back(kept(state.value.velocity_m_per_s.lane(0)));
@@ -74,6 +75,7 @@ TangentResult run_chunk(const Cloth& cloth, const ParameterSet& set,
       result.velocity_tangent[d].push_back(
           kept(state.tangent[d / kLanes].velocity_m_per_s.lane(static_cast<int>(d % kLanes))));
   }
+  if (is_running()) result.run.reason = StopReason::reached_end;
   return result;
 }
 

@@ -46,6 +46,8 @@ std::string verdict_text(const Diagnosis& diagnosis) {
              ". With that, structure still remains that no tested effect explains.";
     case DiagnosisVerdict::unexplained:
       return "Something is missing, and no tested effect explains it.";
+    case DiagnosisVerdict::not_reached:
+      return "The diagnosis did not come to an end.";
   }
   return "";
 }

@@ -11,7 +11,6 @@
 #include <limits>
 #include <random>
 
-#include "data/input_error.h"
 #include "fit/jobs/stop_token.h"
 #include "fit/problem/parameterised_model.h"
 #include "fit/refine/refine.h"
@@ -378,24 +377,6 @@ TEST(ShootingFit, EndsSoonWhenItIsCancelled) {
                StopRequested);
 
   EXPECT_EQ(calls, 2);
-}
-
-TEST(ShootingObjective, RefusesWindowsThatDoNotFit) {
-  const ExactWindows exact(shot_problem(1), 5, 3);
-  const auto make = [&](const ShootingWindows& windows, const Continuity& continuity) {
-    return ShootingObjective(exact.problem, exact.problem.frames(), exact.steps, windows,
-                             continuity);
-  };
-  ShootingWindows falling = exact.windows, fine = exact.windows, short_of_one = exact.windows;
-  std::swap(falling.first_frame[1], falling.first_frame[2]);
-  fine.nodes = 6;  // for a mesh of 5 x 5
-  short_of_one.position_m.pop_back();
-
-  EXPECT_NO_THROW(make(exact.windows, {1e-3, 1e-2}));
-  EXPECT_THROW(make(falling, {1e-3, 1e-2}), InputError);
-  EXPECT_THROW(make(fine, {1e-3, 1e-2}), InputError);
-  EXPECT_THROW(make(short_of_one, {1e-3, 1e-2}), InputError);
-  EXPECT_THROW(make(exact.windows, {0, 1e-2}), InputError);
 }
 
 }  // namespace

@@ -14,7 +14,6 @@
 #include <stdexcept>
 #include <thread>
 
-#include "data/input_error.h"
 #include "fit/jobs/draws.h"
 #include "tests/data/temporary_folder.h"
 
@@ -246,10 +245,6 @@ TEST(Executor, RethrowsWhatProgressThrows) {
                          }),
                  std::logic_error);
   }
-}
-
-TEST(Executor, RefusesANegativeNumberOfThreads) {
-  EXPECT_THROW(execute(1, uneven_piece, {.threads = -1}), InputError);
 }
 
 }  // namespace

@@ -169,7 +169,7 @@ TEST(Journal, RefusesAnotherRunsJournalAndLeavesItAsItIs) {
       "hidden=gust`",
       [&] { Journal(folder / "fields", key(5, "gust"), JournalStart::resume); });
   expect_refused(folder,
-                 "journal: exists; a new file, for this run starts from scratch; give --resume",
+                 "journal: exists; a new file, for this run starts from scratch; go on with it",
                  [&] { Journal(folder / "journal", kKey, JournalStart::fresh); });
   EXPECT_EQ(read_text(folder / "journal"), before);
 }

@@ -218,10 +218,11 @@ TEST(MarkerOffsets, AreRefusedOfPixelsOfAForecastAndBelowZero) {
   FitOptions options = with_offsets(0.01);
   options.observations = ObservationKind::tracks2d;
   EXPECT_THAT([&] { make_problem(synthetic_input({}), options, 5, 5); },
-              ThrowsMessage<InputError>(HasSubstr("--marker-offsets: the fit looks at pixels")));
+              ThrowsMessage<InputError>(
+                  HasSubstr("FitOptions::marker_offset_sigma_m: the fit looks at pixels")));
   options.marker_offset_sigma_m = -0.01;
   EXPECT_THAT([&] { options.validate(); },
-              ThrowsMessage<InputError>(HasSubstr("--marker-offsets")));
+              ThrowsMessage<InputError>(HasSubstr("FitOptions::marker_offset_sigma_m")));
   options.marker_offset_sigma_m = 0.01;
   options.forecast.emplace();
   EXPECT_THAT([&] { options.validate(); },

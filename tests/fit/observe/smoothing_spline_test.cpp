@@ -12,8 +12,6 @@
 #include <numeric>
 #include <random>
 
-#include "data/input_error.h"
-
 namespace clothfit {
 namespace {
 
@@ -395,14 +393,6 @@ TEST(SmoothingSpline, MakesDoWithFewSamples) {
   // One second difference says nothing of its own smoothness: the straighter path is taken.
   const SmoothingSpline three = fit_smoothing_spline({0, 1, 2}, Eigen::RowVector3d(0, 1, 0));
   EXPECT_NEAR(three.position(1)(0), 1.0 / 3, 0.05);
-}
-
-TEST(SmoothingSpline, RefusesOptionsThatMakeNoSense) {
-  const std::vector<double> time_s = {0, 1, 2};
-  EXPECT_THROW(fit_smoothing_spline(time_s, Eigen::RowVector3d(0, 1, 0), {}, {.smoothing = 0.0}),
-               InputError);
-  EXPECT_THROW(fit_smoothing_spline(time_s, Eigen::RowVector3d(0, 1, 0), {}, {.reject_beyond = -1}),
-               InputError);
 }
 
 }  // namespace

@@ -351,7 +351,6 @@ TEST(PooledFit, RefusesRecordingsOfDifferentPhysics) {
 
   EXPECT_THROW(fit_pooled(problems, truth(), {}, {}), InputError);
   EXPECT_THROW(fit_pooled(turned, truth(), {}, {}), InputError);
-  EXPECT_THROW(fit_pooled({}, truth(), {}, {}), InputError);
 }
 
 }  // namespace

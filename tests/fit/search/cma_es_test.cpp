@@ -259,15 +259,9 @@ TEST(CmaEs, MeasuresHowFarItsIndividualsDiffer) {
   EXPECT_NEAR(diversity(state), 0.3 * std::sqrt(8.0), 1e-15);
 }
 
-TEST(CmaEs, RefusesOptionsAndRangesThatMakeNoSense) {
-  const auto parameters = ranges(2, 0, 1);
+TEST(CmaEs, RefusesRangesThatMakeNoSense) {
   EXPECT_THROW(start_cma({}, {}), InputError);
   EXPECT_THROW(start_cma(ranges(2, 1, 1), {}), InputError);
-  EXPECT_THROW(start_cma(parameters, {.population = 3}), InputError);
-  EXPECT_THROW(start_cma(parameters, {.initial_step = 0}), InputError);
-  EXPECT_THROW(start_cma(parameters, {.restarts = -1}), InputError);
-  EXPECT_THROW(start_cma(parameters, {.growth = 0.5}), InputError);
-  EXPECT_THROW(start_cma(parameters, {.most_evaluations = 0}), InputError);
 }
 
 }  // namespace

@@ -9,7 +9,6 @@
 #include <cmath>
 #include <limits>
 
-#include "data/input_error.h"
 #include "fit/uncertainty/cluster_covariance.h"
 #include "fit/uncertainty/space_time_blocks.h"
 #include "tests/fit/smooth_misfit.h"
@@ -143,16 +142,6 @@ TEST(BlockBootstrap, HasNoEstimateWhereTheDataSayNothing) {
   const Bootstrap bootstrap = bootstrap_linearised(fit, nine_blocks(), kWild);
   EXPECT_EQ(bootstrap.failed, kWild.replicates);
   EXPECT_TRUE(std::isnan(studentised_intervals(bootstrap, 0.9).lower[0]));
-}
-
-TEST(BlockBootstrap, RefusesBadInput) {
-  const LinearisedFit fit = draw_misfit({}, 1, 0).fit;
-  BootstrapOptions few = kWild;
-  few.replicates = 10;
-  EXPECT_THROW(bootstrap_linearised(fit, nine_blocks(), few), InputError);
-  EXPECT_THROW(bootstrap_linearised(fit, Eigen::VectorXi::Zero(3), kWild), InputError);
-  EXPECT_THROW(percentile_intervals(bootstrap_linearised(fit, nine_blocks(), kWild), 1),
-               InputError);
 }
 
 }  // namespace

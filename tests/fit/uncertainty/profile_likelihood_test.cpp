@@ -10,7 +10,6 @@
 #include <array>
 #include <cmath>
 
-#include "data/input_error.h"
 #include "fit/jobs/draws.h"
 
 namespace clothfit {
@@ -186,18 +185,6 @@ TEST(ProfileLikelihood, CoversWhereTheSymmetricIntervalDoesNot) {
   EXPECT_NEAR(by_profile / 1000.0, 0.9, 0.03);
   EXPECT_LT(by_sigma / 1000.0, 0.87);
   EXPECT_GT(longer_upwards, 900);
-}
-
-TEST(ProfileLikelihood, RefusesBadInput) {
-  const ProfiledCost cost = [](double value, const Eigen::VectorXd&) {
-    return point(value, 0.5 * value * value);
-  };
-  const ProfilePoint best = point(0, 0);
-  EXPECT_THROW(profile_interval({}, cost, {.lower = -1, .upper = 1, .sigma = 1}), InputError);
-  EXPECT_THROW(profile_interval(best, cost, {.lower = 1, .upper = 2, .sigma = 1}), InputError);
-  EXPECT_THROW(profile_interval(best, cost, {.lower = -1, .upper = 1, .sigma = 0}), InputError);
-  EXPECT_THROW(profile_interval(best, cost, {.level = 1, .lower = -1, .upper = 1, .sigma = 1}),
-               InputError);
 }
 
 }  // namespace

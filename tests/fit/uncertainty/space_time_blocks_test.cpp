@@ -8,7 +8,6 @@
 #include <cmath>
 #include <numbers>
 
-#include "data/input_error.h"
 #include "fit/jobs/draws.h"
 #include "tests/fit/smooth_misfit.h"
 
@@ -91,22 +90,6 @@ TEST(BlockCounts, AreFewWhereResidualsReachFarAndManyWhereTheyDoNot) {
   EXPECT_EQ(many.along_t, 3);
   EXPECT_EQ(few.in_time, 1);
   EXPECT_EQ(many.in_time, 1);
-}
-
-TEST(SpaceTimeBlocks, RefuseBadInput) {
-  const ObservationPlaces places = misfit_places();
-  EXPECT_THROW(space_time_blocks(places, {.along_s = 0}), InputError);
-  EXPECT_THROW(space_time_blocks({}, {}), InputError);
-  ObservationPlaces wrong = places;
-  wrong.component[7] = 3;
-  EXPECT_THROW(space_time_blocks(wrong, {}), InputError);
-  wrong = places;
-  wrong.time_s[0] = std::nan("");
-  EXPECT_THROW(space_time_blocks(wrong, {}), InputError);
-  EXPECT_THROW(correlation_ranges(places, Eigen::VectorXd::Zero(3)), InputError);
-  EXPECT_THROW(choose_block_counts(places, Eigen::VectorXd::Zero(places.s_m.size()),
-                                   {.least = {.along_s = 4}, .most = {.along_s = 3}}),
-               InputError);
 }
 
 }  // namespace
