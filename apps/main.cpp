@@ -7,6 +7,7 @@
 #include "apps/terminal/command_line.h"
 #include "apps/terminal/exit_code.h"
 #include "apps/terminal/interrupt.h"
+#include "apps/terminal/option_flags.h"
 #include "apps/terminal/version.h"
 #include "apps/verbs/verb.h"
 #include "data/input_error.h"
@@ -37,7 +38,7 @@ int run(int argc, char** argv) {
     clothfit::catch_interrupts();
     return parsed.action();
   } catch (const clothfit::InputError& error) {
-    spdlog::error("{}", error.what());
+    spdlog::error("{}", clothfit::with_flags(error.what()));
     return clothfit::kExitBadInput;
   } catch (const clothfit::NoResult& error) {
     spdlog::error("{}", error.what());

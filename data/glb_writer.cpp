@@ -244,7 +244,7 @@ void write_glb(const MeshSequence& mesh, const std::filesystem::path& file) {
   const std::string bytes = writer.bytes();
   if (bytes.empty())
     throw InputError(file.string(), "would be longer than the 4 GiB that glTF allows",
-                     "fewer frames or a smaller mesh", "use --format pc2");
+                     "fewer frames or a smaller mesh", "write pc2 instead");
   write_text(bytes, file);
 }
 

@@ -44,11 +44,11 @@ void require_replaceable(const fs::path& final_path) {
   if (!fs::exists(status)) return;
   if (!fs::is_directory(status))
     throw InputError(final_path.string(), "exists and is not a folder", "a folder to write to",
-                     "choose another --out");
+                     "name another folder");
   if (!fs::exists(final_path / kPublishedMark, error))
     throw InputError(final_path.string(), "exists and was not written by clothfit",
                      "a new folder or an older result",
-                     "choose another --out, or move that folder away");
+                     "name another folder, or move that folder away");
 }
 
 /// Removes the folders that killed runs left beside `final_path`. A folder that cannot be removed
@@ -73,7 +73,7 @@ void remove_stale(const fs::path& final_path) {
 
 [[noreturn]] void refuse(const fs::path& path, const std::string& what, int error_number) {
   throw InputError(path.string(), what + ": " + std::strerror(error_number),
-                   "a writable folder with room on its disk", "choose another --out");
+                   "a writable folder with room on its disk", "name another folder");
 }
 
 void sync(const fs::path& path) {
@@ -114,7 +114,8 @@ bool move_to_free(const fs::path& from, const fs::path& to) {
 }  // namespace
 
 OutputFolder::OutputFolder(fs::path final_path) {
-  if (final_path.empty()) throw InputError("--out", "is empty", "the name of a folder");
+  if (final_path.empty())
+    throw InputError("folder for the results", "the name is empty", "the name of a folder");
   final_path_ = resolved(final_path);
   const fs::path parent = final_path_.parent_path();
   std::error_code error;
@@ -136,7 +137,7 @@ OutputFolder::~OutputFolder() {
 
 void OutputFolder::publish() {
   assert(!published_);
-  write_text("Written by clothfit; a later run with the same --out replaces this folder.\n",
+  write_text("Written by clothfit; a later run that writes here replaces this folder.\n",
              work_path_ / kPublishedMark);
   try {
     sync_tree(work_path_);

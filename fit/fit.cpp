@@ -113,8 +113,9 @@ std::pair<int, int> mesh_of(const ClothDescription& cloth, const FitOptions& opt
   const std::pair<int, int> mesh{options.mesh_columns > 0 ? options.mesh_columns : suggested.first,
                                  options.mesh_rows > 0 ? options.mesh_rows : suggested.second};
   if (of_one_mesh && mesh != suggested)
-    throw InputError("--mesh", "the natural lengths of the earlier fit are those of its own mesh",
-                     fmt::format("{}x{}", suggested.first, suggested.second), "leave --mesh out");
+    throw InputError("FitOptions::mesh_columns",
+                     "the natural lengths of the earlier fit are those of its own mesh",
+                     fmt::format("{}x{}", suggested.first, suggested.second), "leave it out");
   return mesh;
 }
 

@@ -392,7 +392,7 @@ Eigen::VectorXd given_start(const FitProblem& problem, const std::map<std::strin
   for (const auto& [name, value] : given) {
     const int p = problem.space.index(name);
     if (p < 0)
-      throw InputError("--start", "the fit has no parameter '" + name + "'",
+      throw InputError("FitOptions::start", "the fit has no parameter '" + name + "'",
                        "a fit of the same parameter set and effects");
     const FitParameter& parameter = problem.space.parameters[static_cast<size_t>(p)];
     values[p] = std::clamp(value, parameter.lower, parameter.upper);

@@ -143,7 +143,7 @@ DriveCorrection make_drive_correction(const std::vector<TrackedPoint>& tracked, 
                                    correction.basis->time_s.begin() + knots);
   double sum_of_variances = 0;
   for (const TrackedPoint& point : tracked) {
-    const Eigen::MatrixXd covariance = path_covariance(point, knot_s, "--drive-knots");
+    const Eigen::MatrixXd covariance = path_covariance(point, knot_s, "FitOptions::drive_knots");
     const std::string& marker = markers.markers[static_cast<size_t>(point.marker)].name;
     const int first = space.size();
     DriveCorrection::Point corrected{.held = point.held, .values = {}};

@@ -76,9 +76,9 @@ void add_observations(const FitInput& input, const FitOptions& options, FitProbl
 void add_marker_offsets(const FitOptions& options, FitProblem& problem) {
   if (options.marker_offset_sigma_m == 0) return;
   if (problem.observations.front().dimension != 3)
-    throw InputError("--marker-offsets", "the fit looks at pixels",
+    throw InputError("FitOptions::marker_offset_sigma_m", "the fit looks at pixels",
                      "3D tracks: an offset is a constant in space",
-                     "leave it out, or fit 3D tracks (--observations tracks3d)");
+                     "leave it out, or take FitOptions::observations = tracks3d");
   problem.marker_offset_sigma_m = options.marker_offset_sigma_m;
 }
 
@@ -97,7 +97,7 @@ void add_given_priors(const FitOptions& options, FitProblem& problem) {
     if (is_listed(parameter.role)) known.push_back(parameter.name);
   std::vector<std::string> told;
   for (const ParameterPrior& prior : options.priors) {
-    const std::string where = "--prior " + prior.name;
+    const std::string where = "FitOptions::priors = " + prior.name;
     const int p = problem.space.index(prior.name);
     if (p < 0)
       throw InputError(where, "the fit has no such parameter", known_names(prior.name, known));

@@ -9,7 +9,7 @@ void add_drive_correction(const std::vector<TrackedPoint>& tracked, const Record
                           const FitOptions& options, FitProblem& problem) {
   if (options.drive_knots == 0) return;
   if (tracked.empty())
-    throw InputError("--drive-knots",
+    throw InputError("FitOptions::drive_knots",
                      "no held point of " + recording_file(recording) + " is tracked",
                      "a held point with motion: tracked",
                      "leave it out: fixed points and known paths have no noise");

@@ -16,6 +16,9 @@
 namespace clothfit {
 namespace {
 
+/// Where an effect is named that no recording declares.
+const std::string kAskedFor = "FitOptions::effects";
+
 /// Adds an effect of the measurement. Its parameters are bound to `given` values, else to the fit.
 void add_measurement_effect(const MeasurementEffectEntry& entry, const std::string& where,
                             const std::map<std::string, std::vector<double>>& given,
@@ -58,8 +61,8 @@ void add_effect(const std::string& name, const std::string& where,
                 FitProblem& problem) {
   require_effect(name, where);
   if (const MeasurementEffectEntry* entry = measurement_effect_named(name)) {
-    if (options.forecast && where == "--effect")
-      throw InputError("--effect " + name, "asked for in a forecast, which fits nothing",
+    if (options.forecast && where == kAskedFor)
+      throw InputError(kAskedFor + (" = " + name), "asked for in a forecast, which fits nothing",
                        "a value that the recording declares", "leave it out");
     return add_measurement_effect(*entry, where, given, options, problem);
   }
@@ -73,8 +76,9 @@ void add_effect(const std::string& name, const std::string& where,
     if (value != values.end()) {
       binding.constant = value->second;
     } else if (options.forecast) {
-      throw InputError("--forecast", "the fit holds no value for " + name + "." + parameter.name,
-                       "a forecast fits nothing", "fit with --effect " + name + " first");
+      throw InputError(
+          "FitOptions::forecast", "the fit holds no value for " + name + "." + parameter.name,
+          "a forecast fits nothing", "fit with FitOptions::effects = " + name + " first");
     } else {
       binding.parameter = problem.space.size();
       problem.space.parameters.push_back({.name = name + "." + parameter.name,
@@ -105,7 +109,7 @@ class EffectUnknowns final : public UnknownGroup {
         std::map<std::string, std::vector<double>> given;
         for (const ParameterEstimate& parameter : effect.parameters)
           given[parameter.name] = {parameter.value};
-        add_effect(effect.name, "--forecast", given, options, problem);
+        add_effect(effect.name, "FitOptions::forecast", given, options, problem);
         present.push_back(effect.name);
       }
     }
@@ -118,7 +122,7 @@ class EffectUnknowns final : public UnknownGroup {
     }
     for (const std::string& name : options.effects) {
       if (!absent(name)) continue;
-      add_effect(name, "--effect", {}, options, problem);
+      add_effect(name, kAskedFor, {}, options, problem);
       present.push_back(name);
     }
     add_derivative_weights(problem);

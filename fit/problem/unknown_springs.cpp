@@ -56,7 +56,8 @@ class SpringUnknowns final : public UnknownGroup {
         const auto& known = options.forecast->parameters;
         const auto found = std::ranges::find(known, number.name, &ParameterEstimate::name);
         if (found == known.end())
-          throw InputError("--forecast", "the fit holds no parameter '" + number.name + "'",
+          throw InputError("FitOptions::forecast",
+                           "the fit holds no parameter '" + number.name + "'",
                            "a fit.json of the parameter set " + to_string(problem.spring_set));
         binding.constant = found->value;
       } else {

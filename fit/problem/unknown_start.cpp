@@ -17,7 +17,7 @@ class StartUnknowns final : public UnknownGroup {
   void declare(const ProblemSource& source, FitProblem& problem) const override {
     if (problem.start != StartKind::unknown) return;
     if (source.options.forecast)
-      throw InputError("--forecast", "the recording begins with the cloth in motion",
+      throw InputError("FitOptions::forecast", "the recording begins with the cloth in motion",
                        "a start that is known without a fit",
                        "fit the recording, or cut it so that it begins with the cloth at rest");
     problem.start_state =

@@ -128,7 +128,8 @@ TEST(OutputFolder, NeedsAFolderToStandIn) {
 
   expect_refused(folder, "none/a.fit: the folder ", [&] { OutputFolder(folder / "none/a.fit"); });
   expect_refused(folder, "file/a.fit: the folder ", [&] { OutputFolder(folder / "file/a.fit"); });
-  expect_refused(folder, "--out: is empty", [&] { OutputFolder(fs::path()); });
+  expect_refused(folder, "folder for the results: the name is empty",
+                 [&] { OutputFolder(fs::path()); });
 }
 
 TEST(OutputFolder, MayBeNamedRelativeToTheCurrentFolderOrWithASlashBehind) {

@@ -14,6 +14,7 @@
 #include "apps/study/recordings/study_row_json.h"
 #include "apps/terminal/exit_code.h"
 #include "apps/terminal/interrupt.h"
+#include "apps/terminal/option_flags.h"
 #include "apps/terminal/version.h"
 #include "data/input_error.h"
 #include "data/text_file.h"
@@ -198,7 +199,7 @@ std::vector<StudyRow> fit_one(const fs::path& folder, const StudiedModel& model,
     row.reason = report.message;
   } catch (const InputError& error) {
     row.stop = "refused";
-    row.reason = error.what();
+    row.reason = with_flags(error.what());
   }
   return {row};
 }

@@ -152,8 +152,9 @@ TEST(PathCovariance, RefusesATrackThatSaysNothingOfItsNoise) {
   point.path = std::make_shared<const SmoothingSpline>(
       fit_smoothing_spline({0, 1}, Eigen::MatrixXd::Identity(3, 2)));
 
-  EXPECT_THAT([&] { path_covariance(point, {0.5}, "--drive-knots"); },
-              ThrowsMessage<InputError>(HasSubstr("--drive-knots: a tracked held point")));
+  EXPECT_THAT(
+      [&] { path_covariance(point, {0.5}, "FitOptions::drive_knots"); },
+      ThrowsMessage<InputError>(HasSubstr("FitOptions::drive_knots: a tracked held point")));
 }
 
 // --- the path ------------------------------------------------------------------------------------
@@ -274,13 +275,15 @@ TEST(DriveCorrection, HasDerivativesThatAgreeWithDifferences) {
 TEST(DriveCorrection, NeedsATrackedPointAndSomeKnots) {
   const FitInput fixed = synthetic_input({.mesh = 5, .markers = 5});
   EXPECT_THAT([&] { make_problem(fixed, {.drive_knots = 6}, 5, 5); },
-              ThrowsMessage<InputError>(HasSubstr("--drive-knots: no held point")));
-  EXPECT_THAT([] { FitOptions{.drive_knots = 3}.validate(); },
-              ThrowsMessage<InputError>(HasSubstr("--drive-knots: is out of range; 4 to")));
+              ThrowsMessage<InputError>(HasSubstr("FitOptions::drive_knots: no held point")));
+  EXPECT_THAT(
+      [] { FitOptions{.drive_knots = 3}.validate(); },
+      ThrowsMessage<InputError>(HasSubstr("FitOptions::drive_knots: is out of range; 4 to")));
   FitOptions forecast{.drive_knots = 6};
   EXPECT_NO_THROW(forecast.validate());
   forecast.forecast = FitResult();
-  EXPECT_THAT([&] { forecast.validate(); }, ThrowsMessage<InputError>(HasSubstr("--drive-knots")));
+  EXPECT_THAT([&] { forecast.validate(); },
+              ThrowsMessage<InputError>(HasSubstr("FitOptions::drive_knots")));
   EXPECT_TRUE(make_problem(tracked_corners(), {}, 5, 5).drive_correction.points.empty());
 }
 

@@ -200,7 +200,7 @@ TEST(Problem, RefusesEffectsOfTheMeasurementWhereTheyWouldBeWrong) {
       "not refused");
   // 3D tracks have forgotten the camera.
   EXPECT_THAT(refusal([&] { problem_of(good, {.effects = {"focal_error"}}); }),
-              HasSubstr("--effect: focal_error, and 3D tracks; the pixels of cameras"));
+              HasSubstr("FitOptions::effects: focal_error, and 3D tracks; the pixels of cameras"));
 }
 
 TEST(Problem, APriorWeighsItsParameterAlone) {
@@ -241,7 +241,7 @@ TEST(Problem, RefusesPriorsThatSayNothingOrTooMuch) {
     EXPECT_THAT(refusal([&] {
                   FitOptions{.priors = {{"shear", 20, sigma}}}.validate();
                 }),
-                HasSubstr("--prior shear"));
+                HasSubstr("FitOptions::priors = shear"));
 }
 
 TEST(Problem, RefusesWhatCannotBeFitted) {
@@ -265,8 +265,9 @@ TEST(Problem, RefusesWhatCannotBeFitted) {
   EXPECT_THAT(refusal([&] { problem_of(good, {.effects = {"viscous_dampign"}}); }),
               testing::AllOf(HasSubstr("known effects: "), HasSubstr(", viscous_damping")));
 
-  EXPECT_THAT(refusal([&] { problem_of(good, {.effects = {"contact_mesh"}}); }),
-              HasSubstr("--effect: effect 'contact_mesh' has no obstacle to touch; the key "));
+  EXPECT_THAT(
+      refusal([&] { problem_of(good, {.effects = {"contact_mesh"}}); }),
+      HasSubstr("FitOptions::effects: effect 'contact_mesh' has no obstacle to touch; the key "));
   FitInput no_obstacle = good;
   no_obstacle.recording.declared = {{.name = "contact_mesh", .parameters = {}, .line = 12}};
   EXPECT_THAT(refusal([&] { problem_of(no_obstacle); }),
