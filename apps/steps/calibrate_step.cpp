@@ -106,7 +106,7 @@ void write_calibrations(const std::vector<StillsCalibration>& calibrations,
     }
   }
   write_json(json, folder / "calibration.json");
-  write_csv_table({"camera", "parameter", "value", "sigma"}, rows, folder / "calibration.csv");
+  write_csv_table({{"camera", "parameter", "value", "sigma"}, rows}, folder / "calibration.csv");
 }
 
 std::vector<std::string> cameras_to_calibrate(const Recording& recording, bool again) {

@@ -25,12 +25,10 @@ void add_line(const std::vector<std::string>& cells, std::string& text) {
 
 }  // namespace
 
-void write_csv_table(const std::vector<std::string>& header,
-                     const std::vector<std::vector<std::string>>& rows,
-                     const std::filesystem::path& file) {
+void write_csv_table(const Table& table, const std::filesystem::path& file) {
   std::string text;
-  add_line(header, text);
-  for (const std::vector<std::string>& row : rows) add_line(row, text);
+  add_line(table.header, text);
+  for (const std::vector<std::string>& row : table.rows) add_line(row, text);
   write_text(text, file);
 }
 

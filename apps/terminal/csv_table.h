@@ -1,15 +1,13 @@
 #pragma once
 
 #include <filesystem>
-#include <string>
-#include <vector>
+
+#include "apps/terminal/table.h"
 
 namespace clothfit {
 
 /// Writes a result table: a header line, then the rows. Cells with a comma, quote or line break are
 /// quoted as in RFC 4180. Throws InputError where the file cannot be written.
-void write_csv_table(const std::vector<std::string>& header,
-                     const std::vector<std::vector<std::string>>& rows,
-                     const std::filesystem::path& file);
+void write_csv_table(const Table& table, const std::filesystem::path& file);
 
 }  // namespace clothfit

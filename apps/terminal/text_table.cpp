@@ -17,13 +17,12 @@ size_t width_of(const std::string& cell) {
 
 }  // namespace
 
-std::string text_table(const std::vector<std::string>& header,
-                       const std::vector<std::vector<std::string>>& rows) {
-  const size_t columns = header.size();
+std::string text_table(const Table& table) {
+  const size_t columns = table.header.size();
   std::vector<size_t> width(columns);
   std::vector<bool> right(columns, true);
-  for (size_t c = 0; c < columns; ++c) width[c] = width_of(header[c]);
-  for (const std::vector<std::string>& row : rows) {
+  for (size_t c = 0; c < columns; ++c) width[c] = width_of(table.header[c]);
+  for (const std::vector<std::string>& row : table.rows) {
     assert(row.size() == columns);
     for (size_t c = 0; c < columns; ++c) {
       width[c] = std::max(width[c], width_of(row[c]));
@@ -42,11 +41,11 @@ std::string text_table(const std::vector<std::string>& header,
     line.erase(line.find_last_not_of(' ') + 1);
     text += line + "\n";
   };
-  add_row(header);
+  add_row(table.header);
   std::vector<std::string> rule;
   for (size_t c = 0; c < columns; ++c) rule.emplace_back(width[c], '-');
   add_row(rule);
-  for (const std::vector<std::string>& row : rows) add_row(row);
+  for (const std::vector<std::string>& row : table.rows) add_row(row);
   return text;
 }
 

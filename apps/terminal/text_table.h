@@ -1,13 +1,13 @@
 #pragma once
 
 #include <string>
-#include <vector>
+
+#include "apps/terminal/table.h"
 
 namespace clothfit {
 
 /// Writes a table for the terminal: columns two blanks apart, the header underlined, no trailing
 /// blanks. Columns whose cells are all numbers (or empty, or "-") stand right, the others left.
-std::string text_table(const std::vector<std::string>& header,
-                       const std::vector<std::vector<std::string>>& rows);
+std::string text_table(const Table& table);
 
 }  // namespace clothfit

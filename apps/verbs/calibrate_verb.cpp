@@ -80,7 +80,7 @@ void print_calibration(const StillsCalibration& calibration) {
     rows.push_back({parameter.name, value_text(parameter.value, parameter.sigma),
                     significant(parameter.sigma, 2)});
   }
-  fmt::print("{}", text_table({"parameter", "value", "sigma"}, rows));
+  fmt::print("{}", text_table({{"parameter", "value", "sigma"}, rows}));
   for (const std::string& still : calibration.board_not_found)
     spdlog::warn("{}: the whole board was not found", still);
 }

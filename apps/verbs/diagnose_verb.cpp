@@ -76,15 +76,13 @@ void write_results(const Diagnosis& diagnosis, std::span<const Recording> record
   write_diagnosis(diagnosis, command, folder / "diagnosis.json");
   write_fit_result(diagnosis.found().result, folder / "fit.json");
   write_model(diagnosis.found().model, folder);
-  const auto csv = [&](const Table& table, const char* name) {
-    write_csv_table(table.header, table.rows, folder / name);
-  };
-  csv(candidate_table(diagnosis), "candidates.csv");
-  csv(trial_table(diagnosis), "trials.csv");
-  csv(limit_table(diagnosis), "limits.csv");
-  if (!diagnosis.plants.empty()) csv(plant_table(diagnosis), "planted.csv");
+  write_csv_table(candidate_table(diagnosis), folder / "candidates.csv");
+  write_csv_table(trial_table(diagnosis), folder / "trials.csv");
+  write_csv_table(limit_table(diagnosis), folder / "limits.csv");
+  if (!diagnosis.plants.empty()) write_csv_table(plant_table(diagnosis), folder / "planted.csv");
   if (!diagnosis.residual_force.markers.empty())
-    csv(residual_force_table(diagnosis.residual_force, recordings.front()), "residual_force.csv");
+    write_csv_table(residual_force_table(diagnosis.residual_force, recordings.front()),
+                    folder / "residual_force.csv");
   if (diagnosis.law.found() && diagnosis.with_law().usable()) {
     fs::create_directories(folder / "law");
     write_fit_result(diagnosis.with_law().result, folder / "law" / "fit.json");
@@ -94,9 +92,7 @@ void write_results(const Diagnosis& diagnosis, std::span<const Recording> record
 }
 
 void print_result(const Diagnosis& diagnosis, const fs::path& folder) {
-  const auto print = [](const Table& table) {
-    fmt::print("{}\n", text_table(table.header, table.rows));
-  };
+  const auto print = [](const Table& table) { fmt::print("{}\n", text_table(table)); };
   fmt::print("\n{}\n\n", diagnosis_sentence(diagnosis));
   if (diagnosis.seen_elsewhere)
     fmt::print("Markers seen elsewhere: {}\n", seen_elsewhere_text(*diagnosis.seen_elsewhere));

@@ -1,21 +1,20 @@
-#include "apps/verbs/experiment_verb.h"
-
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 
+#include <filesystem>
 #include <memory>
+#include <string>
 
 #include "apps/report/study/louchet1995_page.h"
 #include "apps/report/study/louchet1995_tables.h"
+#include "apps/study/louchet1995/study.h"
 #include "apps/terminal/csv_table.h"
 #include "apps/terminal/exit_code.h"
-#include "apps/terminal/interrupt.h"
 #include "apps/terminal/progress_line.h"
 #include "apps/terminal/text_table.h"
 #include "apps/terminal/version.h"
 #include "apps/verbs/identification_experiment.h"
+#include "apps/verbs/resumable_run.h"
 #include "apps/verbs/verb.h"
-#include "data/output_folder.h"
 #include "data/text_file.h"
 
 namespace clothfit {
@@ -23,21 +22,22 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kDefaultFolder = "louchet1995.experiment";
+struct ExperimentVerbOptions {
+  Louchet1995Options study;
+  fs::path out;      ///< empty: louchet1995.experiment
+  fs::path journal;  ///< empty: beside the output folder, gone with success
+  bool resume = false;
+  std::string command;  ///< verb and options as the report keeps them
+};
 
-/// Returns "louchet1995.experiment.journal" for that folder.
-fs::path journal_beside(const fs::path& folder) {
-  fs::path whole = fs::absolute(folder).lexically_normal();
-  if (!whole.has_filename()) whole = whole.parent_path();
-  return whole.parent_path() / (whole.filename().string() + ".journal");
-}
+constexpr const char* kDefaultFolder = "louchet1995.experiment";
 
 void write_results(const Louchet1995Study& study, const ExperimentVerbOptions& options,
                    const fs::path& folder) {
   for (const StudyTable& one : louchet1995_files(study))
-    write_csv_table(one.table.header, one.table.rows, folder / one.file);
+    write_csv_table(one.table, folder / one.file);
   const StudyTable timing = louchet1995_timing(study);
-  write_csv_table(timing.table.header, timing.table.rows, folder / timing.file);
+  write_csv_table(timing.table, folder / timing.file);
   write_text(louchet1995_page_html(study, options.study, options.command, program_version()),
              folder / "report.html");
 }
@@ -48,35 +48,28 @@ void print_targets(const Louchet1995Study& study) {
   for (std::vector<std::string>& row : table.rows)
     for (std::string& cell : row)
       if (cell.starts_with(mark)) cell.erase(0, mark.size());
-  fmt::print("\n{}\n", text_table(table.header, table.rows));
+  fmt::print("\n{}\n", text_table(table));
 }
-
-}  // namespace
 
 int run_louchet1995(const ExperimentVerbOptions& options) {
   options.study.validate();
-  OutputFolder out(out_folder(options.out, kDefaultFolder));
-  const bool own_journal = options.journal.empty();
-  const fs::path journal_file = own_journal ? journal_beside(out.final_path()) : options.journal;
+  ResumableRun run(options.out, kDefaultFolder, options.journal, "pieces");
   Louchet1995Study study;
   {
-    Journal journal(journal_file, options.study.key(),
+    Journal journal(run.journal(), options.study.key(),
                     options.resume ? JournalStart::resume : JournalStart::fresh);
     ProgressLine line;
     study = study_louchet1995(options.study, &journal, watch(line));
   }
-  if (study.cancelled || interrupted()) {
-    spdlog::info("what was finished is in {}; go on with the same command and --resume",
-                 shown_path(journal_file));
-    throw Cancelled();
-  }
-  write_results(study, options, out.path());
-  out.publish();
-  if (own_journal) fs::remove(journal_file);
+  if (study.cancelled) run.cancel();
+  write_results(study, options, run.folder());
+  run.publish();
   print_targets(study);
-  fmt::print("Report: {}\n", shown_path(out.final_path() / "report.html"));
+  run.print_report_path();
   return kExitGood;
 }
+
+}  // namespace
 
 void add_experiment_verb(Verb program) {
   Verb verb = program.add_verb("experiment",

@@ -92,9 +92,9 @@ void write_results(const FitReport& report, const Recording& recording, const fs
   const Table parameters = parameter_table(report.result);
   const Table errors = error_table(report.result);
   const Table residuals = residual_table(report, recording);
-  write_csv_table(parameters.header, parameters.rows, folder / "parameters.csv");
-  write_csv_table(errors.header, errors.rows, folder / "errors.csv");
-  write_csv_table(residuals.header, residuals.rows, folder / "residuals.csv");
+  write_csv_table(parameters, folder / "parameters.csv");
+  write_csv_table(errors, folder / "errors.csv");
+  write_csv_table(residuals, folder / "residuals.csv");
 
   const std::vector<BackgroundPicture> pictures = background_pictures(report, recording);
   write_text(fit_page_html(report, recording, pictures), folder / "report.html");
@@ -105,10 +105,10 @@ void write_results(const FitReport& report, const Recording& recording, const fs
 void print_result(const FitReport& report, const fs::path& folder) {
   const Table parameters = short_parameter_table(report.result);
   const Table errors = short_error_table(report.result);
-  fmt::print("\n{}\n", text_table(parameters.header, parameters.rows));
-  fmt::print("Errors (rms per coordinate):\n\n{}\n", text_table(errors.header, errors.rows));
+  fmt::print("\n{}\n", text_table(parameters));
+  fmt::print("Errors (rms per coordinate):\n\n{}\n", text_table(errors));
   const Table clouds = cloud_table(report.result);
-  if (!clouds.rows.empty()) fmt::print("{}\n", text_table(clouds.header, clouds.rows));
+  if (!clouds.rows.empty()) fmt::print("{}\n", text_table(clouds));
   fmt::print("{}.\n\nReport: {}\n", summarise(report).verdict, shown_path(folder / "report.html"));
 }
 

@@ -1,26 +1,33 @@
 #include "apps/verbs/identification_experiment.h"
 
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 
 #include <cmath>
+#include <filesystem>
 #include <memory>
 
 #include "apps/report/page/html.h"
 #include "apps/report/study/recover_tables.h"
+#include "apps/study/trials/identification_targets.h"
 #include "apps/terminal/csv_table.h"
 #include "apps/terminal/exit_code.h"
-#include "apps/terminal/interrupt.h"
 #include "apps/terminal/number_text.h"
 #include "apps/terminal/progress_line.h"
 #include "apps/terminal/text_table.h"
-#include "data/output_folder.h"
+#include "apps/verbs/resumable_run.h"
 #include "data/text_file.h"
 
 namespace clothfit {
 namespace {
 
 namespace fs = std::filesystem;
+
+struct IdentificationOptions {
+  TargetsOptions targets;
+  fs::path out;       ///< empty: identification.experiment
+  fs::path journals;  ///< empty: beside the output folder, gone with success
+  bool resume = false;
+};
 
 constexpr const char* kIdentificationFolder = "identification.experiment";
 
@@ -78,50 +85,41 @@ std::string page_html(const Table& targets, const TargetsResult& result) {
   return html_page("What identification reaches", body);
 }
 
-}  // namespace
-
 int run_identification(const IdentificationOptions& options) {
   options.targets.validate();
-  OutputFolder out(out_folder(options.out, kIdentificationFolder));
-  const bool own_journals = options.journals.empty();
-  const fs::path journals =
-      own_journals ? fs::path(out.final_path().string() + ".journals") : options.journals;
-  fs::create_directories(journals);
+  ResumableRun run(options.out, kIdentificationFolder, options.journals, "trials");
+  fs::create_directories(run.journal());
   TargetsResult result;
   {
     ProgressLine line;
     result =
-        measure_targets(options.targets, journals,
+        measure_targets(options.targets, run.journal(),
                         options.resume ? JournalStart::resume : JournalStart::fresh, watch(line));
   }
-  if (result.cancelled || interrupted()) {
-    spdlog::info("what was finished is in {}; go on with the same command and --resume",
-                 shown_path(journals));
-    throw Cancelled();
-  }
+  if (result.cancelled) run.cancel();
   const Table targets = targets_table(result.rows);
-  write_csv_table(targets.header, targets.rows, out.path() / "targets.csv");
+  write_csv_table(targets, run.folder() / "targets.csv");
   for (const auto& [study, found] : result.studies) {
     const Table parameters = recovery_table(found);
     const Table trials = recovery_trials_table(found);
-    write_csv_table(parameters.header, parameters.rows, out.path() / (study.name + ".csv"));
-    write_csv_table(trials.header, trials.rows, out.path() / (study.name + "_trials.csv"));
+    write_csv_table(parameters, run.folder() / (study.name + ".csv"));
+    write_csv_table(trials, run.folder() / (study.name + "_trials.csv"));
   }
   const Table planted = planted_drag_table(result.planted_drag);
-  if (!planted.rows.empty())
-    write_csv_table(planted.header, planted.rows, out.path() / "planted_drag.csv");
-  write_text(page_html(targets, result), out.path() / "report.html");
-  out.publish();
-  if (own_journals) fs::remove_all(journals);
+  if (!planted.rows.empty()) write_csv_table(planted, run.folder() / "planted_drag.csv");
+  write_text(page_html(targets, result), run.folder() / "report.html");
+  run.publish();
   for (const TargetRow& row : result.rows)
     fmt::print("{}\n    {}: {}\n    {}\n", row.target, state_text(row.state), row.measured,
                row.command);
   if (!planted.rows.empty())
     fmt::print("\nIntervals that hold the pseudo-true value, and the true one:\n\n{}\n",
-               text_table(planted.header, planted.rows));
-  fmt::print("Report: {}\n", shown_path(out.final_path() / "report.html"));
+               text_table(planted));
+  run.print_report_path();
   return kExitGood;
 }
+
+}  // namespace
 
 void add_identification_experiment(Verb experiment) {
   const auto options = std::make_shared<IdentificationOptions>();

@@ -9,12 +9,11 @@
 #include "apps/terminal/csv_table.h"
 #include "apps/terminal/exit_code.h"
 #include "apps/terminal/grid_size.h"
-#include "apps/terminal/interrupt.h"
 #include "apps/terminal/progress_line.h"
 #include "apps/terminal/text_table.h"
 #include "apps/verbs/recover_undeclared.h"
+#include "apps/verbs/resumable_run.h"
 #include "apps/verbs/verb.h"
-#include "data/output_folder.h"
 #include "data/text_file.h"
 #include "fit/jobs/draws.h"
 
@@ -87,47 +86,39 @@ UndeclaredRun undeclared_run(RecoverFlags flags, const Verb& verb, const std::st
 int run_recover(const RecoverFlags& flags, const std::string& command) {
   const RecoverOptions options = options_of(flags);
   options.validate();
-  OutputFolder out(out_folder(flags.out, "recover"));
-  const fs::path journal_file =
-      flags.journal.empty() ? fs::path(out.final_path().string() + ".journal") : flags.journal;
-  Journal journal(journal_file, options.key(),
+  ResumableRun run(flags.out, "recover", flags.journal, "trials");
+  Journal journal(run.journal(), options.key(),
                   flags.resume ? JournalStart::resume : JournalStart::fresh);
   RecoverResult result;
   {
     ProgressLine line;
     result = recover(options, &journal, watch(line));
   }
-  if (result.stop == ExecuteStop::cancelled || interrupted()) {
-    fmt::print(stderr, "{} of {} trials are kept in {}; the same command with --resume goes on\n",
-               journal.finished().size(), options.trials, shown_path(journal_file));
-    throw Cancelled();
-  }
+  if (result.stop == ExecuteStop::cancelled) run.cancel();
   const Table parameters = recovery_table(result);
   const Table counts = recovery_counts(result);
   const Table trials = recovery_trials_table(result);
-  write_csv_table(parameters.header, parameters.rows, out.path() / "parameters.csv");
-  write_csv_table(trials.header, trials.rows, out.path() / "trials.csv");
+  write_csv_table(parameters, run.folder() / "parameters.csv");
+  write_csv_table(trials, run.folder() / "trials.csv");
   std::string picture_png;
   if (options.pictures) {
     const Table tracker = tracker_trials_table(result);
-    write_csv_table(tracker.header, tracker.rows, out.path() / "tracker.csv");
+    write_csv_table(tracker, run.folder() / "tracker.csv");
     picture_png = rendered_picture_png(options.scene, *options.pictures,
                                        derived_seed(options.seed, 0), 0, options.scene.frames / 2);
-    write_text(picture_png, out.path() / "picture.png");
+    write_text(picture_png, run.folder() / "picture.png");
   }
-  write_text(recover_page_html(options, result, command, picture_png), out.path() / "report.html");
-  out.publish();
-  if (flags.journal.empty()) fs::remove(journal_file);
-  fmt::print("{}\n{}\n", text_table(counts.header, counts.rows),
-             text_table(parameters.header, parameters.rows));
+  write_text(recover_page_html(options, result, command, picture_png),
+             run.folder() / "report.html");
+  run.publish();
+  fmt::print("{}\n{}\n", text_table(counts), text_table(parameters));
   if (result.tracker) {
     const Table tracker = tracker_table(*result.tracker);
     const Table rejections = tracker_rejections(*result.tracker);
-    fmt::print("{}\n", text_table(tracker.header, tracker.rows));
-    if (!rejections.rows.empty())
-      fmt::print("{}\n", text_table(rejections.header, rejections.rows));
+    fmt::print("{}\n", text_table(tracker));
+    if (!rejections.rows.empty()) fmt::print("{}\n", text_table(rejections));
   }
-  fmt::print("Report: {}\n", shown_path(out.final_path() / "report.html"));
+  run.print_report_path();
   return kExitGood;
 }
 

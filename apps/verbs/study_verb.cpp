@@ -11,14 +11,13 @@
 #include "apps/terminal/csv_table.h"
 #include "apps/terminal/exit_code.h"
 #include "apps/terminal/grid_size.h"
-#include "apps/terminal/interrupt.h"
 #include "apps/terminal/json_file.h"
 #include "apps/terminal/progress_line.h"
 #include "apps/terminal/text_table.h"
 #include "apps/terminal/version.h"
+#include "apps/verbs/resumable_run.h"
 #include "apps/verbs/verb.h"
 #include "data/input_error.h"
-#include "data/output_folder.h"
 #include "data/text_file.h"
 #include "fit/measurement_effects/registry.h"
 
@@ -76,7 +75,7 @@ std::vector<StudiedModel> models_of(const std::vector<std::string>& effects) {
 void write_results(const std::vector<StudyRow>& rows, const std::string& command,
                    const fs::path& folder) {
   const Table table = study_table(rows);
-  write_csv_table(table.header, table.rows, folder / "study.csv");
+  write_csv_table(table, folder / "study.csv");
   nlohmann::ordered_json json;
   json["format"] = "clothfit-study-recordings/1";
   json["version"] = program_version();
@@ -101,35 +100,27 @@ int run_recordings_study(const StudyFlags& flags, const std::string& command) {
 
   options.validate();
 
-  OutputFolder out(out_folder(flags.out, "recordings.study"));
-  const fs::path journal_file =
-      flags.journal.empty() ? fs::path(out.final_path().string() + ".journal") : flags.journal;
+  ResumableRun run(flags.out, "recordings.study", flags.journal, "fits");
   std::vector<StudyRow> rows;
   {
-    Journal journal(journal_file, options.key(),
+    Journal journal(run.journal(), options.key(),
                     flags.resume ? JournalStart::resume : JournalStart::fresh);
     ProgressLine line;
     try {
       rows = study_recordings(options, &journal, watch(line));
     } catch (const Cancelled&) {
-      throw Cancelled(
-          fmt::format("finished fits are kept in {}: the same command with --resume goes on",
-                      shown_path(journal_file)));
+      run.cancel();
     }
   }
-  if (interrupted()) throw Cancelled();
-  write_results(rows, command, out.path());
-  out.publish();
-  if (flags.journal.empty()) fs::remove(journal_file);
+  write_results(rows, command, run.folder());
+  run.publish();
 
   const Table table = short_study_table(rows), summary = study_summary(rows);
-  fmt::print("\n{}\n", text_table(table.header, table.rows));
-  fmt::print("Root mean square of the distance. Medians:\n\n{}\n",
-             text_table(summary.header, summary.rows));
+  fmt::print("\n{}\n", text_table(table));
+  fmt::print("Root mean square of the distance. Medians:\n\n{}\n", text_table(summary));
   if (const Table contest = study_contest(rows); !contest.rows.empty())
-    fmt::print("Weighted error over all frames, recordings:\n\n{}\n",
-               text_table(contest.header, contest.rows));
-  fmt::print("Report: {}\n", shown_path(out.final_path() / "report.html"));
+    fmt::print("Weighted error over all frames, recordings:\n\n{}\n", text_table(contest));
+  run.print_report_path();
   if (std::ranges::none_of(rows, &StudyRow::fitted))
     throw NoResult("no recording could be fitted: " + rows.front().reason);
   return kExitGood;

@@ -38,7 +38,7 @@ void print_tracks(const CameraTracks& tracks, const Recording& recording) {
     std::vector<std::vector<std::string>> rows;
     for (const auto& [reason, count] : result.rejected)
       rows.push_back({reason, std::to_string(count)});
-    fmt::print("\n{}", text_table({"rejected because", "count"}, rows));
+    fmt::print("\n{}", text_table({{"rejected because", "count"}, rows}));
   }
   if (tracks.placement) fmt::print("\n{}\n", tracks.placement->message);
 }

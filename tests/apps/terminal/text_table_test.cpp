@@ -8,7 +8,7 @@ namespace {
 
 TEST(TextTable, AlignsNumbersRightAndWordsLeft) {
   const std::string text =
-      text_table({"name", "value"}, {{"shear", "11.0"}, {"k", "-"}, {"long name", "5"}});
+      text_table({{"name", "value"}, {{"shear", "11.0"}, {"k", "-"}, {"long name", "5"}}});
 
   EXPECT_EQ(text,
             "name       value\n"
@@ -19,7 +19,7 @@ TEST(TextTable, AlignsNumbersRightAndWordsLeft) {
 }
 
 TEST(TextTable, CountsCharactersNotBytes) {
-  const std::string text = text_table({"a", "b"}, {{"é", "x"}, {"ee", "y"}});
+  const std::string text = text_table({{"a", "b"}, {{"é", "x"}, {"ee", "y"}}});
 
   EXPECT_EQ(text,
             "a   b\n"
@@ -29,7 +29,7 @@ TEST(TextTable, CountsCharactersNotBytes) {
 }
 
 TEST(TextTable, ShowsItsHeaderWhenThereAreNoRows) {
-  EXPECT_EQ(text_table({"reason", "count"}, {}), "reason  count\n------  -----\n");
+  EXPECT_EQ(text_table({{"reason", "count"}, {}}), "reason  count\n------  -----\n");
 }
 
 }  // namespace
