@@ -14,10 +14,10 @@ namespace {
 /// Sets up a small cloth for half a second, in air that the fits do not know.
 RecoverOptions small_study(double drag_per_s) {
   RecoverOptions options;
-  options.scene.truth_mesh = options.scene.markers = 7;
+  options.scene.truth_mesh = options.scene.markers = 6;
   options.scene.frames = 37;
   options.scene.drag_per_s = drag_per_s;
-  options.fit.mesh_columns = options.fit.mesh_rows = 7;
+  options.fit.mesh_columns = options.fit.mesh_rows = 6;
   options.fit.loss = Loss::squared;
   options.start_factor = 1.1;
   options.trials = 8;
