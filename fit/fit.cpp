@@ -67,7 +67,7 @@ FurtherLooks look_further(const FitInput& input, const TrajectoryObjective& obje
   return looks;
 }
 
-/// Of all parameters that reports list.
+/// The names of all parameters that reports list.
 void fill_correlation(const ParameterSpace& space, const Uncertainty& uncertainty,
                       FitReport& report) {
   std::vector<int> shown;
@@ -79,7 +79,7 @@ void fill_correlation(const ParameterSpace& space, const Uncertainty& uncertaint
   report.correlation = uncertainty.correlation(shown, shown);
 }
 
-/// Of the physics, what sigma is made of; of all, what residuals it was made from.
+/// Reports what the physics' sigmas are made of, and the residuals that all were made from.
 void add_uncertainty(const FitProblem& problem, const Eigen::VectorXd& values,
                      const Uncertainty& uncertainty, FitReport& report) {
   for (int p = 0; p < problem.space.size(); ++p) {
@@ -157,7 +157,7 @@ Eigen::Matrix3Xd marker_offsets(const FitProblem& problem, const MarkerSet& mark
   return offset_m;
 }
 
-/// What the fit made of the drive's noise, as a line of the report.
+/// Tells what the fit made of the drive's noise, as a line of the report.
 std::string drive_line(const FitProblem& problem, const Eigen::VectorXd& values) {
   const DriveCorrection& correction = problem.drive_correction;
   const std::vector<double> fitted(problem.frame_time_s.begin(),

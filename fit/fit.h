@@ -16,7 +16,7 @@ namespace clothfit {
 /// for a recording that cannot be fitted as it stands.
 FitReport fit(const FitInput& input, const FitOptions& options, const ProgressCallback& progress);
 
-/// What a fit elsewhere found: parameters by name, and where markers are seen.
+/// The findings of a fit elsewhere: parameters by name, and where markers are seen.
 struct KnownParameters {
   std::map<std::string, double> values;  ///< others stand where a fit would begin
   std::map<std::string, double> sigma;   ///< 0 where nothing is known
@@ -25,8 +25,8 @@ struct KnownParameters {
   std::vector<MarkerOffset> marker_offsets = {};
 };
 
-/// What a model with known parameters leaves of a recording; nothing is fitted. Throws InputError
-/// as fit() does.
+/// Reports what a model with known parameters leaves of a recording. Nothing is fitted. Throws
+/// InputError as fit() does.
 FitReport report_at(const FitInput& input, const FitOptions& options, const KnownParameters& known);
 
 }  // namespace clothfit

@@ -32,8 +32,8 @@ constexpr double kHorizonShares[] = {0.4, 0.7};
 constexpr double kFineShares[] = {kSearchShare, 0.7};
 /// A given start may be far off, and nothing has been simulated yet.
 constexpr double kGivenShares[] = {0.1, 0.2, 0.4};
-/// Where an optimum may be a local one: over so few frames there is but one, and it is followed by
-/// steps so short that a horizon's optimum lies in the next one's basin.
+/// Horizons for an optimum that may be local. Over so few frames there is but one; steps are so
+/// short that a horizon's optimum lies in the next one's basin.
 constexpr double kSecondLookShares[] = {0.2, 0.25, 0.3, 0.36, 0.45, 0.7, 1};
 /// Closer than this factor to an end of its range a logarithmic parameter is at that end.
 constexpr double kEnd = 1.5;
@@ -43,7 +43,7 @@ constexpr int kFewestFrames = 8;
 /// that. A longer window is allowed as much more.
 constexpr double kSearchSpringSteps = 1.2e9;
 
-/// How finely a stage is solved. The last one goes to the rounding of the reported digits; those
+/// The precision to which a stage is solved. The last one goes to the rounding of the reported digits; those
 /// before only lead there, and look at slopes over wider spans: the cost of folding cloth is rough,
 /// and its trend is what a start far away needs.
 struct Effort {
@@ -218,7 +218,7 @@ double window_cost(const FitProblem& problem, const Eigen::VectorXd& values) {
   return search_cost(usual_window(problem), values);
 }
 
-/// Whether the model follows the cloth there (fit/cost/observed_motion.h).
+/// Tells whether the model follows the cloth there (fit/cost/observed_motion.h).
 bool follows(const FitProblem& problem, const Eigen::VectorXd& values) {
   return window_cost(problem, values) < cost_of_following(usual_window(problem));
 }
@@ -242,10 +242,10 @@ Eigen::VectorXd away_from_ends(const FitProblem& problem, const Eigen::VectorXd&
   return keeps_to_priors && is_no_worse ? result : values;
 }
 
-/// Whether residuals are no larger than the noise makes them: the sum of n squares is n, give or
-/// take sqrt(2 n).
+/// Tells whether residuals are no larger than the noise makes them. The sum of n squares is n, give
+/// or take sqrt(2 n).
 bool is_noise_alone(const FitProblem& problem, const RefineResult& result) {
-  // Not of the derivatives' rows: a fit that did not converge has none.
+  // The derivatives' rows do not tell: a fit that did not converge has none.
   const TrajectoryObjective whole(problem, problem.first_held_out,
                                   std::numeric_limits<double>::infinity());
   const auto residuals = static_cast<double>(whole.residual_count());
@@ -262,14 +262,14 @@ double mean_square(const FitProblem& problem, const Eigen::VectorXd& values) {
                               : residual.squaredNorm() / static_cast<double>(residual.size());
 }
 
-/// Where the optimum leaves more than noise, the model may be wrong, or the optimum a local one:
-/// over fewer frames the cost has fewer of them, and over growing horizons the one over a fifth is
-/// led to all frames. The better of the two.
+/// Looks for a better optimum where this one leaves more than noise. The model may be wrong, or the
+/// optimum a local one: over fewer frames the cost has fewer of them. Growing horizons lead the one
+/// over a fifth to all frames. Returns the better of the two.
 RefineResult second_look(const FitProblem& problem, const FitOptions& options,
                          const RefineResult& first, const ProgressCallback& progress,
                          FitReport& report) {
   if (!first.usable || is_noise_alone(problem, first)) return first;
-  // Of a start in motion there are hundreds of numbers, which few frames do not determine.
+  // A start in motion has hundreds of numbers, which few frames do not determine.
   if (problem.start == StartKind::unknown) return first;
   const auto look = [&](double share, const Effort& effort, const Eigen::VectorXd& start) {
     return refine_stage({.problem = problem, .share = share, .effort = effort}, options, start,
@@ -288,9 +288,9 @@ RefineResult second_look(const FitProblem& problem, const FitOptions& options,
   return second.usable && second.cost < first.cost ? second : first;
 }
 
-/// What the coarse mesh finds over all frames from `values`, which go there, and how far the fit's
-/// own mesh follows it along its derivatives. Not usable where the model is not as far off as that
-/// asks for on both, in the end.
+/// Fits over all frames on the coarse mesh from `values`, which move there. The fit's own mesh then
+/// follows along its derivatives. The result is not usable where, in the end, the model is not as
+/// far off on both meshes as this asks for.
 RefineResult follow_coarse(const FitProblem& coarse_problem, const FitProblem& problem,
                            const FitOptions& options, Eigen::VectorXd& values,
                            const ProgressCallback& progress, FitReport& report) {
@@ -308,7 +308,7 @@ RefineResult follow_coarse(const FitProblem& coarse_problem, const FitProblem& p
   return led;
 }
 
-/// How refinement comes to where it starts.
+/// The way on which refinement comes to where it starts.
 struct Approach {
   std::span<const double> coarse_shares;  ///< horizons on the coarse mesh
   double least_share = 0;                 ///< shorter ones are left out, on either mesh
@@ -354,7 +354,7 @@ RefineResult refine_on(const FitProblem& coarse_problem, const FitProblem& probl
     if (follows_it) break;
   }
   improve({.problem = problem, .effort = kFinalEffort});
-  // What was followed from the start is a basin that is known.
+  // The basin that was followed from the start is known.
   return follows_it && !approach.by_coarse_mesh
              ? best
              : second_look(problem, options, best, progress, report);
@@ -386,7 +386,7 @@ RefineResult pick_best(const TrajectoryObjective& objective, const FitOptions& o
   return best;
 }
 
-/// Where a fit begins without a search: the values given, within their ranges.
+/// Returns the start of a fit without a search: the values given, within their ranges.
 Eigen::VectorXd given_start(const FitProblem& problem, const std::map<std::string, double>& given) {
   Eigen::VectorXd values = problem.space.start();
   for (const auto& [name, value] : given) {

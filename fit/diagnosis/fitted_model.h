@@ -23,7 +23,7 @@ struct DiagnosisSetup {
   int columns = 0, rows = 0;  ///< of the mesh
 };
 
-/// How far a fit has come.
+/// The progress of a fit.
 enum class FitState {
   not_run,
   failed,     ///< no fit worked out, or the model does not run

@@ -14,7 +14,7 @@ struct Box {
   Eigen::VectorXd clamped(const Eigen::VectorXd& x) const {
     return x.cwiseMax(lower).cwiseMin(upper);
   }
-  /// Whether coordinate `p` stands at an end that keeps it from a lower cost.
+  /// Tells whether coordinate `p` stands at an end that keeps it from a lower cost.
   bool blocks(Eigen::Index p, double coordinate, double gradient) const {
     const double edge = 1e-12 * (upper[p] - lower[p]);
     return gradient > 0 ? coordinate - lower[p] <= edge : upper[p] - coordinate <= edge;

@@ -16,7 +16,7 @@
 namespace clothfit {
 namespace {
 
-/// Where an effect is named that no recording declares.
+/// The place of an effect that no recording declares, in messages.
 const std::string kAskedFor = "FitOptions::effects";
 
 /// Adds an effect of the measurement. Its parameters are bound to `given` values, else to the fit.

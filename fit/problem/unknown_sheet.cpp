@@ -1,7 +1,7 @@
 #include "fit/problem/turned.h"
 #include "fit/problem/unknown_group.h"
 
-/// Where the sheet was placed: a small turn about its middle, and a shift.
+/// The sheet's placement: a small turn about its middle, and a shift.
 namespace clothfit {
 namespace {
 

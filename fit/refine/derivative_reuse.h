@@ -4,7 +4,7 @@
 
 namespace clothfit {
 
-/// What becomes of derivatives where a fit has moved.
+/// The fate of derivatives where a fit has moved.
 enum class DerivativeReuse {
   kept,     ///< they predicted the residuals' change
   updated,  ///< they did so roughly, and were corrected by what they missed
@@ -16,9 +16,9 @@ struct ReuseLimits {
   double updated_within = 0;  ///< the same
 };
 
-/// Judges derivatives by the residuals' change along `way` in the coordinates, and updates them by
-/// the smallest change that would have predicted it [broyden1965], coordinates weighed by what they
-/// change.
+/// Judges derivatives by the residuals' change along `way` in the coordinates. It updates them by
+/// the smallest change that would have predicted it [broyden1965]; coordinates are weighed by what
+/// they change.
 DerivativeReuse reuse_derivatives(Eigen::MatrixXd& residual_by_coordinate,
                                   const Eigen::VectorXd& way, const Eigen::VectorXd& change_seen,
                                   const ReuseLimits& limits);

@@ -8,7 +8,7 @@
 
 namespace clothfit {
 
-/// Where a fit's refinement by the trajectory's cost begins after another cost has led there.
+/// The start of a refinement by the trajectory's cost, to which another cost has led.
 struct LeadIn {
   bool usable = false;
   Eigen::VectorXd values;

@@ -28,7 +28,7 @@ class LeastSquares {
 
   /// Holds coordinates besides those at an end of their range.
   virtual void hold(std::vector<bool>&) const {}
-  /// How far a way moves what is looked at to say that a fit has ended.
+  /// The size of a step, in what is looked at to say that a fit has ended.
   virtual double moved(const Eigen::VectorXd& way) const { return way.cwiseAbs().maxCoeff(); }
   /// A step that promises less is the last one.
   virtual double least_decrease() const { return 0; }

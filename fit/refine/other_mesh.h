@@ -5,7 +5,7 @@
 
 namespace clothfit {
 
-/// Where a fit ends on a mesh of another resolution: the mesh's share of what is not known.
+/// The end of a fit on a mesh of another resolution. It is the mesh's share of what is not known.
 struct OtherMesh {
   bool usable = false;
   std::string message;  ///< one line for a person

@@ -127,7 +127,7 @@ class Pool final : public LeastSquares {
     return true;
   }
 
-  /// Whether neither the time steps nor the loss would be chosen much otherwise now.
+  /// Tells whether neither the time steps nor the loss would be chosen much otherwise now.
   bool is_settled() const {
     constexpr double kRoom = 1.05, kSameScale = 0.8;
     for (size_t n = 0; n < parts_.size(); ++n) {

@@ -20,7 +20,7 @@ struct PooledPart {
   /// residuals, and exact derivatives or such as served (PooledOptions::kept_within).
   Linearisation linear;
   bool borrowed = false;  ///< the derivatives are those of another model, until a step fails
-  /// What the model is expected to err by, added to its residuals; empty: nothing.
+  /// The error that is expected of the model, added to its residuals; empty: none.
   Eigen::VectorXd correction;
   /// Directions, residuals x any, in which it may err beyond that, each by a standard normal
   /// amplitude: residuals are r + correction + directions * amplitudes, which are fitted along.

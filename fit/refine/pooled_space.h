@@ -28,14 +28,14 @@ class PooledSpace {
   int size() const { return size_; }
   int shared() const { return static_cast<int>(shared_.size()); }
   size_t recordings() const { return places_.size(); }
-  /// Of a recording's own space, the parameters that all share, and the others.
+  /// Parameters of a recording's own space: those that all share, and the others.
   std::vector<int> shared_of(size_t recording) const;
   const std::vector<int>& own_of(size_t recording) const { return places_[recording].own; }
   /// The first coordinate of the latter.
   int first_own(size_t recording) const { return places_[recording].first; }
 
   Eigen::VectorXd coordinates(const std::vector<Eigen::VectorXd>& values) const;
-  /// Of each problem's parameters.
+  /// The parameters of each problem.
   std::vector<Eigen::VectorXd> values(const Eigen::VectorXd& coordinates) const;
   Eigen::VectorXd lower() const;  ///< ends of the ranges, in coordinates
   Eigen::VectorXd upper() const;

@@ -48,7 +48,7 @@ class SharedEvaluation final : public ceres::EvaluationCallback {
   }
 
   const Linearisation& now() const { return now_; }
-  /// Of the residuals at the start.
+  /// Returns the robust scale of the residuals at the start.
   double robust_scale() const { return robust_scale_; }
   double huber_threshold() const {
     return options_.loss == Loss::huber ? kHuberScales * robust_scale_
@@ -63,9 +63,9 @@ class SharedEvaluation final : public ceres::EvaluationCallback {
   /// Coordinates that are held at a bound.
   bool is_held(int p) const { return held_[static_cast<size_t>(p)]; }
   int simulations() const { return simulations_; }
-  /// Whether the last derivatives were updated.
+  /// Tells whether the last derivatives were updated.
   bool are_updated() const { return updates_ > 0; }
-  /// Whether the last derivatives are those that belong to `coordinates`, or were kept for them.
+  /// Tells whether the last derivatives are those that belong to `coordinates`, or were kept for them.
   bool is_linearised_at(const Eigen::VectorXd& coordinates) const {
     return now_.usable && has_derivatives_for_.size() == coordinates.size() &&
            has_derivatives_for_ == coordinates;
@@ -125,7 +125,7 @@ class SharedEvaluation final : public ceres::EvaluationCallback {
     ran_at_ = coordinates_;
   }
 
-  /// Whether derivatives that were had elsewhere, as they are or updated, do for this point (see
+  /// Tells whether derivatives that were had elsewhere, as they are or updated, do for this point (see
   /// RefineOptions::kept_within). The residuals are this point's then.
   bool serves_on(const Eigen::VectorXd& values) {
     constexpr int kMostUpdates = 8;

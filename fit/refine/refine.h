@@ -25,8 +25,8 @@ struct RefineOptions {
   double updated_within = 0.3;
   bool exact_in_the_end = true;  ///< whether updated derivatives ask for another round
   Loss loss = Loss::huber;
-  /// Of a round's first step, as Ceres has it: large where the start is near, so that directions
-  /// that the data hardly determine are not held back.
+  /// The trust region's radius in a round's first step, as Ceres has it. It is large where the
+  /// start is near, so that directions that the data hardly determine are not held back.
   double trust_region_radius = 1e2;
   /// Springs times time steps of the linearisations' runs: looked at after each iteration but the
   /// first.

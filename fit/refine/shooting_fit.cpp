@@ -103,7 +103,7 @@ class ShootingCost final : public LeastSquares {
     damping_ = damping;
     return step_.border;
   }
-  /// Of the step as it is. Where the box has cut it short, it promises a little less.
+  /// The promise is the step's as it is. Where the box has cut it short, it is a little less.
   double predicted_decrease(const Eigen::VectorXd&) const override {
     const BorderedChain& chain = equations_.chain;
     const auto part = [&](const Eigen::VectorXd& right, const Eigen::MatrixXd& information,
@@ -199,7 +199,7 @@ std::optional<ShootingWindows> make_windows(const FitProblem& problem, int frame
 BorderedChainSolution damped_step(const BorderedChain& equations, double damping,
                                   const std::vector<bool>& held) {
   BorderedChain damped = equations;
-  // What nothing depends on keeps a unit of its own.
+  // A coordinate that nothing depends on keeps a unit of its own.
   const auto damp = [&](Eigen::MatrixXd& diagonal) {
     for (Eigen::Index n = 0; n < diagonal.rows(); ++n)
       diagonal(n, n) = diagonal(n, n) > 0 ? (1 + damping) * diagonal(n, n) : 1;

@@ -43,8 +43,8 @@ std::optional<ShootingWindows> make_windows(const FitProblem& problem, int frame
                                             const Eigen::VectorXd& values,
                                             const ShootingOptions& options);
 
-/// Lowers the shooting cost from `start` by Levenberg and Marquardt's method over parameters and
-/// window states at once, in rounds of tighter continuity; the windows' states are eliminated from
+/// Lowers the shooting cost from `start` by Levenberg and Marquardt's method. Parameters and window
+/// states move at once, in rounds of tighter continuity; the windows' states are eliminated from
 /// each step (fit/cost/bordered_chain.h). It leads near the optimum of the trajectory's cost from
 /// starts from which that cannot be reached, and no nearer than its last continuity: the trajectory
 /// is for refine() to finish. The bits are the same for any number of threads.

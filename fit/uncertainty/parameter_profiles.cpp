@@ -81,7 +81,7 @@ class ProfiledLeastSquares final : public LeastSquares {
     step_ = SymmetricFactors(information).solve(right);
     return step_;
   }
-  /// Of the whole step: where the box cuts it short, the others may have far to go.
+  /// The promise is the whole step's. Where the box cuts it short, the others may have far to go.
   double predicted_decrease(const Eigen::VectorXd&) const override {
     return -0.5 * gradient_.dot(step_);
   }

@@ -161,7 +161,7 @@ TEST_P(IdentifyWay, LeadsToTheOptimumThatTheTruthLeadsTo) {
   EXPECT_THAT(found.report.stages.front(), testing::StartsWith(GetParam().first_stage));
   EXPECT_EQ(found.report.search_cost.empty(), !GetParam().searches);
   EXPECT_EQ(found.candidates.empty(), !GetParam().searches);
-  // Each way ends with time steps of its own, which differ by some percent and shift the optimum by
+  // Each way ends with time steps of its own. They differ by some percent and shift the optimum by
   // less than a fifth of a sigma.
   const Eigen::VectorXd off = found.coordinates() - expected.coordinates();
   EXPECT_LT(off.dot(expected.information() * off), 0.2 * 0.2);

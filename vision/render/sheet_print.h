@@ -24,9 +24,9 @@ struct PrintOptions {
 /// circles, those of kind `none` show nothing.
 class SheetPrint {
  public:
-  /// Throws InputError for a cloth without size, for an unknown family, for a tag that the family
-  /// lacks or that lacks one of its four corners, for corners that are not those of a rectangle in
-  /// the order of data/markers.h, and for markers of kind `texture`.
+  /// Throws InputError for a cloth without size, an unknown family and markers of kind `texture`.
+  /// It also refuses a tag that the family lacks, that lacks one of its four corners, or whose
+  /// corners are not a rectangle's in the order of data/markers.h.
   SheetPrint(const MarkerSet& markers, double width_m, double height_m,
              const PrintOptions& options = {});
 

@@ -1,7 +1,6 @@
 #include "apps/study/trials/identification_targets.h"
 
 #include <fmt/format.h>
-#include <tbb/global_control.h>
 
 #include <algorithm>
 #include <array>
@@ -11,6 +10,7 @@
 
 #include "data/input_error.h"
 #include "fit/jobs/stop_token.h"
+#include "fit/jobs/thread_limit.h"
 
 namespace clothfit {
 namespace {
@@ -283,7 +283,7 @@ std::vector<TargetStudy> target_studies(const TargetsOptions& options) {
 }
 
 FitSeconds measure_fits(unsigned long long seed) {
-  const tbb::global_control one_core(tbb::global_control::max_allowed_parallelism, 1);
+  const ThreadLimit one_core(1);
   constexpr int kBestOf = 3;
   const TargetsOptions options{.seed = seed};
   RecoverOptions study = study_of(1, options);

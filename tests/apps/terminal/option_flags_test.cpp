@@ -51,8 +51,7 @@ TEST(OptionFlags, LeaveOtherWordsAlone) {
   EXPECT_EQ(with_flags(""), "");
 }
 
-// A member that is named in a message but has no flag would send a user to an option that is not
-// there.
+// A member without a flag would send a user to an option that is not there.
 TEST(OptionFlags, ExistForEveryMemberThatTheLibraryNames) {
   const std::set<std::string> flags = captures("apps/verbs", "\"(--[a-z-]+)\"");
   const std::set<std::string> members =

@@ -1,4 +1,4 @@
-// How a call ends that nobody waits for. That fits and diagnoses catch it: fit_test.cpp,
+// Checks how a call ends that nobody waits for. That fits and diagnoses catch it: fit_test.cpp,
 // diagnose_test.cpp.
 #include "fit/jobs/stop_token.h"
 

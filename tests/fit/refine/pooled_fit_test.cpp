@@ -52,8 +52,8 @@ void make_exact(FitProblem& problem, unsigned seed) {
 
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
-/// Two recordings of one cloth, one with an uncertain vertical, and the costs that a fit of both
-/// adds up, at a time step of 1 ms.
+/// Two recordings of one cloth, one with an uncertain vertical. A fit of both adds up their costs,
+/// at a time step of 1 ms.
 struct TwoRecordings {
   FitProblem first = make_problem(synthetic_input(tiny_cloth(1)), {}, 5, 5);
   FitProblem second = make_problem(seen(), {.observations = ObservationKind::tracks2d}, 5, 5);
@@ -79,8 +79,8 @@ struct TwoRecordings {
     return x;
   }
 
-  /// Half the sum of squares of what all residuals leave and of the priors, directions (of each
-  /// recording, or none) being errors by as much as lowers it most.
+  /// Half the sum of squares of all residuals and of the priors. Directions, of each recording or
+  /// none, are errors by as much as lowers it most.
   double cost_at(const Eigen::VectorXd& x, const std::vector<Eigen::MatrixXd>& directions) const {
     const std::vector<Eigen::VectorXd> values = space.values(x);
     double cost = 0;
