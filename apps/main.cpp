@@ -41,7 +41,7 @@ int run(int argc, char** argv) {
     spdlog::error("{}", clothfit::with_flags(error.what()));
     return clothfit::kExitBadInput;
   } catch (const clothfit::NoResult& error) {
-    spdlog::error("{}", error.what());
+    spdlog::error("{}", clothfit::with_flags(error.what()));
     return clothfit::kExitNoResult;
   } catch (const clothfit::Cancelled& error) {
     spdlog::warn("{}", error.what());

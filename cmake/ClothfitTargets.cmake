@@ -21,7 +21,7 @@ endif()
 # The library of a folder, clothfit::FOLDER with _ for /. It links what its arrows name
 # (ClothfitArrows.cmake); PUBLIC and PRIVATE are libraries of others, seen in headers or not.
 # The single include root lets every include name its folder: "model/integrate/step.h".
-# A release build compiles about eight sources at a time, in batches of one size.
+# A release build compiles about eight sources at a time, in batches of one size (CMAKE_UNITY_BUILD).
 function(clothfit_add_folder folder)
   cmake_parse_arguments(ARG "" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
   string(REPLACE "/" "_" name ${folder})
@@ -45,7 +45,8 @@ function(clothfit_add_folder folder)
     math(EXPR size "(${count} + ${batches} - 1) / ${batches}")
     set_target_properties(clothfit_${name} PROPERTIES UNITY_BUILD_BATCH_SIZE ${size})
   endif()
-  # The command line and the reports compute little, and compile in two thirds of the time so.
+  # The command line and the reports compile in two thirds of the time so. They compute little, and
+  # what they share inline with the libraries is no hot loop.
   if(folder MATCHES "^apps/(report|steps|terminal|verbs)")
     target_compile_options(clothfit_${name} PRIVATE $<$<CONFIG:Release>:-O1>)
   endif()

@@ -13,8 +13,8 @@ namespace clothfit {
 /// not work out are reason codes; neither is an InputError.
 class InputError : public std::runtime_error {
  public:
-  /// `where` is FILE, FILE:LINE or an option, named as a member of its struct; `remedy` may be
-  /// empty.
+  /// `where` is FILE, FILE:LINE, or an option: a member of its struct, in the program its flag;
+  /// `remedy` may be empty.
   InputError(const std::string& where, const std::string& problem, const std::string& expected,
              const std::string& remedy = "");
   /// Refuses line `line` (counted from 1) of `file`.

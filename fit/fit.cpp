@@ -67,7 +67,7 @@ FurtherLooks look_further(const FitInput& input, const TrajectoryObjective& obje
   return looks;
 }
 
-/// The names of all parameters that reports list.
+/// Fills in the correlation of all parameters that reports list.
 void fill_correlation(const ParameterSpace& space, const Uncertainty& uncertainty,
                       FitReport& report) {
   std::vector<int> shown;

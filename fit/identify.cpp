@@ -43,9 +43,9 @@ constexpr int kFewestFrames = 8;
 /// that. A longer window is allowed as much more.
 constexpr double kSearchSpringSteps = 1.2e9;
 
-/// The precision to which a stage is solved. The last one goes to the rounding of the reported digits; those
-/// before only lead there, and look at slopes over wider spans: the cost of folding cloth is rough,
-/// and its trend is what a start far away needs.
+/// The precision to which a stage is solved. The last one goes to the rounding of the reported
+/// digits. Those before only lead there, and look at slopes over wider spans: the cost of folding
+/// cloth is rough, and its trend is what a start far away needs.
 struct Effort {
   int iterations = RefineOptions().iterations;
   int rounds = 0;
@@ -308,7 +308,7 @@ RefineResult follow_coarse(const FitProblem& coarse_problem, const FitProblem& p
   return led;
 }
 
-/// The way on which refinement comes to where it starts.
+/// Says how refinement comes to its start.
 struct Approach {
   std::span<const double> coarse_shares;  ///< horizons on the coarse mesh
   double least_share = 0;                 ///< shorter ones are left out, on either mesh

@@ -20,7 +20,7 @@ RefineResult identify(const FitInput& input, const FitProblem& problem, const Fi
                       const ProgressCallback& progress, FitReport& report,
                       std::vector<Candidate>& candidates);
 
-/// The settings of its last stage.
+/// Returns the settings of its last stage.
 RefineOptions final_refinement(const FitProblem& problem, const FitOptions& options);
 
 }  // namespace clothfit

@@ -53,7 +53,7 @@ void print_targets(const Louchet1995Study& study) {
 
 int run_louchet1995(const ExperimentVerbOptions& options) {
   options.study.validate();
-  ResumableRun run(options.out, kDefaultFolder, options.journal, "pieces");
+  ResumableRun run(options.out, kDefaultFolder, options.journal);
   Louchet1995Study study;
   {
     Journal journal(run.journal(), options.study.key(),
@@ -61,7 +61,7 @@ int run_louchet1995(const ExperimentVerbOptions& options) {
     ProgressLine line;
     study = study_louchet1995(options.study, &journal, watch(line));
   }
-  if (study.cancelled) run.cancel();
+  if (study.cancelled) run.cancel("finished pieces");
   write_results(study, options, run.folder());
   run.publish();
   print_targets(study);

@@ -87,7 +87,7 @@ std::string page_html(const Table& targets, const TargetsResult& result) {
 
 int run_identification(const IdentificationOptions& options) {
   options.targets.validate();
-  ResumableRun run(options.out, kIdentificationFolder, options.journals, "trials");
+  ResumableRun run(options.out, kIdentificationFolder, options.journals, ".journals");
   fs::create_directories(run.journal());
   TargetsResult result;
   {
@@ -96,7 +96,7 @@ int run_identification(const IdentificationOptions& options) {
         measure_targets(options.targets, run.journal(),
                         options.resume ? JournalStart::resume : JournalStart::fresh, watch(line));
   }
-  if (result.cancelled) run.cancel();
+  if (result.cancelled) run.cancel("finished trials");
   const Table targets = targets_table(result.rows);
   write_csv_table(targets, run.folder() / "targets.csv");
   for (const auto& [study, found] : result.studies) {

@@ -111,7 +111,7 @@ void add_undeclared_options(Verb verb, UndeclaredFlags& flags) {
 int run_undeclared(const UndeclaredFlags& flags, const UndeclaredRun& asked) {
   const UndeclaredOptions options = options_of(flags, asked);
   options.validate();
-  ResumableRun run(asked.out, "recover", asked.journal, "trials");
+  ResumableRun run(asked.out, "recover", asked.journal);
   Journal journal(run.journal(), options.key(),
                   asked.resume ? JournalStart::resume : JournalStart::fresh);
   UndeclaredResult result;
@@ -119,7 +119,8 @@ int run_undeclared(const UndeclaredFlags& flags, const UndeclaredRun& asked) {
     ProgressLine line;
     result = recover_undeclared(options, &journal, watch(line));
   }
-  if (result.stop == ExecuteStop::cancelled) run.cancel();
+  if (result.stop == ExecuteStop::cancelled)
+    run.cancel(fmt::format("{} of {} trials", journal.finished().size(), options.count()));
   const Table confusion = confusion_table(result);
   write_csv_table(undeclared_trials_table(result), run.folder() / "trials.csv");
   write_csv_table(undeclared_effects_table(result), run.folder() / "effects.csv");

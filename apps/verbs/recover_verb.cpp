@@ -86,7 +86,7 @@ UndeclaredRun undeclared_run(RecoverFlags flags, const Verb& verb, const std::st
 int run_recover(const RecoverFlags& flags, const std::string& command) {
   const RecoverOptions options = options_of(flags);
   options.validate();
-  ResumableRun run(flags.out, "recover", flags.journal, "trials");
+  ResumableRun run(flags.out, "recover", flags.journal);
   Journal journal(run.journal(), options.key(),
                   flags.resume ? JournalStart::resume : JournalStart::fresh);
   RecoverResult result;
@@ -94,7 +94,8 @@ int run_recover(const RecoverFlags& flags, const std::string& command) {
     ProgressLine line;
     result = recover(options, &journal, watch(line));
   }
-  if (result.stop == ExecuteStop::cancelled) run.cancel();
+  if (result.stop == ExecuteStop::cancelled)
+    run.cancel(fmt::format("{} of {} trials", journal.finished().size(), options.trials));
   const Table parameters = recovery_table(result);
   const Table counts = recovery_counts(result);
   const Table trials = recovery_trials_table(result);

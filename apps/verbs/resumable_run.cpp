@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <utility>
-
 #include "apps/terminal/exit_code.h"
 #include "apps/terminal/interrupt.h"
 #include "apps/verbs/verb.h"
@@ -13,19 +11,18 @@ namespace clothfit {
 namespace fs = std::filesystem;
 
 ResumableRun::ResumableRun(const fs::path& out, const std::string& default_out,
-                           const fs::path& journal, std::string pieces)
+                           const fs::path& journal, const std::string& ending)
     : out_(out_folder(out, default_out)),
       own_journal_(journal.empty()),
-      journal_(own_journal_ ? fs::path(out_.final_path().string() + ".journal") : journal),
-      pieces_(std::move(pieces)) {}
+      journal_(own_journal_ ? fs::path(out_.final_path().string() + ending) : journal) {}
 
-void ResumableRun::cancel() const {
-  throw Cancelled(fmt::format("finished {} are kept in {}: the same command with --resume goes on",
-                              pieces_, shown_path(journal_)));
+void ResumableRun::cancel(const std::string& kept) const {
+  throw Cancelled(fmt::format("{} are kept in {}: the same command with --resume goes on", kept,
+                              shown_path(journal_)));
 }
 
 void ResumableRun::publish() {
-  if (interrupted()) cancel();
+  if (interrupted()) cancel("all pieces");
   out_.publish();
   if (own_journal_) fs::remove_all(journal_);
 }

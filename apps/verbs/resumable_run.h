@@ -7,21 +7,21 @@
 
 namespace clothfit {
 
-/// A study's results, and the journal that keeps its finished pieces until the results are there.
-/// Without a journal of the user's choice it lies beside the results and goes with success.
+/// Keeps a study's results, and its journal of finished pieces until the results are there. A
+/// journal that the user does not name lies beside the results and goes with success.
 class ResumableRun {
  public:
-  /// `out` and `journal` are as asked for, or empty. `pieces` names what the journal keeps in
-  /// messages, "trials". Throws InputError as OutputFolder does.
+  /// `out` and `journal` are as asked for, or empty. A journal of its own has the name of the
+  /// results with `ending`. Throws InputError as OutputFolder does.
   ResumableRun(const std::filesystem::path& out, const std::string& default_out,
-               const std::filesystem::path& journal, std::string pieces);
+               const std::filesystem::path& journal, const std::string& ending = ".journal");
 
   const std::filesystem::path& journal() const { return journal_; }
-  /// The folder that results are written to.
+  /// Returns the folder that results are written to.
   const std::filesystem::path& folder() const { return out_.path(); }
 
-  /// Throws Cancelled, which says how to go on.
-  [[noreturn]] void cancel() const;
+  /// Throws Cancelled, which says how to go on with what is kept: "9 of 22 trials".
+  [[noreturn]] void cancel(const std::string& kept) const;
   /// Moves the results into place and removes a journal of its own. Throws Cancelled where the user
   /// asked to stop meanwhile.
   void publish();
@@ -32,7 +32,6 @@ class ResumableRun {
   OutputFolder out_;
   bool own_journal_;
   std::filesystem::path journal_;
-  std::string pieces_;
 };
 
 }  // namespace clothfit

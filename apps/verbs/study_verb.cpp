@@ -100,7 +100,7 @@ int run_recordings_study(const StudyFlags& flags, const std::string& command) {
 
   options.validate();
 
-  ResumableRun run(flags.out, "recordings.study", flags.journal, "fits");
+  ResumableRun run(flags.out, "recordings.study", flags.journal);
   std::vector<StudyRow> rows;
   {
     Journal journal(run.journal(), options.key(),
@@ -109,7 +109,7 @@ int run_recordings_study(const StudyFlags& flags, const std::string& command) {
     try {
       rows = study_recordings(options, &journal, watch(line));
     } catch (const Cancelled&) {
-      run.cancel();
+      run.cancel("finished fits");
     }
   }
   write_results(rows, command, run.folder());

@@ -46,7 +46,7 @@ std::string number_text(double value, double sigma) {
   return fmt::format("{:.{}f}", value, -place);
 }
 
-/// Returns the left sides of all empirical effects, in the catalogue's order.
+/// Returns the left sides of all empirical effects, in the registry's order.
 std::vector<std::string> law_sides() {
   std::vector<std::string> sides;
   for (const EffectEntry& entry : effect_registry())

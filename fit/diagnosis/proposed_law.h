@@ -30,8 +30,8 @@ struct TermTrial {
 struct LawCoefficient {
   std::string effect, parameter;
   std::string unit;
-  std::string
-      side;  ///< the formula's left side: "a", a force per mass; "p", a pressure; "T / (k l0)"
+  /// The formula's left side: "a", a force per mass; "p", a pressure; or "T / (k l0)".
+  std::string side;
   std::string term;  ///< what it multiplies
   double value = 0;
   double sigma = 0;       ///< as fits state it (fit/uncertainty/uncertainty.h)

@@ -16,7 +16,7 @@
 namespace clothfit {
 namespace {
 
-/// The place of an effect that no recording declares, in messages.
+/// Messages name this place for an effect that no recording declares.
 const std::string kAskedFor = "FitOptions::effects";
 
 /// Adds an effect of the measurement. Its parameters are bound to `given` values, else to the fit.

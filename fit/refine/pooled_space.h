@@ -28,14 +28,15 @@ class PooledSpace {
   int size() const { return size_; }
   int shared() const { return static_cast<int>(shared_.size()); }
   size_t recordings() const { return places_.size(); }
-  /// Parameters of a recording's own space: those that all share, and the others.
+  /// Returns those parameters of a recording's own space that all share.
   std::vector<int> shared_of(size_t recording) const;
+  /// Returns the others.
   const std::vector<int>& own_of(size_t recording) const { return places_[recording].own; }
-  /// The first coordinate of the latter.
+  /// Returns their first coordinate.
   int first_own(size_t recording) const { return places_[recording].first; }
 
   Eigen::VectorXd coordinates(const std::vector<Eigen::VectorXd>& values) const;
-  /// The parameters of each problem.
+  /// Returns the parameters of each problem.
   std::vector<Eigen::VectorXd> values(const Eigen::VectorXd& coordinates) const;
   Eigen::VectorXd lower() const;  ///< ends of the ranges, in coordinates
   Eigen::VectorXd upper() const;

@@ -65,7 +65,7 @@ class SharedEvaluation final : public ceres::EvaluationCallback {
   int simulations() const { return simulations_; }
   /// Tells whether the last derivatives were updated.
   bool are_updated() const { return updates_ > 0; }
-  /// Tells whether the last derivatives are those that belong to `coordinates`, or were kept for them.
+  /// Tells whether the last derivatives belong to `coordinates`, or were kept for them.
   bool is_linearised_at(const Eigen::VectorXd& coordinates) const {
     return now_.usable && has_derivatives_for_.size() == coordinates.size() &&
            has_derivatives_for_ == coordinates;
@@ -125,8 +125,8 @@ class SharedEvaluation final : public ceres::EvaluationCallback {
     ran_at_ = coordinates_;
   }
 
-  /// Tells whether derivatives that were had elsewhere, as they are or updated, do for this point (see
-  /// RefineOptions::kept_within). The residuals are this point's then.
+  /// Tells whether derivatives that were had elsewhere, as they are or updated, do for this point
+  /// (see RefineOptions::kept_within). The residuals are this point's then.
   bool serves_on(const Eigen::VectorXd& values) {
     constexpr int kMostUpdates = 8;
     const bool expensive =

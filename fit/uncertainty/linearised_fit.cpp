@@ -8,12 +8,13 @@ namespace clothfit {
 
 void LinearisedFit::validate() const {
   assert(residual.size() > 0 && jacobian.cols() > 0 && jacobian.rows() == residual.size());
-  assert(weight.size() == 0 || (weight.size() == residual.size() && weight.minCoeff() >= 0));
+  assert(weight.size() == 0 || weight.size() == residual.size());
   assert(prior_information.size() == 0 || (prior_information.rows() == jacobian.cols() &&
                                            prior_information.cols() == jacobian.cols()));
   if (!residual.allFinite() || !jacobian.allFinite() || !weight.allFinite() ||
       !prior_information.allFinite())
     throw InputError("linearised fit", "a number that is not finite", "finite numbers");
+  assert(weight.size() == 0 || weight.minCoeff() >= 0);
 }
 
 BlockSums sum_over_blocks(const LinearisedFit& fit, const Eigen::VectorXi& block) {

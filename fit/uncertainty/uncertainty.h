@@ -42,7 +42,7 @@ struct Uncertainty {
   /// The distance that each parameter would move (in its unit) if the time step went to zero. It is
   /// the discretisation's share, part of sigma.
   Eigen::VectorXd step_shift;
-  /// Each derivative over a hair's breadth as a multiple of that over two per cent. It is
+  /// Tells how much steeper derivatives are over a hair's breadth than over two per cent. It is
   /// about 1 where the cost is a smooth basin. It is far larger where the cost is rough, as of
   /// folding cloth without enough damping, and a sigma from derivatives means nothing.
   Eigen::VectorXd roughness;

@@ -30,8 +30,8 @@ struct EffectParameter {
   double upper = 0;
   double typical = 1;  ///< size of a change that matters, for scaling
   ParameterScale scale = ParameterScale::linear;
-  /// The place of an empirical effect's coefficient in the law that a diagnosis writes: the left
-  /// side, "a", and the factor, "-|v| v". Empty for all other parameters.
+  /// An empirical effect's coefficient stands in the law that a diagnosis writes. These are its
+  /// left side, "a", and its factor, "-|v| v"; empty for all others.
   std::string law_side = {}, law_factor = {};
 };
 
@@ -69,7 +69,7 @@ struct EffectDescription {
   std::vector<EffectMode> modes = {};  ///< none: one mode, whose amplitudes are all parameters
   bool empirical = false;              ///< it describes a force and names no cause for it
   bool touches = false;                ///< it lets the cloth touch an obstacle
-  /// Held points that are driven, least and most, without which it does nothing.
+  /// Without at least and at most so many driven held points it does nothing.
   std::pair<int, int> driven_points = {0, std::numeric_limits<int>::max()};
 };
 

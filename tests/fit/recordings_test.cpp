@@ -128,7 +128,12 @@ TEST(Recordings, AHiddenWindLeavesAnErrorThatThePlainModelCannotHide) {
   // Given a recording whose cloth is also blown at, undeclared; mesh and search kept small
   const FitReport report = fit(
       bundled_recording("swing_breeze"),
-      {.mesh_columns = 9, .mesh_rows = 9, .population = 40, .generations = 10, .refine_best = 1},
+      {.mesh_columns = 9,
+       .mesh_rows = 9,
+       .population = 40,
+       .generations = 10,
+       .refine_best = 1,
+       .work = 0.1},
       {});
 
   // Then springs alone, whatever their fit, stay far above the noise

@@ -46,8 +46,8 @@ struct SyntheticCloth {
 };
 
 /// Simulates a cloth of 0.4 m and 30 g that hangs by its upper corners. It is let go flat, turned
-/// 25 degrees out of the vertical. It is filmed at 60 Hz and simulated at a time step of its own, with
-/// noisy 3D tracks and the noisy pixels of one camera. Tracks state their sigma.
+/// 25 degrees out of the vertical. It is filmed at 60 Hz and simulated at a time step of its own,
+/// with noisy 3D tracks and the noisy pixels of one camera. Tracks state their sigma.
 FitInput synthetic_input(const SyntheticCloth& cloth);
 
 /// Returns the start of a fit, except the fabric, which is given.

@@ -57,7 +57,7 @@ struct EmergingParameter {
   const char* amplitude;
 };
 
-/// The way from neutral along an amplitude for two cloths. One does not have the effect. The
+/// Holds the way from neutral along an amplitude for two cloths. One does not have the effect. The
 /// other is the same cloth with the effect behind its own ones, at its neutral values.
 struct TwoWays {
   Direction emerging, present;

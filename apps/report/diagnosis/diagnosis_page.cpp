@@ -105,7 +105,7 @@ std::string what_to_record(std::span<const Separation> separations) {
   if (table.rows.empty()) return "";
   return paragraph("What to record next: modes are told apart from about five sigma on.") +
          html_table(table,
-                    "How far this law, as it was found, is from what the other one can do in its "
+                    "How far this mode, as it was found, is from what the other one can do in its "
                     "place, all else fitted again, in standard deviations of the noise: now, and "
                     "in recordings that could be made, each by itself, simulated with the model "
                     "found. The best that differ in kind; linear, from the derivatives.");
@@ -235,8 +235,8 @@ std::string words() {
   return "<dl>\n"
          "<dt>chi-square</dt><dd>The sum of squared residuals in units of the measured noise. One "
          "per number is what noise alone leaves.</dd>\n"
-         "<dt>explains</dt><dd>The share of all that is above the noise which a law would take "
-         "away, by the derivatives of the model where the law does nothing yet, everything else "
+         "<dt>explains</dt><dd>The share of all that is above the noise which a mode would take "
+         "away, by the derivatives of the model where the mode does nothing yet, everything else "
          "free to move along; a mean over short horizons.</dd>\n"
          "<dt>left out</dt><dd>Cross-validation: the fitted frames are cut into blocks of time, "
          "and each is predicted by a fit of the others.</dd>\n"

@@ -37,7 +37,8 @@ std::string amounts_text(const Score& score) {
 }  // namespace
 
 Table candidate_table(const Diagnosis& diagnosis) {
-  Table table{{"effect", "law", "shape", "share", "fall", "parameter", "amount", "sigma"}, {}};
+  Table table{{"effect", "mode", "shape", "share", "decrease", "parameter", "amplitude", "sigma"},
+              {}};
   for (const Score& score : diagnosis.scores)
     for (Eigen::Index k = 0; k < score.amplitude.size(); ++k)
       table.rows.push_back({score.hypothesis.effect, score.hypothesis.mode,

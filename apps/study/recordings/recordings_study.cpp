@@ -223,6 +223,7 @@ std::vector<fs::path> find_recordings(const std::vector<fs::path>& folders) {
 
 void RecordingsStudyOptions::validate() const {
   fit.validate();
+  if (threads < 0) throw InputError("--threads", "is out of range", "0 (all) or more");
   const bool offsets = std::ranges::any_of(models, &StudiedModel::marker_offsets);
   if (offsets && fit.marker_offset_sigma_m == 0)
     throw InputError("--marker-offsets", "is 0, and a model has offsets of markers",

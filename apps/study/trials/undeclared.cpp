@@ -247,7 +247,7 @@ void UndeclaredOptions::validate() const {
   require(trials >= 1, "--trials", "at least 1");
   require(threads >= 0, "--threads", "0 (all) or more");
   require(most_mimicked > 0 && most_mimicked <= 1, "--mimicked", "a share, to 1");
-  require(draw.least > 0 && draw.least <= draw.most, "--sigmas", "rising, more than 0");
+  require(draw.least > 0 && draw.least <= draw.most, "--least-sigmas", "rising, more than 0");
   require(diagnosis.fit.mesh_columns >= 3 && diagnosis.fit.mesh_columns == diagnosis.fit.mesh_rows,
           "--mesh", "at least 3 vertices a side");
   require(scene.held_out_from > 0, "--fitted", "frames to judge by");

@@ -29,7 +29,7 @@ TEST(MeasurementEffectRegistry, IsSortedAndNamesWhatItDescribes) {
   }
 }
 
-TEST(MeasurementEffectRegistry, MakesEveryLawOfItsEffectsParametersWithinTheirRanges) {
+TEST(MeasurementEffectRegistry, MakesEveryModeOfItsEffectsParametersWithinTheirRanges) {
   for (const MeasurementEffectEntry& entry : measurement_effect_registry()) {
     const EffectDescription effect = entry.describe();
     std::set<std::string> in_no_mode;

@@ -31,7 +31,7 @@ TEST(EffectRegistry, EveryEffectKeepsTheContract) {
   for (const EffectEntry& entry : effect_registry()) expect_effect_contract(entry.name, {});
 }
 
-TEST(EffectRegistry, EveryLawIsMadeOfItsEffectsParametersWithinTheirRanges) {
+TEST(EffectRegistry, EveryModeIsMadeOfItsEffectsParametersWithinTheirRanges) {
   for (const EffectEntry& entry : effect_registry()) {
     const EffectDescription effect = entry.describe();
     const auto parameter = [&](const std::string& name) {
@@ -53,6 +53,18 @@ TEST(EffectRegistry, EveryLawIsMadeOfItsEffectsParametersWithinTheirRanges) {
           EXPECT_LE(value, found->upper);
         }
       }
+    }
+  }
+}
+
+// A coefficient without a place would be missing from the law that a diagnosis writes.
+TEST(EffectRegistry, GivesCoefficientsOfEmpiricalEffectsAndNoOthersAPlaceInALaw) {
+  for (const EffectEntry& entry : effect_registry()) {
+    const EffectDescription effect = entry.describe();
+    for (const EffectParameter& parameter : effect.parameters) {
+      SCOPED_TRACE(effect.name + "." + parameter.name);
+      EXPECT_EQ(parameter.law_side.empty(), !effect.empirical);
+      EXPECT_EQ(parameter.law_factor.empty(), !effect.empirical);
     }
   }
 }

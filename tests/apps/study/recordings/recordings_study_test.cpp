@@ -261,6 +261,10 @@ TEST_F(RecordingsStudy, RefusesOffsetsWithoutADeviationAndPublishedErrorsWithout
   options.models = {{.name = "offset", .effects = {}, .marker_offsets = true}};
   EXPECT_THAT([&] { options.validate(); },
               ThrowsMessage<InputError>(HasSubstr("--marker-offsets: is 0")));
+  options.threads = -1;
+  EXPECT_THAT([&] { options.validate(); },
+              ThrowsMessage<InputError>(HasSubstr("--threads: is out of range")));
+  options.threads = 0;
   options.fit.marker_offset_sigma_m = 0.01;
   options.published["any"] = 0.01;
   EXPECT_THAT([&] { options.validate(); },
