@@ -126,15 +126,14 @@ TEST(Recordings, AWindThatWasNotDeclaredIsFoundWhenAskedFor) {
 
 TEST(Recordings, AHiddenWindLeavesAnErrorThatThePlainModelCannotHide) {
   // Given a recording whose cloth is also blown at, undeclared; mesh and search kept small
-  const FitReport report = fit(
-      bundled_recording("swing_breeze"),
-      {.mesh_columns = 9,
-       .mesh_rows = 9,
-       .population = 40,
-       .generations = 10,
-       .refine_best = 1,
-       .work = 0.1},
-      {});
+  const FitReport report = fit(bundled_recording("swing_breeze"),
+                               {.mesh_columns = 9,
+                                .mesh_rows = 9,
+                                .population = 40,
+                                .generations = 10,
+                                .refine_best = 1,
+                                .work = 0.1},
+                               {});
 
   // Then springs alone, whatever their fit, stay far above the noise
   ASSERT_TRUE(report.usable()) << report.message;
