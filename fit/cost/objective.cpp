@@ -175,7 +175,8 @@ Linearisation TrajectoryObjective::linearise_by(const Eigen::VectorXd& values,
       .frame_time_s = {of.frame_time_s.begin(),
                        of.frame_time_s.begin() + predictor.frames_to_run(frames_)},
       .time_step_s = time_step_s(),
-      .velocities = predictor.needs_velocities()};
+      .velocities = predictor.needs_velocities(),
+      .derivatives_kept_s = of.derivatives_kept_s};
   const TangentResult run = simulate_with_tangents(of.cloth, set, along, schedule);
   result.runs = 1 + static_cast<int>(simulated.size());
   if (!run.run.usable()) return result;

@@ -69,6 +69,7 @@ struct FitProblem {
   std::vector<EmergingTerm> emerging;
   double marker_offset_sigma_m =
       0;  ///< prior of fit/observe/marker_offsets.h; 0: markers have none
+  double derivatives_kept_s = 0;  ///< of effects' forces (Schedule)
 
   int frames() const { return static_cast<int>(frame_time_s.size()); }
 };

@@ -161,6 +161,8 @@ FitProblem make_problem(const FitInput& input, const FitOptions& options, int me
   problem.driving_markers = std::move(drive.driving_markers);
   add_observations(input, options, problem);
   add_marker_offsets(options, problem);
+  // A diagnosis compares models, for which derivatives to half a per cent do.
+  if (!options.hypotheses.empty()) problem.derivatives_kept_s = kEmergingInterval_s;
   problem.marker_place_m = marker_places(recording.markers);
   problem.vertex_weights = vertex_weights(
       make_surface(mesh.columns, mesh.rows, mesh.width_m, mesh.height_m, problem.marker_place_m));

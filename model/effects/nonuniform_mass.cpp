@@ -141,12 +141,16 @@ class NonuniformMass final : public LawEffect<NonuniformMass, Law> {
       for (int k = 0; k < mesh.vertex_count(); ++k)
         set_at<L>(force_n, k, ratios[static_cast<size_t>(k)] * vector_at<L>(force_n, k));
     } else {
-      for (int i = 0; i < mesh.rows; ++i)
-        for (int j = 0; j < mesh.columns; ++j) {
-          const int k = mesh.vertex(i, j);
-          set_at<L>(force_n, k,
-                    RealOf<L>(1.0) / relative_mass(mesh, i, j, p) * vector_at<L>(force_n, k));
-        }
+      thread_local Remembered<RealOf<L>, size_t{kCount} * L::kCount, 2> remembered;
+      std::array<double, size_t{kCount} * L::kCount> of_lanes;
+      for (size_t n = 0; n < kCount; ++n)
+        for (size_t lane = 0; lane < L::kCount; ++lane)
+          of_lanes[n * L::kCount + lane] =
+              static_cast<double>(parameters[n][static_cast<Eigen::Index>(lane)]);
+      const std::vector<RealOf<L>>& ratios =
+          remembered.at(mesh, of_lanes, [&] { return inverse_ratios<RealOf<L>>(mesh, p); });
+      for (int k = 0; k < mesh.vertex_count(); ++k)
+        set_at<L>(force_n, k, ratios[static_cast<size_t>(k)] * vector_at<L>(force_n, k));
     }
   }
 

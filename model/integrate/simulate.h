@@ -13,6 +13,9 @@ struct Schedule {
   std::vector<double> frame_time_s;  ///< rising; the first is the start
   double time_step_s = 0;            ///< at most this; each frame interval is cut into equal steps
   bool velocities = false;           ///< hand on velocities beside positions
+  /// Derivatives of forces that change smoothly are computed once in that time, and kept between
+  /// (TangentStepper); 0: in every step.
+  double derivatives_kept_s = 0;
 
   /// Returns the equal steps in the interval that ends at frame `frame` >= 1.
   int substeps(int frame) const;

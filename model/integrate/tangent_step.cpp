@@ -133,7 +133,8 @@ TangentState TangentState::of(const Cloth& cloth, const ParameterSet& set,
   return state;
 }
 
-TangentStepper::TangentStepper(const Cloth& cloth, std::span<const Direction> directions)
+TangentStepper::TangentStepper(const Cloth& cloth, std::span<const Direction> directions,
+                               double kept_s)
     : cloth_(cloth),
       inverse_mass_per_kg_(cloth.mass_kg.cwiseInverse()),
       held_value_(cloth),
@@ -142,6 +143,8 @@ TangentStepper::TangentStepper(const Cloth& cloth, std::span<const Direction> di
       tangent_sweep_(cloth.mesh),
       limiter_(cloth.mesh, movable_inverse_mass(cloth, held_value_.touched())),
       next_memory_(LaneState<>::of(cloth).effect_memory),
+      of_forces_(cloth.effects.size()),
+      of_changes_(cloth.effects.size()),
       changed_n_(LaneVectors<>::zero(cloth.mesh.vertex_count())) {
   const auto zero = [&](int count) {
     return TangentVectors{
@@ -157,6 +160,12 @@ TangentStepper::TangentStepper(const Cloth& cloth, std::span<const Direction> di
     shifts_supports_ = shifts_supports_ || effect.shifts_supports();
   };
   for (const std::shared_ptr<const Effect>& effect : cloth.effects) note(*effect);
+  for (size_t e = 0; e < cloth.effect_descriptions.size(); ++e) {
+    // A contact sets in suddenly, and what remembers changes in every step.
+    if (cloth.effect_descriptions[e].test == EffectTest::finite) continue;
+    if (cloth.effects[e]->memory_size(cloth) > 0) continue;
+    of_forces_[e].lasts_s = of_changes_[e].lasts_s = kept_s;
+  }
   for (size_t d = 0; d < directions.size(); ++d) {
     if (!directions[d].emerging) continue;
     const EmergingEffect& from = *directions[d].emerging;
@@ -247,14 +256,29 @@ void TangentStepper::add_effect_forces(const TangentParameters& parameters,
   for (size_t e = 0; e < cloth_.effects.size(); ++e) {
     const Effect& effect = *cloth_.effects[e];
     EffectMemory<SingleLane>& memory = state.value.effect_memory[e];
-    derivatives_.clear();
-    find_changing(parameters, e, derivatives_.looked_at);
-    effect.linearise_force(scene, parameters.value.effects[e], memory, derivatives_);
+    const EffectLinearisation& derivatives =
+        derivatives_of(e, parameters, scene, of_forces_[e], [&](EffectLinearisation& of) {
+          effect.linearise_force(scene, parameters.value.effects[e], memory, of);
+        });
     for (size_t g = 0; g < state.tangent.size(); ++g)
-      apply(e, parameters.tangent[g], nullptr, force_n_.tangent[g], state.tangent[g]);
+      apply(e, derivatives, parameters.tangent[g], nullptr, force_n_.tangent[g], state.tangent[g]);
     effect.add_force(scene, parameters.value.effects[e], memory, force_n_.value);
   }
   if (!emerging_.empty()) add_emerging_forces(scene);
+}
+
+template <class Linearise>
+const EffectLinearisation& TangentStepper::derivatives_of(size_t effect,
+                                                          const TangentParameters& parameters,
+                                                          const EffectScene<SingleLane>& scene,
+                                                          KeptDerivatives& kept,
+                                                          const Linearise& linearise) {
+  if (scene.time_s + scene.time_step_s / 2 < kept.taken_s + kept.lasts_s) return kept.of;
+  kept.of.clear();
+  if (kept.of.looked_at.empty()) find_changing(parameters, effect, kept.of.looked_at);
+  linearise(kept.of);
+  kept.taken_s = scene.time_s;
+  return kept.of;
 }
 
 void TangentStepper::add_emerging_forces(const EffectScene<SingleLane>& scene) {
@@ -313,7 +337,8 @@ void TangentStepper::shift_supports(const TangentParameters& parameters,
     effect.linearise_supports(scene, parameters.value.effects[e], pull_n_.value, memory,
                               derivatives_);
     for (size_t g = 0; g < state.tangent.size(); ++g)
-      apply(e, parameters.tangent[g], &pull_n_.tangent[g], target_m_.tangent[g], state.tangent[g]);
+      apply(e, derivatives_, parameters.tangent[g], &pull_n_.tangent[g], target_m_.tangent[g],
+            state.tangent[g]);
     effect.shift_supports(scene, parameters.value.effects[e], pull_n_.value, memory,
                           target_m_.value);
   }
@@ -333,14 +358,15 @@ void TangentStepper::change_forces(const TangentParameters& parameters,
   for (size_t e = 0; e < cloth_.effects.size(); ++e) {
     const Effect& effect = *cloth_.effects[e];
     if (!effect.changes_force()) continue;
-    derivatives_.clear();
-    find_changing(parameters, e, derivatives_.looked_at);
-    effect.linearise_change(scene, parameters.value.effects[e], force_n_.value, derivatives_);
+    const EffectLinearisation& derivatives =
+        derivatives_of(e, parameters, scene, of_changes_[e], [&](EffectLinearisation& of) {
+          effect.linearise_change(scene, parameters.value.effects[e], force_n_.value, of);
+        });
     for (size_t g = 0; g < state.tangent.size(); ++g) {
       LaneVectors<>& tangent = force_n_.tangent[g];
       changed_n_.set_zero();
-      add_products(derivatives_.by_force, tangent, changed_n_);
-      add_actions(e, parameters.tangent[g], state.tangent[g], changed_n_);
+      add_products(derivatives.by_force, tangent, changed_n_);
+      add_actions(e, derivatives, parameters.tangent[g], state.tangent[g], changed_n_);
       tangent = changed_n_;
     }
     effect.change_force(scene, parameters.value.effects[e], force_n_.value);
@@ -354,45 +380,47 @@ void TangentStepper::change_forces(const TangentParameters& parameters,
   }
 }
 
-void TangentStepper::add_actions(size_t e, const LaneParameters<>& parameters,
-                                 const LaneState<>& state, LaneVectors<>& action) {
-  add_products(derivatives_.by_motion, state.position_m, state.velocity_m_per_s, action);
-  for (const EffectLinearisation::ByParameter& column : derivatives_.by_parameter)
+void TangentStepper::add_actions(size_t e, const EffectLinearisation& derivatives,
+                                 const LaneParameters<>& parameters, const LaneState<>& state,
+                                 LaneVectors<>& action) {
+  add_products(derivatives.by_motion, state.position_m, state.velocity_m_per_s, action);
+  for (const EffectLinearisation::ByParameter& column : derivatives.by_parameter)
     add_product(column.derivative, parameter_change(parameters, e, column.parameter), column.on,
                 action);
   const EffectMemory<>& memory = state.effect_memory[e];
-  for (const EffectLinearisation::ByMemory& column : derivatives_.by_memory)
+  for (const EffectLinearisation::ByMemory& column : derivatives.by_memory)
     add_product(column.derivative, memory.col(column.number), column.on, action);
-  if (derivatives_.by_spring.empty()) return;
-  const auto springs = static_cast<Eigen::Index>(derivatives_.by_spring.size());
+  if (derivatives.by_spring.empty()) return;
+  const auto springs = static_cast<Eigen::Index>(derivatives.by_spring.size());
   if (tension_n_.cols() != springs) tension_n_ = LaneArray<>(kLanes, springs);
   tension_n_.setZero();
-  for (const EffectLinearisation::TensionByParameter& of : derivatives_.tension_by_parameter)
+  for (const EffectLinearisation::TensionByParameter& of : derivatives.tension_by_parameter)
     tension_n_.col(of.spring) += of.derivative * parameter_change(parameters, e, of.parameter);
-  for (const EffectLinearisation::TensionByMemory& of : derivatives_.tension_by_memory)
+  for (const EffectLinearisation::TensionByMemory& of : derivatives.tension_by_memory)
     tension_n_.col(of.spring) += of.derivative * memory.col(of.number);
-  add_products(derivatives_.by_spring, tension_n_, state.position_m, state.velocity_m_per_s,
+  add_products(derivatives.by_spring, tension_n_, state.position_m, state.velocity_m_per_s,
                action);
 }
 
-void TangentStepper::apply(size_t e, const LaneParameters<>& parameters,
-                           const LaneVectors<>* pull_n, LaneVectors<>& action, LaneState<>& state) {
-  add_actions(e, parameters, state, action);
-  if (pull_n != nullptr) add_products(derivatives_.by_force, *pull_n, action);
+void TangentStepper::apply(size_t e, const EffectLinearisation& derivatives,
+                           const LaneParameters<>& parameters, const LaneVectors<>* pull_n,
+                           LaneVectors<>& action, LaneState<>& state) {
+  add_actions(e, derivatives, parameters, state, action);
+  if (pull_n != nullptr) add_products(derivatives.by_force, *pull_n, action);
 
-  if (derivatives_.memory_by_memory.empty() && derivatives_.by_memory.empty()) return;
+  if (derivatives.memory_by_memory.empty() && derivatives.by_memory.empty()) return;
   EffectMemory<>& memory = state.effect_memory[e];
   EffectMemory<>& next = next_memory_[e];
   next.setZero();
-  for (const EffectLinearisation::MemoryByMemory& entry : derivatives_.memory_by_memory)
+  for (const EffectLinearisation::MemoryByMemory& entry : derivatives.memory_by_memory)
     next.col(entry.number) += entry.derivative * memory.col(entry.of);
-  for (const EffectLinearisation::MemoryByMotion& row : derivatives_.memory_by_motion)
+  for (const EffectLinearisation::MemoryByMotion& row : derivatives.memory_by_motion)
     next.col(row.number) += product(row.by_position, state.position_m, row.of) +
                             product(row.by_velocity, state.velocity_m_per_s, row.of);
-  for (const EffectLinearisation::MemoryByParameter& entry : derivatives_.memory_by_parameter)
+  for (const EffectLinearisation::MemoryByParameter& entry : derivatives.memory_by_parameter)
     next.col(entry.number) += entry.derivative * parameter_change(parameters, e, entry.parameter);
   if (pull_n != nullptr)
-    for (const EffectLinearisation::MemoryByForce& row : derivatives_.memory_by_force)
+    for (const EffectLinearisation::MemoryByForce& row : derivatives.memory_by_force)
       next.col(row.number) += product(row.derivative, *pull_n, row.of);
   memory = next;
 }

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <span>
@@ -77,7 +78,10 @@ struct TangentState {
 class TangentStepper {
  public:
   /// `cloth` must outlive the stepper. `directions` name the effects that emerge along them.
-  explicit TangentStepper(const Cloth& cloth, std::span<const Direction> directions = {});
+  /// Derivatives of effects' forces serve for the steps within `kept_s`, where the force depends on
+  /// no memory and does not set in suddenly. That is off by the motion in half of that time.
+  explicit TangentStepper(const Cloth& cloth, std::span<const Direction> directions = {},
+                          double kept_s = 0);
 
   /// Returns the memory of the effect that emerges along a direction; empty where none does.
   Eigen::VectorXd emerging_memory(size_t direction) const;
@@ -103,20 +107,31 @@ class TangentStepper {
     Eigen::Index lane() const { return static_cast<Eigen::Index>(direction % kLanes); }
   };
 
+  /// Derivatives of one effect's forces, when they were taken, and how long they serve.
+  struct KeptDerivatives {
+    EffectLinearisation of;
+    double lasts_s = 0;
+    double taken_s = -std::numeric_limits<double>::infinity();
+  };
+
   void add_effect_forces(const TangentParameters& parameters, const EffectScene<SingleLane>& scene,
                          TangentState& state);
+  template <class Linearise>
+  const EffectLinearisation& derivatives_of(size_t effect, const TangentParameters& parameters,
+                                            const EffectScene<SingleLane>& scene,
+                                            KeptDerivatives& kept, const Linearise& linearise);
   void add_emerging_forces(const EffectScene<SingleLane>& scene);
   void shift_supports(const TangentParameters& parameters, const EffectScene<SingleLane>& scene,
                       TangentState& state);
   void change_forces(const TangentParameters& parameters, const EffectScene<SingleLane>& scene,
                      const TangentState& state);
-  /// Adds the products of `derivatives_` of effect `e` with a group's tangents to those of its
-  /// action.
-  void add_actions(size_t e, const LaneParameters<>& parameters, const LaneState<>& state,
+  /// Adds the products of derivatives of effect `e` with a group's tangents to those of its action.
+  void add_actions(size_t e, const EffectLinearisation& derivatives,
+                   const LaneParameters<>& parameters, const LaneState<>& state,
                    LaneVectors<>& action);
   /// Adds them and advances the memory too; `pull_n` of held points, or null.
-  void apply(size_t e, const LaneParameters<>& parameters, const LaneVectors<>* pull_n,
-             LaneVectors<>& action, LaneState<>& state);
+  void apply(size_t e, const EffectLinearisation& derivatives, const LaneParameters<>& parameters,
+             const LaneVectors<>* pull_n, LaneVectors<>& action, LaneState<>& state);
   void apply_limit(const TangentParameters& parameters, double time_step_s, TangentState& state);
 
   const Cloth& cloth_;
@@ -131,6 +146,7 @@ class TangentStepper {
   TangentVectors force_n_, pull_n_, target_m_;
   EffectLinearisation derivatives_;
   std::vector<EffectMemory<>> next_memory_;  ///< of each effect
+  std::vector<KeptDerivatives> of_forces_, of_changes_;  ///< of each effect
   std::vector<Emerging> emerging_;
   /// For each group: the emerging force until it is computed again, and when that last was.
   std::vector<LaneVectors<>> carried_n_, emerged_last_n_;
