@@ -94,6 +94,7 @@ void write_results(const Diagnosis& diagnosis, std::span<const Recording> record
 void print_result(const Diagnosis& diagnosis, const fs::path& folder) {
   const auto print = [](const Table& table) { fmt::print("{}\n", text_table(table)); };
   fmt::print("\n{}\n\n", diagnosis_sentence(diagnosis));
+  if (!diagnosis.complete) fmt::print("{}\n\n", incomplete_text(diagnosis));
   if (diagnosis.seen_elsewhere)
     fmt::print("Markers seen elsewhere: {}\n", seen_elsewhere_text(*diagnosis.seen_elsewhere));
   for (size_t n = 0; n < diagnosis.accepted.size(); ++n) {
@@ -126,6 +127,7 @@ int run_diagnose(DiagnoseFlags flags, const std::string& command) {
   for (const std::string& prior : flags.priors) fit.priors.push_back(parse_prior(prior));
   flags.options.plants = parse_plant(flags.plant);
   flags.options.reinject = true;
+  flags.options.is_enough = interrupted;
   fit.loss = flags.loss == "squared" ? Loss::squared : Loss::huber;
   flags.options.validate();
   if (flags.whole && flags.held_out.empty())
@@ -150,7 +152,8 @@ int run_diagnose(DiagnoseFlags flags, const std::string& command) {
     diagnosis = diagnose(all.first(flags.recordings.size()), all.subspan(flags.recordings.size()),
                          flags.options, progress);
   }
-  if (diagnosis.stop == FitStop::cancelled || interrupted()) throw Cancelled();
+  if (diagnosis.stop == FitStop::cancelled || (interrupted() && diagnosis.complete))
+    throw Cancelled();
   if (!diagnosis.usable()) throw NoResult("no diagnosis: " + diagnosis.message);
   for (DiagnosedRecording& recording : diagnosis.recordings)
     for (FitReport* report : {&recording.before, &recording.after, &recording.with_law}) {
@@ -158,7 +161,7 @@ int run_diagnose(DiagnoseFlags flags, const std::string& command) {
       report->result.command = command;
     }
   write_results(diagnosis, recordings, command, out.path());
-  if (interrupted()) throw Cancelled();
+  if (interrupted() && diagnosis.complete) throw Cancelled();
   out.publish();
   print_result(diagnosis, out.final_path());
   return kExitGood;
@@ -228,6 +231,9 @@ void add_diagnose_verb(Verb program) {
   verb.add_option("--plant", &flags->plant,
                   "Modes that are planted on twins of the recording at 1.6 times their limit, to "
                   "see whether they are named: a number, or all")
+      .shows_default();
+  verb.add_option("--budget", &options.budget_s,
+                  "Seconds after which the search ends with what it has; 0: it takes what it needs")
       .shows_default();
   verb.add_option("--threads", &options.fit.threads, "Threads; 0 for as many as the machine has")
       .shows_default()

@@ -30,13 +30,14 @@ double huber_threshold(const FittedModel& model, Loss loss) {
                              : std::numeric_limits<double>::infinity();
 }
 
-void search_for_effects(Analysis& analysis, const ProgressCallback& progress) {
+void search_for_effects(Analysis& analysis, const ProgressCallback& progress, PhaseClock* clock) {
   const DiagnoseOptions& asked = analysis.diagnosis;
   analysis.search = {.hypotheses = hypotheses_of(analysis),
                      .beam_width = asked.beam_width,
                      .refits = asked.refits,
                      .most_effects = static_cast<size_t>(asked.most_effects),
-                     .threshold = huber_threshold(analysis.base, analysis.options.loss)};
+                     .threshold = huber_threshold(analysis.base, analysis.options.loss),
+                     .clock = clock};
   analysis.found = search_hypotheses(analysis.setup, analysis.base, analysis.search, progress);
   if (!analysis.found.base.usable()) return;
   analysis.base = analysis.found.base;

@@ -42,6 +42,7 @@ struct Analysis {
 double huber_threshold(const FittedModel& model, Loss loss);
 
 /// Searches for hypotheses from the base model. Where the search moved that model, `base` follows.
-void search_for_effects(Analysis& analysis, const ProgressCallback& progress);
+/// `clock` is told of the phases, or null.
+void search_for_effects(Analysis& analysis, const ProgressCallback& progress, PhaseClock* clock);
 
 }  // namespace clothfit

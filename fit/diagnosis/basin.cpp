@@ -6,6 +6,7 @@
 
 #include "fit/cost/huber.h"
 #include "fit/diagnosis/beam.h"
+#include "fit/diagnosis/coarse_rounds.h"
 #include "fit/diagnosis/clearance.h"
 #include "fit/diagnosis/criteria.h"
 #include "fit/diagnosis/discretisation.h"
@@ -17,9 +18,23 @@ namespace clothfit {
 namespace {
 
 /// Identifies the model with these hypotheses from scratch, and refines it with its mesh's errors.
-FittedModel from_scratch(const SearchContext& search, const std::vector<Hypothesis>& hypotheses) {
-  FittedModel model = identified_from_scratch(search.setup, hypotheses, search.progress);
-  if (model.usable()) refine_with_discretisation(model, search.setup, search.progress);
+/// A basin is that of the coarse mesh too. So that mesh looks for it, and the analysed mesh is asked
+/// only where it leaves less than `than` there. Otherwise the result is not usable.
+FittedModel from_scratch(const SearchContext& search, const std::vector<Hypothesis>& hypotheses,
+                         const FittedModel& than) {
+  FittedModel model;
+  if (is_coarser(search.coarse, search.setup)) {
+    const FittedModel coarse = identified_from_scratch(search.coarse, hypotheses, search.progress);
+    if (!coarse.usable()) return {};
+    const FittedModel here = fit_on_mesh(search.coarse, than, search.progress);
+    const double above = search.left_by(here) - static_cast<double>(here.residual_count());
+    if (search.left_by(coarse) >= search.left_by(here) - kCriteria.other_basin * above) return {};
+    model = led_to_analysed_mesh(search, coarse);
+  } else {
+    model = identified_from_scratch(search.setup, hypotheses, search.progress);
+  }
+  if (search.left_by(model) >= search.left_by(than)) return {};
+  refine_with_discretisation(model, search.setup, search.progress);
   return model;
 }
 
@@ -60,30 +75,30 @@ void converge(SearchContext& search, BeamEntry& entry) {
   if (converged.usable()) stand_at(search, entry, std::move(converged));
 }
 
-void look_for_better_basin(const SearchContext& search, FittedModel& model) {
-  if (!model.usable() || sure_excess(model, search.threshold) == 0) return;
-  if (model.parts.size() > 1 && !search.is_far_off(model)) return;
-  FittedModel other = identified_from_scratch(search.setup, model.hypotheses, search.progress);
-  if (!other.usable() || other.chi_square(search.threshold) >= model.chi_square(search.threshold))
-    return;
-  refine_with_discretisation(other, search.setup, search.progress);
-  if (other.usable()) model = std::move(other);
+bool look_for_better_basin(const SearchContext& search, FittedModel& model) {
+  if (search.only_chooses || !model.usable() || !search.is_far_off(model)) return false;
+  FittedModel other = from_scratch(search, model.hypotheses, model);
+  if (!other.usable()) return false;
+  model = std::move(other);
+  return true;
 }
 
 void look_in_other_basins(const SearchContext& search, std::vector<Extended>& extended,
                           const FittedModel& without) {
-  if (extended.empty()) return;
+  if (search.only_chooses || extended.empty()) return;
   const Extended& best = best_of(search, extended);
   if (!best.model.usable() || !search.is_far_off(best.model) ||
       !leaves_good_part(search, best, without))
     return;
   double predicted = 0;
   for (const Extended& child : extended) predicted = std::max(predicted, child.score->decrease);
+  // On a fine mesh each one takes long.
+  const bool best_alone = is_coarser(search.coarse, search.setup);
   for (Extended& child : extended) {
-    if (!child.model.usable() || child.score->decrease < kCriteria.from_scratch_of_best * predicted)
-      continue;
-    FittedModel other = from_scratch(search, child.model.hypotheses);
-    if (search.left_by(other) >= search.left_by(child.model)) continue;
+    if (!child.model.usable() || (best_alone && &child != &best)) continue;
+    if (child.score->decrease < kCriteria.from_scratch_of_best * predicted) continue;
+    FittedModel other = from_scratch(search, child.model.hypotheses, child.model);
+    if (!other.usable()) continue;
     child.model = std::move(other);
     child.from_scratch = true;
   }
@@ -91,7 +106,9 @@ void look_in_other_basins(const SearchContext& search, std::vector<Extended>& ex
 
 FittedModel in_basin_of(const SearchContext& search, const Extended& best,
                         const FittedModel& without) {
-  if (!best.model.usable() || !search.is_far_off(without)) return {};
+  if (search.only_chooses || !best.model.usable() || !search.is_far_off(without)) return {};
+  // A model that was not refined leaves more than its optimum in its own basin.
+  if (without.is_unrefined()) return {};
   const double taken = search.left_by(without) - search.left_by(best.model);
   if (taken <= 0 || (!best.from_scratch && rise_without_last(best.model, search.threshold) > taken))
     return {};
@@ -102,8 +119,8 @@ FittedModel in_basin_of(const SearchContext& search, const Extended& best,
   // part in that gain.
   const double enough = search.left_by(without) - kCriteria.other_basin * taken;
   if (best.from_scratch || (search.left_by(there) < enough && search.is_far_off(there))) {
-    FittedModel other = from_scratch(search, without.hypotheses);
-    if (search.left_by(other) < search.left_by(there)) there = std::move(other);
+    FittedModel other = from_scratch(search, without.hypotheses, there);
+    if (other.usable()) there = std::move(other);
   }
   if (search.left_by(there) >= enough) return {};
   return there;

@@ -34,13 +34,14 @@ void stand_at(SearchContext& search, BeamEntry& entry, FittedModel there);
 /// Refines a base model that was left unrefined. Where that does not work out, it stands as it is.
 void converge(SearchContext& search, BeamEntry& entry);
 
-/// Identifies a model from scratch where it leaves more than noise. The result is taken where it
-/// leaves less: its optimum may lie in another basin than the one that the model was led into.
-/// Several recordings cost more, so of them only a model that is far off is identified.
-void look_for_better_basin(const SearchContext& search, FittedModel& model);
+/// Identifies a model from scratch where it is far off. The result is taken where it leaves less:
+/// its optimum may lie in another basin than the one that the model was led into. Returns whether
+/// the model has moved.
+bool look_for_better_basin(const SearchContext& search, FittedModel& model);
 
 /// Identifies promising hypotheses from scratch where even the best leaves a good part and is far
-/// off. A hypothesis is promising that is predicted to take half as much as the best. It may be
+/// off. A hypothesis is promising that is predicted to take half as much as the best; where there is
+/// a coarse mesh, only the one that leaves least is looked at. It may be
 /// right in another basin than the one in which `without` stands.
 void look_in_other_basins(const SearchContext& search, std::vector<Extended>& extended,
                           const FittedModel& without);

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "fit/diagnosis/fitted_model.h"
@@ -48,6 +49,7 @@ class Beam {
   BeamEntry* next();
 
   BeamEntry& best() { return entries_.front(); }
+  std::vector<BeamEntry> release() { return std::move(entries_); }
 
   /// Adds extensions of an entry. Of entries with the same hypotheses the cheapest stays. An entry
   /// is dropped that gained far less than the best one, counted from `base_cost`, or for which the

@@ -38,7 +38,10 @@ struct DiagnosisCriteria {
   double cautious_start = 0.5;
   double exact_fit_of_best = 0.5;
   double race_far_behind = 10;
+  double race_worth = 0.1;
   double race_of_noise = 0.2;
+  double coarse_worth = 0.5;
+  double coarse_near_best = 1.25;
   double coarse_far_behind = 2;
   double own_errors_of_best = 0.5;
   double shape_fit_of_best = 0.2;
@@ -46,7 +49,7 @@ struct DiagnosisCriteria {
   // Basins (basin.h)
   double good_part = 0.25;
   double from_scratch_of_best = 0.5;
-  double other_basin = 0.1;
+  double other_basin = 0.25;
 
   // A trial (trial.h)
   double predicted_share = 0.5;

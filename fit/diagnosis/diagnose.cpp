@@ -25,11 +25,12 @@ class Run {
       const DiagnoseOptions& options, const ProgressCallback& progress)
       : fitted_(fitted),
         options_(options),
-        progress_(stop_token(progress)),
+        began_(std::chrono::steady_clock::now()),
+        progress_(stop_token(until_winding_up(progress))),
+        search_progress_(until_enough()),
         reports_(fitted, held_out, progress_) {}
 
   Diagnosis run() {
-    const auto began = std::chrono::steady_clock::now();
     try {
       diagnose_all();
     } catch (const StopRequested&) {
@@ -40,16 +41,40 @@ class Run {
       result_.message = given_up.message;
     }
     result_.recordings = std::move(reports_.recordings);
-    result_.seconds =
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+    result_.phases = clock_.times();
+    result_.seconds = seconds();
     return std::move(result_);
   }
 
  private:
+  double seconds() const {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - began_).count();
+  }
+
+  /// Returns a progress that nobody can stop once results are being made of what was found.
+  ProgressCallback until_winding_up(const ProgressCallback& asked) const {
+    if (!asked) return asked;
+    return [this, asked](const Progress& now) { return asked(now) || winding_up_; };
+  }
+
+  /// Returns the progress of a search, which ends once its time is up. Throws TimeIsUp then.
+  ProgressCallback until_enough() const {
+    return [this](const Progress& now) {
+      const bool is_late = options_.budget_s > 0 && seconds() > options_.budget_s;
+      if (is_late || (options_.is_enough && options_.is_enough())) throw TimeIsUp();
+      report_progress(progress_, now);
+      return true;
+    };
+  }
+
   void diagnose_all() {
     Analysis declared(fitted_, options_, options_.fit);
+    clock_.enter("base fit");
     report_base(declared);
-    search_for_effects(declared, progress_);
+    search_for_effects(declared, search_progress_, &clock_);
+    result_.complete = declared.found.complete;
+    winding_up_ = !result_.complete;
+    clock_.enter("reports");
     if (declared.found.base.usable()) {
       reports_.add(declared.setup, declared.base, &DiagnosedRecording::before);
       result_.before = judge_adequacy(declared.base, options_.fit.loss);
@@ -57,12 +82,15 @@ class Run {
     const double share = declared.found.first_share;
     result_.score_frames = frames_of_share(*declared.base.problems.front(), share);
     result_.scores = std::move(declared.found.first);
+    if (!result_.complete) return conclude(declared);
+    clock_.enter("residual force");
     look_at_forces(declared, share);
 
     result_.seen_elsewhere = constants_to_try(declared, reports_);
     if (result_.seen_elsewhere) {
       FitOptions with_offsets = options_.fit;
       with_offsets.marker_offset_sigma_m = result_.seen_elsewhere->rms_m;
+      clock_.enter("marker constants");
       Analysis beside(fitted_, options_, with_offsets);
       if (search_beside_constants(beside, declared, *result_.seen_elsewhere, progress_))
         return conclude(beside);
@@ -96,6 +124,7 @@ class Run {
 
   /// Reports what was found, and what else would have been.
   void conclude(Analysis& analysis) {
+    clock_.enter("reports");
     const FittedModel& model = analysis.found.model;
     const double threshold = analysis.search.threshold;
     result_.columns = analysis.setup.columns;
@@ -112,10 +141,14 @@ class Run {
       for (DiagnosedRecording& recording : reports_.recordings) recording.after = recording.before;
     result_.verdict = verdict();
 
+    if (!result_.complete) return;
+    clock_.enter("separation");
     if (options_.separate)
       result_.separations =
           separating_recordings(analysis.setup, model, result_.accepted, progress_);
+    clock_.enter("twins");
     search_all_twins(analysis);
+    clock_.enter("proposed law");
     if (result_.after.adequate || options_.law_terms == 0) return;
     result_.law = propose_law(analysis.setup, model,
                               {.most_terms = options_.law_terms,
@@ -151,7 +184,10 @@ class Run {
 
   std::span<const FitInput> fitted_;
   const DiagnoseOptions& options_;
-  ProgressCallback progress_;
+  std::chrono::steady_clock::time_point began_;
+  ProgressCallback progress_, search_progress_;
+  bool winding_up_ = false;
+  PhaseClock clock_;
   RecordingReports reports_;
   Diagnosis result_;
 };

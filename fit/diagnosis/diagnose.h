@@ -17,6 +17,7 @@
 #include "fit/diagnosis/separation.h"
 #include "fit/interface/fit_input.h"
 #include "fit/interface/fit_report.h"
+#include "fit/jobs/phase_clock.h"
 
 namespace clothfit {
 
@@ -57,6 +58,10 @@ struct Diagnosis {
   ResidualForce residual_force;  ///< of the model as declared, over its first frames
   ProposedLaw law;               ///< for the residual, where that has structure
   double seconds = 0;
+  std::vector<PhaseTime> phases;  ///< where the time went
+  /// False where the search ended before it had tried all (DiagnoseOptions::budget_s, is_enough).
+  /// Then neither limits nor separations nor a law were looked for.
+  bool complete = true;
   bool usable() const { return is_usable(stop); }
   /// Tells whether the model found is another one than the one declared.
   bool changed() const { return seen_elsewhere.has_value() || !accepted.empty(); }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -20,6 +21,10 @@ struct DiagnoseOptions {
   int plants = 0;
   bool reinject = false;  ///< whether what was found is simulated and searched again
   bool separate = true;   ///< whether recordings are sought that tell alike hypotheses apart
+  /// Seconds after which the search ends and reports what it has; 0: it takes what it needs.
+  double budget_s = 0;
+  /// Says that the search is to end with what it has. Any thread may ask; or empty.
+  std::function<bool()> is_enough;
   void validate() const;  ///< throws InputError
 };
 

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "fit/diagnosis/basin.h"
+#include "fit/diagnosis/coarse_rounds.h"
 #include "fit/diagnosis/criteria.h"
 #include "fit/diagnosis/discretisation.h"
 #include "fit/diagnosis/refit.h"
@@ -32,40 +33,79 @@ std::vector<const Score*> worth_fitting(const SearchContext& search, const Fitte
   return scores;
 }
 
-/// Fits models of the coarse mesh on the analysed one, side by side. Those that leave least are
-/// fitted from where they stand. Where that leaves more than the model without the hypothesis does,
-/// or none works out, the fit begins where that model stands. All others fail, and so do those that
-/// fall out.
-std::vector<FittedModel> on_analysed_mesh(const SearchContext& search, const FittedModel& without,
-                                          std::vector<FittedModel> models) {
-  const auto above = [&](const FittedModel& model) {
-    return search.left_by(model) - static_cast<double>(model.residual_count());
-  };
-  double least = std::numeric_limits<double>::infinity();
-  for (const FittedModel& model : models)
-    if (model.usable())
-      least =
-          std::min(least, std::max(above(model), kCriteria.race_of_noise *
-                                                     static_cast<double>(model.residual_count())));
-  std::vector<size_t> best;
-  std::vector<FittedModel> coarse;
-  for (size_t k = 0; k < models.size(); ++k) {
-    FittedModel& model = models[k];
-    if (model.usable() && above(model) <= kCriteria.coarse_far_behind * least) {
-      best.push_back(k);
-      coarse.push_back(std::move(model));
-    }
-    model.state = FitState::failed;
-  }
-  std::vector<FittedModel> fitted =
-      race_on_mesh(search.setup, coarse, search.threshold, search.progress);
-  const bool none = std::ranges::none_of(fitted, &FittedModel::usable);
-  for_each_index(best.size(), [&](size_t k) {
-    FittedModel& model = models[best[k]] = std::move(fitted[k]);
-    if ((!model.usable() && !none) || search.left_by(model) < search.left_by(without)) return;
-    model = with_hypotheses(search.setup, without, coarse[k].hypotheses, {});
-    refine_model(model, search.setup, {}, search.progress);
+/// Fits the shape of a model's last hypothesis too. The result is not usable where the hypothesis
+/// has none, or where another one of the model has it fitted already.
+FittedModel with_shape_fitted(const SearchContext& search, const DiagnosisSetup& setup,
+                              const FittedModel& model) {
+  if (!model.usable()) return {};
+  std::vector<Hypothesis> hypotheses = model.hypotheses;
+  const bool is_fitted = std::ranges::any_of(hypotheses, [&](const Hypothesis& hypothesis) {
+    return hypothesis.fits_shape && share_shape(hypothesis, hypotheses.back());
   });
+  if (hypotheses.back().shape.empty() || is_fitted) return {};
+  hypotheses.back().fits_shape = true;
+  FittedModel result = with_hypotheses(setup, model, hypotheses, {});
+  refine_model(result, setup, {.rounds = 1}, search.progress);
+  return result;
+}
+
+/// Fits shapes between those of the grid too, for models of the coarse mesh that are near the best.
+void fit_shapes_of_best(const SearchContext& search, const FittedModel& without,
+                        std::vector<FittedModel>& models) {
+  double best = std::numeric_limits<double>::infinity();
+  for (const FittedModel& model : models) best = std::min(best, search.left_by(model));
+  const double reach = kCriteria.shape_fit_of_best * (search.left_by(without) - best);
+  for_each_index(models.size(), [&](size_t k) {
+    if (!models[k].usable() || search.left_by(models[k]) > best + reach) return;
+    FittedModel with_shape = with_shape_fitted(search, search.coarse, models[k]);
+    if (!with_shape.usable()) return;
+    if (search.cost(with_shape) < search.cost(models[k])) models[k] = std::move(with_shape);
+  });
+}
+
+/// Returns what a model leaves above the noise, a share of the noise at least.
+double above_noise(const SearchContext& search, const FittedModel& model) {
+  const auto count = static_cast<double>(model.residual_count());
+  return std::max(search.left_by(model) - count, kCriteria.race_of_noise * count);
+}
+
+/// Fits models of the coarse mesh on the analysed one. Those that leave hardly more than the best
+/// one are led there side by side. Another one is led there if it leaves no more than the best one
+/// does there, by a factor. All others fail, and so do those that gain far less on the coarse mesh
+/// than is worth a name. Where a model leaves more there than the model without the hypothesis, the
+/// fit begins where that model stands.
+std::vector<FittedModel> on_analysed_mesh(const SearchContext& search, const FittedModel& without,
+                                          const FittedModel& coarse_without,
+                                          std::vector<FittedModel> models) {
+  const double most = search.left_by(coarse_without) - kCriteria.coarse_worth * search.worth(without);
+  std::vector<size_t> order;
+  for (size_t k = 0; k < models.size(); ++k)
+    if (search.left_by(models[k]) < most) order.push_back(k);
+  std::ranges::stable_sort(order, {}, [&](size_t k) { return above_noise(search, models[k]); });
+  std::vector<FittedModel> coarse = std::move(models);
+  models.assign(coarse.size(), FittedModel());
+  const auto lead = [&](size_t k) {
+    models[k] = led_to_analysed_mesh(search, coarse[k]);
+    if (search.left_by(models[k]) < search.left_by(without)) return;
+    models[k] = with_hypotheses(search.setup, without, coarse[k].hypotheses, {});
+    refine_model(models[k], search.setup, {}, search.progress);
+  };
+  size_t led = 0;
+  if (!order.empty()) {
+    const double near_best =
+        kCriteria.coarse_near_best * above_noise(search, coarse[order.front()]);
+    while (led < order.size() && above_noise(search, coarse[order[led]]) <= near_best) ++led;
+  }
+  for_each_index(led, [&](size_t n) { lead(order[n]); });
+  double best = std::numeric_limits<double>::infinity();
+  for (size_t n = 0; n < order.size(); ++n) {
+    const size_t k = order[n];
+    if (n >= led) {
+      if (above_noise(search, coarse[k]) > kCriteria.coarse_far_behind * best) break;
+      lead(k);
+    }
+    if (models[k].usable()) best = std::min(best, above_noise(search, models[k]));
+  }
   return models;
 }
 
@@ -73,13 +113,15 @@ std::vector<Extended> fit_shortlist(const SearchContext& search, const FittedMod
                                     const Shortlist& list) {
   const std::vector<const Score*> scores = worth_fitting(search, model, list);
   std::vector<FittedModel> fitted;
-  if (list.coarse.usable())
-    fitted = on_analysed_mesh(search, model,
-                              fit_with_hypotheses(search.coarse, list.coarse, list.early, scores,
-                                                  list.share, search.threshold, search.progress));
-  else
+  if (list.coarse.usable()) {
+    fitted = fit_with_hypotheses(search.coarse, list.coarse, list.early, scores, list.share,
+                                 search.threshold, search.progress);
+    fit_shapes_of_best(search, list.coarse, fitted);
+    fitted = on_analysed_mesh(search, model, list.coarse, std::move(fitted));
+  } else {
     fitted = fit_with_hypotheses(search.setup, model, list.early, scores, list.share,
                                  search.threshold, search.progress);
+  }
   std::vector<Extended> extended;
   for (size_t k = 0; k < scores.size(); ++k)
     extended.push_back({.score = scores[k], .model = std::move(fitted[k])});
@@ -90,6 +132,7 @@ std::vector<Extended> fit_shortlist(const SearchContext& search, const FittedMod
 /// far from where the entry's directions were taken.
 void let_best_err(const SearchContext& search, std::vector<Extended>& extended,
                   const FittedModel& without) {
+  if (search.only_chooses) return;
   const double from = without.chi_square(search.threshold);
   double best = 0;
   for (const Extended& child : extended)
@@ -97,7 +140,8 @@ void let_best_err(const SearchContext& search, std::vector<Extended>& extended,
       best = std::max(best, from - child.model.chi_square(search.threshold));
   for_each_index(extended.size(), [&](size_t k) {
     FittedModel& model = extended[k].model;
-    if (model.usable() && model.parts.front().directions.cols() == 0 &&
+    if (model.usable() && model.misfit() <= kCriteria.biased &&
+        model.parts.front().directions.cols() == 0 &&
         from - model.chi_square(search.threshold) >= kCriteria.own_errors_of_best * best)
       refine_with_discretisation(model, search.setup, search.progress);
   });
@@ -142,6 +186,22 @@ BeamEntry child_of(const SearchContext& search, const BeamEntry& entry, Extended
   return child;
 }
 
+/// Moves the shape of a model's last hypothesis as the coarse mesh has it, corrected by what the
+/// meshes differ by. Derivatives by a shape cost too much on the analysed mesh.
+FittedModel with_shape_by_coarse_mesh(const SearchContext& search, const FittedModel& model) {
+  const FittedModel coarse =
+      with_shape_fitted(search, search.coarse, corrected_on_mesh(search.coarse, model));
+  if (!coarse.usable()) return {};
+  FittedModel moved = led_to_analysed_mesh(search, coarse);
+  if (!moved.usable()) return moved;
+  for (size_t n = 0; n < moved.parts.size(); ++n) {
+    moved.parts[n].correction = model.parts[n].correction;
+    moved.parts[n].directions = model.parts[n].directions;
+  }
+  refine_model(moved, search.setup, {}, search.progress);
+  return moved;
+}
+
 /// Fits shapes between those of the grid too, for hypotheses that are near the best.
 void fit_shapes(const SearchContext& search, std::vector<BeamEntry>& children) {
   if (children.empty()) return;
@@ -149,14 +209,10 @@ void fit_shapes(const SearchContext& search, std::vector<BeamEntry>& children) {
       kCriteria.shape_fit_of_best * children.front().accepted.back().trial.decrease;
   const double best = children.front().cost;
   for (BeamEntry& child : children) {
-    std::vector<Hypothesis> hypotheses = child.model.hypotheses;
-    const bool is_fitted = std::ranges::any_of(hypotheses, [&](const Hypothesis& hypothesis) {
-      return hypothesis.fits_shape && share_shape(hypothesis, hypotheses.back());
-    });
-    if (hypotheses.back().shape.empty() || is_fitted || child.cost > best + reach) continue;
-    hypotheses.back().fits_shape = true;
-    FittedModel with_shape = with_hypotheses(search.setup, child.model, hypotheses, {});
-    refine_model(with_shape, search.setup, {.rounds = 1}, search.progress);
+    if (child.cost > best + reach) continue;
+    FittedModel with_shape = is_coarser(search.coarse, search.setup)
+                                 ? with_shape_by_coarse_mesh(search, child.model)
+                                 : with_shape_fitted(search, search.setup, child.model);
     if (!with_shape.usable() || search.cost(with_shape) >= child.cost) continue;
     Trial& trial = child.accepted.back().trial;
     trial.decrease +=
@@ -168,8 +224,8 @@ void fit_shapes(const SearchContext& search, std::vector<BeamEntry>& children) {
   std::ranges::stable_sort(children, {}, &BeamEntry::cost);
 }
 
-/// Returns the hypotheses that this recording cannot tell from the one accepted last. Fitted in its
-/// place they leave hardly more.
+}  // namespace
+
 std::vector<Hypothesis> alike(const std::vector<BeamEntry>& children, const BeamEntry& best) {
   std::vector<Hypothesis> result;
   for (const BeamEntry& child : children)
@@ -178,13 +234,12 @@ std::vector<Hypothesis> alike(const std::vector<BeamEntry>& children, const Beam
   return result;
 }
 
-}  // namespace
-
 std::vector<BeamEntry> expand(SearchContext& search, BeamEntry& entry, const Shortlist& list) {
   entry.finished = true;
   entry.refused.clear();
   entry.last.clear();
   if (list.is_of_whole_run()) entry.last = list.scores;
+  if (!search.only_chooses) search.enter("fits");
   std::vector<Extended> extended = fit_shortlist(search, entry.model, list);
 
   // The base is refined unless a hypothesis takes nearly all that it leaves. What it leaves above
@@ -201,6 +256,7 @@ std::vector<BeamEntry> expand(SearchContext& search, BeamEntry& entry, const Sho
     entry.basin = BasinOrigin::changed;
   }
 
+  if (!search.only_chooses) search.enter("trials");
   const CrossValidation left_out = left_out_of(search, entry.model, &search.coarse);
   if (moves && !entry.is_sound()) entry.must_still_beat = without_physics(left_out);
   std::vector<Trial> trials =

@@ -15,4 +15,8 @@ struct Shortlist;
 /// basin in which the model leaves less without it.
 std::vector<BeamEntry> expand(SearchContext& search, BeamEntry& entry, const Shortlist& list);
 
+/// Returns the hypotheses that this recording cannot tell from the one that an entry accepted last.
+/// Fitted in its place they leave hardly more.
+std::vector<Hypothesis> alike(const std::vector<BeamEntry>& children, const BeamEntry& best);
+
 }  // namespace clothfit

@@ -23,7 +23,11 @@ constexpr int kFewestFrames = 8;
 
 /// Derivatives are kept, or updated, as long as they predict the residuals' change this well.
 constexpr double kKeptWithin = 0.02;
-constexpr double kUpdatedWithin = 0.1;
+constexpr double kUpdatedWithin = 0.15;
+
+/// Exact derivatives of each recording in one fit. A model that takes more of them is wrong, or near
+/// enough: they cost tens of runs.
+constexpr int kMostLinearisations = 8;
 
 void set_neutral(const EffectDescription& effect, const std::vector<Binding>& bindings,
                  Eigen::VectorXd& values) {
@@ -226,6 +230,7 @@ void refine_model(FittedModel& model, const DiagnosisSetup& setup, const StageOp
   for (const auto& problem : model.problems)
     most_spring_steps += final_refinement(*problem, setup.options).most_spring_steps;
   const PooledOptions pooled{.iterations = options.iterations,
+                             .linearisations = kMostLinearisations * static_cast<int>(model.problems.size()),
                              .rounds = options.rounds,
                              .least_decrease = options.least_decrease,
                              .loss = setup.options.loss,
@@ -282,6 +287,18 @@ FittedModel with_derivatives_of(const DiagnosisSetup& other_mesh, const FittedMo
     Eigen::VectorXd& residual = result.parts[n].linear.residual;
     if (residual.size() != model.parts[n].linear.residual.size()) result.state = FitState::failed;
     residual = model.parts[n].linear.residual;
+  }
+  return result;
+}
+
+FittedModel corrected_on_mesh(const DiagnosisSetup& other, const FittedModel& model) {
+  if (!model.usable()) return {};
+  FittedModel result = model_at(other, model.hypotheses, model.values());
+  for (size_t n = 0; n < result.parts.size(); ++n) result.parts[n].frames = model.parts[n].frames;
+  linearise_model(result);
+  for (size_t n = 0; result.usable() && n < result.parts.size(); ++n) {
+    PooledPart& part = result.parts[n];
+    part.correction = residual_of(model.parts[n]) - part.linear.residual;
   }
   return result;
 }

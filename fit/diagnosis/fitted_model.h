@@ -105,7 +105,7 @@ FittedModel shortened(const FittedModel& model, double share);
 
 struct StageOptions {
   int rounds = 2;
-  int iterations = 12;
+  int iterations = 20;
   /// A step that promises less than this of half chi-square is the last one. The default moves no
   /// parameter by a seventh of its sigma.
   double least_decrease = 0.01;
@@ -132,5 +132,10 @@ bool is_coarser(const DiagnosisSetup& mesh, const DiagnosisSetup& than);
 /// meshes' predictions hardly differ, and a mesh of half the cells a side costs a sixteenth. The
 /// model has failed where the other mesh does not run.
 FittedModel with_derivatives_of(const DiagnosisSetup& other_mesh, const FittedModel& model);
+
+/// Returns the model on another mesh where it stands, linearised, with the difference of the meshes
+/// there as a correction. So it leaves what `model` leaves. The model has failed where the other
+/// mesh does not run.
+FittedModel corrected_on_mesh(const DiagnosisSetup& other_mesh, const FittedModel& model);
 
 }  // namespace clothfit

@@ -65,7 +65,7 @@ std::optional<SeenElsewhere> constants_to_try(const Analysis& analysis, Recordin
 bool search_beside_constants(Analysis& analysis, const Analysis& declared,
                              const SeenElsewhere& constants, const ProgressCallback& progress) {
   if (!begin(analysis, declared, progress)) return false;
-  search_for_effects(analysis, progress);
+  search_for_effects(analysis, progress, nullptr);
   const CrossValidation left_out = blocks_left_out(analysis);
   if (!left_out.usable ||
       constants.without_it - left_out.mean < kCriteria.good_part * (constants.without_it - 1))

@@ -8,10 +8,11 @@
 #include "fit/diagnosis/criteria.h"
 #include "fit/diagnosis/discretisation.h"
 #include "fit/diagnosis/horizons.h"
-#include "fit/fit.h"
+#include "fit/diagnosis/worth.h"
+#include "fit/identify.h"
 #include "fit/jobs/parallel.h"
-#include "fit/jobs/stop_token.h"
 #include "fit/problem/effects_of.h"
+#include "fit/problem/problem.h"
 
 namespace clothfit {
 namespace {
@@ -81,8 +82,10 @@ using FitOver = std::function<FittedModel(size_t model, double share, const Fitt
 
 /// Fits models side by side over growing horizons. Those that leave far more than the best one
 /// fall out, and are not usable.
+/// `least_gain`, where it is above 0, is the decrease that the first horizon must bring below
+/// `without`.
 std::vector<FittedModel> race(size_t models, double first_share, double threshold,
-                              const FitOver& fit_over) {
+                              const FitOver& fit_over, double without = 0, double least_gain = 0) {
   std::vector<FittedModel> fitted(models);
   std::vector<size_t> running(models);
   std::iota(running.begin(), running.end(), size_t{0});
@@ -95,8 +98,13 @@ std::vector<FittedModel> race(size_t models, double first_share, double threshol
     for (const size_t k : running)
       if (fitted[k].usable()) least = std::min(least, fitted[k].chi_square(threshold));
     if (share == 1) break;
+    const bool is_first = share == first_share;
     std::erase_if(running, [&](size_t k) {
       if (!fitted[k].usable()) return true;
+      if (is_first && least_gain > 0 && without - fitted[k].chi_square(threshold) < least_gain) {
+        fitted[k].state = FitState::failed;
+        return true;
+      }
       const auto count = static_cast<double>(fitted[k].residual_count());
       const double above = fitted[k].chi_square(threshold) - count;
       const bool keeps_up = above <= kCriteria.race_far_behind *
@@ -108,6 +116,21 @@ std::vector<FittedModel> race(size_t models, double first_share, double threshol
   return fitted;
 }
 
+/// Returns a recording's correction over all frames: that of `early` over its own.
+Eigen::VectorXd correction_of(const FittedModel& model, const FittedModel& early, size_t n) {
+  Eigen::VectorXd correction = model.parts[n].correction;
+  const Eigen::VectorXd& first = early.parts[n].correction;
+  if (correction.size() == 0 || first.size() == 0) return correction;
+  Eigen::Index row = 0;
+  const TrajectoryObjective objective = model.objective(n);
+  for (const Objective::Block& block : objective.blocks()) {
+    if (block.frame >= early.parts[n].frames) continue;
+    correction.segment(block.offset, block.dimension) = first.segment(row, block.dimension);
+    row += block.dimension;
+  }
+  return correction;
+}
+
 /// Fits hypotheses beside a model, from where `early` stands.
 std::vector<FittedModel> race_hypotheses(const DiagnosisSetup& setup, const FittedModel& model,
                                          const FittedModel& early,
@@ -115,11 +138,20 @@ std::vector<FittedModel> race_hypotheses(const DiagnosisSetup& setup, const Fitt
                                          double first_share, double threshold,
                                          const ProgressCallback& progress) {
   std::vector<FittedModel> whole;
-  for (const Score* score : scores) whole.push_back(cautious_start(setup, early, *score));
-  return race(scores.size(), first_share, threshold,
-              [&](size_t k, double share, const FittedModel&) {
-                return refined_over(setup, whole[k], model, share, progress);
-              });
+  for (const Score* score : scores) {
+    whole.push_back(cautious_start(setup, early, *score));
+    for (size_t n = 0; n < model.parts.size(); ++n)
+      whole.back().parts[n].correction = correction_of(model, early, n);
+  }
+  const bool is_early = first_share < 1 && early.parts.front().frames < model.parts.front().frames;
+  const double least_gain =
+      is_early ? kCriteria.race_worth * worth_naming(early, threshold) : 0;
+  return race(
+      scores.size(), first_share, threshold,
+      [&](size_t k, double share, const FittedModel&) {
+        return refined_over(setup, whole[k], model, share, progress);
+      },
+      is_early ? early.chi_square(threshold) : 0, least_gain);
 }
 
 /// Refines an unrefined fit. Where that does not gain what was predicted, growing horizons are
@@ -252,11 +284,18 @@ FittedModel identified_from_scratch(const DiagnosisSetup& setup,
       }))
     return {};
   const FitOptions options = options_on_mesh(setup, hypotheses, 0);
-  const FitReport first = fit(setup.inputs.front(), options, progress);
-  if (first.stop == FitStop::cancelled) throw StopRequested();
-  if (!first.usable()) return {};
+  const FitProblem problem =
+      make_problem(setup.inputs.front(), options, setup.columns, setup.rows);
+  FitReport report;
+  std::vector<Candidate> candidates;
+  const RefineResult found =
+      identify(setup.inputs.front(), problem, options, progress, report, candidates);
+  if (!found.usable) return {};
+  NamedValues values;
+  for (int p = 0; p < problem.space.size(); ++p)
+    values[problem.space.parameters[static_cast<size_t>(p)].name] = found.values[p];
   FittedModel fitted =
-      model_at(setup, hypotheses, std::vector<NamedValues>(setup.inputs.size(), first.values));
+      model_at(setup, hypotheses, std::vector<NamedValues>(setup.inputs.size(), values));
   if (setup.inputs.size() > 1) return fit_on_mesh(setup, fitted, progress);
   linearise_model(fitted);
   return fitted;

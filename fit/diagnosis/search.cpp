@@ -5,10 +5,13 @@
 #include "fit/diagnosis/adequacy.h"
 #include "fit/diagnosis/basin.h"
 #include "fit/diagnosis/beam.h"
+#include "fit/diagnosis/coarse_rounds.h"
+#include "fit/diagnosis/criteria.h"
 #include "fit/diagnosis/discretisation.h"
 #include "fit/diagnosis/expand.h"
 #include "fit/diagnosis/prune.h"
 #include "fit/diagnosis/shortlist.h"
+#include "fit/jobs/stop_token.h"
 
 namespace clothfit {
 namespace {
@@ -19,19 +22,15 @@ BeamEntry first_entry(SearchContext& search, FittedModel base) {
   return entry;
 }
 
-/// Makes the shortlist of the base model, which is refined first unless the coarse mesh does.
-Shortlist first_shortlist(SearchContext& search, BeamEntry& entry) {
-  Shortlist list = make_shortlist(search, entry.model);
-  if (!entry.model.is_unrefined() || list.coarse.usable()) return list;
-  converge(search, entry);
-  return make_shortlist(search, entry.model);
-}
-
 /// Refines an entry's model before it is extended. Returns false where that does not work out.
-bool refine(const SearchContext& search, bool is_best, BeamEntry& entry) {
+bool refine(const SearchContext& search, BeamEntry& entry) {
+  search.enter("refinement");
   FittedModel refined = entry.model;
-  refine_with_discretisation(refined, search.setup, search.progress);
-  if (is_best && entry.basin != BasinOrigin::from_scratch) look_for_better_basin(search, refined);
+  // What a model that lacks much says does not depend on errors of its mesh.
+  if (refined.misfit() > kCriteria.biased)
+    refine_model(refined, search.setup, {}, search.progress);
+  else
+    refine_with_discretisation(refined, search.setup, search.progress);
   if (!refined.usable()) {
     entry.finished = true;
     return false;
@@ -41,19 +40,80 @@ bool refine(const SearchContext& search, bool is_best, BeamEntry& entry) {
   return true;
 }
 
-/// Extends an entry. Where nothing was found, it is extended once more if it has changed its basin
-/// or was scored on the coarse mesh: other hypotheses may show in its own basin, on its own mesh.
-std::vector<BeamEntry> extend(SearchContext& search, BeamEntry& entry, const Shortlist& list) {
+/// Extends an entry. Where nothing was found, it is extended once more if it has changed its basin,
+/// or finds a better one now: other hypotheses may show there.
+std::vector<BeamEntry> extend(SearchContext& search, BeamEntry& entry, const Shortlist& list,
+                              bool is_best) {
   std::vector<BeamEntry> children = expand(search, entry, list);
-  const bool changed = entry.basin == BasinOrigin::changed;
-  if (!children.empty() || (!changed && !list.coarse.usable())) return children;
+  if (!children.empty()) return children;
+  if (is_best && !entry.accepted.empty() && entry.basin == BasinOrigin::of_parent &&
+      look_for_better_basin(search, entry.model)) {
+    entry.basin = BasinOrigin::from_scratch;
+    stand_at(search, entry, entry.model);
+  } else if (entry.basin != BasinOrigin::changed) {
+    return children;
+  }
   converge(search, entry);
-  return expand(search, entry, make_shortlist(search, entry.model, changed));
+  return expand(search, entry, make_shortlist(search, entry.model));
+}
+
+/// Lets the coarse mesh find what a base that misfits grossly lacks. The base is refined unless
+/// what is found takes nearly all that it leaves; what it leaves above its optimum does not matter
+/// then.
+void begin_on_coarse_mesh(SearchContext& search, Beam& beam, SearchResult& result) {
+  search.enter("coarse mesh");
+  CoarseRounds rounds = search_on_coarse_mesh(search, beam.best().model);
+  result.first = std::move(rounds.first);
+  result.first_share = rounds.first_share;
+  BeamEntry& base = beam.best();
+  if (rounds.found.empty()) return converge(search, base);
+  base.finished = true;
+  base.refused = std::move(rounds.refused);
+  if (rounds.found.front().cost >= kCriteria.good_part * search.base_chi_square)
+    converge(search, base);
+  beam.add(std::move(rounds.found), search.base_cost);
+}
+
+/// Extends the entries of a beam, the cheapest first, until nothing leads on.
+void extend_all(SearchContext& search, Beam& beam, SearchResult& result) {
+  while (BeamEntry* next = beam.next()) {
+    const bool is_best = next == &beam.best();
+    if (!next->accepted.empty() && !refine(search, *next)) continue;
+    search.enter("scores");
+    const Shortlist list = make_shortlist(search, next->model);
+    if (result.first.empty()) {
+      result.first = list.merged();
+      result.first_share = list.share;
+    }
+    std::vector<BeamEntry> children = extend(search, *next, list, is_best);
+    if (next->basin == BasinOrigin::changed && next->accepted.empty()) {
+      result.first = without_columns(score_at_best_shapes(search, search.setup, next->model,
+                                                          search.untested(next->model)));
+      result.first_share = 1;
+    }
+    const bool is_end = children.empty() && is_best && next->is_sound();
+    if (is_end && judge_adequacy(next->model, search.setup.options.loss).adequate) break;
+    beam.add(std::move(children), search.base_cost);
+  }
+}
+
+/// Makes the result of the best entry as it stands.
+SearchResult found_in_time(SearchContext& search, BeamEntry best, SearchResult result) {
+  result.base = std::move(search.base);
+  result.threshold = search.threshold;
+  result.model = std::move(best.model);
+  result.accepted = std::move(best.accepted);
+  result.refused = std::move(best.refused);
+  result.last = std::move(best.last);
+  return result;
 }
 
 /// Makes the result of the best entry, which is converged and pruned first.
 SearchResult conclude(SearchContext& search, BeamEntry best, SearchResult result) {
+  search.enter("pruning");
   converge(search, best);
+  if (best.model.is_unrefined() && !best.accepted.empty())
+    refine_with_discretisation(best.model, search.setup, search.progress);
   const bool found = !best.accepted.empty();
   prune(search, best);
   const bool came_back = found && best.accepted.empty();
@@ -77,25 +137,13 @@ SearchResult search_hypotheses(const DiagnosisSetup& setup, FittedModel base,
   SearchContext search(setup, options, progress);
   Beam beam(first_entry(search, std::move(base)), static_cast<size_t>(options.beam_width),
             options.most_effects);
-  Shortlist list = first_shortlist(search, beam.best());
   SearchResult result;
-  result.first = list.merged();
-  result.first_share = list.share;
-  while (BeamEntry* next = beam.next()) {
-    const bool is_best = next == &beam.best();
-    if (!next->accepted.empty()) {
-      if (!refine(search, is_best, *next)) continue;
-      list = make_shortlist(search, next->model);
-    }
-    std::vector<BeamEntry> children = extend(search, *next, list);
-    if (next->basin == BasinOrigin::changed && next->accepted.empty()) {
-      result.first = without_columns(
-          score_at_best_shapes(search, setup, next->model, search.untested(next->model)));
-      result.first_share = 1;
-    }
-    const bool is_end = children.empty() && is_best && next->is_sound();
-    if (is_end && judge_adequacy(next->model, setup.options.loss).adequate) break;
-    beam.add(std::move(children), search.base_cost);
+  try {
+    begin_on_coarse_mesh(search, beam, result);
+    extend_all(search, beam, result);
+  } catch (const TimeIsUp&) {
+    result.complete = false;
+    return found_in_time(search, std::move(beam.best()), std::move(result));
   }
   return conclude(search, std::move(beam.best()), std::move(result));
 }

@@ -14,6 +14,7 @@ struct SearchResult {
   /// The model without hypotheses, where the search changed it; else not run. The search refines
   /// it, or finds another basin in which it leaves less.
   FittedModel base;
+  bool complete = true;       ///< false where its time was up before all was tried
   bool changed_basin = false;            ///< whether a hypothesis has led it to another one
   double threshold = 0;                  ///< SearchOptions::threshold in that basin
   std::vector<AcceptedEffect> accepted;  ///< in the order of acceptance

@@ -4,6 +4,7 @@
 
 #include "fit/diagnosis/catalogue.h"
 #include "fit/diagnosis/fitted_model.h"
+#include "fit/jobs/phase_clock.h"
 
 namespace clothfit {
 
@@ -14,6 +15,7 @@ struct SearchOptions {
   size_t most_effects = 4;
   /// Residuals beyond it count less (Huber), in sigmas; infinite for squares.
   double threshold = 1e300;
+  PhaseClock* clock = nullptr;  ///< told of the search's phases; or null
 };
 
 /// The state that the steps of one search share.
@@ -24,6 +26,8 @@ struct SearchContext {
   SearchContext& operator=(const SearchContext&) = delete;
 
   const DiagnosisSetup& setup;
+  /// The mesh only chooses: its own errors are not asked for, and no other basin is looked for.
+  bool only_chooses = false;
   const DiagnosisSetup coarse;  ///< a mesh of half the cells a side, where there is one
   const SearchOptions& options;
   const ProgressCallback progress;
@@ -33,6 +37,10 @@ struct SearchContext {
   /// The same model, where it was refined or changed its basin; else not run.
   FittedModel base;
 
+  /// Says what the search is at.
+  void enter(const std::string& phase) const {
+    if (options.clock != nullptr) options.clock->enter(phase);
+  }
   /// Returns chi-square, which is infinite for a model that is not usable.
   double left_by(const FittedModel& model) const;
   /// Returns chi-square and the price of a model's amplitudes, added up.

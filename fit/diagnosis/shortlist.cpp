@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "fit/diagnosis/adequacy.h"
+#include "fit/diagnosis/coarse_rounds.h"
 #include "fit/diagnosis/criteria.h"
 #include "fit/diagnosis/discretisation.h"
 #include "fit/diagnosis/search_context.h"
@@ -68,7 +69,7 @@ std::vector<NamedValues> values_of_effects(const FittedModel& model) {
   return values;
 }
 
-/// Leads a model on the coarse mesh from `start` over growing shares. The result takes the place of
+/// Leads a model from `start` over growing shares. The result takes the place of
 /// `fitted` where it leaves less. Springs and place of a model that misfits grossly make up for
 /// what is missing, so its optimum over few frames is not near the one over all. A start in motion
 /// has hundreds of numbers, and is left out.
@@ -79,10 +80,10 @@ void leave_bias(const SearchContext& search, FittedModel& fitted,
     return;
   FittedModel other;
   for (const double share : shares) {
-    other = model_at(search.coarse, fitted.hypotheses, start);
+    other = model_at(search.setup, fitted.hypotheses, start);
     for (size_t n = 0; n < other.parts.size(); ++n)
       other.parts[n].frames = frames_of_share(*other.problems[n], share);
-    refine_model(other, search.coarse, {}, search.progress);
+    refine_model(other, search.setup, {}, search.progress);
     if (!other.usable()) return;
     start = other.values();
   }
@@ -95,10 +96,13 @@ FittedModel over_horizon(const SearchContext& search, const DiagnosisSetup& setu
   if (share == 1) return model;
   FittedModel fitted = shortened(model, share);
   refine_model(fitted, setup, {.rounds = 1}, search.progress);
-  if (&setup != &search.coarse) {
-    if (fitted.usable()) refine_with_discretisation(fitted, setup, search.progress);
+  if (!search.only_chooses) {
+    if (!fitted.usable()) return fitted;
+    if (&setup == &search.setup)
+      refine_with_discretisation(fitted, setup, search.progress);
+    else  // what the meshes differ by over all frames is not what they differ by over few
+      fitted = corrected_on_mesh(setup, mapped_to_analysed_mesh(search, fitted, share));
   } else if (before == nullptr) {
-    // The coarse mesh only chooses, and goes without directions of its errors.
     leave_bias(search, fitted, {0.5 * share, share}, values_of_effects(model));
   } else {
     leave_bias(search, fitted, {share}, before->values());
@@ -179,6 +183,20 @@ bool says_enough(const SearchContext& search, const FittedModel& model, const Sh
          judge_adequacy(model, search.setup.options.loss).adequate;
 }
 
+/// Scores over the shortest horizons at which chi-square per residual is `visible`, on the coarse
+/// mesh where there is one.
+Shortlist over_few_frames(const SearchContext& search, const FittedModel& model, double visible) {
+  if (is_coarser(search.coarse, search.setup)) {
+    FittedModel coarse = corrected_on_mesh(search.coarse, model);
+    if (coarse.usable()) {
+      Shortlist list = over_shares(search, search.coarse, coarse, kScoreShares[0], visible);
+      list.coarse = std::move(coarse);
+      return list;
+    }
+  }
+  return over_shares(search, search.setup, model, kScoreShares[0], visible);
+}
+
 }  // namespace
 
 std::vector<Score> without_columns(std::vector<Score> scores) {
@@ -218,24 +236,12 @@ std::vector<Score> score_at_best_shapes(const SearchContext& search, const Diagn
   return at_best_shapes(search, model, projection, hypotheses);
 }
 
-Shortlist make_shortlist(const SearchContext& search, const FittedModel& model,
-                         bool may_be_coarse) {
-  if (model.misfits_grossly() && may_be_coarse && is_coarser(search.coarse, search.setup)) {
-    FittedModel coarse = fit_on_mesh(search.coarse, model, search.progress);
-    if (coarse.usable() && coarse.misfits_grossly()) {
-      Shortlist list =
-          over_shares(search, search.coarse, coarse, kScoreShares[0], kCriteria.visible);
-      list.coarse = std::move(coarse);
-      return list;
-    }
-  }
-  if (model.misfit() > kCriteria.biased)
-    return over_shares(search, search.setup, model, kScoreShares[0], kCriteria.visible);
+Shortlist make_shortlist(const SearchContext& search, const FittedModel& model) {
+  if (model.misfit() > kCriteria.biased) return over_few_frames(search, model, kCriteria.visible);
   Shortlist list = over_shares(search, search.setup, model, 1, kCriteria.visible);
   if (says_enough(search, model, list)) return list;
   const double scatter = std::sqrt(2 / static_cast<double>(model.residual_count()));
-  Shortlist over_few = over_shares(search, search.setup, model, kScoreShares[0],
-                                   1 + kCriteria.visible_sigmas * scatter);
+  Shortlist over_few = over_few_frames(search, model, 1 + kCriteria.visible_sigmas * scatter);
   return over_few.share < 1 ? over_few : list;
 }
 

@@ -12,7 +12,8 @@ struct SearchContext;
 /// The hypotheses that an entry may be extended by.
 struct Shortlist {
   /// The entry's model on the coarse mesh, where that mesh does for the round; otherwise not run.
-  /// It does where the model misfits grossly.
+  /// It leaves what the entry's model leaves: the difference of the two meshes where the entry
+  /// stands is taken for constant.
   FittedModel coarse;
   double share = 1;           ///< the shortest horizon, as a share of the fitted frames
   FittedModel early;          ///< the model fitted over that
@@ -32,10 +33,9 @@ std::vector<Score> without_columns(std::vector<Score> scores);
 
 /// Scores every hypothesis that a model does not have. A fit over all frames of a model that lacks
 /// much is biased, and its scores with it. So such a model is fitted over a few frames too, and
-/// scored from the shortest horizon on at which something is missing. Where `may_be_coarse`, a
-/// model that misfits grossly is scored on the coarse mesh.
-Shortlist make_shortlist(const SearchContext& search, const FittedModel& model,
-                         bool may_be_coarse = true);
+/// scored from the shortest horizon on at which something is missing, on the coarse mesh where
+/// there is one.
+Shortlist make_shortlist(const SearchContext& search, const FittedModel& model);
 
 /// Scores hypotheses, each at its best shape, over the frames and on the mesh of `model`.
 std::vector<Score> score_at_best_shapes(const SearchContext& search, const DiagnosisSetup& setup,

@@ -10,6 +10,9 @@ namespace clothfit {
 /// Ends a call that nobody waits for. fit() and diagnose() catch it; it never leaves them.
 struct StopRequested {};
 
+/// Ends a search whose time is up. diagnose() catches it and goes on with what was found.
+struct TimeIsUp {};
+
 /// Returns a callback that throws StopRequested where `progress` says to stop, and else returns
 /// true. Several threads may call it at once, in loops of for_each_index (fit/jobs/parallel.h). It
 /// is empty where there is no `progress`.

@@ -91,7 +91,9 @@ class Pool final : public LeastSquares {
     return count > 0 ? way.segment(first, count).cwiseAbs().maxCoeff() : 0.0;
   }
   double least_decrease() const override { return options_.least_decrease * scatter(); }
-  bool is_out_of_work() const override { return spring_steps_ >= options_.most_spring_steps; }
+  bool is_out_of_work() const override {
+    return spring_steps_ >= options_.most_spring_steps || linearisations_ >= options_.linearisations;
+  }
 
   /// Derivatives are kept, updated, or computed there.
   bool move_to(const Eigen::VectorXd& next) override { return try_to_move(space_.values(next)); }
@@ -223,6 +225,7 @@ class Pool final : public LeastSquares {
   bool linearise() {
     std::vector<char> usable(parts_.size(), 1);
     std::vector<double> spring_steps(parts_.size(), 0);
+    for (const PooledPart& part : parts_) linearisations_ += part.linear.usable ? 0 : 1;
     tbb::parallel_for(size_t{0}, parts_.size(), [&](size_t n) {
       if (parts_[n].linear.usable) return;
       const TrajectoryObjective objective = objective_of(*problems_[n], parts_[n]);
@@ -244,6 +247,7 @@ class Pool final : public LeastSquares {
   std::vector<char> exact_;  ///< whether the derivatives are those of where the recording stands
   double threshold_ = kInfinite, cost_ = 0;
   double spring_steps_ = 0;
+  int linearisations_ = 0;  ///< exact ones, of any recording
 };
 
 /// Moves parts into their ranges. Derivatives of those that move are none of where they stand.

@@ -36,6 +36,8 @@ Eigen::VectorXd residual_of(const PooledPart& part);
 
 struct PooledOptions {
   int iterations = 60;       ///< in all, without steps that were refused
+  /// Exact derivatives, of all recordings together, after which it ends.
+  int linearisations = 1000000;
   int rounds = 6;            ///< each with its own time steps and loss, until one hardly moves
   double least_step = 1e-7;  ///< it ends when no shared coordinate moves further,
   /// or the next step promises no more of the cost than this, times chi-square per residual where

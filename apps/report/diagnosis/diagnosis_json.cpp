@@ -111,7 +111,12 @@ void write_diagnosis(const Diagnosis& diagnosis, const std::string& command,
                     {"recordings", names(false)},
                     {"held_out_recordings", names(true)},
                     {"verdict", to_string(diagnosis.verdict)},
+                    {"complete", diagnosis.complete},
                     {"seconds", diagnosis.seconds}};
+  json["phases"] = ordered_json::array();
+  for (const PhaseTime& phase : diagnosis.phases)
+    json["phases"].push_back({{"name", phase.name}, {"seconds", phase.seconds}});
+  if (!diagnosis.complete) json["not_tried"] = titles(not_tried(diagnosis));
   if (const auto& seen = diagnosis.seen_elsewhere)
     json["seen_elsewhere"] = {{"rms_m", seen->rms_m},
                               {"cross_validated", seen->cross_validated},

@@ -261,15 +261,25 @@ std::string diagnosis_sentence(const Diagnosis& diagnosis) {
   return verdict_text(diagnosis);
 }
 
+std::string incomplete_text(const Diagnosis& diagnosis) {
+  if (diagnosis.scores.empty())
+    return "Incomplete: the search ended before any effect was scored.";
+  return fmt::format(
+      "Incomplete: the search ended after {} s. {} of {} modes were scored but not fitted; neither "
+      "limits nor separations nor a law were looked for.",
+      significant(diagnosis.seconds, 3), not_tried(diagnosis).size(), diagnosis.scores.size());
+}
+
 std::string diagnosis_page_html(const Diagnosis& diagnosis, std::span<const Recording> recordings,
                                 const std::string& command) {
   const Recording& recording = recordings.front();
   std::string body = fmt::format(
       "<h1>Diagnosis of “{}”</h1>\n<p class=\"meta\">clothfit {} · {} s</p>\n"
-      "<div class=\"verdict\"><strong>{}</strong>\n<p>{}</p></div>\n",
+      "<div class=\"verdict\"><strong>{}</strong>\n<p>{}</p>{}</div>\n",
       escape_xml(names_text(diagnosis)), escape_xml(program_version()),
       significant(diagnosis.seconds, 3), escape_xml(verdict_text(diagnosis)),
-      escape_xml(before_after_text(diagnosis)));
+      escape_xml(before_after_text(diagnosis)),
+      diagnosis.complete ? "" : "<p>" + escape_xml(incomplete_text(diagnosis)) + "</p>");
   body += section("What was missing", what_was_missing(diagnosis));
   body += section("Errors before and after",
                   wide(html_table(before_after_table(diagnosis),

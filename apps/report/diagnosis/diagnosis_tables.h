@@ -16,6 +16,9 @@ Table short_candidate_table(const Diagnosis& diagnosis);
 /// Lists modes with which the model was fitted again, accepted and refused, and why.
 Table trial_table(const Diagnosis& diagnosis);
 
+/// Returns the modes that were scored and not fitted.
+std::vector<Hypothesis> not_tried(const Diagnosis& diagnosis);
+
 /// Lists every amplitude's detection limit, found and as the score predicts it.
 Table limit_table(const Diagnosis& diagnosis);
 
