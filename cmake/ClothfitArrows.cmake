@@ -71,14 +71,17 @@ set(CLOTHFIT_ARROWS
                              fit/cost fit/search fit/refine"
   "apps/study/recordings -> data fit/jobs fit/observe fit/problem fit apps/terminal apps/steps
                             apps/report/fit"
+  "apps/study/foreign   -> data fit/jobs fit/diagnosis apps/terminal apps/steps
+                           apps/study/recordings"
   "apps/report/study    -> data vision/track apps/terminal apps/report/page apps/report/fit
-                           apps/study/trials apps/study/louchet1995 apps/study/recordings"
+                           apps/study/trials apps/study/louchet1995 apps/study/recordings
+                           apps/study/foreign"
   "apps/verbs           -> data model/topology model/fabric model/cloth model/effects
                            model/integrate fit/interface fit/jobs fit/measurement_effects
                            fit/problem fit fit/diagnosis apps/terminal apps/steps
                            apps/report/page apps/report/fit apps/report/diagnosis
                            apps/study/trials apps/study/louchet1995 apps/study/recordings
-                           apps/report/study"
+                           apps/study/foreign apps/report/study"
   "apps                 -> data apps/terminal apps/verbs"
 )
 

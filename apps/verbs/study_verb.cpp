@@ -16,6 +16,7 @@
 #include "apps/terminal/text_table.h"
 #include "apps/terminal/version.h"
 #include "apps/verbs/resumable_run.h"
+#include "apps/verbs/study_foreign.h"
 #include "apps/verbs/verb.h"
 #include "data/input_error.h"
 #include "data/text_file.h"
@@ -130,7 +131,7 @@ int run_recordings_study(const StudyFlags& flags, const std::string& command) {
 
 void add_study_verb(Verb program) {
   const auto flags = std::make_shared<StudyFlags>();
-  Verb verb = program.add_verb("study", "Fit many recordings, and judge the models");
+  Verb verb = program.add_verb("study", "Fit or diagnose many recordings, and judge the models");
   verb.requires_verb();
   Verb recordings = verb.add_verb(
       "recordings", "Fit every recording with every model; one table beside the trivial guesses");
@@ -200,6 +201,7 @@ void add_study_verb(Verb program) {
       "      --effect natural_size+viscous_damping+marker_offsets");
   recordings.runs(
       [flags, recordings] { return run_recordings_study(*flags, recordings.command_text()); });
+  add_foreign_study(verb);
 }
 
 }  // namespace clothfit

@@ -112,6 +112,7 @@ TEST_F(Program, AnswersWrongUsageWithTwo) {
         {"fit", "a", "--springs", "louchet6"},
         {"fit", "a", "--resume"},
         {"fit", "a", "--start", "a.json", "--forecast", "b.json"},
+        {"study", "foreign"},
         {"recover", "--tags", "4"},
         {"recover", "--render", "--markers", "4"},
         {"recover", "--render", "--picture", "640"},

@@ -11,14 +11,13 @@
 
 #include "apps/report/fit/fit_tables.h"
 #include "apps/steps/steps.h"
+#include "apps/study/recordings/recordings_checksum.h"
 #include "apps/study/recordings/study_row_json.h"
 #include "apps/terminal/exit_code.h"
 #include "apps/terminal/interrupt.h"
 #include "apps/terminal/option_flags.h"
 #include "apps/terminal/version.h"
 #include "data/input_error.h"
-#include "data/text_file.h"
-#include "fit/jobs/checksum.h"
 #include "fit/jobs/executor.h"
 #include "fit/jobs/journal_key.h"
 #include "fit/observe/marker_error.h"
@@ -31,7 +30,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-constexpr const char* kRecordingFile = "recording.yaml";
 
 using Tracks = std::vector<Eigen::MatrixXd>;
 
@@ -234,22 +232,8 @@ void RecordingsStudyOptions::validate() const {
 }
 
 std::string RecordingsStudyOptions::key() const {
-  std::uint64_t sum = kEmptyChecksum;
-  const auto add = [&](const std::string& text) {
-    sum = checksum(text, sum);
-    sum = checksum(std::string_view("\0", 1), sum);
-  };
-  for (const fs::path& folder : recordings) {
-    add(folder.generic_string());
-    std::set<fs::path> files;
-    for (const auto& entry : fs::recursive_directory_iterator(folder))
-      if (entry.is_regular_file()) files.insert(entry.path());
-    for (const fs::path& file : files) {
-      add(file.lexically_relative(folder).generic_string());
-      add(std::to_string(fs::file_size(file)));
-    }
-    add(read_text(folder / kRecordingFile));
-  }
+  std::uint64_t sum = recordings_checksum(recordings);
+  const auto add = [&](const std::string& text) { sum = checksum_of_text(text, sum); };
   for (const StudiedModel& model : models) {
     add(model.name);
     for (const std::string& effect : model.effects) add(effect);
