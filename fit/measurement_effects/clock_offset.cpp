@@ -25,7 +25,8 @@ EffectDescription describe() {
                           .neutral = 0,
                           .lower = -0.2,
                           .upper = 0.2,
-                          .typical = 1e-3}}};
+                          .typical = 1e-3}},
+          .remedy = "measure the offset between the clocks of camera and drive, and declare it"};
 }
 
 std::unique_ptr<MeasurementEffect> make() {

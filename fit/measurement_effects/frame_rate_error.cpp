@@ -29,7 +29,8 @@ EffectDescription describe() {
                           .neutral = 0,
                           .lower = -0.2,
                           .upper = 0.2,
-                          .typical = 1e-3}}};
+                          .typical = 1e-3}},
+          .remedy = "check the declared frame_rate against the file"};
 }
 
 std::unique_ptr<MeasurementEffect> make() {

@@ -29,7 +29,8 @@ EffectDescription describe() {
                           .neutral = 0,
                           .lower = -0.05,
                           .upper = 0.05,
-                          .typical = 1e-3}}};
+                          .typical = 1e-3}},
+          .remedy = "declare rolling_shutter with the camera's readout"};
 }
 
 std::unique_ptr<MeasurementEffect> make() {

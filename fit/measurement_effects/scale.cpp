@@ -27,7 +27,8 @@ EffectDescription describe() {
                           .neutral = 1,
                           .lower = 0.8,
                           .upper = 1.25,
-                          .typical = 1e-3}}};
+                          .typical = 1e-3}},
+          .remedy = "check the units and the size of the cloth"};
 }
 
 std::unique_ptr<MeasurementEffect> make() {

@@ -38,7 +38,8 @@ EffectDescription describe() {
                           .neutral = 0,
                           .lower = -0.3,
                           .upper = 0.3,
-                          .typical = 1e-3}}};
+                          .typical = 1e-3}},
+          .remedy = "level the camera's or the tracker's axes against gravity"};
 }
 
 std::unique_ptr<MeasurementEffect> make() {

@@ -71,6 +71,8 @@ struct EffectDescription {
   bool touches = false;                ///< it lets the cloth touch an obstacle
   /// Without at least and at most so many driven held points it does nothing.
   std::pair<int, int> driven_points = {0, std::numeric_limits<int>::max()};
+  /// Says what a person may do about it, as a short command: "level the camera". Empty: nothing.
+  std::string remedy = {};
 };
 
 /// The state that an effect may look at: at the beginning of a step, in SI units, world.

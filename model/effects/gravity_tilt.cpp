@@ -43,7 +43,8 @@ EffectDescription describe() {
                           .neutral = 0,
                           .lower = -0.3,
                           .upper = 0.3,
-                          .typical = 0.01}}};
+                          .typical = 0.01}},
+          .remedy = "level the camera's or the tracker's axes against gravity"};
 }
 
 std::unique_ptr<Effect> make() {

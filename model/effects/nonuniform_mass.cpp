@@ -272,7 +272,8 @@ EffectDescription describe() {
                      .amplitudes = {"patch"},
                      .shapes = {over_cloth("patch_s", {0.2, 0.5, 0.8}),
                                 over_cloth("patch_t", {0.2, 0.5, 0.8}),
-                                over_cloth("patch_radius", {0.05, 0.12})}}}};
+                                over_cloth("patch_radius", {0.05, 0.12})}}},
+          .remedy = "weigh the hem, or declare masses"};
 }
 
 std::unique_ptr<Effect> make() {

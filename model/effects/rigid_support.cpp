@@ -51,7 +51,8 @@ EffectDescription describe() {
       .modes = {{.name = "",
                  .amplitudes = {"share"},
                  .shapes = {{.parameter = "slack", .values = {-0.08, -0.04, -0.02, 0}}}}},
-      .driven_points = {2, 2}};
+      .driven_points = {2, 2},
+      .remedy = "track the body that holds both points, and declare the paths that it gives"};
 }
 
 std::unique_ptr<Effect> make() {

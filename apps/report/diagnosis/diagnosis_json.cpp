@@ -8,6 +8,7 @@
 #include "apps/report/diagnosis/diagnosis_tables.h"
 #include "apps/terminal/json_file.h"
 #include "apps/terminal/version.h"
+#include "fit/problem/effects_of.h"
 
 namespace clothfit {
 namespace {
@@ -131,6 +132,9 @@ void write_diagnosis(const Diagnosis& diagnosis, const std::string& command,
       if (std::ranges::find(alike, term.effect) == alike.end()) alike.push_back(term.effect);
     one["class"] = alike;
     one["parameters"] = found_json(accepted.trial.hypothesis, diagnosis.found());
+    if (const std::string remedy = describe_effect(accepted.trial.hypothesis.effect).remedy;
+        !remedy.empty())
+      one["remedy"] = remedy;
     one["instead"] = ordered_json::array();
     for (const Trial& trial : accepted.refused) one["instead"].push_back(trial_json(trial));
     one["separation"] = ordered_json::array();

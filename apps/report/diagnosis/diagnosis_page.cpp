@@ -135,6 +135,8 @@ std::string what_was_missing(const Diagnosis& diagnosis) {
     content += paragraph(describe_effect(trial.hypothesis.effect).summary + ".");
     content += fmt::format("<p class=\"found\"><strong>{}</strong></p>\n",
                            escape_xml(found_text(trial.hypothesis, diagnosis.found().result)));
+    if (const std::string remedy = remedy_text(trial.hypothesis); !remedy.empty())
+      content += paragraph(remedy);
     content += paragraph(fmt::format(
         "Chi-square falls by {}, of {} that the derivatives predicted. Blocks of time that were "
         "left "

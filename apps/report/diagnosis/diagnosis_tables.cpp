@@ -225,6 +225,11 @@ std::string seen_elsewhere_text(const SeenElsewhere& seen) {
                      significant(1e3 * seen.rms_m, 3));
 }
 
+std::string remedy_text(const Hypothesis& term) {
+  const std::string remedy = describe_effect(term.effect).remedy;
+  return remedy.empty() ? remedy : "Remedy: " + remedy + ".";
+}
+
 std::string found_text(const Hypothesis& term, const FitResult& result) {
   std::string text;
   const auto add = [&](const ParameterEstimate& parameter) {

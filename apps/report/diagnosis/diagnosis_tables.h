@@ -53,6 +53,9 @@ Table adequacy_table(const Diagnosis& diagnosis);
 /// Writes "q_x 0.05, q_y 0.21 Pa (frequency 2 Hz)": a fit's values for a term, with sigma.
 std::string found_text(const Hypothesis& term, const FitResult& result);
 
+/// Writes "Remedy: level the camera." for a term whose effect has one; nothing for others.
+std::string remedy_text(const Hypothesis& term);
+
 /// Writes "a constant for each, 8.31 mm in the mean (rms of a coordinate)".
 std::string seen_elsewhere_text(const SeenElsewhere& seen);
 

@@ -38,5 +38,11 @@ TEST(SeparationText, NamesTheBestRecordingThatTells) {
             "gravity_tilt cannot be told from world_tilt (0.0 sigma; 35 sigma with: shaken)");
 }
 
+TEST(RemedyText, IsThatOfTheEffectWhereItHasOne) {
+  EXPECT_EQ(remedy_text({.effect = "nonuniform_mass", .mode = "hem"}),
+            "Remedy: weigh the hem, or declare masses.");
+  EXPECT_EQ(remedy_text({.effect = "wind", .mode = "pressure"}), "");
+}
+
 }  // namespace
 }  // namespace clothfit
