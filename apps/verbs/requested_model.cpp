@@ -189,7 +189,7 @@ FitResult complete_parameters(const Recording& recording, GivenParameters given)
     for (const EffectParameter& parameter :
          find_effect(effect.name, "--fit").describe().parameters) {
       const auto found = effect.parameters.find(parameter.name);
-      if (found == effect.parameters.end() && declared)
+      if (found == effect.parameters.end() && declared && !parameter.picks)
         throw InputError(
             file, effect.line,
             fmt::format("{}.{} is left to a fit, and nobody gave it", effect.name, parameter.name),

@@ -161,7 +161,8 @@ void shake(FitProblem& problem, const Eigen::Vector3d& amplitude_m, double frequ
                                               {"amplitude_y", amplitude_m.y()},
                                               {"amplitude_z", amplitude_m.z()},
                                               {"frequency", frequency_hz},
-                                              {"phase", 0.25}};
+                                              {"phase", 0.25},
+                                              {"point", 0}};
   add_effect(problem.cloth, "support_motion", "a candidate recording");
   std::vector<Binding> bindings;
   for (const EffectParameter& parameter : problem.cloth.effect_descriptions.back().parameters)

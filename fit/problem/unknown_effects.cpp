@@ -75,6 +75,8 @@ void add_effect(const std::string& name, const std::string& where,
     const auto value = values.find(parameter.name);
     if (value != values.end()) {
       binding.constant = value->second;
+    } else if (parameter.picks) {
+      binding.constant = parameter.neutral;
     } else if (options.forecast) {
       throw InputError(
           "FitOptions::forecast", "the fit holds no value for " + name + "." + parameter.name,

@@ -33,6 +33,9 @@ struct EffectParameter {
   /// An empirical effect's coefficient stands in the law that a diagnosis writes. These are its
   /// left side, "a", and its factor, "-|v| v"; empty for all others.
   std::string law_side = {}, law_factor = {};
+  /// It is a whole number that picks something. No fit moves it, and where nobody gives it, it is
+  /// neutral.
+  bool picks = false;
 };
 
 /// Says how the data are tested for an effect.
@@ -49,6 +52,9 @@ struct ShapeGrid {
   bool per_duration = false;   ///< frequencies, in units of 1 / duration of the observed motion
   bool of_duration = false;    ///< times since its first frame, as fractions of its duration
   bool over_cloth = false;     ///< a place or a length on it
+  /// The numbers of the held points on which the effect acts, from 1 on, in place of values. There
+  /// are none where these are fewer than two, or where an edge is held.
+  bool per_held_point = false;
 };
 
 /// One mode of an effect; the data are asked for each mode by itself.

@@ -1,19 +1,18 @@
 #include "model/effects/support_law.h"
-#include "model/effects/vector_parameter.h"
 
 /// Lets the held points drift, all alike, beside their known motion: shift(t) = velocity t, with t
-/// the recording's time (s). Parameters: velocity_x, velocity_y, velocity_z (m/s), neutral at 0.
-/// Ours.
+/// the recording's time (s). Parameters: velocity_x, velocity_y, velocity_z (m/s), neutral at 0;
+/// point (index), the number of the held point that drifts, or 0 for all. Ours.
 namespace clothfit::support_drift {
 namespace {
 struct Law {
-  static constexpr int kParameters = 3, kMemory = 0;
+  static constexpr int kParameters = 4, kMemory = 0;
   static constexpr bool kAtRest = false, kOfTwo = false;
 
   template <class Real>
-  static Vector3<Real> shift(const SupportSight<Real>& at, const std::array<Real, 3>& p,
+  static Vector3<Real> shift(const SupportSight<Real>& at, const std::array<Real, 4>& p,
                              std::array<Real, 0>&) {
-    return Real(at.end_time_s) * Vector3<Real>{p[0], p[1], p[2]};
+    return Real(at.end_time_s) * at.is_asked(p[3]) * Vector3<Real>{p[0], p[1], p[2]};
   }
 
   static EffectRates rates(const Cloth&, const SpringParameters&, const std::vector<double>&) {
@@ -26,12 +25,16 @@ struct Law {
 EffectDescription describe() {
   return {.name = "support_drift",
           .summary = "held points drift, shift = velocity t",
-          .parameters = vector_parameter({.name = "velocity",
-                                          .unit = "m/s",
-                                          .neutral = 0,
-                                          .lower = -0.2,
-                                          .upper = 0.2,
-                                          .typical = 0.002})};
+          .parameters = vector_at_point({.name = "velocity",
+                                         .unit = "m/s",
+                                         .neutral = 0,
+                                         .lower = -0.2,
+                                         .upper = 0.2,
+                                         .typical = 0.002}),
+          .test = EffectTest::profiled,
+          .modes = alike_and_single(
+              {.name = "", .amplitudes = {"velocity_x", "velocity_y", "velocity_z"}, .shapes = {}}),
+          .remedy = kDeclareMotion};
 }
 
 std::unique_ptr<Effect> make() {

@@ -3,11 +3,14 @@
 #include <ceres/jet.h>
 
 #include <array>
+#include <utility>
+#include <vector>
 
 #include "model/cloth/cloth.h"
 #include "model/effects/law_effect.h"
 #include "model/effects/linearisation.h"
 #include "model/effects/number.h"
+#include "model/effects/vector_parameter.h"
 
 namespace clothfit {
 
@@ -15,15 +18,57 @@ namespace clothfit {
 template <class Real>
 struct SupportSight {
   Vector3<Real> pull_n;  ///< of the cloth, its weight included
-  int number = 0;        ///< which held point
-  bool driven = false;   ///< follows a motion of its own; else rests where it started
+  /// Says which held point of the cloth it is, from 0 on. That is the place in a recording's list
+  /// of held points as long as no edge comes before, which stands for a point at each vertex.
+  int number = 0;
+  bool driven = false;  ///< follows a motion of its own; else rests where it started
   /// Vector to the only other driven point, where there is just one (world, m), and its length over
   /// the flat cloth. Their motions give it; it is set for laws that ask for it, nothing for others.
   Eigen::Vector3d to_partner_m = Eigen::Vector3d::Zero();
   double partner_over_cloth_m = 0;
   double end_time_s = 0;  ///< when it will be where the law places it
   double time_step_s = 0;
+
+  /// Returns 1 where a law acts on this held point, else 0. It acts on all for `point` 0, and on
+  /// the one of that number, from 1 on, for others.
+  Real is_asked(const Real& point) const {
+    const Real none(0.0), all(1.0);
+    const Real own(number + 1.0);
+    const Real not_below = select(point > own - Real(0.5), all, none);
+    const Real same = select(point < own + Real(0.5), not_below, none);
+    return select(point < Real(0.5), all, same);
+  }
 };
+
+/// Returns the parameter by which a law acts on one held point alone (SupportSight::is_asked).
+inline EffectParameter point_parameter() {
+  return {.name = "point",
+          .unit = "index",
+          .neutral = 0,
+          .lower = 0,
+          .upper = 64,
+          .typical = 1,
+          .picks = true};
+}
+
+/// Returns a vector's parameters, and the one that picks a held point.
+inline std::vector<EffectParameter> vector_at_point(const EffectParameter& of_each) {
+  std::vector<EffectParameter> all = vector_parameter(of_each);
+  all.push_back(point_parameter());
+  return all;
+}
+
+/// Returns a mode of all held points alike, and the same mode of single ones.
+inline std::vector<EffectMode> alike_and_single(EffectMode alike) {
+  EffectMode single = alike;
+  single.name = "single";
+  single.shapes.push_back({.parameter = "point", .values = {}, .per_held_point = true});
+  return {std::move(alike), std::move(single)};
+}
+
+/// Says what to do about held points that move otherwise than a recording has them.
+inline constexpr const char* kDeclareMotion =
+    "declare its motion: tracked (with tracks of a marker there) or path";
 
 /// Makes an effect on the places of the held points. A Law has
 ///   static constexpr int kParameters, kMemory;   // kMemory numbers are remembered per held point

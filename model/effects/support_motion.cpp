@@ -7,18 +7,19 @@
 ///
 /// with t the recording's time (s), so that the shift is nothing at 0, where the start shape holds.
 /// Parameters: amplitude_x, amplitude_y, amplitude_z (m), neutral at 0; frequency f (Hz) and phase
-/// (turns), which matter only where the amplitude does. A motion at constant velocity is
-/// support_drift's. Ours.
+/// (turns), which matter only where the amplitude does; point (index), the number of the held point
+/// that moves, or 0 for all. A motion at constant velocity is support_drift's. Ours.
 namespace clothfit::support_motion {
 namespace {
 struct Law {
-  static constexpr int kParameters = Harmonic::kParameters, kMemory = 0;
+  static constexpr int kParameters = Harmonic::kParameters + 1, kMemory = 0;
   static constexpr bool kAtRest = false, kOfTwo = false;
 
   template <class Real>
-  static Vector3<Real> shift(const SupportSight<Real>& at, const Harmonic::Parameters<Real>& p,
+  static Vector3<Real> shift(const SupportSight<Real>& at, const std::array<Real, kParameters>& p,
                              std::array<Real, 0>&) {
-    return Harmonic::vector(p, at.end_time_s) - Harmonic::vector(p, 0);
+    const Harmonic::Parameters<Real> wave{p[0], p[1], p[2], p[3], p[4]};
+    return at.is_asked(p[5]) * (Harmonic::vector(wave, at.end_time_s) - Harmonic::vector(wave, 0));
   }
 
   static EffectRates rates(const Cloth&, const SpringParameters&, const std::vector<double>&) {
@@ -29,18 +30,21 @@ struct Law {
 }  // namespace
 
 EffectDescription describe() {
+  std::vector<EffectParameter> parameters = Harmonic::parameters({.name = "amplitude",
+                                                                  .unit = "m",
+                                                                  .neutral = 0,
+                                                                  .lower = -0.1,
+                                                                  .upper = 0.1,
+                                                                  .typical = 0.002});
+  parameters.push_back(point_parameter());
   return {
       .name = "support_motion",
       .summary =
           "held points to and fro, shift = amplitude [sin(2 pi (f t + phase)) - sin(2 pi phase)]",
-      .parameters = Harmonic::parameters({.name = "amplitude",
-                                          .unit = "m",
-                                          .neutral = 0,
-                                          .lower = -0.1,
-                                          .upper = 0.1,
-                                          .typical = 0.002}),
+      .parameters = std::move(parameters),
       .test = EffectTest::profiled,
-      .modes = Harmonic::modes("amplitude")};
+      .modes = alike_and_single(Harmonic::modes("amplitude").front()),
+      .remedy = kDeclareMotion};
 }
 
 std::unique_ptr<Effect> make() {

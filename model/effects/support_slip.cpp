@@ -6,19 +6,19 @@
 ///
 /// F (N) is the cloth's pull on a held point, the weight included, at the beginning of the step.
 /// The creep of a point is remembered. Parameters: mobility (m/(N s)), neutral at 0; threshold (N),
-/// the pull up to which the point holds, which matters only where mobility does. Ours: dry friction
-/// in a clamp, then viscous.
+/// the pull up to which the point holds, which matters only where mobility does; point (index), the
+/// number of the held point that creeps, or 0 for all. Ours: dry friction in a clamp, then viscous.
 ///
 /// Dashpots pull on a support that creeps. Mobility times a support's damping (N s/m) must
 /// therefore stay below 1; the mobility's bounds ensure this for cloth.
 namespace clothfit::support_slip {
 namespace {
 struct Law {
-  static constexpr int kParameters = 2, kMemory = 3;
+  static constexpr int kParameters = 3, kMemory = 3;
   static constexpr bool kAtRest = false, kOfTwo = false;
 
   template <class Real>
-  static Vector3<Real> shift(const SupportSight<Real>& at, const std::array<Real, 2>& p,
+  static Vector3<Real> shift(const SupportSight<Real>& at, const std::array<Real, 3>& p,
                              std::array<Real, 3>& crept_m) {
     using std::sqrt;
     const Real square = dot(at.pull_n, at.pull_n);
@@ -26,7 +26,7 @@ struct Law {
     const auto some = square > Real(1e-30);
     const Real pull = sqrt(select(some, square, Real(1.0)));
     const Real excess = select(some, pull - p[1], Real(0.0));
-    const Real speed = p[0] * select(excess > Real(0.0), excess, Real(0.0));
+    const Real speed = at.is_asked(p[2]) * p[0] * select(excess > Real(0.0), excess, Real(0.0));
     const Vector3<Real> creep = Real(at.time_step_s) * speed / pull * at.pull_n;
     crept_m = {crept_m[0] + creep.x, crept_m[1] + creep.y, crept_m[2] + creep.z};
     return {crept_m[0], crept_m[1], crept_m[2]};
@@ -46,24 +46,27 @@ struct Law {
 }  // namespace
 
 EffectDescription describe() {
-  return {.name = "support_slip",
-          .summary = "held points creep where the cloth pulls, at mobility max(|F| - threshold, 0)",
-          .parameters = {{.name = "mobility",
-                          .unit = "m/(N s)",
-                          .neutral = 0,
-                          .lower = 0,
-                          .upper = 0.1,
-                          .typical = 0.005},
-                         {.name = "threshold",
-                          .unit = "N",
-                          .neutral = 0.1,
-                          .lower = 0,
-                          .upper = 10,
-                          .typical = 0.02}},
-          .test = EffectTest::finite,
-          .modes = {{.name = "",
-                     .amplitudes = {"mobility"},
-                     .shapes = {{.parameter = "threshold", .values = {0, 0.05, 0.2}}}}}};
+  return {
+      .name = "support_slip",
+      .summary = "held points creep where the cloth pulls, at mobility max(|F| - threshold, 0)",
+      .parameters = {{.name = "mobility",
+                      .unit = "m/(N s)",
+                      .neutral = 0,
+                      .lower = 0,
+                      .upper = 0.1,
+                      .typical = 0.005},
+                     {.name = "threshold",
+                      .unit = "N",
+                      .neutral = 0.1,
+                      .lower = 0,
+                      .upper = 10,
+                      .typical = 0.02},
+                     point_parameter()},
+      .test = EffectTest::finite,
+      .modes = alike_and_single({.name = "",
+                                 .amplitudes = {"mobility"},
+                                 .shapes = {{.parameter = "threshold", .values = {0, 0.05, 0.2}}}}),
+      .remedy = kDeclareMotion};
 }
 
 std::unique_ptr<Effect> make() {

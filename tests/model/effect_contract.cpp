@@ -166,7 +166,9 @@ void expect_the_stable_step_to_be_stable(const EffectEntry& entry, Uniform& unif
                    .effects = {{}},
                    .start_position_m = crumpled_for(entry.name, cloth.mesh, 0.3, uniform)};
   for (const EffectParameter& p : entry.describe().parameters)
-    set.effects[0].push_back(uniform(0, 1) < 0.5 ? p.lower : p.upper);
+    set.effects[0].push_back(p.picks               ? random_pick(uniform)
+                             : uniform(0, 1) < 0.5 ? p.lower
+                                                   : p.upper);
 
   const double time_step_s = 0.9 * stable_time_step_s(cloth, set);
   const SimulateResult result =

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 #include <utility>
 #include <vector>
@@ -36,12 +37,18 @@ inline Parameters neutral(const EffectDescription& effect) {
   return values;
 }
 
+/// Draws 0, 1 or 2 for a parameter that picks. Of two things that is either or both.
+inline double random_pick(Uniform& uniform) {
+  return std::floor(uniform(0, 3));
+}
+
 /// Draws parameters somewhere within the bounds, a few typical changes away from neutral.
 inline Parameters random_parameters(const EffectDescription& effect, Uniform& uniform) {
   Parameters values;
   for (const EffectParameter& p : effect.parameters)
-    values.push_back(uniform(std::max(p.lower, p.neutral - 5 * p.typical),
-                             std::min(p.upper, p.neutral + 5 * p.typical)));
+    values.push_back(p.picks ? random_pick(uniform)
+                             : uniform(std::max(p.lower, p.neutral - 5 * p.typical),
+                                       std::min(p.upper, p.neutral + 5 * p.typical)));
   return values;
 }
 

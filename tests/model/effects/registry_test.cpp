@@ -46,7 +46,8 @@ TEST(EffectRegistry, EveryModeIsMadeOfItsEffectsParametersWithinTheirRanges) {
         const auto found = parameter(shape.parameter);
         ASSERT_NE(found, effect.parameters.end()) << shape.parameter;
         EXPECT_THAT(mode.amplitudes, Not(Contains(shape.parameter)));
-        EXPECT_FALSE(shape.values.empty());
+        EXPECT_EQ(shape.per_held_point, found->picks);
+        EXPECT_EQ(shape.values.empty(), shape.per_held_point);
         if (shape.per_duration) continue;
         for (const double value : shape.values) {
           EXPECT_GE(value, found->lower);

@@ -13,8 +13,8 @@ namespace {
 const Eigen::Vector3d kAmplitude_m(0.03, -0.02, 0.01);
 constexpr double kFrequency_hz = 1.9, kPhase_turns = 0.12;
 
-std::vector<double> parameters() {
-  return {kAmplitude_m.x(), kAmplitude_m.y(), kAmplitude_m.z(), kFrequency_hz, kPhase_turns};
+std::vector<double> parameters(double point = 0) {
+  return {kAmplitude_m.x(), kAmplitude_m.y(), kAmplitude_m.z(), kFrequency_hz, kPhase_turns, point};
 }
 double harmonic(double time_s) {
   return std::sin(2 * std::numbers::pi * (kFrequency_hz * time_s + kPhase_turns));
@@ -69,6 +69,20 @@ TEST(SupportMotion, IsAShakenFrameSeenFromOutside) {
   EXPECT_GT((world - frame).cwiseAbs().maxCoeff(), 0.01);
   // The factor loses ten digits to cancellation, h^2 f^2 of the amplitude.
   EXPECT_LT((world.colwise() - shift_m(steps * h) - frame).cwiseAbs().maxCoeff(), 1e-8);
+}
+
+TEST(SupportMotion, OfASinglePointLeavesTheOtherWhereItIs) {
+  Cloth bare = square_cloth(5);
+  const Eigen::Matrix3Xd start = flat_positions(bare.mesh);
+  bare.held = {held_at(bare.mesh, 0, 0), held_at(bare.mesh, 0.4, 0)};
+  const double h = 1e-3;
+
+  ClothWithEffect(bare, "support_motion", parameters(2), start)
+      .after(300, h, [&](int step, const ClothWithEffect::State& state) {
+        EXPECT_EQ(state.position_m.col(0), start.col(0)) << step;
+        EXPECT_LT((state.position_m.col(4) - start.col(4) - shift_m(step * h)).norm(), 1e-14)
+            << step;
+      });
 }
 
 }  // namespace

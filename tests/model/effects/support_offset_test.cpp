@@ -30,12 +30,25 @@ TEST(SupportOffset, ShiftsWhatIsDrivenAndLeavesWhatRests) {
   const Cloth bare = half_driven();
   const Eigen::Matrix3Xd start = flat_positions(bare.mesh);
   const double h = 1e-3;
-  ClothWithEffect(bare, "support_offset", {kOffset_m.x(), kOffset_m.y(), kOffset_m.z()}, start)
+  ClothWithEffect(bare, "support_offset", {kOffset_m.x(), kOffset_m.y(), kOffset_m.z(), 0}, start)
       .after(100, h, [&](int step, const ClothWithEffect::State& state) {
         EXPECT_LT((state.position_m.col(0) - start.col(0)).norm(), 1e-14) << step;
         EXPECT_LT((state.position_m.col(5) - bare.held[1].motion(step * h) - kOffset_m).norm(),
                   1e-14)
             << step;
+      });
+}
+
+TEST(SupportOffset, OfASinglePointLeavesTheOtherWhereItsMotionHasIt) {
+  Cloth bare = half_driven();
+  const Eigen::Matrix3Xd start = flat_positions(bare.mesh);
+  const Eigen::Vector3d corner = start.col(0);
+  bare.held[0].motion = [corner](double) { return corner; };
+  const double h = 1e-3;
+  ClothWithEffect(bare, "support_offset", {kOffset_m.x(), kOffset_m.y(), kOffset_m.z(), 1}, start)
+      .after(100, h, [&](int step, const ClothWithEffect::State& state) {
+        EXPECT_LT((state.position_m.col(0) - corner - kOffset_m).norm(), 1e-14) << step;
+        EXPECT_LT((state.position_m.col(5) - bare.held[1].motion(step * h)).norm(), 1e-14) << step;
       });
 }
 
@@ -59,9 +72,9 @@ TEST(SupportOffset, IsAMotionThatIsElsewhereFromTheRestBeforeTheStartOn) {
       return at + way(time_s) + kOffset_m;
     };
   }
-  ClothWithEffect offset(bare, "support_offset", {kOffset_m.x(), kOffset_m.y(), kOffset_m.z()},
+  ClothWithEffect offset(bare, "support_offset", {kOffset_m.x(), kOffset_m.y(), kOffset_m.z(), 0},
                          start);
-  ClothWithEffect neutral(elsewhere, "support_offset", {0, 0, 0}, start);
+  ClothWithEffect neutral(elsewhere, "support_offset", {0, 0, 0, 0}, start);
   for (ClothWithEffect* cloth : {&offset, &neutral}) {
     const double rest_s = 0.9 * stable_rest_step_s(cloth->cloth, cloth->set);
     start_at_rest(cloth->cloth, {&cloth->set, 1}, 9.81, 0, rest_s);
@@ -74,7 +87,7 @@ TEST(SupportOffset, IsAMotionThatIsElsewhereFromTheRestBeforeTheStartOn) {
   EXPECT_LT((rest.col(0) - start.col(0) - kOffset_m).norm(), 1e-14);
 
   neutral.set = offset.set;
-  neutral.set.effects = {{0, 0, 0}};
+  neutral.set.effects = {{0, 0, 0, 0}};
   const double h = 2e-4;
   EXPECT_LT(
       (offset.after(1500, h).position_m - neutral.after(1500, h).position_m).cwiseAbs().maxCoeff(),

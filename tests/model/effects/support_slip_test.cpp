@@ -11,10 +11,10 @@ constexpr double kWeight_n = 0.025 * 9.81;  // weight of square_cloth
 
 /// Makes a cloth of two columns that hangs by its two upper corners, each of which carries half of
 /// it. Without shear springs nothing pulls the corners together.
-ClothWithEffect hung_by_two(double mobility, double threshold) {
+ClothWithEffect hung_by_two(double mobility, double threshold, double point = 0) {
   Cloth bare = square_cloth(2);
   bare.held = {held_at(bare.mesh, 0, 0), held_at(bare.mesh, 0.4, 0)};
-  ClothWithEffect cloth(bare, "support_slip", {mobility, threshold}, hung_flat(bare.mesh));
+  ClothWithEffect cloth(bare, "support_slip", {mobility, threshold, point}, hung_flat(bare.mesh));
   cloth.set.springs.stiffness_n_per_m[shear_down] = 0;
   cloth.set.springs.stiffness_n_per_m[shear_up] = 0;
   return cloth;
@@ -42,6 +42,16 @@ TEST(SupportSlip, HoldsUpToTheThreshold) {
   const auto state = hung_by_two(0.05, 1.01 * kWeight_n).after(1000, 1e-3);
 
   EXPECT_EQ(state.position_m.leftCols(2), hung_by_two(0, 0).set.start_position_m.leftCols(2));
+}
+
+TEST(SupportSlip, OfASinglePointLeavesTheOtherWhereItIs) {
+  const ClothWithEffect cloth = hung_by_two(0.05, 0.03, 2);
+  const Eigen::Matrix3Xd start = cloth.set.start_position_m;
+
+  const Eigen::Matrix3Xd after = cloth.after(500, 1e-3).position_m;
+
+  EXPECT_EQ(after.col(0), start.col(0));
+  EXPECT_LT(after(2, 1) - start(2, 1), -1e-3);
 }
 
 TEST(SupportSlip, TurnsWithTheScene) {
