@@ -24,9 +24,36 @@ double spacing(const std::vector<double>& values, double at) {
   return wider > 0 ? wider : 0.5 * std::abs(at);
 }
 
+/// Returns the numbers of the held points that an effect is asked of one by one. There are none
+/// where it acts on fewer than two. An edge is held at each of its vertices, and the recording
+/// numbers none of these.
+std::vector<int> single_points(const Recording& recording, const EffectDescription& effect) {
+  std::vector<int> numbers;
+  for (size_t n = 0; n < recording.held.size(); ++n) {
+    const HeldPoint& point = recording.held[n];
+    if (point.edge) return {};
+    if (effect.driven_points.first == 0 || point.motion != HeldMotion::fixed)
+      numbers.push_back(static_cast<int>(n) + 1);
+  }
+  return numbers.size() < 2 ? std::vector<int>() : numbers;
+}
+
+/// Returns the candidates, each at each of the numbers that a parameter picks by.
+ShapeCandidates at_each_number(const ShapeCandidates& narrow, const std::string& parameter,
+                               const std::vector<int>& numbers) {
+  ShapeCandidates wider;
+  for (const Hypothesis& hypothesis : narrow) {
+    for (const int number : numbers) {
+      wider.push_back(hypothesis);
+      wider.back().picked[parameter] = number;
+    }
+  }
+  return wider;
+}
+
 /// Returns all combinations of the values that a mode's shapes are tried at.
-ShapeCandidates shapes_of(const EffectDescription& effect, const EffectMode& mode,
-                          double duration_s) {
+ShapeCandidates shapes_of(const Recording& recording, const EffectDescription& effect,
+                          const EffectMode& mode, double duration_s) {
   Hypothesis hypothesis{.effect = effect.name,
                         .mode = mode.name,
                         .amplitudes = mode.amplitudes,
@@ -34,6 +61,10 @@ ShapeCandidates shapes_of(const EffectDescription& effect, const EffectMode& mod
                         .shape_sigma = {}};
   ShapeCandidates result{hypothesis};
   for (const ShapeGrid& grid : mode.shapes) {
+    if (grid.per_held_point) {
+      result = at_each_number(result, grid.parameter, single_points(recording, effect));
+      continue;
+    }
     const auto parameter =
         std::ranges::find(effect.parameters, grid.parameter, &EffectParameter::name);
     const double in_unit_per_value = grid.per_duration  ? 1 / duration_s
@@ -92,8 +123,10 @@ ShapeCandidates at_shapes_of(const std::vector<Hypothesis>& hypotheses,
         one.shape[parameter] = fitted == values.end() ? value : fitted->second;
       }
     }
-    if (std::ranges::find(result, one.shape, &Hypothesis::shape) == result.end())
-      result.push_back(std::move(one));
+    const bool known = std::ranges::any_of(result, [&](const Hypothesis& other) {
+      return other.shape == one.shape && other.picked == one.picked;
+    });
+    if (!known) result.push_back(std::move(one));
   }
   return result;
 }
@@ -160,7 +193,7 @@ std::vector<ShapeCandidates> hypotheses_to_test(const FitInput& input, const Fit
     const EffectDescription effect = describe_effect(name);
     if (effect.test == EffectTest::finite && effect.modes.empty()) continue;
     for (const EffectMode& mode : modes_of(effect)) {
-      ShapeCandidates shapes = shapes_of(effect, mode, duration_s);
+      ShapeCandidates shapes = shapes_of(input.recording, effect, mode, duration_s);
       if (!shapes.empty()) result.push_back(std::move(shapes));
     }
   }

@@ -37,7 +37,8 @@ std::vector<Hypothesis> empirical_hypotheses(const FitInput& input, const FitOpt
 /// Returns the hypotheses to test on a recording: the modes of all registered effects, with
 /// exceptions. Excepted are effects that it declares or that `options` add, empirical ones, and
 /// those that do not apply to it. So are those whose geometry would have to be guessed (contact
-/// with an obstacle nobody has described). Frequencies run from the inverse of `duration_s`.
+/// with an obstacle nobody has described). Frequencies run from the inverse of `duration_s`. A mode
+/// of single held points has a shape of each.
 std::vector<ShapeCandidates> hypotheses_to_test(const FitInput& input, const FitOptions& options,
                                                 double duration_s);
 

@@ -46,6 +46,8 @@ void add(Batch& batch, size_t index, const Hypothesis& hypothesis) {
     Binding binding{.parameter = -1, .constant = parameter.neutral};
     if (const auto shape = hypothesis.shape.find(parameter.name); shape != hypothesis.shape.end())
       binding.constant = shape->second;
+    if (const auto one = hypothesis.picked.find(parameter.name); one != hypothesis.picked.end())
+      binding.constant = one->second;
     if (std::ranges::find(hypothesis.amplitudes, parameter.name) != hypothesis.amplitudes.end()) {
       binding.parameter = batch.problem.space.size();
       added.coordinates.push_back(binding.parameter);
@@ -177,10 +179,12 @@ std::vector<Columns> hypothesis_derivatives(const FittedModel& model,
                                             std::span<const Hypothesis> hypotheses) {
   // Derivatives of a harmonic at any phase are combinations of those at two.
   constexpr size_t kPhases = 2;
-  std::map<std::tuple<std::string, std::string, double>, std::vector<size_t>> harmonics;
+  using Key = std::tuple<std::string, std::string, std::map<std::string, int>, double>;
+  std::map<Key, std::vector<size_t>> harmonics;
   for (size_t k = 0; k < hypotheses.size(); ++k)
     if (is_harmonic(hypotheses[k]))
-      harmonics[{hypotheses[k].effect, hypotheses[k].mode, hypotheses[k].shape.at("frequency")}]
+      harmonics[{hypotheses[k].effect, hypotheses[k].mode, hypotheses[k].picked,
+                 hypotheses[k].shape.at("frequency")}]
           .push_back(k);
   std::erase_if(harmonics, [](const auto& known) { return known.second.size() <= kPhases; });
 

@@ -16,6 +16,16 @@ constexpr double kInfinite = std::numeric_limits<double>::infinity();
 /// Hypotheses that are differentiated at once: as many as keep all cores at work.
 constexpr size_t kAtOnce = 64;
 
+/// Tells whether a model has an amplitude of the hypothesis by another mode of its effect. All held
+/// points alike and single ones are such modes. An effect has one number for both.
+bool is_taken(const Hypothesis& hypothesis, const std::vector<Hypothesis>& model) {
+  return std::ranges::any_of(model, [&](const Hypothesis& own) {
+    return own.effect == hypothesis.effect && own.mode != hypothesis.mode &&
+           std::ranges::find_first_of(own.amplitudes, hypothesis.amplitudes) !=
+               own.amplitudes.end();
+  });
+}
+
 Score judge(const Hypothesis& hypothesis, const ModelProjection& projection, Columns columns) {
   const EffectDescription effect = describe_effect(hypothesis.effect);
   const Eigen::Index count = columns.front().cols();
@@ -65,6 +75,7 @@ std::vector<Score> score_hypotheses(const FittedModel& model, const ModelProject
   std::vector<size_t> mode_of_test;
   for (size_t mode = 0; mode < hypotheses.size(); ++mode) {
     for (const Hypothesis& hypothesis : hypotheses[mode]) {
+      if (is_taken(hypothesis, model.hypotheses)) continue;
       tests.push_back(hypothesis);
       mode_of_test.push_back(mode);
     }

@@ -27,7 +27,7 @@ struct Score {
 /// Runs the score test [rao1948] of each hypothesis at its neutral value. Projected derivatives
 /// there are held against the projected residual, with amplitudes within their ranges. The scores
 /// are in the order of `hypotheses`, each at its best shape. A hypothesis whose effect cannot act
-/// in this model has none.
+/// in this model has none. So has one whose amplitudes the model has by another mode.
 std::vector<Score> score_hypotheses(const FittedModel& model, const ModelProjection& projection,
                                     const std::vector<ShapeCandidates>& hypotheses,
                                     const ProgressCallback& progress);

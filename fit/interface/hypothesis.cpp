@@ -5,7 +5,11 @@
 namespace clothfit {
 
 std::string Hypothesis::title() const {
-  return mode.empty() ? effect : effect + " (" + mode + ")";
+  std::string which = mode;
+  for (const auto& [parameter, number] : picked)
+    which += (which.empty() ? "" : ", ") + (parameter == "point" ? "held point" : parameter) + " " +
+             std::to_string(number);
+  return which.empty() ? effect : effect + " (" + which + ")";
 }
 
 std::vector<std::string> Hypothesis::parameters() const {

@@ -15,8 +15,11 @@ struct Hypothesis {
   /// Standard deviations of the shape's prior, from the spacing of its grid.
   std::map<std::string, double> shape_sigma;
   bool fits_shape = false;  ///< says whether the shape is fitted too
+  /// Whole numbers that pick what it acts on, such as a held point (EffectParameter::picks). They
+  /// are given, and never fitted or moved.
+  std::map<std::string, int> picked = {};
 
-  std::string title() const;  ///< "nonuniform_mass (hem)"
+  std::string title() const;  ///< "nonuniform_mass (hem)", "support_drift (single, held point 1)"
   /// Names of the amplitudes in the space of a fit, EFFECT.PARAMETER.
   std::vector<std::string> parameters() const;
   bool same_mode(const Hypothesis& other) const {

@@ -30,6 +30,8 @@ std::vector<DeclaredEffect> effects_of(const Recording& recording,
       effect = std::prev(effects.end());
     }
     for (const auto& [parameter, value] : hypothesis.shape) effect->parameters[parameter] = {value};
+    for (const auto& [parameter, number] : hypothesis.picked)
+      effect->parameters[parameter] = {static_cast<double>(number)};
   }
   // A parameter that any hypothesis fits has no given value.
   for (const Hypothesis& hypothesis : hypotheses) {

@@ -53,10 +53,10 @@ struct Harmonic {
                         {.parameter = "phase", .values = {0, 0.125, 0.25, 0.375}}}}};
   }
 
-  /// Says whether a mode's shapes are those of a harmonic. A small one at any phase is a sum of
-  /// two: at phase 0 times the phase's cosine, and at a quarter turn times its sine.
+  /// Says whether a mode's shapes begin with those of a harmonic. A small one at any phase is a sum
+  /// of two: at phase 0 times the phase's cosine, and at a quarter turn times its sine.
   static bool is_followed_by(const EffectMode& mode) {
-    return mode.shapes.size() == 2 && mode.shapes[0].parameter == "frequency" &&
+    return mode.shapes.size() >= 2 && mode.shapes[0].parameter == "frequency" &&
            mode.shapes[1].parameter == "phase";
   }
 };

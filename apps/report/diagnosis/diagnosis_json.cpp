@@ -18,6 +18,7 @@ using nlohmann::ordered_json;
 ordered_json term_json(const Hypothesis& term) {
   ordered_json json{{"effect", term.effect}, {"law", term.mode}};
   if (!term.shape.empty()) json["shape"] = term.shape;
+  for (const auto& [name, number] : term.picked) json["shape"][name] = number;
   return json;
 }
 

@@ -18,6 +18,8 @@ std::string shape_text(const Hypothesis& term) {
   std::string text;
   for (const auto& [name, value] : term.shape)
     text += (text.empty() ? "" : ", ") + name + " " + significant(value, 3);
+  for (const auto& [name, number] : term.picked)
+    text += (text.empty() ? "" : ", ") + name + " " + std::to_string(number);
   return text;
 }
 

@@ -176,6 +176,9 @@ HiddenEffect hidden_effect(const DrawnMode& drawn) {
     if (const auto shape = drawn.hypothesis.shape.find(parameter.name);
         shape != drawn.hypothesis.shape.end())
       value = shape->second;
+    if (const auto one = drawn.hypothesis.picked.find(parameter.name);
+        one != drawn.hypothesis.picked.end())
+      value = one->second;
     const auto& amplitudes = drawn.hypothesis.amplitudes;
     if (const auto at = std::ranges::find(amplitudes, parameter.name); at != amplitudes.end())
       value += drawn.amplitude[at - amplitudes.begin()];

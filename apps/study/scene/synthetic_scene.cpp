@@ -56,6 +56,13 @@ std::function<Eigen::Vector3d(double)> support_shift_m(const HiddenEffect& effec
   return {};
 }
 
+/// Returns the number of the held point that an effect moves by itself; 0 where it moves all. The
+/// last parameter says so, after those of support_shift_m().
+size_t moved_alone(const HiddenEffect& effect) {
+  const size_t point = effect.name == "support_drift" ? 3 : 5;
+  return effect.values.size() > point ? static_cast<size_t>(effect.values[point]) : 0;
+}
+
 /// The cloth and its numbers, released, with its hidden effects of motion.
 struct Truth {
   Cloth cloth;
@@ -78,9 +85,12 @@ Truth make_truth(const SyntheticScene& scene, std::uint64_t seed) {
       truth.set.effects.push_back(hidden.values);
       continue;
     }
-    // The cloth is released where the supports are by then.
+    // The cloth is released where the supports are by then, all moved alike.
     const Eigen::Vector3d first_m = shift_m(-scene.before_s);
-    for (HeldVertexWeights& held : truth.cloth.held) {
+    const size_t one = moved_alone(hidden);
+    for (size_t h = 0; h < truth.cloth.held.size(); ++h) {
+      if (one > 0 && h + 1 != one) continue;
+      HeldVertexWeights& held = truth.cloth.held[h];
       Eigen::Vector3d at_rest_m = Eigen::Vector3d::Zero();
       for (const auto& [vertex, weight] : held.weights)
         at_rest_m += weight * truth.set.start_position_m.col(vertex);
@@ -88,7 +98,7 @@ Truth make_truth(const SyntheticScene& scene, std::uint64_t seed) {
         return Eigen::Vector3d((before ? before(time_s) : at_rest_m) + shift_m(time_s));
       };
     }
-    truth.set.start_position_m.colwise() += first_m;
+    if (one == 0) truth.set.start_position_m.colwise() += first_m;
   }
   return truth;
 }

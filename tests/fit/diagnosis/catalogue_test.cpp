@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <set>
 
 #include "data/input_error.h"
 #include "fit/diagnosis/fitted_model.h"
@@ -110,6 +111,74 @@ TEST(AtShapesOf, AreThoseOfTheEffectsOtherMode) {
   EXPECT_THAT(widths({kDrag, edges}, {}), ElementsAre(0.004));
   edges.fits_shape = true;
   EXPECT_THAT(widths({edges}, {{"nonuniform_mass.hem_width", 0.003}}), ElementsAre(0.003));
+}
+
+TEST(Hypothesis, NeverFitsWhatPicks) {
+  const Hypothesis single{.effect = "support_drift",
+                          .mode = "single",
+                          .amplitudes = {"velocity_x"},
+                          .shape = {},
+                          .shape_sigma = {},
+                          .fits_shape = true,
+                          .picked = {{"point", 2}}};
+  EXPECT_EQ(single.title(), "support_drift (single, held point 2)");
+  const FitInput input = synthetic_input({});
+  FitOptions options;
+  options.hypotheses = {single};
+  const FitProblem problem = make_problem(input, options, 9, 9);
+
+  EXPECT_GE(problem.space.index("support_drift.velocity_x"), 0);
+  EXPECT_EQ(problem.space.index("support_drift.point"), -1);
+  EXPECT_EQ(problem.effects.back().back().constant, 2);
+
+  options = {.effects = {"support_drift"}};
+  EXPECT_EQ(make_problem(input, options, 9, 9).space.index("support_drift.point"), -1);
+}
+
+TEST(ShapesAround, LeaveWhatPicksAsItIs) {
+  for (const ShapeCandidates& mode : hypotheses_to_test(synthetic_input({}), {}, 0.5)) {
+    if (mode.front().mode != "single") continue;
+    SCOPED_TRACE(mode.front().effect);
+    const ShapeCandidates around = shapes_around(mode.back(), 0.5);
+    EXPECT_EQ(around.empty(), mode.back().shape.empty());
+    for (const Hypothesis& moved : around) EXPECT_EQ(moved.picked, mode.back().picked);
+  }
+}
+
+TEST(AtShapesOf, KeepEachHeldPoint) {
+  const std::vector<ShapeCandidates> modes = hypotheses_to_test(synthetic_input({}), {}, 0.5);
+  const auto single = std::ranges::find_if(modes, [](const ShapeCandidates& mode) {
+    return mode.front().effect == "support_drift" && mode.front().mode == "single";
+  });
+  ASSERT_NE(single, modes.end());
+  EXPECT_EQ(at_shapes_of({kDrag}, {}, *single).size(), 2u);
+}
+
+TEST(HypothesesToTest, AskSingleHeldPointsWhereThereAreTwoThatAnEffectActsOn) {
+  FitInput input = synthetic_input({});
+  const auto points = [&](const std::string& effect) {
+    std::set<int> numbers;
+    for (const ShapeCandidates& mode : hypotheses_to_test(input, {}, 0.5))
+      if (mode.front().effect == effect && mode.front().mode == "single")
+        for (const Hypothesis& shape : mode) numbers.insert(shape.picked.at("point"));
+    return std::vector<int>(numbers.begin(), numbers.end());
+  };
+  const std::vector<HeldPoint> two = input.recording.held;
+  ASSERT_EQ(two.size(), 2u);
+
+  for (const char* effect : {"support_drift", "support_motion", "support_path", "support_slip"})
+    EXPECT_THAT(points(effect), ElementsAre(1, 2)) << effect;
+  EXPECT_TRUE(points("support_offset").empty());  // no point is driven
+
+  input.recording.held[1].motion = HeldMotion::path;
+  EXPECT_TRUE(points("support_offset").empty());
+  input.recording.held.push_back(input.recording.held[1]);
+  EXPECT_THAT(points("support_offset"), ElementsAre(2, 3));
+
+  input.recording.held = {two[0]};
+  EXPECT_TRUE(points("support_drift").empty());
+  input.recording.held = {two[0], {.at_m = {}, .edge = ClothEdge::bottom, .file = {}}, two[1]};
+  EXPECT_TRUE(points("support_drift").empty());
 }
 
 TEST(HypothesesToTest, AreThoseOfEffectsThatAreNotThereAlready) {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "tests/fit/diagnosis/true_model.h"
+#include "tests/fit/hidden_effect.h"
 #include "tests/fit/synthetic_cloth.h"
 
 namespace clothfit {
@@ -63,6 +64,46 @@ TEST(Score, IsThatOfNoiseWhereNothingIsHidden) {
     // Beyond 20 lies the chi-square of one hypothesis in 100 000, with one degree of freedom.
     EXPECT_LT(score.decrease, 20 + 4 * static_cast<double>(score.amplitude.size() - 1))
         << score.hypothesis.title();
+}
+
+TEST(Score, AsksNoModeWhoseAmplitudesTheModelHasByAnother) {
+  const FitInput input = synthetic_input(kFewVertices);
+  const Hypothesis alike{.effect = "support_drift", .mode = "", .amplitudes = {"velocity_x"}};
+  Hypothesis single = alike;
+  single.mode = "single";
+  single.picked["point"] = 1;
+  const FittedModel model = true_model(score_setup({&input, 1}), kFewVertices, {alike});
+  ASSERT_TRUE(model.usable());
+
+  const std::vector<Score> scores = score_hypotheses(
+      model, ModelProjection(model, kScoreOptions.loss), {{single}, {drag_hypothesis()}}, {});
+
+  ASSERT_EQ(scores.size(), 1u);
+  EXPECT_EQ(scores[0].hypothesis.effect, "viscous_damping");
+}
+
+TEST(Score, TellsWhichHeldPointDrifts) {
+  const SyntheticCloth cloth;
+  const FitInput input = moved_by(
+      {.name = "support_drift", .parameters = {{"velocity", {0.003, 0, 0.002}}, {"point", {2}}}},
+      synthetic_input(cloth));
+  const FittedModel model = true_model(score_setup({&input, 1}), cloth);
+  ASSERT_TRUE(model.usable());
+  std::vector<ShapeCandidates> drifts = hypotheses_to_test(input, kScoreOptions, 0.4);
+  std::erase_if(drifts, [](const ShapeCandidates& shapes) {
+    return shapes.front().effect != "support_drift";
+  });
+
+  const std::vector<Score> scores =
+      score_hypotheses(model, ModelProjection(model, kScoreOptions.loss), drifts, {});
+
+  ASSERT_EQ(scores.size(), 2u);
+  EXPECT_EQ(scores[0].hypothesis.title(), "support_drift");
+  EXPECT_EQ(scores[1].hypothesis.title(), "support_drift (single, held point 2)");
+  EXPECT_GT(scores[1].decrease, 1.5 * scores[0].decrease);
+  // A drift of a millimetre bends the derivatives by a few per cent.
+  EXPECT_NEAR(scores[1].amplitude[0], 0.003, 1e-4 + 4 * scores[1].sigma[0]);
+  EXPECT_NEAR(scores[1].amplitude[2], 0.002, 1e-4 + 4 * scores[1].sigma[2]);
 }
 
 // Two recordings of one motion have the same derivatives, but for where noise has put the sheet. Of
