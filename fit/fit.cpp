@@ -187,6 +187,8 @@ FitReport report_of(const FitInput& input, const FitProblem& problem, const FitO
   result.integrator = "euler";
   result.start = to_string(problem.start);
   result.observations_rejected = problem.rejected;
+  if (const auto why = why_readout_is_not_used(problem))
+    report.stages.push_back("the cameras' readout_time is not used: there is " + *why);
   return report;
 }
 

@@ -104,6 +104,9 @@ void print_result(const Diagnosis& diagnosis, const fs::path& folder) {
     if (!diagnosis.separation_of(n).empty())
       fmt::print("  {}\n", separation_text(term, diagnosis.separation_of(n)));
   }
+  for (const Hypothesis& trace : traces(diagnosis))
+    fmt::print("A trace, less than {:g} of the noise: {}\n", diagnosis.criteria.trace,
+               trace.title());
   if (diagnosis.changed()) fmt::print("\n");
   print(before_after_table(diagnosis));
   if (diagnosis.law.found()) {

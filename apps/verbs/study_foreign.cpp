@@ -76,6 +76,9 @@ void add_foreign_study(Verb study) {
   verb.add_option("--seed", &flags->options.seed, "Seed of the searches")
       .check(check_seed)
       .shows_default();
+  verb.add_option("--budget", &flags->options.budget_s,
+                  "Seconds after which a search ends with what it has; 0: it takes what it needs")
+      .shows_default();
   verb.add_option("--journal", &flags->journal,
                   "Where finished diagnoses are kept (default: OUT.journal)")
       .shapes_no_result()

@@ -77,8 +77,8 @@ FittedModel fit_from_here(const DiagnosisSetup& setup, const FittedModel& model,
   return fitted;
 }
 
-/// A model fitted over a share of the frames, after the fit over the shorter one.
-using FitOver = std::function<FittedModel(size_t model, double share, const FittedModel& shorter)>;
+/// A model fitted over a share of the frames.
+using FitOver = std::function<FittedModel(size_t model, double share)>;
 
 /// Fits models side by side over growing horizons. Those that leave far more than the best one
 /// fall out, and are not usable.
@@ -93,7 +93,7 @@ std::vector<FittedModel> race(size_t models, double first_share, double threshol
     double least = std::numeric_limits<double>::infinity();
     for_each_index(running.size(), [&](size_t n) {
       const size_t k = running[n];
-      fitted[k] = fit_over(k, share, fitted[k]);
+      fitted[k] = fit_over(k, share);
     });
     for (const size_t k : running)
       if (fitted[k].usable()) least = std::min(least, fitted[k].chi_square(threshold));
@@ -148,7 +148,7 @@ std::vector<FittedModel> race_hypotheses(const DiagnosisSetup& setup, const Fitt
       is_early ? kCriteria.race_worth * worth_naming(early, threshold) : 0;
   return race(
       scores.size(), first_share, threshold,
-      [&](size_t k, double share, const FittedModel&) {
+      [&](size_t k, double share) {
         return refined_over(setup, whole[k], model, share, progress);
       },
       is_early ? early.chi_square(threshold) : 0, least_gain);
@@ -263,15 +263,6 @@ std::vector<FittedModel> fit_with_hypotheses(const DiagnosisSetup& setup, const 
     fitted[k] = fit_from_here(setup, model, *scores[k], {}, progress);
   }
   return fitted;
-}
-
-std::vector<FittedModel> race_on_mesh(const DiagnosisSetup& other,
-                                      const std::vector<FittedModel>& models, double threshold,
-                                      const ProgressCallback& progress) {
-  return race(models.size(), kFirstOnMesh, threshold,
-              [&](size_t k, double share, const FittedModel& shorter) {
-                return lead_to_mesh(other, models[k], share, shorter, progress);
-              });
 }
 
 FittedModel identified_from_scratch(const DiagnosisSetup& setup,

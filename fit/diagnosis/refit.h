@@ -31,12 +31,6 @@ std::vector<FittedModel> fit_with_hypotheses(const DiagnosisSetup& setup, const 
                                              double first_share, double threshold,
                                              const ProgressCallback& progress);
 
-/// Fits models on another mesh (fit_on_mesh), side by side. After each horizon those that leave far
-/// more than the best one fall out and fail.
-std::vector<FittedModel> race_on_mesh(const DiagnosisSetup& other,
-                                      const std::vector<FittedModel>& models, double threshold,
-                                      const ProgressCallback& progress);
-
 /// Identifies the model with these hypotheses as if nothing were known of its parameters
 /// (fit/fit.h). It is fitted to the first recording, from there to all of them, and linearised. It
 /// is not usable where that leads nowhere, nor where a recording begins in motion.

@@ -1,16 +1,22 @@
 #include "fit/diagnosis/trial.h"
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
+#include <limits>
 
 #include "fit/diagnosis/adequacy.h"
 #include "fit/diagnosis/clearance.h"
 #include "fit/diagnosis/criteria.h"
 #include "fit/diagnosis/search_context.h"
 #include "fit/diagnosis/worth.h"
+#include "fit/problem/effects_of.h"
 
 namespace clothfit {
 namespace {
+
+/// The criterion by which a trial ends as a trace.
+constexpr const char* kMatters = "matters";
 
 class Asked {
  public:
@@ -29,7 +35,8 @@ class Asked {
     if (!ask(keeps_its_promise()) || !ask(is_worth_a_name())) return trial_;
 
     measure_left_out();
-    if (!ask(predicts_better()) || !ask(is_clear_of_neutral()) || !ask(beats_free_forces()))
+    if (!ask(predicts_better()) || !ask(is_clear_of_neutral()) || !ask(matters()) ||
+        !ask(beats_free_forces()))
       return trial_;
     if (!ask(beats_corrections())) trial_.on_credit = takes_good_part();
     return trial_;
@@ -79,6 +86,12 @@ class Asked {
             "not clear of its neutral value"};
   }
 
+  Criterion matters() const {
+    const double change = change_of_prediction(models_.with);
+    return {kMatters, change, kCriteria.trace, !(change < kCriteria.trace),
+            "a trace: it changes the prediction by little beside the noise"};
+  }
+
   Criterion beats_free_forces() const {
     const double forces = models_.without_left_out.free_forces;
     return {"free_forces", left_out_.mean, forces, left_out_.mean < forces || helps_free_forces(),
@@ -122,6 +135,32 @@ class Asked {
 };
 
 }  // namespace
+
+double change_of_prediction(const FittedModel& model) {
+  const Hypothesis& last = model.hypotheses.back();
+  const EffectDescription effect = describe_effect(last.effect);
+  double square = 0;
+  for (size_t n = 0; n < model.parts.size(); ++n) {
+    const PooledPart& part = model.parts[n];
+    Eigen::VectorXd neutral = part.values;
+    for (const std::string& name : last.amplitudes) {
+      const int p = model.problems[n]->space.index(last.effect + "." + name);
+      if (p < 0) continue;
+      neutral[p] = std::ranges::find(effect.parameters, name, &EffectParameter::name)->neutral;
+    }
+    const Eigen::VectorXd without = model.objective(n).residuals({neutral}).front();
+    // A run that diverges without the effect is changed by it, however much.
+    if (without.size() != part.linear.residual.size())
+      return std::numeric_limits<double>::infinity();
+    square += (without - part.linear.residual).squaredNorm();
+  }
+  return std::sqrt(square / static_cast<double>(model.residual_count()));
+}
+
+bool Trial::is_trace() const {
+  const auto failed = std::ranges::find(criteria, false, &Criterion::passed);
+  return failed != criteria.end() && failed->name == kMatters;
+}
 
 bool Trial::passed() const {
   return std::ranges::all_of(criteria, &Criterion::passed);

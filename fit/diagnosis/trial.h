@@ -37,6 +37,7 @@ struct Trial {
   bool on_credit = false;
 
   bool passed() const;          ///< every criterion
+  bool is_trace() const;        ///< refused only because it changes the prediction too little
   std::string refusal() const;  ///< of the criterion that it did not pass; else empty
 };
 
@@ -59,6 +60,10 @@ struct Compared {
 
 /// Asks one criterion after the other, the cheap ones first, until one is not passed.
 Trial try_hypothesis(const SearchContext& search, const Compared& models);
+
+/// Returns how much the last hypothesis' amplitudes change a model's prediction, with everything
+/// else as it is: rms in units of the noise.
+double change_of_prediction(const FittedModel& model);
 
 /// Cross-validates a model. `forces_mesh` is that of free forces, where these are asked for.
 CrossValidation left_out_of(const SearchContext& search, const FittedModel& model,

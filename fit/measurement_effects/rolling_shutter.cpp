@@ -30,7 +30,7 @@ EffectDescription describe() {
                           .lower = -0.05,
                           .upper = 0.05,
                           .typical = 1e-3}},
-          .remedy = "declare rolling_shutter with the camera's readout"};
+          .remedy = "declare readout_time in the camera file"};
 }
 
 std::unique_ptr<MeasurementEffect> make() {

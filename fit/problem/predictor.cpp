@@ -116,6 +116,7 @@ Predictor::Predictor(const FitProblem& problem, const Eigen::VectorXd& values)
     : problem_(problem),
       sheet_middle_m_(problem.placed_sheet_m.rowwise().mean()),
       pattern_middle_m_(problem.marker_place_m.rowwise().mean()) {
+  needs_velocities_ = problem.reads_in_rows;
   if (!problem.measurement.empty()) frame_interval_s_ = median_interval_s(problem.frame_time_s);
   for (const FitProblem::MeasurementTerm& term : problem.measurement) {
     mixes_neighbours_ = mixes_neighbours_ || term.effect->mixes_neighbours();
@@ -144,6 +145,9 @@ Sighting Predictor::sighting(const ObservationSet& set, const Observation& row) 
 
 MeasuredNumber Predictor::seen_s(const Sighting& sighting) const {
   MeasuredNumber time_s(sighting.time_s);
+  if (problem_.reads_in_rows)
+    time_s += sighting.camera->readout_time_s *
+              (sighting.observed_row_px / sighting.camera->image_height - 0.5);
   for (size_t e = 0; e < parameters_.size(); ++e)
     problem_.measurement[e].effect->shift_time(sighting, parameters_[e], time_s);
   return time_s;

@@ -11,6 +11,7 @@
 #include "data/input_error.h"
 #include "data/nearest_name.h"
 #include "fit/measurement_effects/applicability.h"
+#include "fit/measurement_effects/registry.h"
 #include "fit/observe/sheet_placement.h"
 #include "fit/problem/cloth_setup.h"
 #include "fit/problem/unknown_group.h"
@@ -118,6 +119,12 @@ void add_given_priors(const FitOptions& options, FitProblem& problem) {
   }
 }
 
+bool declares_readout(const FitProblem& problem) {
+  return std::ranges::any_of(problem.observations, [](const ObservationSet& set) {
+    return set.camera && set.camera->readout_time_s > 0;
+  });
+}
+
 Rigid3 place_sheet_of(const Recording& recording, FitProblem& problem) {
   const Eigen::Matrix2Xd& places = problem.marker_place_m;
   const int frames = recording.start == StartKind::at_rest ? kRestFrames : 1;
@@ -136,6 +143,13 @@ Rigid3 place_sheet_of(const Recording& recording, FitProblem& problem) {
 }
 
 }  // namespace
+
+std::optional<std::string> why_readout_is_not_used(const FitProblem& problem) {
+  if (!declares_readout(problem)) return std::nullopt;
+  const auto effect = measurement_effect_named("rolling_shutter")->make();
+  const auto why = why_inapplicable(*effect, measurement_setting(problem));
+  return why ? std::optional(why->problem) : std::nullopt;
+}
 
 FitProblem make_problem(const FitInput& input, const FitOptions& options, int mesh_columns,
                         int mesh_rows) {
@@ -171,6 +185,7 @@ FitProblem make_problem(const FitInput& input, const FitOptions& options, int me
       .input = input, .options = options, .drive = drive, .world_from_sheet = world_from_sheet};
   for (const UnknownGroup* group : unknown_groups()) group->declare(source, problem);
   add_given_priors(options, problem);
+  problem.reads_in_rows = declares_readout(problem) && !why_readout_is_not_used(problem);
   return problem;
 }
 

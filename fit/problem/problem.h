@@ -1,5 +1,8 @@
 #pragma once
 
+#include <optional>
+#include <string>
+
 #include "fit/problem/fit_problem.h"
 
 namespace clothfit {
@@ -8,5 +11,9 @@ namespace clothfit {
 /// InputError for a recording that cannot be fitted as it stands.
 FitProblem make_problem(const FitInput& input, const FitOptions& options, int mesh_columns,
                         int mesh_rows);
+
+/// Says why a readout that cameras declare takes no part in a fit; nothing where it does, or where
+/// none is declared.
+std::optional<std::string> why_readout_is_not_used(const FitProblem& problem);
 
 }  // namespace clothfit

@@ -145,6 +145,7 @@ void write_diagnosis(const Diagnosis& diagnosis, const std::string& command,
   }
   json["refused"] = ordered_json::array();
   for (const Trial& trial : diagnosis.refused) json["refused"].push_back(trial_json(trial));
+  json["traces"] = titles(traces(diagnosis));
   json["errors"] = ordered_json::array();
   // Frames that were not held out, or not fitted, have no error.
   const auto known = [](const ErrorSummary& error, double rms) {

@@ -86,6 +86,13 @@ Table trial_table(const Diagnosis& diagnosis) {
   return table;
 }
 
+std::vector<Hypothesis> traces(const Diagnosis& diagnosis) {
+  std::vector<Hypothesis> found;
+  for (const Trial& trial : diagnosis.refused)
+    if (trial.is_trace()) found.push_back(trial.hypothesis);
+  return found;
+}
+
 std::vector<Hypothesis> not_tried(const Diagnosis& diagnosis) {
   const auto is_of = [](const Score& score, const std::vector<Trial>& trials) {
     return std::ranges::any_of(trials, [&](const Trial& trial) {

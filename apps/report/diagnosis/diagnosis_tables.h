@@ -16,6 +16,10 @@ Table short_candidate_table(const Diagnosis& diagnosis);
 /// Lists modes with which the model was fitted again, accepted and refused, and why.
 Table trial_table(const Diagnosis& diagnosis);
 
+/// Returns the modes that were refused in the last round only because they change the prediction by
+/// little beside the noise.
+std::vector<Hypothesis> traces(const Diagnosis& diagnosis);
+
 /// Returns the modes that were scored and not fitted.
 std::vector<Hypothesis> not_tried(const Diagnosis& diagnosis);
 

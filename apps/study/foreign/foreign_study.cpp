@@ -54,6 +54,7 @@ ForeignDiagnosis diagnose_one(const fs::path& folder, const ForeignStudyOptions&
   DiagnoseOptions diagnosis_options;
   diagnosis_options.fit.seed = options.seed;
   diagnosis_options.fit.threads = options.threads;
+  diagnosis_options.budget_s = options.budget_s;
   try {
     const ObservationKind observations = diagnosis_options.fit.observations;
     const Recording recording =
@@ -113,11 +114,12 @@ std::vector<fs::path> find_foreign_recordings(const fs::path& folder,
 
 void ForeignStudyOptions::validate() const {
   if (threads < 0) throw InputError("--threads", "is out of range", "0 (all) or more");
+  if (budget_s < 0) throw InputError("--budget", "is out of range", "seconds, or 0");
 }
 
 std::string ForeignStudyOptions::key() const {
   JournalKey key("study foreign/1");
-  key.add("clothfit", program_version()).add("seed", seed);
+  key.add("clothfit", program_version()).add("seed", seed).add("budget", budget_s);
   key.add("recordings", fmt::format("{:016x}", recordings_checksum(recordings)));
   return key.line();
 }

@@ -15,7 +15,8 @@ namespace clothfit {
 struct ForeignStudyOptions {
   std::vector<std::filesystem::path> recordings;  ///< folders, each with a truth.json
   unsigned long long seed = 1;                    ///< of the searches of every diagnosis
-  int threads = 0;  ///< of one diagnosis; 0: as many as the machine has
+  double budget_s = 0;  ///< of one search, after which it reports what it has; 0: unbounded
+  int threads = 0;      ///< of one diagnosis; 0: as many as the machine has
 
   void validate() const;  ///< throws InputError
   /// Returns one line that names all that a diagnosis depends on, for the journal.

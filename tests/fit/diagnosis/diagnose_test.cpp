@@ -241,6 +241,25 @@ TEST(Diagnose, EndsSoonWhenItIsToldTo) {
   EXPECT_EQ(diagnosis.stop, FitStop::cancelled);
 }
 
+TEST(Diagnose, ReportsWhatItHasWhereItsTimeIsUp) {
+  DiagnoseOptions options = diagnosis_of_small_cloth();
+  options.is_enough = [] { return true; };
+  const Diagnosis diagnosis = diagnose(synthetic_input(kSmallWithDrag), options, {});
+
+  ASSERT_TRUE(diagnosis.usable()) << diagnosis.message;
+  EXPECT_FALSE(diagnosis.complete);
+  EXPECT_TRUE(diagnosis.accepted.empty());
+  EXPECT_TRUE(diagnosis.limits.empty());
+  EXPECT_EQ(diagnosis.verdict, DiagnosisVerdict::unexplained);
+  EXPECT_GT(diagnosis.base().result.observations_used, 0);
+  ASSERT_FALSE(diagnosis.phases.empty());
+  EXPECT_EQ(diagnosis.phases.front().name, "base fit");
+
+  options.is_enough = {};
+  options.budget_s = 1e-3;
+  EXPECT_FALSE(diagnose(synthetic_input(kSmallWithDrag), options, {}).complete);
+}
+
 TEST(Diagnose, RefusesRecordingsOfTwoCloths) {
   std::vector<FitInput> inputs{synthetic_input({}), synthetic_input({})};
   inputs[1].recording.cloth.width_m *= 1.1;

@@ -5,7 +5,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <limits>
 #include <vector>
 
 #include "tests/fit/diagnosis/true_model.h"
@@ -70,29 +69,6 @@ TEST(IdentifiedFromScratch, IsOfAKnownStart) {
       .inputs = {&input, 1}, .options = kRefitOptions, .columns = 9, .rows = 9};
 
   EXPECT_FALSE(identified_from_scratch(setup, {}, {}).usable());
-}
-
-TEST(RaceOnMesh, LeavesWhatIsNotFarBehindAndRuns) {
-  const SyntheticCloth cloth{.drag_rate_per_s = 1.2};
-  const FitInput input = synthetic_input(cloth);
-  const DiagnosisSetup setup{
-      .inputs = {&input, 1}, .options = kRefitOptions, .columns = 9, .rows = 9};
-  DiagnosisSetup coarse = setup;
-  coarse.columns = coarse.rows = 7;
-  const Hypothesis drift{.effect = "support_drift", .mode = "", .amplitudes = {"velocity_x"}};
-  const FittedModel with_drag = true_model(coarse, cloth, {drag_hypothesis()});
-  const FittedModel with_drift = true_model(coarse, cloth, {drift});
-  FittedModel lost = with_drag;
-  lost.parts.front().values.setConstant(std::numeric_limits<double>::quiet_NaN());
-
-  const std::vector<FittedModel> fitted = race_on_mesh(setup, {with_drift, lost, with_drag},
-                                                       std::numeric_limits<double>::infinity(), {});
-
-  EXPECT_FALSE(fitted[0].usable());
-  EXPECT_FALSE(fitted[1].usable());
-  ASSERT_TRUE(fitted[2].usable());
-  EXPECT_EQ(fitted[2].problems.front()->cloth.mesh.columns, 9);
-  ASSERT_NO_FATAL_FAILURE(expect_optimum(fitted[2], setup, cloth));
 }
 
 TEST(WithHypotheses, HandsOnWhatTheModelIsExpectedToErrBy) {

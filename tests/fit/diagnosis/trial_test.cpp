@@ -65,10 +65,35 @@ TEST(TryHypothesis, PassesTheHiddenEffectByEveryCriterion) {
   EXPECT_EQ(trial.refusal(), "");
   EXPECT_EQ(asked(trial),
             (std::vector<std::string>{"fitted", "decrease", "worth_naming", "left_out",
-                                      "clear_of_neutral", "free_forces", "corrections"}));
+                                      "clear_of_neutral", "matters", "free_forces",
+                                      "corrections"}));
   EXPECT_GT(trial.decrease, 100);
   EXPECT_LT(trial.cross_validated, trial.without_it);
   EXPECT_GT(trial.clear_of_neutral, kCriteria.clear_of_neutral);
+}
+
+TEST(ChangeOfPrediction, IsProportionalToASmallAmplitude) {
+  const Scene scene;
+  FittedModel model = with_hypotheses(scene.setup, scene.without, {drag_hypothesis()}, {});
+  const int rate = model.problems.front()->space.index("viscous_damping.rate");
+  const auto change_at = [&](double per_s) {
+    model.parts.front().values[rate] = per_s;
+    linearise_model(model);
+    return change_of_prediction(model);
+  };
+  EXPECT_EQ(change_at(0), 0);
+  const double once = change_at(0.001);
+  EXPECT_GT(once, 0);
+  EXPECT_NEAR(change_at(0.002) / once, 2, 0.01);
+}
+
+TEST(Trial, IsATraceWhereOnlyItsChangeOfThePredictionIsTooSmall) {
+  Trial trial;
+  trial.criteria = {{.name = "decrease", .passed = true}, {.name = "matters", .passed = false}};
+  EXPECT_TRUE(trial.is_trace());
+  trial.criteria.front().passed = false;
+  EXPECT_FALSE(trial.is_trace());
+  EXPECT_FALSE(Trial().is_trace());
 }
 
 TEST(TryHypothesis, AsksNoFurtherThanTheFirstCriterionThatIsNotPassed) {

@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include "calib/camera/projection.h"
+#include "fit/cost/objective.h"
+#include "fit/problem/problem.h"
 #include "tests/fit/measurement_contract.h"
 #include "tests/fit/planted_effect.h"
 #include "tests/fit/synthetic_cloth.h"
@@ -12,6 +14,24 @@ namespace {
 
 TEST(RollingShutter, KeepsToTheContract) {
   check_measurement_effect("rolling_shutter", synthetic_input({}));
+}
+
+TEST(RollingShutter, IsWhatACameraDeclares) {
+  FitInput declared = synthetic_input({}), effect = synthetic_input({});
+  declared.cameras.front().readout_time_s = 0.012;
+  effect.recording.declared = {{.name = "rolling_shutter", .parameters = {{"readout", {0.012}}}}};
+  const FitOptions pixels{.observations = ObservationKind::tracks2d};
+  const FitProblem of_camera = make_problem(declared, pixels, 7, 7),
+                   of_effect = make_problem(effect, pixels, 7, 7);
+  const TrajectoryObjective seen(of_camera, 20, 1e-4), expected(of_effect, 20, 1e-4);
+  const Eigen::VectorXd start = of_camera.space.start();
+
+  ASSERT_TRUE(of_camera.reads_in_rows);
+  EXPECT_EQ(seen.residuals({start}), expected.residuals({start}));
+  EXPECT_FALSE(why_readout_is_not_used(of_camera));
+
+  // Tracks in space show no rows, and whoever declares a readout is not told of it for them.
+  EXPECT_FALSE(make_problem(declared, {}, 7, 7).reads_in_rows);
 }
 
 TEST(RollingShutter, IsFoundWhereItWasPlanted) {

@@ -116,6 +116,28 @@ TEST(Tangents, AgreeWithCentralDifferencesUnderEveryEffect) {
   }
 }
 
+TEST(Tangents, WithDerivativesThatAreKeptErrByTheMotionInThatTime) {
+  Uniform uniform(5);
+  Swing swing(uniform);
+  add_effect(swing.cloth, "wind", "test");
+  add_effect(swing.cloth, "viscous_damping", "test");
+  swing.set.effects = {{0.1, 0.2, -0.3, 0.4}, {0.7}};
+  Direction direction;
+  direction.effects = {{0.1, 0.2, 0.3, 0.1}, {0.4}};
+  const auto tangents = [&](double kept_s) {
+    Schedule schedule = swing.schedule;
+    schedule.derivatives_kept_s = kept_s;
+    return simulate_with_tangents(swing.cloth, swing.set, {&direction, 1}, schedule);
+  };
+  const TangentResult exact = tangents(0), kept = tangents(1e-3);
+
+  EXPECT_EQ(kept.run.position_m, exact.run.position_m);
+  const Eigen::Matrix3Xd& expected = exact.position_tangent.front().back();
+  const double error = (kept.position_tangent.front().back() - expected).norm() / expected.norm();
+  EXPECT_GT(error, 0);
+  EXPECT_LT(error, 0.02);
+}
+
 TEST(Tangents, AlongAnEmergingEffectAreThoseOfAClothThatHasItAtItsNeutralValues) {
   // The modes are forces, also with a memory; inertia; supports. More than go side by side.
   constexpr EmergingParameter kEmerging[] = {{"wind", "q_x"},
