@@ -10,13 +10,10 @@ namespace {
 /// Returns the flag that sets a member: its name with dashes, but for these.
 std::string flag_of(std::string member) {
   static const std::map<std::string, std::string> kOthers = {
-      {"beam_width", "lines"},
-      {"effects", "effect"},
-      {"marker_offset_sigma_m", "marker-offsets"},
-      {"mesh_columns", "mesh"},
-      {"mesh_rows", "mesh"},
-      {"plants", "plant"},
-      {"priors", "prior"},
+      {"beam_width", "lines"},   {"budget_s", "budget"},
+      {"effects", "effect"},     {"marker_offset_sigma_m", "marker-offsets"},
+      {"mesh_columns", "mesh"},  {"mesh_rows", "mesh"},
+      {"plants", "plant"},       {"priors", "prior"},
       {"spring_set", "springs"},
   };
   if (const auto other = kOthers.find(member); other != kOthers.end()) return "--" + other->second;

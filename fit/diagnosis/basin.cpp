@@ -6,20 +6,20 @@
 
 #include "fit/cost/huber.h"
 #include "fit/diagnosis/beam.h"
-#include "fit/diagnosis/coarse_rounds.h"
 #include "fit/diagnosis/clearance.h"
 #include "fit/diagnosis/criteria.h"
 #include "fit/diagnosis/discretisation.h"
 #include "fit/diagnosis/refit.h"
 #include "fit/diagnosis/search_context.h"
+#include "fit/diagnosis/space_mapping.h"
 #include "fit/diagnosis/worth.h"
 
 namespace clothfit {
 namespace {
 
 /// Identifies the model with these hypotheses from scratch, and refines it with its mesh's errors.
-/// A basin is that of the coarse mesh too. So that mesh looks for it, and the analysed mesh is asked
-/// only where it leaves less than `than` there. Otherwise the result is not usable.
+/// A basin is that of the coarse mesh too. So that mesh looks for it, and the analysed mesh is
+/// asked only where it leaves less than `than` there. Otherwise the result is not usable.
 FittedModel from_scratch(const SearchContext& search, const std::vector<Hypothesis>& hypotheses,
                          const FittedModel& than) {
   FittedModel model;

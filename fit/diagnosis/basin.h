@@ -40,9 +40,9 @@ void converge(SearchContext& search, BeamEntry& entry);
 bool look_for_better_basin(const SearchContext& search, FittedModel& model);
 
 /// Identifies promising hypotheses from scratch where even the best leaves a good part and is far
-/// off. A hypothesis is promising that is predicted to take half as much as the best; where there is
-/// a coarse mesh, only the one that leaves least is looked at. It may be
-/// right in another basin than the one in which `without` stands.
+/// off. A hypothesis is promising that is predicted to take half as much as the best; where there
+/// is a coarse mesh, only the one that leaves least is looked at. It may be right in another basin
+/// than the one in which `without` stands.
 void look_in_other_basins(const SearchContext& search, std::vector<Extended>& extended,
                           const FittedModel& without);
 

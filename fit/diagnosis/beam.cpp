@@ -45,6 +45,10 @@ BeamEntry* Beam::next() {
   }
 }
 
+BeamEntry Beam::release_best_sound() {
+  return best_sound(std::exchange(entries_, {}), std::exchange(dropped_, {}));
+}
+
 void Beam::add(std::vector<BeamEntry> children, double base_cost) {
   std::ranges::move(children, std::back_inserter(entries_));
   std::ranges::stable_sort(entries_, {}, &BeamEntry::cost);

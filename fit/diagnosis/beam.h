@@ -50,6 +50,8 @@ class Beam {
 
   BeamEntry& best() { return entries_.front(); }
   std::vector<BeamEntry> release() { return std::move(entries_); }
+  /// Gives away the cheapest sound entry, as the result of a search that ends early.
+  BeamEntry release_best_sound();
 
   /// Adds extensions of an entry. Of entries with the same hypotheses the cheapest stays. An entry
   /// is dropped that gained far less than the best one, counted from `base_cost`, or for which the

@@ -5,12 +5,12 @@
 #include <utility>
 
 #include "fit/diagnosis/basin.h"
-#include "fit/diagnosis/coarse_rounds.h"
 #include "fit/diagnosis/criteria.h"
 #include "fit/diagnosis/discretisation.h"
 #include "fit/diagnosis/refit.h"
 #include "fit/diagnosis/search_context.h"
 #include "fit/diagnosis/shortlist.h"
+#include "fit/diagnosis/space_mapping.h"
 #include "fit/diagnosis/worth.h"
 #include "fit/jobs/parallel.h"
 
@@ -77,7 +77,8 @@ double above_noise(const SearchContext& search, const FittedModel& model) {
 std::vector<FittedModel> on_analysed_mesh(const SearchContext& search, const FittedModel& without,
                                           const FittedModel& coarse_without,
                                           std::vector<FittedModel> models) {
-  const double most = search.left_by(coarse_without) - kCriteria.coarse_worth * search.worth(without);
+  const double most =
+      search.left_by(coarse_without) - kCriteria.coarse_worth * search.worth(without);
   std::vector<size_t> order;
   for (size_t k = 0; k < models.size(); ++k)
     if (search.left_by(models[k]) < most) order.push_back(k);

@@ -25,8 +25,8 @@ constexpr int kFewestFrames = 8;
 constexpr double kKeptWithin = 0.02;
 constexpr double kUpdatedWithin = 0.15;
 
-/// Exact derivatives of each recording in one fit. A model that takes more of them is wrong, or near
-/// enough: they cost tens of runs.
+/// Exact derivatives of each recording in one fit. A model that takes more of them is wrong, or
+/// near enough: they cost tens of runs.
 constexpr int kMostLinearisations = 8;
 
 void set_neutral(const EffectDescription& effect, const std::vector<Binding>& bindings,
@@ -229,16 +229,17 @@ void refine_model(FittedModel& model, const DiagnosisSetup& setup, const StageOp
   double most_spring_steps = 0;
   for (const auto& problem : model.problems)
     most_spring_steps += final_refinement(*problem, setup.options).most_spring_steps;
-  const PooledOptions pooled{.iterations = options.iterations,
-                             .linearisations = kMostLinearisations * static_cast<int>(model.problems.size()),
-                             .rounds = options.rounds,
-                             .least_decrease = options.least_decrease,
-                             .loss = setup.options.loss,
-                             .kept_within = kKeptWithin,
-                             .updated_within = kUpdatedWithin,
-                             .own_only = options.own_only,
-                             .unrefined = options.unrefined,
-                             .most_spring_steps = most_spring_steps};
+  const PooledOptions pooled{
+      .iterations = options.iterations,
+      .linearisations = kMostLinearisations * static_cast<int>(model.problems.size()),
+      .rounds = options.rounds,
+      .least_decrease = options.least_decrease,
+      .loss = setup.options.loss,
+      .kept_within = kKeptWithin,
+      .updated_within = kUpdatedWithin,
+      .own_only = options.own_only,
+      .unrefined = options.unrefined,
+      .most_spring_steps = most_spring_steps};
   const std::vector<const FitProblem*> problems = model.problem_pointers();
   PooledFit fitted = fit_pooled(problems, model.parts, pooled, progress);
   model.state = !fitted.usable      ? FitState::failed

@@ -144,13 +144,10 @@ std::vector<FittedModel> race_hypotheses(const DiagnosisSetup& setup, const Fitt
       whole.back().parts[n].correction = correction_of(model, early, n);
   }
   const bool is_early = first_share < 1 && early.parts.front().frames < model.parts.front().frames;
-  const double least_gain =
-      is_early ? kCriteria.race_worth * worth_naming(early, threshold) : 0;
+  const double least_gain = is_early ? kCriteria.race_worth * worth_naming(early, threshold) : 0;
   return race(
       scores.size(), first_share, threshold,
-      [&](size_t k, double share) {
-        return refined_over(setup, whole[k], model, share, progress);
-      },
+      [&](size_t k, double share) { return refined_over(setup, whole[k], model, share, progress); },
       is_early ? early.chi_square(threshold) : 0, least_gain);
 }
 
@@ -275,8 +272,7 @@ FittedModel identified_from_scratch(const DiagnosisSetup& setup,
       }))
     return {};
   const FitOptions options = options_on_mesh(setup, hypotheses, 0);
-  const FitProblem problem =
-      make_problem(setup.inputs.front(), options, setup.columns, setup.rows);
+  const FitProblem problem = make_problem(setup.inputs.front(), options, setup.columns, setup.rows);
   FitReport report;
   std::vector<Candidate> candidates;
   const RefineResult found =

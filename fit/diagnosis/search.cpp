@@ -1,5 +1,6 @@
 #include "fit/diagnosis/search.h"
 
+#include <optional>
 #include <utility>
 
 #include "fit/diagnosis/adequacy.h"
@@ -71,24 +72,33 @@ void begin_on_coarse_mesh(SearchContext& search, Beam& beam, SearchResult& resul
   base.refused = std::move(rounds.refused);
   if (rounds.found.front().cost >= kCriteria.good_part * search.base_chi_square)
     converge(search, base);
+  for (BeamEntry& entry : rounds.found)
+    if (entry.accepted.size() == 1)
+      entry.accepted.front().trial.decrease = search.base_chi_square - search.left_by(entry.model);
   beam.add(std::move(rounds.found), search.base_cost);
 }
 
 /// Extends the entries of a beam, the cheapest first, until nothing leads on.
 void extend_all(SearchContext& search, Beam& beam, SearchResult& result) {
+  std::optional<Shortlist> of_base;
+  // The base is scored for the report even where nothing may be added to it.
+  if (result.first.empty()) {
+    search.enter("scores");
+    of_base = make_shortlist(search, beam.best().model);
+    result.first = of_base->merged();
+    result.first_share = of_base->share;
+  }
   while (BeamEntry* next = beam.next()) {
     const bool is_best = next == &beam.best();
     if (!next->accepted.empty() && !refine(search, *next)) continue;
     search.enter("scores");
-    const Shortlist list = make_shortlist(search, next->model);
-    if (result.first.empty()) {
-      result.first = list.merged();
-      result.first_share = list.share;
-    }
+    const Shortlist list = next->accepted.empty() && of_base ? std::move(*of_base)
+                                                             : make_shortlist(search, next->model);
+    of_base.reset();
     std::vector<BeamEntry> children = extend(search, *next, list, is_best);
     if (next->basin == BasinOrigin::changed && next->accepted.empty()) {
-      result.first = without_columns(score_at_best_shapes(search, search.setup, next->model,
-                                                          search.untested(next->model)));
+      result.first = without_columns(
+          score_at_best_shapes(search, search.setup, next->model, search.untested(next->model)));
       result.first_share = 1;
     }
     const bool is_end = children.empty() && is_best && next->is_sound();
@@ -143,7 +153,7 @@ SearchResult search_hypotheses(const DiagnosisSetup& setup, FittedModel base,
     extend_all(search, beam, result);
   } catch (const TimeIsUp&) {
     result.complete = false;
-    return found_in_time(search, std::move(beam.best()), std::move(result));
+    return found_in_time(search, beam.release_best_sound(), std::move(result));
   }
   return conclude(search, std::move(beam.best()), std::move(result));
 }

@@ -14,7 +14,7 @@ struct SearchResult {
   /// The model without hypotheses, where the search changed it; else not run. The search refines
   /// it, or finds another basin in which it leaves less.
   FittedModel base;
-  bool complete = true;       ///< false where its time was up before all was tried
+  bool complete = true;                  ///< false where its time was up before all was tried
   bool changed_basin = false;            ///< whether a hypothesis has led it to another one
   double threshold = 0;                  ///< SearchOptions::threshold in that basin
   std::vector<AcceptedEffect> accepted;  ///< in the order of acceptance
@@ -32,7 +32,8 @@ struct SearchResult {
 /// end hypotheses that later ones make needless are dropped (prune.h).
 ///
 /// `base` is linearised and has directions of its errors, or it is unrefined and misfits grossly.
-/// An unrefined base is refined where no hypothesis takes nearly all of what it leaves. Throws
+/// An unrefined base is refined where no hypothesis takes nearly all of what it leaves. Where
+/// `progress` throws TimeIsUp, the cheapest sound entry is the result as it stands. Throws
 /// StopRequested where `progress` says to stop.
 SearchResult search_hypotheses(const DiagnosisSetup& setup, FittedModel base,
                                const SearchOptions& options, const ProgressCallback& progress);

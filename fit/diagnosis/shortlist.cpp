@@ -7,10 +7,10 @@
 #include <utility>
 
 #include "fit/diagnosis/adequacy.h"
-#include "fit/diagnosis/coarse_rounds.h"
 #include "fit/diagnosis/criteria.h"
 #include "fit/diagnosis/discretisation.h"
 #include "fit/diagnosis/search_context.h"
+#include "fit/diagnosis/space_mapping.h"
 #include "fit/diagnosis/worth.h"
 
 namespace clothfit {

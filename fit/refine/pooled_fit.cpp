@@ -92,7 +92,8 @@ class Pool final : public LeastSquares {
   }
   double least_decrease() const override { return options_.least_decrease * scatter(); }
   bool is_out_of_work() const override {
-    return spring_steps_ >= options_.most_spring_steps || linearisations_ >= options_.linearisations;
+    return spring_steps_ >= options_.most_spring_steps ||
+           linearisations_ >= options_.linearisations;
   }
 
   /// Derivatives are kept, updated, or computed there.

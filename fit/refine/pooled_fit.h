@@ -35,7 +35,7 @@ Eigen::VectorXd corrected_residual(const PooledPart& part);
 Eigen::VectorXd residual_of(const PooledPart& part);
 
 struct PooledOptions {
-  int iterations = 60;       ///< in all, without steps that were refused
+  int iterations = 60;  ///< in all, without steps that were refused
   /// Exact derivatives, of all recordings together, after which it ends.
   int linearisations = 1000000;
   int rounds = 6;            ///< each with its own time steps and loss, until one hardly moves

@@ -398,8 +398,7 @@ void TangentStepper::add_actions(size_t e, const EffectLinearisation& derivative
     tension_n_.col(of.spring) += of.derivative * parameter_change(parameters, e, of.parameter);
   for (const EffectLinearisation::TensionByMemory& of : derivatives.tension_by_memory)
     tension_n_.col(of.spring) += of.derivative * memory.col(of.number);
-  add_products(derivatives.by_spring, tension_n_, state.position_m, state.velocity_m_per_s,
-               action);
+  add_products(derivatives.by_spring, tension_n_, state.position_m, state.velocity_m_per_s, action);
 }
 
 void TangentStepper::apply(size_t e, const EffectLinearisation& derivatives,

@@ -145,7 +145,7 @@ class TangentStepper {
   std::vector<LimitMove> moves_;  ///< of the last step's strain limit
   TangentVectors force_n_, pull_n_, target_m_;
   EffectLinearisation derivatives_;
-  std::vector<EffectMemory<>> next_memory_;  ///< of each effect
+  std::vector<EffectMemory<>> next_memory_;              ///< of each effect
   std::vector<KeptDerivatives> of_forces_, of_changes_;  ///< of each effect
   std::vector<Emerging> emerging_;
   /// For each group: the emerging force until it is computed again, and when that last was.

@@ -14,9 +14,9 @@ TangentResult run_chunk(const Cloth& cloth, const ParameterSet& set,
                         std::span<const Direction> directions, const Schedule& schedule) {
   // A few steps change the derivatives as little as they do the cloth.
   constexpr double kFewSteps = 5;
-  const double kept_s = schedule.derivatives_kept_s > 0
-                            ? std::max(schedule.derivatives_kept_s, kFewSteps * schedule.time_step_s)
-                            : 0;
+  const double kept_s = schedule.derivatives_kept_s > 0 ? std::max(schedule.derivatives_kept_s,
+                                                                   kFewSteps * schedule.time_step_s)
+                                                        : 0;
   TangentStepper stepper(cloth, directions, kept_s);
   const TangentParameters parameters = TangentParameters::of(cloth, set, directions);
   TangentState state = TangentState::of(cloth, set, directions);

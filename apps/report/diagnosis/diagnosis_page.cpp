@@ -264,8 +264,7 @@ std::string diagnosis_sentence(const Diagnosis& diagnosis) {
 }
 
 std::string incomplete_text(const Diagnosis& diagnosis) {
-  if (diagnosis.scores.empty())
-    return "Incomplete: the search ended before any effect was scored.";
+  if (diagnosis.scores.empty()) return "Incomplete: the search ended before any effect was scored.";
   return fmt::format(
       "Incomplete: the search ended after {} s. {} of {} modes were scored but not fitted; neither "
       "limits nor separations nor a law were looked for.",

@@ -95,18 +95,16 @@ std::vector<Hypothesis> traces(const Diagnosis& diagnosis) {
 
 std::vector<Hypothesis> not_tried(const Diagnosis& diagnosis) {
   const auto is_of = [](const Score& score, const std::vector<Trial>& trials) {
-    return std::ranges::any_of(trials, [&](const Trial& trial) {
-      return trial.hypothesis.same_mode(score.hypothesis);
-    });
+    return std::ranges::any_of(
+        trials, [&](const Trial& trial) { return trial.hypothesis.same_mode(score.hypothesis); });
   };
   std::vector<Hypothesis> left;
   for (const Score& score : diagnosis.scores) {
-    const bool tried =
-        is_of(score, diagnosis.refused) ||
-        std::ranges::any_of(diagnosis.accepted, [&](const AcceptedEffect& accepted) {
-          return accepted.trial.hypothesis.same_mode(score.hypothesis) ||
-                 is_of(score, accepted.refused);
-        });
+    const bool tried = is_of(score, diagnosis.refused) ||
+                       std::ranges::any_of(diagnosis.accepted, [&](const AcceptedEffect& accepted) {
+                         return accepted.trial.hypothesis.same_mode(score.hypothesis) ||
+                                is_of(score, accepted.refused);
+                       });
     if (!tried) left.push_back(score.hypothesis);
   }
   return left;

@@ -94,6 +94,16 @@ TEST(Beam, FallsBackOnTheCheapestSoundEntryWhereTheBestIsNone) {
   EXPECT_EQ(effects_of(beam.best()), "b");
 }
 
+TEST(Beam, GivesAwayTheCheapestSoundEntryWhereItEndsEarly) {
+  Beam beam(entry_of(kBase, {}), 3, 4);
+  EXPECT_EQ(extend(beam, {entry_of(40, {"a"}, 2.0), entry_of(45, {"b"})}), "");
+  EXPECT_EQ(effects_of(beam.release_best_sound()), "b");
+
+  Beam none_sound(entry_of(kBase, {}), 1, 4);
+  EXPECT_EQ(extend(none_sound, {entry_of(40, {"a"}, 2.0)}), "");
+  EXPECT_EQ(effects_of(none_sound.release_best_sound()), "");
+}
+
 TEST(Beam, FallsBackOnWhatItBeganWith) {
   Beam beam(entry_of(kBase, {}), 3, 1);
   extend(beam, {entry_of(20, {"a"}, 2)});

@@ -6,6 +6,7 @@
 
 #include <limits>
 
+#include "fit/diagnosis/space_mapping.h"
 #include "tests/fit/diagnosis/true_model.h"
 
 namespace clothfit {

@@ -63,10 +63,9 @@ TEST(TryHypothesis, PassesTheHiddenEffectByEveryCriterion) {
 
   EXPECT_TRUE(trial.passed()) << trial.refusal();
   EXPECT_EQ(trial.refusal(), "");
-  EXPECT_EQ(asked(trial),
-            (std::vector<std::string>{"fitted", "decrease", "worth_naming", "left_out",
-                                      "clear_of_neutral", "matters", "free_forces",
-                                      "corrections"}));
+  EXPECT_EQ(asked(trial), (std::vector<std::string>{"fitted", "decrease", "worth_naming",
+                                                    "left_out", "clear_of_neutral", "matters",
+                                                    "free_forces", "corrections"}));
   EXPECT_GT(trial.decrease, 100);
   EXPECT_LT(trial.cross_validated, trial.without_it);
   EXPECT_GT(trial.clear_of_neutral, kCriteria.clear_of_neutral);

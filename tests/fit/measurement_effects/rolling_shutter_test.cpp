@@ -27,7 +27,8 @@ TEST(RollingShutter, IsWhatACameraDeclares) {
   const Eigen::VectorXd start = of_camera.space.start();
 
   ASSERT_TRUE(of_camera.reads_in_rows);
-  EXPECT_EQ(seen.residuals({start}), expected.residuals({start}));
+  const Eigen::VectorXd same = expected.residuals({start}).front();
+  EXPECT_LT((seen.residuals({start}).front() - same).norm(), 1e-9 * same.norm());
   EXPECT_FALSE(why_readout_is_not_used(of_camera));
 
   // Tracks in space show no rows, and whoever declares a readout is not told of it for them.
