@@ -230,7 +230,7 @@ bool Predictor::appears(const ObservationSet& set, const Observation& row, const
   Instant& at_frame = result.looks.look[0].instant;
   at_frame.frame = static_cast<size_t>(row.frame);
   at_frame.place.position[0] = 1;
-  const bool measured_exactly = parameters_.empty();
+  const bool measured_exactly = parameters_.empty() && !problem_.reads_in_rows;
   Sighting from;
   if (measured_exactly) {
     result.seen = run.position_m[at_frame.frame].col(row.marker);
