@@ -39,6 +39,7 @@ void search_for_effects(Analysis& analysis, const ProgressCallback& progress, Ph
                      .threshold = huber_threshold(analysis.base, analysis.options.loss),
                      .clock = clock};
   analysis.found = search_hypotheses(analysis.setup, analysis.base, analysis.search, progress);
+  analysis.search.clock = nullptr;  // searches of twins are a phase of their own
   if (!analysis.found.base.usable()) return;
   analysis.base = analysis.found.base;
   analysis.search.threshold = analysis.found.threshold;

@@ -28,6 +28,7 @@ FittedModel from_scratch(const SearchContext& search, const std::vector<Hypothes
     if (!coarse.usable()) return {};
     const FittedModel here = fit_on_mesh(search.coarse, than, search.progress);
     const double above = search.left_by(here) - static_cast<double>(here.residual_count());
+    if (!here.usable()) return {};
     if (search.left_by(coarse) >= search.left_by(here) - kCriteria.other_basin * above) return {};
     model = led_to_analysed_mesh(search, coarse);
   } else {
@@ -35,6 +36,7 @@ FittedModel from_scratch(const SearchContext& search, const std::vector<Hypothes
   }
   if (search.left_by(model) >= search.left_by(than)) return {};
   refine_with_discretisation(model, search.setup, search.progress);
+  if (search.left_by(model) >= search.left_by(than)) return {};
   return model;
 }
 

@@ -26,6 +26,7 @@ std::vector<BeamEntry> led(const SearchContext& search, std::vector<BeamEntry> e
     entry.cost = search.cost(entry.model);
     entry.finished = false;
     entry.last.clear();
+    entry.accepted.back().trial.hypothesis = entry.model.hypotheses.back();
   }
   std::ranges::stable_sort(entries, {}, &BeamEntry::cost);
   for (BeamEntry& entry : entries) entry.accepted.back().alike = alike(entries, entry);
@@ -34,11 +35,11 @@ std::vector<BeamEntry> led(const SearchContext& search, std::vector<BeamEntry> e
 
 }  // namespace
 
-CoarseRounds search_on_coarse_mesh(const SearchContext& search, const FittedModel& base) {
-  CoarseRounds result;
-  if (!base.misfits_grossly() || !is_coarser(search.coarse, search.setup)) return result;
+void search_on_coarse_mesh(const SearchContext& search, const FittedModel& base,
+                           CoarseRounds& result) {
+  if (!base.misfits_grossly() || !is_coarser(search.coarse, search.setup)) return;
   FittedModel model = fit_on_mesh(search.coarse, base, search.progress);
-  if (!model.usable() || !model.misfits_grossly()) return result;
+  if (!model.usable() || !model.misfits_grossly()) return;
 
   SearchContext coarse(search.coarse, search.options, search.progress);
   coarse.only_chooses = true;
@@ -55,7 +56,7 @@ CoarseRounds search_on_coarse_mesh(const SearchContext& search, const FittedMode
       result.first_share = list.share;
     }
     std::vector<BeamEntry> children = expand(coarse, *next, list);
-    result.refused = next->refused;
+    if (next->accepted.empty()) result.refused = next->refused;
     beam.add(std::move(children), coarse.base_cost);
   }
   std::vector<BeamEntry> entries = beam.release();
@@ -66,7 +67,6 @@ CoarseRounds search_on_coarse_mesh(const SearchContext& search, const FittedMode
     return entry.accepted.empty() || above(entry) > enough;
   });
   result.found = led(search, std::move(entries));
-  return result;
 }
 
 }  // namespace clothfit

@@ -133,8 +133,9 @@ class Run {
     result_.refused = std::move(analysis.found.refused);
     result_.after = judge_adequacy(model, options_.fit.loss);
     const double explained = analysis.base.chi_square(threshold) - model.chi_square(threshold);
-    result_.limits = detection_limits(model, result_.after, analysis.found.last,
-                                      worth_naming(model, threshold, explained));
+    if (result_.complete)
+      result_.limits = detection_limits(model, result_.after, analysis.found.last,
+                                        worth_naming(model, threshold, explained));
     if (result_.changed())
       reports_.add(analysis.setup, model, &DiagnosedRecording::after);
     else

@@ -88,7 +88,7 @@ std::vector<FittedModel> on_analysed_mesh(const SearchContext& search, const Fit
   const auto lead = [&](size_t k) {
     models[k] = led_to_analysed_mesh(search, coarse[k]);
     if (search.left_by(models[k]) < search.left_by(without)) return;
-    models[k] = with_hypotheses(search.setup, without, coarse[k].hypotheses, {});
+    models[k] = with_hypotheses(search.setup, without, at_fitted_shapes(coarse[k]), {});
     refine_model(models[k], search.setup, {}, search.progress);
   };
   size_t led = 0;

@@ -1,5 +1,6 @@
 #include "fit/diagnosis/search.h"
 
+#include <algorithm>
 #include <optional>
 #include <utility>
 
@@ -12,6 +13,7 @@
 #include "fit/diagnosis/expand.h"
 #include "fit/diagnosis/prune.h"
 #include "fit/diagnosis/shortlist.h"
+#include "fit/diagnosis/worth.h"
 #include "fit/jobs/stop_token.h"
 
 namespace clothfit {
@@ -63,18 +65,36 @@ std::vector<BeamEntry> extend(SearchContext& search, BeamEntry& entry, const Sho
 /// then.
 void begin_on_coarse_mesh(SearchContext& search, Beam& beam, SearchResult& result) {
   search.enter("coarse mesh");
-  CoarseRounds rounds = search_on_coarse_mesh(search, beam.best().model);
-  result.first = std::move(rounds.first);
-  result.first_share = rounds.first_share;
   BeamEntry& base = beam.best();
+  CoarseRounds rounds;
+  const auto note = [&] {
+    result.first = std::move(rounds.first);
+    result.first_share = rounds.first_share;
+    base.refused = std::move(rounds.refused);
+  };
+  try {
+    search_on_coarse_mesh(search, base.model, rounds);
+  } catch (const TimeIsUp&) {
+    note();
+    throw;
+  }
+  note();
   if (rounds.found.empty()) return converge(search, base);
-  base.finished = true;
-  base.refused = std::move(rounds.refused);
   if (rounds.found.front().cost >= kCriteria.good_part * search.base_chi_square)
     converge(search, base);
-  for (BeamEntry& entry : rounds.found)
+  // The base may leave less now, and by another loss.
+  std::erase_if(rounds.found, [&](const BeamEntry& entry) {
+    const auto amplitudes =
+        static_cast<Eigen::Index>(entry.accepted.back().trial.hypothesis.amplitudes.size());
+    return search.base_chi_square - search.left_by(entry.model) <
+           std::max(least_decrease(amplitudes), search.worth(base.model));
+  });
+  for (BeamEntry& entry : rounds.found) {
+    entry.cost = search.cost(entry.model);
     if (entry.accepted.size() == 1)
       entry.accepted.front().trial.decrease = search.base_chi_square - search.left_by(entry.model);
+  }
+  base.finished = !rounds.found.empty();
   beam.add(std::move(rounds.found), search.base_cost);
 }
 
@@ -121,15 +141,23 @@ SearchResult found_in_time(SearchContext& search, BeamEntry best, SearchResult r
 /// Makes the result of the best entry, which is converged and pruned first.
 SearchResult conclude(SearchContext& search, BeamEntry best, SearchResult result) {
   search.enter("pruning");
-  converge(search, best);
-  if (best.model.is_unrefined() && !best.accepted.empty())
-    refine_with_discretisation(best.model, search.setup, search.progress);
   const bool found = !best.accepted.empty();
-  prune(search, best);
+  try {
+    converge(search, best);
+    if (best.model.is_unrefined() && found) {
+      FittedModel refined = best.model;
+      refine_with_discretisation(refined, search.setup, search.progress);
+      if (refined.usable()) best.model = std::move(refined);
+    }
+    prune(search, best);
+    if (best.last.empty())
+      best.last =
+          score_at_best_shapes(search, search.setup, best.model, search.untested(best.model));
+  } catch (const TimeIsUp&) {
+    result.complete = false;
+  }
   const bool came_back = found && best.accepted.empty();
   if (came_back) search.base = best.model;
-  if (best.last.empty())
-    best.last = score_at_best_shapes(search, search.setup, best.model, search.untested(best.model));
   result.base = std::move(search.base);
   result.changed_basin = best.basin == BasinOrigin::changed || came_back;
   result.threshold = search.threshold;

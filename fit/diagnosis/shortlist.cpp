@@ -186,7 +186,7 @@ bool says_enough(const SearchContext& search, const FittedModel& model, const Sh
 /// Scores over the shortest horizons at which chi-square per residual is `visible`, on the coarse
 /// mesh where there is one.
 Shortlist over_few_frames(const SearchContext& search, const FittedModel& model, double visible) {
-  if (is_coarser(search.coarse, search.setup)) {
+  if (!search.only_chooses && is_coarser(search.coarse, search.setup)) {
     FittedModel coarse = corrected_on_mesh(search.coarse, model);
     if (coarse.usable()) {
       Shortlist list = over_shares(search, search.coarse, coarse, kScoreShares[0], visible);

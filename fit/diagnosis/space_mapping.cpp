@@ -23,21 +23,18 @@ FittedModel run_at(const SearchContext& search, const FittedModel& coarse, doubl
   return model;
 }
 
-/// Takes the shape of a model's last hypothesis for known, as it was fitted. Blocks left out are
-/// predicted along derivatives, which lead astray where a shape is free.
-FittedModel with_shape_fixed(const SearchContext& search, FittedModel model) {
-  if (model.hypotheses.empty() || !model.hypotheses.back().fits_shape) return model;
-  std::vector<Hypothesis> hypotheses = model.hypotheses;
-  Hypothesis& last = hypotheses.back();
-  const NamedValues values = model.values().front();
-  for (auto& [name, value] : last.shape) value = values.at(last.effect + "." + name);
-  last.fits_shape = false;
-  FittedModel fixed = model_at(search.setup, hypotheses, model.values());
-  fixed.state = model.state;
-  return fixed;
-}
-
 }  // namespace
+
+std::vector<Hypothesis> at_fitted_shapes(const FittedModel& model) {
+  std::vector<Hypothesis> hypotheses = model.hypotheses;
+  const NamedValues values = model.values().front();
+  for (Hypothesis& hypothesis : hypotheses) {
+    if (!hypothesis.fits_shape) continue;
+    for (auto& [name, value] : hypothesis.shape) value = values.at(hypothesis.effect + "." + name);
+    hypothesis.fits_shape = false;
+  }
+  return hypotheses;
+}
 
 FittedModel mapped_to_analysed_mesh(const SearchContext& search, const FittedModel& coarse,
                                     double share) {
@@ -67,9 +64,11 @@ FittedModel led_to_analysed_mesh(const SearchContext& search, const FittedModel&
     }
     if (search.left_by(slowly) < search.left_by(best)) best = std::move(slowly);
   }
-  if (best.usable()) best = with_shape_fixed(search, std::move(best));
-  if (best.usable()) linearise_model(best);
-  return best;
+  if (!best.usable()) return best;
+  FittedModel result = model_at(search.setup, at_fitted_shapes(best), best.values());
+  result.state = best.state;
+  linearise_model(result);
+  return result;
 }
 
 }  // namespace clothfit

@@ -1,10 +1,16 @@
 #pragma once
 
+#include <vector>
+
 #include "fit/diagnosis/fitted_model.h"
 
 namespace clothfit {
 
 struct SearchContext;
+
+/// Returns a model's hypotheses with their fitted shapes taken for known. Blocks left out are
+/// predicted along derivatives, which lead astray where a shape is free.
+std::vector<Hypothesis> at_fitted_shapes(const FittedModel& model);
 
 /// Moves a model of the coarse mesh to where the analysed mesh leaves least over a share of the
 /// frames. Each time the coarse mesh is fitted with the difference of the meshes where it stood

@@ -161,10 +161,11 @@ TangentStepper::TangentStepper(const Cloth& cloth, std::span<const Direction> di
   };
   for (const std::shared_ptr<const Effect>& effect : cloth.effects) note(*effect);
   for (size_t e = 0; e < cloth.effect_descriptions.size(); ++e) {
-    // A contact sets in suddenly, and what remembers changes in every step.
+    // A contact sets in suddenly, and what remembers changes in every step. So do the forces of
+    // springs, which effects change that change forces.
     if (cloth.effect_descriptions[e].test == EffectTest::finite) continue;
     if (cloth.effects[e]->memory_size(cloth) > 0) continue;
-    of_forces_[e].lasts_s = of_changes_[e].lasts_s = kept_s;
+    of_forces_[e].lasts_s = kept_s;
   }
   for (size_t d = 0; d < directions.size(); ++d) {
     if (!directions[d].emerging) continue;

@@ -264,9 +264,10 @@ std::string diagnosis_sentence(const Diagnosis& diagnosis) {
 }
 
 std::string incomplete_text(const Diagnosis& diagnosis) {
-  if (diagnosis.scores.empty()) return "Incomplete: the search ended before any effect was scored.";
+  if (diagnosis.scores.empty())
+    return "Incomplete: the search ended before its first scores were complete.";
   return fmt::format(
-      "Incomplete: the search ended after {} s. {} of {} modes were scored but not fitted; neither "
+      "Incomplete: the search ended after {} s. {} of {} modes were scored and not judged; neither "
       "limits nor separations nor a law were looked for.",
       significant(diagnosis.seconds, 3), not_tried(diagnosis).size(), diagnosis.scores.size());
 }

@@ -20,7 +20,7 @@ Table trial_table(const Diagnosis& diagnosis);
 /// little beside the noise.
 std::vector<Hypothesis> traces(const Diagnosis& diagnosis);
 
-/// Returns the modes that were scored and not fitted.
+/// Returns the modes that were scored and not judged.
 std::vector<Hypothesis> not_tried(const Diagnosis& diagnosis);
 
 /// Lists every amplitude's detection limit, found and as the score predicts it.

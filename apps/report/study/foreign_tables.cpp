@@ -38,7 +38,8 @@ std::string named_text(const ForeignRow& row) {
 }
 
 std::string reached_text(const ForeignRow& row) {
-  return row.diagnosis.reached() ? to_string(row.diagnosis.verdict) : "no diagnosis";
+  if (!row.diagnosis.reached()) return "no diagnosis";
+  return to_string(row.diagnosis.verdict) + (row.diagnosis.complete ? "" : " (incomplete)");
 }
 
 /// Says what is wrong with a row, in a phrase.

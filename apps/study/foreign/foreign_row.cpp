@@ -27,6 +27,7 @@ double ForeignRow::error_over_floor() const {
 std::string payload_of(const ForeignDiagnosis& diagnosis) {
   Json json{{"reason", diagnosis.reason},
             {"verdict", static_cast<int>(diagnosis.verdict)},
+            {"complete", diagnosis.complete},
             {"named", Json::array()},
             {"unit", diagnosis.unit},
             {"held_out_rms", number_json(diagnosis.held_out_rms)},
@@ -43,6 +44,7 @@ ForeignDiagnosis foreign_diagnosis_of(const std::string& payload) {
   ForeignDiagnosis diagnosis{
       .reason = json.at("reason"),
       .verdict = static_cast<DiagnosisVerdict>(json.at("verdict").get<int>()),
+      .complete = json.at("complete"),
       .named = {},
       .unit = json.at("unit"),
       .held_out_rms = number_of(json.at("held_out_rms")),

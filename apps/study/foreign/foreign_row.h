@@ -13,6 +13,7 @@ namespace clothfit {
 struct ForeignDiagnosis {
   std::string reason;  ///< why there is none; empty where there is one
   DiagnosisVerdict verdict = DiagnosisVerdict::not_reached;
+  bool complete = true;            ///< false where its budget was spent before all was tried
   std::vector<NamedEffect> named;  ///< in the order of acceptance
   std::string unit;                ///< of the errors: "m" or "px"
   /// Error of the model found on held-out frames, and the noise of the observations. Both are root

@@ -27,6 +27,7 @@ constexpr const char* kTruthFile = "truth.json";
 /// Copies what the study keeps of a diagnosis.
 void note(const Diagnosis& diagnosis, ForeignDiagnosis& kept) {
   kept.verdict = diagnosis.verdict;
+  kept.complete = diagnosis.complete;
   // This is never right: no recording hides such a thing.
   if (diagnosis.seen_elsewhere)
     kept.named.push_back(

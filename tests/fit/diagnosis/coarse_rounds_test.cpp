@@ -58,7 +58,8 @@ TEST(CoarseRounds, AreOfModelsThatMisfitGrosslyAlone) {
   const FittedModel model = true_model(meshes.setup, kOnTwoMeshes, {drag_hypothesis()});
   ASSERT_FALSE(model.misfits_grossly());
 
-  const CoarseRounds rounds = search_on_coarse_mesh(meshes.search, model);
+  CoarseRounds rounds;
+  search_on_coarse_mesh(meshes.search, model, rounds);
 
   EXPECT_TRUE(rounds.first.empty());
   EXPECT_TRUE(rounds.found.empty());

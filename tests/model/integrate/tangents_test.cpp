@@ -120,10 +120,10 @@ TEST(Tangents, WithDerivativesThatAreKeptErrByTheMotionInThatTime) {
   Uniform uniform(5);
   Swing swing(uniform);
   add_effect(swing.cloth, "wind", "test");
-  add_effect(swing.cloth, "viscous_damping", "test");
-  swing.set.effects = {{0.1, 0.2, -0.3, 0.4}, {0.7}};
+  add_effect(swing.cloth, "added_air_mass", "test");  // it changes forces
+  swing.set.effects = {{0.1, 0.2, -0.3, 0.4}, {0.05}};
   Direction direction;
-  direction.effects = {{0.1, 0.2, 0.3, 0.1}, {0.4}};
+  direction.effects = {{0.1, 0.2, 0.3, 0.1}, {0.01}};
   const auto tangents = [&](double kept_s) {
     Schedule schedule = swing.schedule;
     schedule.derivatives_kept_s = kept_s;
