@@ -1,6 +1,7 @@
 #include "fit/diagnosis/coarse_rounds.h"
 
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 #include "fit/diagnosis/basin.h"
@@ -14,6 +15,25 @@
 namespace clothfit {
 namespace {
 
+/// Returns what a model leaves above the noise, per residual: a share of the noise at least.
+double excess_of(const FittedModel& model) {
+  return std::max(model.misfit() - 1, kCriteria.race_of_noise);
+}
+
+/// Refines the entries that leave hardly more than the best one. Where they stand before that says
+/// nothing of whether a recording can tell them apart.
+void refine_near_best(const SearchContext& search, std::vector<BeamEntry>& entries) {
+  if (entries.size() < 2) return;
+  double least = std::numeric_limits<double>::infinity();
+  for (const BeamEntry& entry : entries) least = std::min(least, excess_of(entry.model));
+  for_each_index(entries.size(), [&](size_t k) {
+    if (excess_of(entries[k].model) > kCriteria.coarse_near_best * least) return;
+    FittedModel refined = entries[k].model;
+    refine_model(refined, search.setup, {}, search.progress);
+    if (refined.usable()) entries[k].model = std::move(refined);
+  });
+}
+
 /// Leads entries to the analysed mesh. Those stay that leave less there than the base does.
 std::vector<BeamEntry> led(const SearchContext& search, std::vector<BeamEntry> entries) {
   for_each_index(entries.size(), [&](size_t k) {
@@ -22,6 +42,7 @@ std::vector<BeamEntry> led(const SearchContext& search, std::vector<BeamEntry> e
   std::erase_if(entries, [&](const BeamEntry& entry) {
     return !(search.left_by(entry.model) < search.base_chi_square);
   });
+  refine_near_best(search, entries);
   for (BeamEntry& entry : entries) {
     entry.cost = search.cost(entry.model);
     entry.finished = false;
@@ -60,11 +81,9 @@ void search_on_coarse_mesh(const SearchContext& search, const FittedModel& base,
     beam.add(std::move(children), coarse.base_cost);
   }
   std::vector<BeamEntry> entries = beam.release();
-  const auto above = [](const BeamEntry& entry) { return entry.model.misfit() - 1; };
-  const double enough =
-      kCriteria.coarse_far_behind * std::max(above(entries.front()), kCriteria.race_of_noise);
+  const double enough = kCriteria.coarse_far_behind * excess_of(entries.front().model);
   std::erase_if(entries, [&](const BeamEntry& entry) {
-    return entry.accepted.empty() || above(entry) > enough;
+    return entry.accepted.empty() || excess_of(entry.model) > enough;
   });
   result.found = led(search, std::move(entries));
 }

@@ -127,14 +127,14 @@ void extend_all(SearchContext& search, Beam& beam, SearchResult& result) {
   }
 }
 
-/// Makes the result of the best entry as it stands.
-SearchResult found_in_time(SearchContext& search, BeamEntry best, SearchResult result) {
+/// Makes the result of an entry as it stands.
+SearchResult result_of(SearchContext& search, BeamEntry entry, SearchResult result) {
   result.base = std::move(search.base);
   result.threshold = search.threshold;
-  result.model = std::move(best.model);
-  result.accepted = std::move(best.accepted);
-  result.refused = std::move(best.refused);
-  result.last = std::move(best.last);
+  result.model = std::move(entry.model);
+  result.accepted = std::move(entry.accepted);
+  result.refused = std::move(entry.refused);
+  result.last = std::move(entry.last);
   return result;
 }
 
@@ -158,14 +158,8 @@ SearchResult conclude(SearchContext& search, BeamEntry best, SearchResult result
   }
   const bool came_back = found && best.accepted.empty();
   if (came_back) search.base = best.model;
-  result.base = std::move(search.base);
   result.changed_basin = best.basin == BasinOrigin::changed || came_back;
-  result.threshold = search.threshold;
-  result.model = std::move(best.model);
-  result.accepted = std::move(best.accepted);
-  result.refused = std::move(best.refused);
-  result.last = std::move(best.last);
-  return result;
+  return result_of(search, std::move(best), std::move(result));
 }
 
 }  // namespace
@@ -181,7 +175,7 @@ SearchResult search_hypotheses(const DiagnosisSetup& setup, FittedModel base,
     extend_all(search, beam, result);
   } catch (const TimeIsUp&) {
     result.complete = false;
-    return found_in_time(search, beam.release_best_sound(), std::move(result));
+    return result_of(search, beam.release_best_sound(), std::move(result));
   }
   return conclude(search, std::move(beam.best()), std::move(result));
 }

@@ -43,9 +43,12 @@ std::string verdict_text(const Diagnosis& diagnosis) {
              ". With that, the residual looks like noise.";
     case DiagnosisVerdict::partly_explained:
       return "The model lacked " + effects_text(diagnosis) +
-             ". With that, structure still remains that no tested effect explains.";
+             (diagnosis.complete
+                  ? ". With that, structure still remains that no tested effect explains."
+                  : ". With that, structure still remains, and not all effects were tried.");
     case DiagnosisVerdict::unexplained:
-      return "Something is missing, and no tested effect explains it.";
+      return diagnosis.complete ? "Something is missing, and no tested effect explains it."
+                                : "Something is missing, and not all effects were tried.";
     case DiagnosisVerdict::not_reached:
       return "The diagnosis did not come to an end.";
   }

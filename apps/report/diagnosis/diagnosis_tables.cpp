@@ -27,12 +27,15 @@ std::string sigmas_text(double sigmas) {
   return fmt::format("{:.{}f}", sigmas, sigmas < 9.95 ? 1 : 0);
 }
 
-/// Writes "q_x 0.05 ± 0.01, q_y ..." with as many digits as sigma allows.
+/// Writes "q_x 0.05, q_y ..., and 2 more" with as many digits as sigma allows.
 std::string amounts_text(const Score& score) {
+  constexpr Eigen::Index kMostAmounts = 4;  // what a line of a terminal holds
   std::string text;
-  for (Eigen::Index k = 0; k < score.amplitude.size(); ++k)
+  for (Eigen::Index k = 0; k < std::min(kMostAmounts, score.amplitude.size()); ++k)
     text += fmt::format("{}{} {}", text.empty() ? "" : ", ", score.amplitude_name(k),
                         value_text(score.amplitude[k], score.sigma[k]));
+  if (score.amplitude.size() > kMostAmounts)
+    text += fmt::format(", and {} more", score.amplitude.size() - kMostAmounts);
   return text;
 }
 
@@ -257,7 +260,11 @@ std::string found_text(const Hypothesis& term, const FitResult& result) {
     if (parameter.name.starts_with(term.effect + ".") &&
         of_term(parameter.name.substr(term.effect.size() + 1)))
       add(parameter);
-  return text;
+  if (term.fits_shape || term.shape.empty()) return text;
+  std::string known;
+  for (const auto& [name, value] : term.shape)
+    known += (known.empty() ? "" : ", ") + name + " " + significant(value, 3);
+  return text + " (at " + known + ")";
 }
 
 }  // namespace clothfit

@@ -54,7 +54,8 @@ Table before_after_table(const Diagnosis& diagnosis);
 /// Lists the tests of step 1, before and after.
 Table adequacy_table(const Diagnosis& diagnosis);
 
-/// Writes "q_x 0.05, q_y 0.21 Pa (frequency 2 Hz)": a fit's values for a term, with sigma.
+/// Writes "hem_bottom = 4.3 ± 0.1 ratio (at hem_width 0.012)": a fit's values for a term, with
+/// sigma, and its shape where that was taken for known.
 std::string found_text(const Hypothesis& term, const FitResult& result);
 
 /// Writes "Remedy: level the camera." for a term whose effect has one; nothing for others.

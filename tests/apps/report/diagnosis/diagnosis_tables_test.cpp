@@ -38,6 +38,26 @@ TEST(SeparationText, NamesTheBestRecordingThatTells) {
             "gravity_tilt cannot be told from world_tilt (0.0 sigma; 35 sigma with: shaken)");
 }
 
+TEST(FoundText, NamesAShapeThatWasTakenForKnown) {
+  Hypothesis hem{.effect = "nonuniform_mass",
+                 .mode = "hem",
+                 .amplitudes = {"hem"},
+                 .shape = {{"hem_width", 0.012}}};
+  EXPECT_EQ(found_text(hem, {}), " (at hem_width 0.0120)");
+  hem.fits_shape = true;
+  EXPECT_EQ(found_text(hem, {}), "");
+}
+
+TEST(ShortCandidateTable, ListsFourAmplitudesOfMany) {
+  Diagnosis diagnosis;
+  diagnosis.scores.push_back(
+      {.hypothesis = {.effect = "support_path", .amplitudes = {"a", "b", "c", "d", "e", "f"}},
+       .amplitude = Eigen::VectorXd::Ones(6),
+       .sigma = Eigen::VectorXd::Ones(6)});
+  EXPECT_THAT(short_candidate_table(diagnosis).rows.front()[3], HasSubstr(", and 2 more"));
+  EXPECT_EQ(candidate_table(diagnosis).rows.size(), 6u);
+}
+
 TEST(RemedyText, IsThatOfTheEffectWhereItHasOne) {
   EXPECT_EQ(remedy_text({.effect = "nonuniform_mass", .mode = "hem"}),
             "Remedy: weigh the hem, or declare masses.");
