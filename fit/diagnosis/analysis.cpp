@@ -23,6 +23,16 @@ std::vector<ShapeCandidates> hypotheses_of(const Analysis& analysis) {
   return hypotheses;
 }
 
+std::vector<Hypothesis> contacts_of(const Analysis& analysis) {
+  std::vector<Hypothesis> contacts =
+      contacts_to_test(analysis.setup.inputs.front(), analysis.options);
+  const std::vector<std::string>& without = analysis.diagnosis.without;
+  std::erase_if(contacts, [&](const Hypothesis& contact) {
+    return std::ranges::find(without, contact.effect) != without.end();
+  });
+  return contacts;
+}
+
 }  // namespace
 
 double huber_threshold(const FittedModel& model, Loss loss) {
@@ -33,6 +43,7 @@ double huber_threshold(const FittedModel& model, Loss loss) {
 void search_for_effects(Analysis& analysis, const ProgressCallback& progress, PhaseClock* clock) {
   const DiagnoseOptions& asked = analysis.diagnosis;
   analysis.search = {.hypotheses = hypotheses_of(analysis),
+                     .contacts = contacts_of(analysis),
                      .beam_width = asked.beam_width,
                      .refits = asked.refits,
                      .most_effects = static_cast<size_t>(asked.most_effects),

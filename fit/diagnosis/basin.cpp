@@ -13,6 +13,7 @@
 #include "fit/diagnosis/search_context.h"
 #include "fit/diagnosis/space_mapping.h"
 #include "fit/diagnosis/worth.h"
+#include "fit/problem/effects_of.h"
 
 namespace clothfit {
 namespace {
@@ -112,8 +113,8 @@ FittedModel in_basin_of(const SearchContext& search, const Extended& best,
   // A model that was not refined leaves more than its optimum in its own basin.
   if (without.is_unrefined()) return {};
   const double taken = search.left_by(without) - search.left_by(best.model);
-  if (taken <= 0 || (!best.from_scratch && rise_without_last(best.model, search.threshold) > taken))
-    return {};
+  if (taken <= 0 || describe_effect(best.model.hypotheses.back().effect).touches) return {};
+  if (!best.from_scratch && rise_without_last(best.model, search.threshold) > taken) return {};
   FittedModel there = with_hypotheses(search.setup, best.model, without.hypotheses, {});
   refine_model(there, search.setup, {}, search.progress);
   if (there.usable()) refine_with_discretisation(there, search.setup, search.progress);

@@ -175,6 +175,23 @@ std::vector<Hypothesis> empirical_hypotheses(const FitInput& input, const FitOpt
   return result;
 }
 
+std::vector<Hypothesis> contacts_to_test(const FitInput& input, const FitOptions& options) {
+  const std::vector<std::string> present = present_effects(input, options);
+  std::vector<Hypothesis> result;
+  for (const EffectEntry& entry : effect_registry()) {
+    const EffectDescription effect = entry.describe();
+    if (std::ranges::find(present, effect.name) != present.end()) continue;
+    for (const EffectMode& mode : effect.modes)
+      if (std::ranges::any_of(mode.shapes, &ShapeGrid::from_pushes))
+        result.push_back({.effect = effect.name,
+                          .mode = mode.name,
+                          .amplitudes = mode.amplitudes,
+                          .shape = {},
+                          .shape_sigma = {}});
+  }
+  return result;
+}
+
 std::vector<ShapeCandidates> hypotheses_to_test(const FitInput& input, const FitOptions& options,
                                                 double duration_s) {
   const std::vector<std::string> present = present_effects(input, options);

@@ -36,10 +36,13 @@ std::vector<Hypothesis> empirical_hypotheses(const FitInput& input, const FitOpt
 
 /// Returns the hypotheses to test on a recording: the modes of all registered effects, with
 /// exceptions. Excepted are effects that it declares or that `options` add, empirical ones, and
-/// those that do not apply to it. So are those whose geometry would have to be guessed (contact
-/// with an obstacle nobody has described). Frequencies run from the inverse of `duration_s`. A mode
-/// of single held points has a shape of each.
+/// those that do not apply to it. So is contact with obstacles (contacts_to_test). Frequencies run
+/// from the inverse of `duration_s`. A mode of single held points has a shape of each.
 std::vector<ShapeCandidates> hypotheses_to_test(const FitInput& input, const FitOptions& options,
                                                 double duration_s);
+
+/// Returns contact with each kind of obstacle whose place the pushes on the cloth can say, without
+/// a shape. Excepted are those that the recording declares or that `options` add.
+std::vector<Hypothesis> contacts_to_test(const FitInput& input, const FitOptions& options);
 
 }  // namespace clothfit

@@ -110,8 +110,12 @@ FromNeutral from_neutral(const FittedModel& model, double threshold) {
 
 double clear_of_neutral(const FittedModel& model, const Adequacy& structure, double threshold) {
   const FromNeutral own = from_neutral(model, threshold);
+  return clear_by(own.square, own.amplitudes, structure);
+}
+
+double clear_by(double decrease, Eigen::Index amplitudes, const Adequacy& structure) {
   return kCriteria.clear_of_neutral *
-         std::sqrt(own.square / inflation(structure) / least_decrease(own.amplitudes));
+         std::sqrt(decrease / inflation(structure) / least_decrease(amplitudes));
 }
 
 double rise_without_last(const FittedModel& model, double threshold) {

@@ -77,6 +77,11 @@ FittedModel fit_from_here(const DiagnosisSetup& setup, const FittedModel& model,
   return fitted;
 }
 
+/// Tells whether a hypothesis is contact. No derivative at neutral says what it does.
+bool is_contact(const Score& score) {
+  return describe_effect(score.hypothesis.effect).touches;
+}
+
 /// A model fitted over a share of the frames.
 using FitOver = std::function<FittedModel(size_t model, double share)>;
 
@@ -179,13 +184,17 @@ std::vector<FittedModel> fit_near(const DiagnosisSetup& setup, const FittedModel
   std::vector<FittedModel> fitted(scores.size());
   std::vector<double> decrease(scores.size(), 0);
   for_each_index(scores.size(), [&](size_t k) {
-    fitted[k] = fit_from_here(setup, model, *scores[k], {.rounds = 1, .unrefined = true}, progress);
+    fitted[k] =
+        is_contact(*scores[k])
+            ? race_hypotheses(setup, model, model, {scores[k]}, 1, threshold, progress).front()
+            : fit_from_here(setup, model, *scores[k], {.rounds = 1, .unrefined = true}, progress);
     if (fitted[k].usable()) decrease[k] = without - fitted[k].chi_square(threshold);
   });
   if (fitted.empty()) return fitted;
   const double enough = kCriteria.exact_fit_of_best * *std::ranges::max_element(decrease);
   for_each_index(scores.size(), [&](size_t k) {
     if (decrease[k] < enough && decrease[k] > kCriteria.kept_promise * scores[k]->decrease) return;
+    if (is_contact(*scores[k])) return;
     fitted[k] =
         fit_from_unrefined(setup, model, *scores[k], std::move(fitted[k]), threshold, progress);
   });

@@ -10,6 +10,7 @@ namespace clothfit {
 
 struct SearchOptions {
   std::vector<ShapeCandidates> hypotheses;  ///< to test
+  std::vector<Hypothesis> contacts;         ///< with obstacles in unknown places, to test too
   int beam_width = 3;                       ///< entries that are followed side by side
   int refits = 6;                           ///< hypotheses of each entry that are fitted at a time
   size_t most_effects = 4;

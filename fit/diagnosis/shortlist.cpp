@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "fit/diagnosis/adequacy.h"
+#include "fit/diagnosis/contacts.h"
 #include "fit/diagnosis/criteria.h"
 #include "fit/diagnosis/discretisation.h"
 #include "fit/diagnosis/search_context.h"
@@ -110,12 +111,19 @@ FittedModel over_horizon(const SearchContext& search, const DiagnosisSetup& setu
   return fitted;
 }
 
+/// A model over several horizons.
+struct OverHorizons {
+  FittedModel before;                ///< over the longest one at which nothing shows, or not run
+  std::vector<FittedModel> shorter;  ///< those at which something does
+  double first_share = 1;            ///< the first of these, as a share of the frames
+};
+
 /// Fits the model over horizons from share `first` on. They begin with the one at which chi-square
-/// per residual is `visible`, or with all frames. `share_of_first` becomes that one's share.
-std::vector<FittedModel> over_horizons(const SearchContext& search, const DiagnosisSetup& setup,
-                                       const FittedModel& model, double first, double visible,
-                                       double& share_of_first) {
-  std::vector<FittedModel> shorter;
+/// per residual is `visible`, or with all frames.
+OverHorizons over_horizons(const SearchContext& search, const DiagnosisSetup& setup,
+                           const FittedModel& model, double first, double visible) {
+  OverHorizons result;
+  std::vector<FittedModel>& shorter = result.shorter;
   for (const double share : kScoreShares) {
     if (share < first) continue;
     FittedModel fitted =
@@ -123,12 +131,15 @@ std::vector<FittedModel> over_horizons(const SearchContext& search, const Diagno
     if (!fitted.usable()) continue;
     const bool shows =
         fitted.residual().squaredNorm() > visible * static_cast<double>(fitted.residual_count());
-    if (!shows && shorter.empty() && share < 1) continue;
-    if (shorter.empty()) share_of_first = share;
+    if (!shows && shorter.empty() && share < 1) {
+      result.before = std::move(fitted);
+      continue;
+    }
+    if (shorter.empty()) result.first_share = share;
     shorter.push_back(std::move(fitted));
     if (shorter.size() == kScoreHorizons) break;
   }
-  return shorter;
+  return result;
 }
 
 /// Adds the scores over a further horizon, for the hypotheses that are best so far.
@@ -149,11 +160,27 @@ void add_horizon(const SearchContext& search, const FittedModel& at, double hori
   sort_by_share(best);
 }
 
+/// Adds scores of contact with obstacles that a model does not have.
+void add_contacts(const SearchContext& search, const DiagnosisSetup& setup,
+                  const FittedModel& before, const FittedModel& at, Shortlist& list) {
+  std::vector<Hypothesis> untested = search.options.contacts;
+  std::erase_if(untested, [&](const Hypothesis& contact) {
+    return std::ranges::find(at.hypotheses, contact.effect, &Hypothesis::effect) !=
+           at.hypotheses.end();
+  });
+  for (const Score& score : score_contacts(search, setup, before, at, untested)) {
+    list.scores.push_back(score);
+    list.best.push_back(score);
+  }
+  sort_by_share(list.best);
+}
+
 Shortlist over_shares(const SearchContext& search, const DiagnosisSetup& setup,
                       const FittedModel& model, double first, double visible) {
   Shortlist list;
-  std::vector<FittedModel> shorter =
-      over_horizons(search, setup, model, first, visible, list.share);
+  OverHorizons over = over_horizons(search, setup, model, first, visible);
+  list.share = over.first_share;
+  std::vector<FittedModel>& shorter = over.shorter;
   const auto horizons = static_cast<double>(shorter.size());
   for (size_t k = 0; k < shorter.size(); ++k) {
     if (k == 0) {
@@ -169,6 +196,8 @@ Shortlist over_shares(const SearchContext& search, const DiagnosisSetup& setup,
     const size_t kept = std::min(list.best.size(), static_cast<size_t>(2 * search.options.refits));
     list.best.erase(list.best.begin() + static_cast<std::ptrdiff_t>(kept), list.best.end());
   }
+  if (!shorter.empty() && shorter.front().misfit() > visible)
+    add_contacts(search, setup, over.before, shorter.front(), list);
   if (!shorter.empty()) list.early = std::move(shorter.front());
   return list;
 }

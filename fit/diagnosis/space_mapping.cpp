@@ -5,6 +5,7 @@
 #include "fit/diagnosis/discretisation.h"
 #include "fit/diagnosis/horizons.h"
 #include "fit/diagnosis/search_context.h"
+#include "fit/problem/effects_of.h"
 
 namespace clothfit {
 namespace {
@@ -29,7 +30,8 @@ std::vector<Hypothesis> at_fitted_shapes(const FittedModel& model) {
   std::vector<Hypothesis> hypotheses = model.hypotheses;
   const NamedValues values = model.values().front();
   for (Hypothesis& hypothesis : hypotheses) {
-    if (!hypothesis.fits_shape) continue;
+    // Where an obstacle is follows from how fine the cloth is that meets it.
+    if (!hypothesis.fits_shape || describe_effect(hypothesis.effect).touches) continue;
     for (auto& [name, value] : hypothesis.shape) value = values.at(hypothesis.effect + "." + name);
     hypothesis.fits_shape = false;
   }

@@ -68,8 +68,11 @@ class Asked {
     trial_.without_it = models_.without_left_out.mean;
     trial_.best_trivial =
         std::min(without_physics(models_.without_left_out), models_.without_left_out.free_forces);
-    trial_.clear_of_neutral = clear_of_neutral(
-        models_.with, judge_adequacy(models_.with, search_.setup.options.loss), search_.threshold);
+    const Adequacy structure = judge_adequacy(models_.with, search_.setup.options.loss);
+    trial_.clear_of_neutral =
+        describe_effect(trial_.hypothesis.effect).touches
+            ? clear_by(trial_.decrease, models_.score.amplitude.size(), structure)
+            : clear_of_neutral(models_.with, structure, search_.threshold);
   }
 
   Criterion predicts_better() const {

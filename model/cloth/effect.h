@@ -55,6 +55,8 @@ struct ShapeGrid {
   /// The numbers of the held points on which the effect acts, from 1 on, in place of values. There
   /// are none where these are fewer than two, or where an edge is held.
   bool per_held_point = false;
+  /// No grid says where the effect acts; the pushes on the cloth do (fit/diagnosis/contacts.h).
+  bool from_pushes = false;
 };
 
 /// One mode of an effect; the data are asked for each mode by itself.

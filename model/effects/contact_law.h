@@ -62,6 +62,14 @@ struct Contact {
             .frequency2_per_s2 = most * stiffness};
   }
 
+  /// An obstacle in an unknown place, which the parameters named say. It does not rub.
+  static std::vector<EffectMode> modes(const std::vector<std::string>& place) {
+    EffectMode mode{.name = "", .amplitudes = {"stiffness", "damping"}, .shapes = {}};
+    for (const std::string& parameter : place)
+      mode.shapes.push_back({.parameter = parameter, .values = {}, .from_pushes = true});
+    return {mode};
+  }
+
   static std::vector<EffectParameter> parameters() {
     return {
         {.name = "stiffness",

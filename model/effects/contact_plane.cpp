@@ -41,6 +41,7 @@ EffectDescription describe() {
       {.name = "n_z", .unit = "ratio", .neutral = 1, .lower = -1, .upper = 1, .typical = 0.02});
   effect.parameters.push_back(
       {.name = "offset", .unit = "m", .neutral = 0, .lower = -10, .upper = 10, .typical = 0.01});
+  effect.modes = Contact::modes({"n_x", "n_y", "n_z", "offset"});
   effect.touches = true;
   return effect;
 }

@@ -46,6 +46,7 @@ EffectDescription describe() {
                                .lower = 0.005,
                                .upper = 5,
                                .typical = 0.005});
+  effect.modes = Contact::modes({"centre_x", "centre_y", "centre_z", "radius"});
   effect.touches = true;
   return effect;
 }
