@@ -223,10 +223,24 @@ TEST(HypothesesToTest, TryEachCombinationOfShapesWithFrequenciesInTheDuration) {
       EXPECT_EQ(mode.size(), 48u);                       // 12 frequencies, 4 phases
       EXPECT_EQ(mode.front().shape.at("frequency"), 1);  // half a turn in half a second
     }
+    if (mode.front().effect == "wind_field" && mode.front().mode == "pulse") {
+      EXPECT_EQ(mode.size(), 32u);  // 8 frequencies, 4 phases
+    }
     if (mode.front().effect == "relaxation") {
       EXPECT_GT(mode.front().shape_sigma.at("time"), 0);
     }
   }
+}
+
+// Of a pulse at another phase a part stays as it is. It is no sum of those at two phases.
+TEST(IsHarmonic, HoldsForAWindOfBothSignsAndNotForPulses) {
+  std::set<std::string> harmonic, other;
+  for (const ShapeCandidates& mode : hypotheses_to_test(synthetic_input({}), {}, 0.5))
+    if (mode.front().effect == "wind_field")
+      (is_harmonic(mode.front()) ? harmonic : other).insert(mode.front().mode);
+
+  EXPECT_THAT(harmonic, ElementsAre("harmonic"));
+  EXPECT_THAT(other, ElementsAre("cloth", "pulse", "world"));
 }
 
 TEST(DescribeEffect, KnowsThoseOfMotionAndOfTheMeasurementAndRefusesOthers) {

@@ -173,19 +173,23 @@ TEST(HypothesisDerivatives, OfAHarmonicAtAnyPhaseAreCombinationsOfTwo) {
   const FitInput input = synthetic_input(kAskedCloth);
   const FittedModel model = true_model(asked_setup({&input, 1}), kAskedCloth);
   struct Kind {
-    const char *effect, *mode, *amplitude;
+    std::string effect, mode;
+    std::vector<std::string> amplitudes;
+  };
+  const auto vector = [](const std::string& name) {
+    return std::vector{name + "_x", name + "_y", name + "_z"};
   };
   std::vector<Hypothesis> hypotheses;
-  for (const Kind& kind : {Kind{"gust", "", "q"}, Kind{"support_motion", "", "amplitude"},
-                           Kind{"camera_shake", "shift", "shift"}})
+  for (const Kind& kind :
+       {Kind{"gust", "", vector("q")}, Kind{"support_motion", "", vector("amplitude")},
+        Kind{"camera_shake", "shift", vector("shift")},
+        Kind{"wind_field", "harmonic", {"h", "h_s", "h_t"}}})
     for (const double frequency_hz : {3.0, 5.0})
       for (const double phase : {-0.2, 0.05, 0.3})
-        hypotheses.push_back(
-            {.effect = kind.effect,
-             .mode = kind.mode,
-             .amplitudes = {std::string(kind.amplitude) + "_x", std::string(kind.amplitude) + "_y",
-                            std::string(kind.amplitude) + "_z"},
-             .shape = {{"frequency", frequency_hz}, {"phase", phase}}});
+        hypotheses.push_back({.effect = kind.effect,
+                              .mode = kind.mode,
+                              .amplitudes = kind.amplitudes,
+                              .shape = {{"frequency", frequency_hz}, {"phase", phase}}});
 
   const std::vector<Columns> together = hypothesis_derivatives(model, hypotheses);
 
