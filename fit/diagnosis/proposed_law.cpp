@@ -13,6 +13,7 @@
 #include "fit/diagnosis/worth.h"
 #include "fit/jobs/parallel.h"
 #include "fit/jobs/stop_token.h"
+#include "fit/problem/effects_of.h"
 #include "fit/uncertainty/uncertainty.h"
 #include "model/effects/registry.h"
 

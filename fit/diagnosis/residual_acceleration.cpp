@@ -11,19 +11,20 @@ namespace {
 constexpr int kReach = 2;            ///< frames on either side
 constexpr size_t kFewestFrames = 4;  ///< of the five
 
-struct Sample {
+struct TimedResidual {
   double time_s = 0, sigma_m = 0;
   Eigen::Vector3d residual_m;
 };
 
 /// The parabola's second derivative at the samples' mean time, and its sigma.
-ResidualAcceleration fit_parabola(const std::vector<const Sample*>& samples) {
+ResidualAcceleration fit_parabola(const std::vector<const TimedResidual*>& samples) {
   const auto count = static_cast<Eigen::Index>(samples.size());
   double middle_s = 0;
-  for (const Sample* sample : samples) middle_s += sample->time_s / static_cast<double>(count);
+  for (const TimedResidual* sample : samples)
+    middle_s += sample->time_s / static_cast<double>(count);
   Eigen::MatrixXd powers(count, 3), residual_m(count, 3);
   for (Eigen::Index k = 0; k < count; ++k) {
-    const Sample& sample = *samples[static_cast<size_t>(k)];
+    const TimedResidual& sample = *samples[static_cast<size_t>(k)];
     const double t = sample.time_s - middle_s;
     powers.row(k) << 1, t, 0.5 * t * t;
     powers.row(k) /= sample.sigma_m;
@@ -47,7 +48,7 @@ std::vector<ResidualAcceleration> residual_accelerations(const FittedModel& mode
                                                          size_t recording) {
   const FitProblem& problem = *model.problems[recording];
   const Eigen::VectorXd residual = residual_of(model.parts[recording]);
-  std::map<int, std::map<int, Sample>> of_marker;  // of each frame
+  std::map<int, std::map<int, TimedResidual>> of_marker;  // of each frame
   std::map<int, std::map<int, Eigen::Vector3d>> observed_m;
   const TrajectoryObjective objective = model.objective(recording);
   for (const Objective::Block& block : objective.blocks()) {
@@ -65,7 +66,7 @@ std::vector<ResidualAcceleration> residual_accelerations(const FittedModel& mode
   for (const auto& [marker, frames] : of_marker) {
     for (const auto& [frame, here] : frames) {
       if (!frames.contains(frame - 1) || !frames.contains(frame + 1)) continue;
-      std::vector<const Sample*> around;
+      std::vector<const TimedResidual*> around;
       for (int f = frame - kReach; f <= frame + kReach; ++f)
         if (const auto found = frames.find(f); found != frames.end())
           around.push_back(&found->second);
