@@ -99,7 +99,7 @@ void print_result(const Diagnosis& diagnosis, const fs::path& folder) {
     fmt::print("Markers seen elsewhere: {}\n", seen_elsewhere_text(*diagnosis.seen_elsewhere));
   for (size_t n = 0; n < diagnosis.accepted.size(); ++n) {
     const Hypothesis& term = diagnosis.accepted[n].trial.hypothesis;
-    fmt::print("{}: {}\n", term.title(), found_text(term, diagnosis.found().result));
+    fmt::print("{}\n", accepted_text(term, diagnosis.found()));
     if (const std::string remedy = remedy_text(term); !remedy.empty()) fmt::print("  {}\n", remedy);
     if (!diagnosis.separation_of(n).empty())
       fmt::print("  {}\n", separation_text(term, diagnosis.separation_of(n)));

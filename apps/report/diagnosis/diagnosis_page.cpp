@@ -11,6 +11,7 @@
 #include "apps/report/page/html.h"
 #include "apps/terminal/number_text.h"
 #include "apps/terminal/version.h"
+#include "fit/problem/effect_words.h"
 #include "fit/problem/effects_of.h"
 
 namespace clothfit {
@@ -136,8 +137,11 @@ std::string what_was_missing(const Diagnosis& diagnosis) {
     const Trial& trial = accepted.trial;
     content += fmt::format("<h3>{}</h3>\n", escape_xml(trial.hypothesis.title()));
     content += paragraph(describe_effect(trial.hypothesis.effect).summary + ".");
+    const std::string values = found_text(trial.hypothesis, diagnosis.found().result);
+    const std::string told = words_of(trial.hypothesis, diagnosis.found());
     content += fmt::format("<p class=\"found\"><strong>{}</strong></p>\n",
-                           escape_xml(found_text(trial.hypothesis, diagnosis.found().result)));
+                           escape_xml(told.empty() ? values : told));
+    if (!told.empty()) content += paragraph(values + ".");
     if (const std::string remedy = remedy_text(trial.hypothesis); !remedy.empty())
       content += paragraph(remedy);
     content += paragraph(fmt::format(
