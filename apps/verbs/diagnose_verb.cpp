@@ -12,6 +12,7 @@
 #include "apps/report/diagnosis/diagnosis_law.h"
 #include "apps/report/diagnosis/diagnosis_page.h"
 #include "apps/report/diagnosis/diagnosis_tables.h"
+#include "apps/report/fit/fit_tables.h"
 #include "apps/steps/steps.h"
 #include "apps/terminal/csv_table.h"
 #include "apps/terminal/exit_code.h"
@@ -109,6 +110,8 @@ void print_result(const Diagnosis& diagnosis, const fs::path& folder) {
                trace.title());
   if (diagnosis.changed()) fmt::print("\n");
   print(before_after_table(diagnosis));
+  fmt::print("Parameters of the model found:\n\n");
+  print(short_parameter_table(diagnosis.found().result));
   if (diagnosis.law.found()) {
     fmt::print("A law for what remains:\n{}\n\n", diagnosis.law.formula);
     print(law_error_table(diagnosis));

@@ -1,4 +1,5 @@
-// Checks that a diagnosis' report and diagnosis.json tell what was found in quantities of people. Not checked here: the terminal's
+// Checks that a diagnosis' report and diagnosis.json tell what was found in quantities of people,
+// and that the report shows the parameters of the model found. Not checked here: the terminal's
 // text (diagnosis_tables_test.cpp), what effects say (tests/model/effects/effect_words_test.cpp).
 
 #include <gmock/gmock.h>
@@ -36,7 +37,7 @@ Diagnosis with_two_effects(const test::SampleFit& sample) {
   return diagnosis;
 }
 
-TEST(DiagnosisWords, StandInTheReportAboveTheValues) {
+TEST(DiagnosisWords, StandInTheReportAboveTheValuesAndBesideTheParameters) {
   const test::SampleFit sample = test::sample_fit(3);
 
   const std::string html =
@@ -45,6 +46,9 @@ TEST(DiagnosisWords, StandInTheReportAboveTheValues) {
   EXPECT_THAT(html, HasSubstr("<strong>half of a speed is gone after 0.462 s</strong>"));
   EXPECT_THAT(html, HasSubstr("<p>rate = 1.500 ± 0.020 1/s.</p>"));
   EXPECT_THAT(html, HasSubstr("<strong>shear = 0.00100 ± 0.00010 s</strong>"));
+  EXPECT_THAT(html, HasSubstr("<h2>Parameters</h2>"));
+  EXPECT_THAT(html, HasSubstr("tension_warp"));
+  EXPECT_THAT(html, HasSubstr("undetermined: sigma exceeds the value, p &lt; 1"));
 }
 
 TEST(DiagnosisWords, StandInTheJsonOfEffectsThatHaveThem) {
