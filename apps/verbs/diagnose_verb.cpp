@@ -12,6 +12,7 @@
 #include "apps/report/diagnosis/diagnosis_law.h"
 #include "apps/report/diagnosis/diagnosis_page.h"
 #include "apps/report/diagnosis/diagnosis_tables.h"
+#include "apps/report/fit/fit_tables.h"
 #include "apps/steps/steps.h"
 #include "apps/terminal/csv_table.h"
 #include "apps/terminal/exit_code.h"
@@ -99,7 +100,7 @@ void print_result(const Diagnosis& diagnosis, const fs::path& folder) {
     fmt::print("Markers seen elsewhere: {}\n", seen_elsewhere_text(*diagnosis.seen_elsewhere));
   for (size_t n = 0; n < diagnosis.accepted.size(); ++n) {
     const Hypothesis& term = diagnosis.accepted[n].trial.hypothesis;
-    fmt::print("{}: {}\n", term.title(), found_text(term, diagnosis.found().result));
+    fmt::print("{}\n", accepted_text(term, diagnosis.found()));
     if (const std::string remedy = remedy_text(term); !remedy.empty()) fmt::print("  {}\n", remedy);
     if (!diagnosis.separation_of(n).empty())
       fmt::print("  {}\n", separation_text(term, diagnosis.separation_of(n)));
@@ -109,6 +110,8 @@ void print_result(const Diagnosis& diagnosis, const fs::path& folder) {
                trace.title());
   if (diagnosis.changed()) fmt::print("\n");
   print(before_after_table(diagnosis));
+  fmt::print("Parameters of the model found:\n\n");
+  print(short_parameter_table(diagnosis.found().result));
   if (diagnosis.law.found()) {
     fmt::print("A law for what remains:\n{}\n\n", diagnosis.law.formula);
     print(law_error_table(diagnosis));

@@ -3,6 +3,7 @@
 
 #include "fit/measurement_effects/rigid_change.h"
 #include "model/cloth/effect.h"
+#include "model/cloth/wording.h"
 #include "model/effects/vector_parameter.h"
 
 /// Makes the camera creep, and the measured world with it: a marker at x appears at
@@ -25,6 +26,19 @@ class CameraDrift final : public MeasurementEffect {
   }
 };
 
+/// Tells how far the measured world has gone, or turned, at the last frame.
+std::string in_words(const FittedEffect& found) {
+  if (found.mode == "turn") {
+    const Eigen::Vector3d turn_rad = found.duration_s() * found.vector("turn_rate");
+    if (turn_rad.isZero(0)) return {};
+    return rounded(turn_degrees(turn_rad)) + " degrees about " + unit_vector(turn_rad) +
+           " by the end";
+  }
+  const Eigen::Vector3d shift_m = found.duration_s() * found.vector("velocity");
+  if (shift_m.isZero(0)) return {};
+  return millimetres(shift_m.norm()) + " towards " + unit_vector(shift_m) + " by the end";
+}
+
 }  // namespace
 
 EffectDescription describe() {
@@ -41,15 +55,16 @@ EffectDescription describe() {
                                       .upper = 0.5,
                                       .typical = 2e-3}),
                     std::back_inserter(parameters));
-  return {
-      .name = "camera_drift",
-      .summary = "the measured world drifts rigidly from the first frame on",
-      .parameters = std::move(parameters),
-      .modes = {
-          {.name = "shift", .amplitudes = {"velocity_x", "velocity_y", "velocity_z"}, .shapes = {}},
-          {.name = "turn",
-           .amplitudes = {"turn_rate_x", "turn_rate_y", "turn_rate_z"},
-           .shapes = {}}}};
+  return {.name = "camera_drift",
+          .summary = "the measured world drifts rigidly from the first frame on",
+          .parameters = std::move(parameters),
+          .modes = {{.name = "shift",
+                     .amplitudes = {"velocity_x", "velocity_y", "velocity_z"},
+                     .shapes = {}},
+                    {.name = "turn",
+                     .amplitudes = {"turn_rate_x", "turn_rate_y", "turn_rate_z"},
+                     .shapes = {}}},
+          .in_words = in_words};
 }
 
 std::unique_ptr<MeasurementEffect> make() {

@@ -2,6 +2,7 @@
 #include <iterator>
 
 #include "fit/measurement_effects/rigid_change.h"
+#include "model/cloth/wording.h"
 #include "model/effects/harmonic.h"
 
 /// Makes the camera shake, and the measured world with it: a marker at x appears at
@@ -27,6 +28,16 @@ class CameraShake final : public MeasurementEffect {
   }
 };
 
+std::string in_words(const FittedEffect& found) {
+  const bool turns = found.mode == "turn";
+  const Eigen::Vector3d amplitude = found.vector(turns ? "turn" : "shift");
+  if (amplitude.isZero(0)) return {};
+  const std::string size =
+      turns ? rounded(turn_degrees(amplitude)) + " degrees" : millimetres(amplitude.norm());
+  return size + " to either side " + (turns ? "about " : "along ") + unit_vector(amplitude) + ", " +
+         rounded(found.value("frequency")) + " times a second";
+}
+
 }  // namespace
 
 EffectDescription describe() {
@@ -48,7 +59,8 @@ EffectDescription describe() {
           .summary = "the measured world shakes rigidly, with one harmonic",
           .parameters = std::move(parameters),
           .test = EffectTest::profiled,
-          .modes = std::move(modes)};
+          .modes = std::move(modes),
+          .in_words = in_words};
 }
 
 std::unique_ptr<MeasurementEffect> make() {

@@ -1,5 +1,8 @@
+#include <cmath>
+
 #include "fit/measurement_effects/measurement_effect.h"
 #include "model/cloth/effect.h"
+#include "model/cloth/wording.h"
 
 /// Makes the camera's clock late against that of the drive. An observation of time t shows the
 /// cloth at t + time. Parameter: time (s), neutral at 0. Ours.
@@ -15,6 +18,14 @@ class ClockOffset final : public MeasurementEffect {
   }
 };
 
+std::string in_words(const FittedEffect& found) {
+  const double late_s = found.value("time");
+  if (late_s == 0) return {};
+  return "frames show the cloth " + rounded(1e3 * std::abs(late_s)) + " ms (" +
+         rounded(std::abs(late_s) / found.frame_interval_s) + " frames) " +
+         (late_s > 0 ? "later" : "earlier") + " than their times say";
+}
+
 }  // namespace
 
 EffectDescription describe() {
@@ -26,7 +37,8 @@ EffectDescription describe() {
                           .lower = -0.2,
                           .upper = 0.2,
                           .typical = 1e-3}},
-          .remedy = "measure the offset between the clocks of camera and drive, and declare it"};
+          .remedy = "measure the offset between the clocks of camera and drive, and declare it",
+          .in_words = in_words};
 }
 
 std::unique_ptr<MeasurementEffect> make() {

@@ -1,5 +1,8 @@
+#include <cmath>
+
 #include "fit/measurement_effects/measurement_effect.h"
 #include "model/cloth/effect.h"
+#include "model/cloth/wording.h"
 
 /// Loses frames unnoticed: from a time on, everything was seen later than its frame's time says. A
 /// frame of time t shows the cloth at
@@ -28,6 +31,14 @@ class DroppedFrames final : public MeasurementEffect {
   }
 };
 
+std::string in_words(const FittedEffect& found) {
+  const double lost_s = found.value("lost");
+  if (lost_s == 0) return {};
+  return rounded(std::abs(lost_s) / found.frame_interval_s) + " frames " +
+         (lost_s > 0 ? "lost " : "too many ") + rounded(found.value("from")) +
+         " s after the first one";
+}
+
 }  // namespace
 
 EffectDescription describe() {
@@ -47,7 +58,8 @@ EffectDescription describe() {
                  .amplitudes = {"lost"},
                  .shapes = {{.parameter = "from",
                              .values = {0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9},
-                             .of_duration = true}}}}};
+                             .of_duration = true}}}},
+      .in_words = in_words};
 }
 
 std::unique_ptr<MeasurementEffect> make() {

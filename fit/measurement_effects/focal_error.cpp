@@ -1,5 +1,6 @@
 #include "fit/measurement_effects/measurement_effect.h"
 #include "model/cloth/effect.h"
+#include "model/cloth/wording.h"
 
 /// Makes the focal length differ from the calibrated one. A pixel at u appears at u + excess (u -
 /// c), c the camera's principal point. Parameter: excess (1), neutral at 0. It applies to cameras
@@ -16,6 +17,13 @@ class FocalError final : public MeasurementEffect {
   }
 };
 
+/// Pixels that are further out by a factor are those of a focal length longer by it.
+std::string in_words(const FittedEffect& found) {
+  const double excess = found.value("excess");
+  if (excess == 0) return {};
+  return "the focal length is " + percent(excess, "longer", "shorter") + " than calibrated";
+}
+
 }  // namespace
 
 EffectDescription describe() {
@@ -26,7 +34,8 @@ EffectDescription describe() {
                           .neutral = 0,
                           .lower = -0.2,
                           .upper = 0.2,
-                          .typical = 1e-3}}};
+                          .typical = 1e-3}},
+          .in_words = in_words};
 }
 
 std::unique_ptr<MeasurementEffect> make() {

@@ -1,5 +1,6 @@
 #include "fit/measurement_effects/measurement_effect.h"
 #include "model/cloth/effect.h"
+#include "model/cloth/wording.h"
 
 /// Makes the frame rate differ from the stated one. A frame of time t shows the cloth at t0 + (1 +
 /// excess) (t - t0), t0 the first frame's time. Parameter: excess (1), neutral at 0. Ours.
@@ -19,6 +20,15 @@ class FrameRateError final : public MeasurementEffect {
   }
 };
 
+std::string in_words(const FittedEffect& found) {
+  const double excess = found.value("excess");
+  if (excess == 0) return {};
+  const double stated_hz = 1 / found.frame_interval_s;
+  return "frames are " + percent(excess, "longer", "shorter") +
+         " than stated: " + rounded(stated_hz / (1 + excess)) + " a second, stated " +
+         rounded(stated_hz);
+}
+
 }  // namespace
 
 EffectDescription describe() {
@@ -30,7 +40,8 @@ EffectDescription describe() {
                           .lower = -0.2,
                           .upper = 0.2,
                           .typical = 1e-3}},
-          .remedy = "check the declared frame_rate against the file"};
+          .remedy = "check the declared frame_rate against the file",
+          .in_words = in_words};
 }
 
 std::unique_ptr<MeasurementEffect> make() {

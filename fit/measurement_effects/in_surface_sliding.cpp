@@ -1,5 +1,6 @@
 #include "fit/measurement_effects/measurement_effect.h"
 #include "model/cloth/effect.h"
+#include "model/cloth/wording.h"
 
 /// Slides the pattern of markers over the cloth. After the time t - t0 since the first frame, a
 /// marker that is said to be at (s, t) is (velocity_s, velocity_t) (t - t0) further. It appears
@@ -19,6 +20,12 @@ class InSurfaceSliding final : public MeasurementEffect {
   }
 };
 
+std::string in_words(const FittedEffect& found) {
+  const std::string way = way_over_cloth(
+      found.duration_s() * Eigen::Vector2d(found.value("velocity_s"), found.value("velocity_t")));
+  return way.empty() ? way : "the pattern slides " + way + " by the end";
+}
+
 }  // namespace
 
 EffectDescription describe() {
@@ -35,7 +42,8 @@ EffectDescription describe() {
                           .neutral = 0,
                           .lower = -0.1,
                           .upper = 0.1,
-                          .typical = 1e-3}}};
+                          .typical = 1e-3}},
+          .in_words = in_words};
 }
 
 std::unique_ptr<MeasurementEffect> make() {

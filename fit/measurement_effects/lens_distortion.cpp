@@ -1,5 +1,6 @@
 #include "fit/measurement_effects/measurement_effect.h"
 #include "model/cloth/effect.h"
+#include "model/cloth/wording.h"
 
 /// Makes the lens bend more than its calibration says: a pixel at u appears at
 ///
@@ -22,13 +23,23 @@ class LensDistortion final : public MeasurementEffect {
   }
 };
 
+/// Tells the relative shift k1 r^2 at r = 1/2, a common picture's edge.
+std::string in_words(const FittedEffect& found) {
+  constexpr double kFocalLengths = 0.5;
+  const double k1 = found.value("k1");
+  if (k1 == 0) return {};
+  return "half a focal length from the middle, pixels are " +
+         percent(k1 * kFocalLengths * kFocalLengths, "further out", "further in");
+}
+
 }  // namespace
 
 EffectDescription describe() {
   return {.name = "lens_distortion",
           .summary = "pixels further out by k1 r^2 (u - c), r in focal lengths from the centre c",
-          .parameters = {
-              {.name = "k1", .unit = "1", .neutral = 0, .lower = -1, .upper = 1, .typical = 1e-3}}};
+          .parameters =
+              {{.name = "k1", .unit = "1", .neutral = 0, .lower = -1, .upper = 1, .typical = 1e-3}},
+          .in_words = in_words};
 }
 
 std::unique_ptr<MeasurementEffect> make() {

@@ -1,5 +1,9 @@
+#include <cmath>
+#include <numbers>
+
 #include "fit/measurement_effects/measurement_effect.h"
 #include "model/cloth/effect.h"
+#include "model/cloth/wording.h"
 
 /// Places the pattern of markers elsewhere on the cloth than stated. A marker that is said to be at
 /// (s, t) is at (s + ds, t + dt),
@@ -26,6 +30,28 @@ class MarkerPlacement final : public MeasurementEffect {
     shift_m[1] += p[1] + p[3] * t + p[4] * s;
   }
 };
+
+/// Turned by (-turn t, turn s), t down, a pattern is turned clockwise by atan turn.
+std::string in_words(const FittedEffect& found) {
+  if (found.mode == "turn") {
+    const double turn = found.value("turn");
+    if (turn == 0) return {};
+    return "the pattern is turned by " +
+           rounded(std::atan(std::abs(turn)) * 180 / std::numbers::pi) + " degrees " +
+           (turn > 0 ? "clockwise" : "counterclockwise");
+  }
+  if (found.mode == "stretch") {
+    const auto side = [&](const char* name, const char* more, const char* less) {
+      const double stretch = found.value(name);
+      return stretch == 0 ? std::string() : percent(stretch, more, less);
+    };
+    const std::string sides =
+        listed({side("stretch_s", "wider", "narrower"), side("stretch_t", "longer", "shorter")});
+    return sides.empty() ? sides : "the pattern is " + sides + " than stated";
+  }
+  const std::string way = way_over_cloth({found.value("shift_s"), found.value("shift_t")});
+  return way.empty() ? way : "the pattern lies " + way;
+}
 
 }  // namespace
 
@@ -64,7 +90,8 @@ EffectDescription describe() {
                           .typical = 2e-3}},
           .modes = {{.name = "shift", .amplitudes = {"shift_s", "shift_t"}, .shapes = {}},
                     {.name = "stretch", .amplitudes = {"stretch_s", "stretch_t"}, .shapes = {}},
-                    {.name = "turn", .amplitudes = {"turn"}, .shapes = {}}}};
+                    {.name = "turn", .amplitudes = {"turn"}, .shapes = {}}},
+          .in_words = in_words};
 }
 
 std::unique_ptr<MeasurementEffect> make() {

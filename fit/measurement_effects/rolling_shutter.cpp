@@ -1,5 +1,8 @@
+#include <cmath>
+
 #include "fit/measurement_effects/measurement_effect.h"
 #include "model/cloth/effect.h"
+#include "model/cloth/wording.h"
 
 /// Makes the camera read its picture row by row. A pixel in row y of H is seen readout (y / H -
 /// 1/2) later than its frame's time says, which is that of the middle row. The row is that of the
@@ -19,6 +22,13 @@ class RollingShutter final : public MeasurementEffect {
   }
 };
 
+std::string in_words(const FittedEffect& found) {
+  const double readout_s = found.value("readout");
+  if (readout_s == 0) return {};
+  return rounded(1e3 * std::abs(readout_s)) + " ms from the " +
+         (readout_s > 0 ? "top row to the bottom row" : "bottom row to the top row");
+}
+
 }  // namespace
 
 EffectDescription describe() {
@@ -30,7 +40,8 @@ EffectDescription describe() {
                           .lower = -0.05,
                           .upper = 0.05,
                           .typical = 1e-3}},
-          .remedy = "declare readout_time in the camera file"};
+          .remedy = "declare readout_time in the camera file",
+          .in_words = in_words};
 }
 
 std::unique_ptr<MeasurementEffect> make() {

@@ -1,5 +1,6 @@
 #include "fit/measurement_effects/measurement_effect.h"
 #include "model/cloth/effect.h"
+#include "model/cloth/wording.h"
 
 /// Measures everything larger than it is, by a factor about the middle of the placed sheet. The
 /// cause may be a calibration target whose squares are not as long as stated. Parameter: factor
@@ -17,6 +18,12 @@ class Scale final : public MeasurementEffect {
   }
 };
 
+std::string in_words(const FittedEffect& found) {
+  const double excess = found.value("factor") - 1;
+  if (excess == 0) return {};
+  return "everything is measured " + percent(excess, "larger", "smaller") + " than it is";
+}
+
 }  // namespace
 
 EffectDescription describe() {
@@ -28,7 +35,8 @@ EffectDescription describe() {
                           .lower = 0.8,
                           .upper = 1.25,
                           .typical = 1e-3}},
-          .remedy = "check the units and the size of the cloth"};
+          .remedy = "check the units and the size of the cloth",
+          .in_words = in_words};
 }
 
 std::unique_ptr<MeasurementEffect> make() {

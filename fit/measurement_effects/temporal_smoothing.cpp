@@ -1,5 +1,8 @@
+#include <cmath>
+
 #include "fit/measurement_effects/measurement_effect.h"
 #include "model/cloth/effect.h"
+#include "model/cloth/wording.h"
 
 /// Smooths the tracks over time: a marker appears at
 ///
@@ -21,13 +24,24 @@ class TemporalSmoothing final : public MeasurementEffect {
   }
 };
 
+/// A kernel of variance v has w = v / (2 d^2).
+std::string in_words(const FittedEffect& found) {
+  const double w = found.value("w");
+  if (!(w > 0)) return {};
+  const double deviation_frames = std::sqrt(2 * w);
+  return "averaged over time with a standard deviation of " +
+         rounded(1e3 * deviation_frames * found.frame_interval_s) + " ms (" +
+         rounded(deviation_frames) + " frames)";
+}
+
 }  // namespace
 
 EffectDescription describe() {
   return {.name = "temporal_smoothing",
           .summary = "tracks smoothed over time: x + w (x(t + d) - 2 x + x(t - d))",
-          .parameters = {
-              {.name = "w", .unit = "1", .neutral = 0, .lower = 0, .upper = 1, .typical = 0.01}}};
+          .parameters =
+              {{.name = "w", .unit = "1", .neutral = 0, .lower = 0, .upper = 1, .typical = 0.01}},
+          .in_words = in_words};
 }
 
 std::unique_ptr<MeasurementEffect> make() {

@@ -1,5 +1,6 @@
 #include "fit/measurement_effects/rigid_change.h"
 #include "model/cloth/effect.h"
+#include "model/cloth/wording.h"
 
 /// Turns the measured world about the middle c of the placed sheet, because "down" was taken from a
 /// wrong direction. A marker at x appears at c + R (x - c), R the turn about the world's axes x and
@@ -22,6 +23,13 @@ class WorldTilt final : public MeasurementEffect {
   }
 };
 
+std::string in_words(const FittedEffect& found) {
+  const Eigen::Vector3d turn_rad(found.value("about_x"), found.value("about_y"), 0);
+  if (turn_rad.isZero(0)) return {};
+  return "what is measured is turned by " + rounded(turn_degrees(turn_rad)) + " degrees about " +
+         unit_vector(turn_rad);
+}
+
 }  // namespace
 
 EffectDescription describe() {
@@ -39,7 +47,8 @@ EffectDescription describe() {
                           .lower = -0.3,
                           .upper = 0.3,
                           .typical = 1e-3}},
-          .remedy = "level the camera's or the tracker's axes against gravity"};
+          .remedy = "level the camera's or the tracker's axes against gravity",
+          .in_words = in_words};
 }
 
 std::unique_ptr<MeasurementEffect> make() {

@@ -16,6 +16,7 @@ namespace clothfit {
 
 struct Cloth;
 struct EffectLinearisation;
+struct FittedEffect;
 
 /// Says how a fit walks along a parameter.
 enum class ParameterScale { linear, logarithmic };
@@ -81,6 +82,9 @@ struct EffectDescription {
   std::pair<int, int> driven_points = {0, std::numeric_limits<int>::max()};
   /// Says what a person may do about it, as a short command: "level the camera". Empty: nothing.
   std::string remedy = {};
+  /// Tells the fitted values of a mode in quantities of people: "6.43 g along the bottom edge". The
+  /// text is empty where they do nothing. Null: nothing says more than the parameters themselves.
+  std::string (*in_words)(const FittedEffect& found) = nullptr;
 };
 
 /// The state that an effect may look at: at the beginning of a step, in SI units, world.

@@ -1,3 +1,4 @@
+#include "model/cloth/wording.h"
 #include "model/effects/vertex_law.h"
 
 /// Adds the inertia of air that moves along with the surface. It is a mass mu A beside the vertex's
@@ -33,6 +34,15 @@ struct Law {
   }
 };
 
+/// mu over the density of air is the thickness of a layer of as much air.
+std::string in_words(const FittedEffect& found) {
+  const double mu_kg_per_m2 = found.value("mu");
+  if (!(mu_kg_per_m2 > 0)) return {};
+  return "air of " + rounded(mu_kg_per_m2 / found.areal_density_kg_per_m2()) +
+         " times the cloth's mass moves along with it, as a layer of " +
+         millimetres(mu_kg_per_m2 / kAirDensity_kg_per_m3);
+}
+
 }  // namespace
 
 EffectDescription describe() {
@@ -40,8 +50,9 @@ EffectDescription describe() {
       .name = "added_air_mass",
       .summary =
           "inertia of air along the surface's normal, F' = F - mu A / (m + mu A) n [n . (F + m g)]",
-      .parameters = {
-          {.name = "mu", .unit = "kg/m2", .neutral = 0, .lower = 0, .upper = 2, .typical = 0.02}}};
+      .parameters =
+          {{.name = "mu", .unit = "kg/m2", .neutral = 0, .lower = 0, .upper = 2, .typical = 0.02}},
+      .in_words = in_words};
 }
 
 std::unique_ptr<Effect> make() {

@@ -1,6 +1,7 @@
 #include <algorithm>
 
 #include "model/cloth/network_bound.h"
+#include "model/cloth/wording.h"
 #include "model/effects/spring_law.h"
 
 /// Makes warp stiffer than weft beyond the fabric's own numbers, or softer:
@@ -50,14 +51,22 @@ struct Law {
   }
 };
 
+std::string in_words(const FittedEffect& found) {
+  const double a = found.value("a");
+  if (a == 0) return {};
+  return "warp " + percent(a, "stiffer", "softer") + ", weft " + percent(-a, "stiffer", "softer") +
+         " than the fabric's numbers";
+}
+
 }  // namespace
 
 EffectDescription describe() {
   return {
       .name = "anisotropy",
       .summary = "warp against weft, T = +-a (k (l - l0) + c dl/dt)",
-      .parameters = {
-          {.name = "a", .unit = "1", .neutral = 0, .lower = -0.9, .upper = 0.9, .typical = 0.1}}};
+      .parameters =
+          {{.name = "a", .unit = "1", .neutral = 0, .lower = -0.9, .upper = 0.9, .typical = 0.1}},
+      .in_words = in_words};
 }
 
 std::unique_ptr<Effect> make() {

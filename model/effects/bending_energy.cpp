@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "model/cloth/wording.h"
 #include "model/effects/stencil_law.h"
 
 /// Resists bending as a plate without lateral contraction does (Poisson's ratio 0):
@@ -70,14 +71,26 @@ struct Law {
   }
 };
 
+/// A strip that is clamped at one end sags by w L^4 / (8 B), w its weight per area, while its slope
+/// is small. Tells at which length L that is a tenth of L.
+std::string in_words(const FittedEffect& found) {
+  constexpr double kSag = 0.1;
+  const double b_nm = found.value("B");
+  if (!(b_nm > 0 && found.weight_pa() > 0)) return {};
+  return "by this alone, a strip of " +
+         millimetres(std::cbrt(8 * b_nm * kSag / found.weight_pa())) +
+         " that is clamped at one end sags by a tenth of that";
+}
+
 }  // namespace
 
 EffectDescription describe() {
   return {
       .name = "bending_energy",
       .summary = "bending stiffness of a plate, E = B/2 int x_ss^2 + x_tt^2 + 2 x_st^2 dA",
-      .parameters = {
-          {.name = "B", .unit = "N m", .neutral = 0, .lower = 0, .upper = 1e-3, .typical = 1e-5}}};
+      .parameters =
+          {{.name = "B", .unit = "N m", .neutral = 0, .lower = 0, .upper = 1e-3, .typical = 1e-5}},
+      .in_words = in_words};
 }
 
 std::unique_ptr<Effect> make() {

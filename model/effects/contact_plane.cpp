@@ -1,3 +1,4 @@
+#include "model/cloth/wording.h"
 #include "model/effects/contact_law.h"
 #include "model/effects/vertex_law.h"
 
@@ -26,13 +27,22 @@ struct Law {
   }
 };
 
+/// Tells the plane's point nearest to the origin.
+std::string in_words(const FittedEffect& found) {
+  const Eigen::Vector3d n = found.vector("n").normalized();
+  if (found.value("stiffness") == 0 && found.value("damping") == 0) return {};
+  return "a plane through " + world_place(found.value("offset") * n) +
+         " that keeps the cloth on its side towards " + unit_vector(n);
+}
+
 }  // namespace
 
 EffectDescription describe() {
   EffectDescription effect{.name = "contact_plane",
                            .summary = "a plane that the cloth cannot pass, depth = offset - n . x",
                            .parameters = Contact::parameters(),
-                           .test = EffectTest::finite};
+                           .test = EffectTest::finite,
+                           .in_words = in_words};
   effect.parameters.push_back(
       {.name = "n_x", .unit = "ratio", .neutral = 0, .lower = -1, .upper = 1, .typical = 0.02});
   effect.parameters.push_back(

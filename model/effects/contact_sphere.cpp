@@ -1,3 +1,4 @@
+#include "model/cloth/wording.h"
 #include "model/effects/contact_law.h"
 #include "model/effects/vertex_law.h"
 
@@ -26,6 +27,12 @@ struct Law {
   }
 };
 
+std::string in_words(const FittedEffect& found) {
+  if (found.value("stiffness") == 0 && found.value("damping") == 0) return {};
+  return "a ball of " + millimetres(found.value("radius")) + " radius about " +
+         world_place(found.vector("centre"));
+}
+
 }  // namespace
 
 EffectDescription describe() {
@@ -33,7 +40,8 @@ EffectDescription describe() {
       .name = "contact_sphere",
       .summary = "a ball that the cloth cannot pass, depth = radius - |x - centre|",
       .parameters = Contact::parameters(),
-      .test = EffectTest::finite};
+      .test = EffectTest::finite,
+      .in_words = in_words};
   effect.parameters.push_back(
       {.name = "centre_x", .unit = "m", .neutral = 0, .lower = -10, .upper = 10, .typical = 0.01});
   effect.parameters.push_back(

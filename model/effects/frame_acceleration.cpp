@@ -1,3 +1,6 @@
+#include <numbers>
+
+#include "model/cloth/wording.h"
 #include "model/effects/harmonic.h"
 #include "model/effects/vertex_law.h"
 
@@ -28,6 +31,17 @@ struct Law {
   }
 };
 
+/// A frame that accelerates by a sin(2 pi f t) goes a / (2 pi f)^2 to either side.
+std::string in_words(const FittedEffect& found) {
+  const Eigen::Vector3d a_m_per_s2 = found.vector("a");
+  const double frequency_hz = found.value("frequency");
+  if (a_m_per_s2.isZero(0) || !(frequency_hz > 0)) return {};
+  const double rate_per_s = 2 * std::numbers::pi * frequency_hz;
+  return "the frame shakes by " + millimetres(a_m_per_s2.norm() / (rate_per_s * rate_per_s)) +
+         " to either side along " + unit_vector(a_m_per_s2) + ", " + rounded(frequency_hz) +
+         " times a second";
+}
+
 }  // namespace
 
 EffectDescription describe() {
@@ -37,7 +51,8 @@ EffectDescription describe() {
       .parameters = Harmonic::parameters(
           {.name = "a", .unit = "m/s2", .neutral = 0, .lower = -20, .upper = 20, .typical = 0.1}),
       .test = EffectTest::profiled,
-      .modes = Harmonic::modes("a")};
+      .modes = Harmonic::modes("a"),
+      .in_words = in_words};
 }
 
 std::unique_ptr<Effect> make() {

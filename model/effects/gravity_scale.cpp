@@ -1,3 +1,4 @@
+#include "model/cloth/wording.h"
 #include "model/effects/vertex_law.h"
 
 /// Makes gravity stronger or weaker than stated: F = excess m g at every vertex. Parameter: excess
@@ -21,6 +22,13 @@ struct Law {
   }
 };
 
+std::string in_words(const FittedEffect& found) {
+  const double excess = found.value("excess");
+  if (excess == 0) return {};
+  return "gravity of " + rounded((1 + excess) * found.gravity()) + " m/s2, stated " +
+         rounded(found.gravity());
+}
+
 }  // namespace
 
 EffectDescription describe() {
@@ -31,7 +39,8 @@ EffectDescription describe() {
                           .neutral = 0,
                           .lower = -0.5,
                           .upper = 0.5,
-                          .typical = 0.01}}};
+                          .typical = 0.01}},
+          .in_words = in_words};
 }
 
 std::unique_ptr<Effect> make() {

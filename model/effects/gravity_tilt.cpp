@@ -1,3 +1,7 @@
+#include <cmath>
+#include <numbers>
+
+#include "model/cloth/wording.h"
 #include "model/effects/vertex_law.h"
 
 /// Turns gravity away from the stated direction: F = m (R g - g). R is the turn about the
@@ -27,6 +31,21 @@ struct Law {
   }
 };
 
+/// Tells the angle between the stated gravity and the turned one, and where the latter leans.
+std::string in_words(const FittedEffect& found) {
+  const Eigen::Vector3d& stated = found.gravity_m_per_s2;
+  const VertexSight<double> of_one_kg{.gravity_m_per_s2 = {stated.x(), stated.y(), stated.z()},
+                                      .mass_kg = 1};
+  const Vector3<double> change =
+      Law::force<double>(of_one_kg, {found.value("about_x"), found.value("about_y")});
+  const Eigen::Vector3d turned = stated + Eigen::Vector3d(change.x, change.y, change.z);
+  const double angle_rad = std::atan2(stated.cross(turned).norm(), stated.dot(turned));
+  if (!(angle_rad > 0)) return {};
+  const Eigen::Vector3d aside = turned - stated * (stated.dot(turned) / stated.squaredNorm());
+  return "down leans by " + rounded(angle_rad * 180 / std::numbers::pi) + " degrees towards " +
+         unit_vector(aside);
+}
+
 }  // namespace
 
 EffectDescription describe() {
@@ -44,7 +63,8 @@ EffectDescription describe() {
                           .lower = -0.3,
                           .upper = 0.3,
                           .typical = 0.01}},
-          .remedy = "level the camera's or the tracker's axes against gravity"};
+          .remedy = "level the camera's or the tracker's axes against gravity",
+          .in_words = in_words};
 }
 
 std::unique_ptr<Effect> make() {

@@ -1,3 +1,6 @@
+#include <cmath>
+
+#include "model/cloth/wording.h"
 #include "model/effects/harmonic.h"
 #include "model/effects/vertex_law.h"
 
@@ -32,6 +35,16 @@ struct Law {
   }
 };
 
+/// The pressure at the harmonic's height is told as wind's is.
+std::string in_words(const FittedEffect& found) {
+  const Eigen::Vector3d q_pa = found.vector("q");
+  if (q_pa.isZero(0)) return {};
+  const double speed_m_per_s = std::sqrt(2 * q_pa.norm() / kAirDensity_kg_per_m3);
+  return "up to " + rounded(q_pa.norm()) + " Pa along " + unit_vector(q_pa) + ", to and fro " +
+         rounded(found.value("frequency")) + " times a second, as of a wind of " +
+         rounded(speed_m_per_s) + " m/s";
+}
+
 }  // namespace
 
 EffectDescription describe() {
@@ -40,7 +53,8 @@ EffectDescription describe() {
           .parameters = Harmonic::parameters(
               {.name = "q", .unit = "Pa", .neutral = 0, .lower = -3, .upper = 3, .typical = 0.05}),
           .test = EffectTest::profiled,
-          .modes = Harmonic::modes("q")};
+          .modes = Harmonic::modes("q"),
+          .in_words = in_words};
 }
 
 std::unique_ptr<Effect> make() {

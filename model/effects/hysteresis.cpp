@@ -1,4 +1,5 @@
 #include "model/cloth/network_bound.h"
+#include "model/cloth/wording.h"
 #include "model/effects/spring_law.h"
 
 /// Adds dry friction inside the fabric: an elastoplastic element beside every spring (Prandtl's),
@@ -35,6 +36,14 @@ struct Law {
   }
 };
 
+/// Between slips the element's stiffness stands beside the spring's.
+std::string in_words(const FittedEffect& found) {
+  const double ratio = found.value("ratio");
+  if (!(ratio > 0)) return {};
+  return rounded(1 + ratio) + " times as stiff up to a stretch of " +
+         rounded(100 * found.value("yield")) + " %, where it slips";
+}
+
 }  // namespace
 
 EffectDescription describe() {
@@ -52,7 +61,8 @@ EffectDescription describe() {
           .test = EffectTest::profiled,
           .modes = {{.name = "",
                      .amplitudes = {"ratio"},
-                     .shapes = {{.parameter = "yield", .values = {5e-4, 2e-3, 8e-3, 3e-2}}}}}};
+                     .shapes = {{.parameter = "yield", .values = {5e-4, 2e-3, 8e-3, 3e-2}}}}},
+          .in_words = in_words};
 }
 
 std::unique_ptr<Effect> make() {

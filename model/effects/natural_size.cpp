@@ -1,6 +1,8 @@
 #include <algorithm>
+#include <cmath>
 
 #include "model/cloth/network_bound.h"
+#include "model/cloth/wording.h"
 #include "model/effects/spring_law.h"
 
 /// Gives the fabric's springs another size at rest than the stated one. The cloth may have shrunk,
@@ -51,20 +53,36 @@ struct Law {
   }
 };
 
+/// The warp runs from top to bottom, the weft from left to right.
+std::string in_words(const FittedEffect& found) {
+  const auto side = [](double by_m, const char* way) {
+    if (by_m == 0) return std::string();
+    return millimetres(std::abs(by_m)) + (by_m < 0 ? " shorter " : " longer ") + way;
+  };
+  const std::string sides =
+      listed({side(found.value("warp") * found.mesh.height_m, "from top to bottom"),
+              side(found.value("weft") * found.mesh.width_m, "from left to right")});
+  return sides.empty() ? sides : "unloaded, the cloth is " + sides;
+}
+
 }  // namespace
 
 EffectDescription describe() {
-  return {
-      .name = "natural_size",
-      .summary = "natural lengths l0 (1 + e), T = -k l0 e",
-      .parameters = {
-          {.name = "warp", .unit = "1", .neutral = 0, .lower = -0.2, .upper = 0.1, .typical = 0.02},
-          {.name = "weft",
-           .unit = "1",
-           .neutral = 0,
-           .lower = -0.2,
-           .upper = 0.1,
-           .typical = 0.02}}};
+  return {.name = "natural_size",
+          .summary = "natural lengths l0 (1 + e), T = -k l0 e",
+          .parameters = {{.name = "warp",
+                          .unit = "1",
+                          .neutral = 0,
+                          .lower = -0.2,
+                          .upper = 0.1,
+                          .typical = 0.02},
+                         {.name = "weft",
+                          .unit = "1",
+                          .neutral = 0,
+                          .lower = -0.2,
+                          .upper = 0.1,
+                          .typical = 0.02}},
+          .in_words = in_words};
 }
 
 std::unique_ptr<Effect> make() {

@@ -2,9 +2,14 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <functional>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "model/cloth/cloth.h"
+#include "model/cloth/wording.h"
 #include "model/effects/law_effect.h"
 #include "model/effects/linearisation.h"
 #include "model/effects/number.h"
@@ -180,86 +185,103 @@ class NonuniformMass final : public LawEffect<NonuniformMass, Law> {
   }
 };
 
+constexpr std::array<const char*, kCount> kNames{
+    "hem",        "hem_width",  "hem_left", "hem_right", "hem_top", "hem_bottom",
+    "gradient_s", "gradient_t", "patch",    "patch_s",   "patch_t", "patch_radius"};
+
+/// The cloth's mass and its centre (s, t).
+struct Weighed {
+  double mass_kg = 0;
+  Eigen::Vector2d centre_m = Eigen::Vector2d::Zero();
+};
+
+/// Weighs the cloth with the amplitudes of `absent` at nothing.
+Weighed weigh(const FittedEffect& found, const std::vector<Parameter>& absent) {
+  Parameters<double> p;
+  for (size_t n = 0; n < kCount; ++n) p[n] = found.value(kNames[n]);
+  for (const Parameter one : absent) p[one] = 0;
+  const Mesh& mesh = found.mesh;
+  Weighed all;
+  for (int i = 0; i < mesh.rows; ++i)
+    for (int j = 0; j < mesh.columns; ++j) {
+      const double mass_kg = found.mass_kg[mesh.vertex(i, j)] * relative_mass(mesh, i, j, p);
+      all.mass_kg += mass_kg;
+      all.centre_m += mass_kg * Eigen::Vector2d(j * mesh.spacing_s_m(), i * mesh.spacing_t_m());
+    }
+  all.centre_m /= all.mass_kg;
+  return all;
+}
+
+/// Tells the mass that each edge adds, the largest first; none below a hundredth of that.
+std::string edges_in_words(const FittedEffect& found) {
+  constexpr double kSmall = 0.01;
+  std::vector<std::pair<double, std::string>> edges;
+  for (const auto& [edge, name] : {std::pair{hem_left, "left"},
+                                   {hem_right, "right"},
+                                   {hem_top, "top"},
+                                   {hem_bottom, "bottom"}})
+    edges.emplace_back(1e3 * (weigh(found, {}).mass_kg - weigh(found, {edge}).mass_kg), name);
+  std::ranges::stable_sort(edges, std::greater<>(),
+                           [](const auto& edge) { return std::abs(edge.first); });
+  std::vector<std::string> texts;
+  for (const auto& [grams, name] : edges)
+    if (std::abs(grams) > kSmall * std::abs(edges.front().first))
+      texts.push_back(rounded(grams) + " g along the " + name + " edge");
+  return listed(texts);
+}
+
+/// Masses are those of the vertices on the mesh of the fit, with what the other modes make of them.
+std::string in_words(const FittedEffect& found) {
+  const auto grams = [&](Parameter amplitude) {
+    return 1e3 * (weigh(found, {}).mass_kg - weigh(found, {amplitude}).mass_kg);
+  };
+  if (found.mode == "edges") return edges_in_words(found);
+  if (found.mode == "gradient") {
+    const std::string way =
+        way_over_cloth(weigh(found, {}).centre_m - weigh(found, {gradient_s, gradient_t}).centre_m);
+    return way.empty() ? way : "centre of mass " + way;
+  }
+  if (found.mode == "patch") {
+    if (found.value("patch") == 0) return {};
+    return rounded(grams(patch)) + " g within " + millimetres(found.value("patch_radius")) +
+           " of a place " +
+           place_on_cloth({found.value("patch_s") * found.mesh.width_m,
+                           found.value("patch_t") * found.mesh.height_m});
+  }
+  if (found.value("hem") == 0) return {};
+  return rounded(grams(hem)) + " g in a hem of " + millimetres(found.value("hem_width")) +
+         " all round";
+}
+
 }  // namespace
 
 EffectDescription describe() {
+  const auto number = [](const char* name, const char* unit, double neutral, double lower,
+                         double upper, double typical) {
+    return EffectParameter{.name = name,
+                           .unit = unit,
+                           .neutral = neutral,
+                           .lower = lower,
+                           .upper = upper,
+                           .typical = typical};
+  };
   const auto over_cloth = [](const char* parameter, std::vector<double> values) {
     return ShapeGrid{.parameter = parameter, .values = std::move(values), .over_cloth = true};
   };
   return {.name = "nonuniform_mass",
           .summary = "mass that is not spread as stated, F' = F / r(s, t)",
-          .parameters = {{.name = "hem",
-                          .unit = "ratio",
-                          .neutral = 0,
-                          .lower = -0.2,
-                          .upper = 40,
-                          .typical = 0.1},
-                         {.name = "hem_width",
-                          .unit = "m",
-                          .neutral = 0.01,
-                          .lower = 0.001,
-                          .upper = 0.1,
-                          .typical = 0.001},
-                         {.name = "hem_left",
-                          .unit = "ratio",
-                          .neutral = 0,
-                          .lower = -0.2,
-                          .upper = 40,
-                          .typical = 0.1},
-                         {.name = "hem_right",
-                          .unit = "ratio",
-                          .neutral = 0,
-                          .lower = -0.2,
-                          .upper = 40,
-                          .typical = 0.1},
-                         {.name = "hem_top",
-                          .unit = "ratio",
-                          .neutral = 0,
-                          .lower = -0.2,
-                          .upper = 40,
-                          .typical = 0.1},
-                         {.name = "hem_bottom",
-                          .unit = "ratio",
-                          .neutral = 0,
-                          .lower = -0.2,
-                          .upper = 40,
-                          .typical = 0.1},
-                         {.name = "gradient_s",
-                          .unit = "ratio",
-                          .neutral = 0,
-                          .lower = -1,
-                          .upper = 1,
-                          .typical = 0.05},
-                         {.name = "gradient_t",
-                          .unit = "ratio",
-                          .neutral = 0,
-                          .lower = -1,
-                          .upper = 1,
-                          .typical = 0.05},
-                         {.name = "patch",
-                          .unit = "ratio",
-                          .neutral = 0,
-                          .lower = -0.5,
-                          .upper = 4,
-                          .typical = 0.1},
-                         {.name = "patch_s",
-                          .unit = "ratio",
-                          .neutral = 0.5,
-                          .lower = 0,
-                          .upper = 1,
-                          .typical = 0.02},
-                         {.name = "patch_t",
-                          .unit = "ratio",
-                          .neutral = 0.5,
-                          .lower = 0,
-                          .upper = 1,
-                          .typical = 0.02},
-                         {.name = "patch_radius",
-                          .unit = "m",
-                          .neutral = 0.1,
-                          .lower = 0.02,
-                          .upper = 1,
-                          .typical = 0.01}},
+          .parameters = {number("hem", "ratio", 0, -0.2, 40, 0.1),
+                         number("hem_width", "m", 0.01, 0.001, 0.1, 0.001),
+                         number("hem_left", "ratio", 0, -0.2, 40, 0.1),
+                         number("hem_right", "ratio", 0, -0.2, 40, 0.1),
+                         number("hem_top", "ratio", 0, -0.2, 40, 0.1),
+                         number("hem_bottom", "ratio", 0, -0.2, 40, 0.1),
+                         number("gradient_s", "ratio", 0, -1, 1, 0.05),
+                         number("gradient_t", "ratio", 0, -1, 1, 0.05),
+                         number("patch", "ratio", 0, -0.5, 4, 0.1),
+                         number("patch_s", "ratio", 0.5, 0, 1, 0.02),
+                         number("patch_t", "ratio", 0.5, 0, 1, 0.02),
+                         number("patch_radius", "m", 0.1, 0.02, 1, 0.01)},
           .test = EffectTest::profiled,
           .modes = {{.name = "hem",
                      .amplitudes = {"hem"},
@@ -273,7 +295,8 @@ EffectDescription describe() {
                      .shapes = {over_cloth("patch_s", {0.2, 0.5, 0.8}),
                                 over_cloth("patch_t", {0.2, 0.5, 0.8}),
                                 over_cloth("patch_radius", {0.05, 0.12})}}},
-          .remedy = "weigh the hem, or declare masses"};
+          .remedy = "weigh the hem, or declare masses",
+          .in_words = in_words};
 }
 
 std::unique_ptr<Effect> make() {

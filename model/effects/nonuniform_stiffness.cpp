@@ -1,6 +1,7 @@
 #include <algorithm>
 
 #include "model/cloth/network_bound.h"
+#include "model/cloth/wording.h"
 #include "model/effects/spring_law.h"
 
 /// Varies the stiffness over the cloth by a relative change of every spring and its dashpot:
@@ -77,6 +78,25 @@ struct Law {
   }
 };
 
+/// Tells the factor in the middle of the patch, on the border, or at opposite edges.
+std::string in_words(const FittedEffect& found) {
+  const auto times = [](double excess) { return rounded(1 + excess) + " times as stiff "; };
+  if (found.mode == "gradient") {
+    const auto ends = [&](double gradient, const std::string& first, const std::string& last) {
+      if (gradient == 0) return std::string();
+      return times(-gradient) + first + " and " + rounded(1 + gradient) + " times " + last;
+    };
+    return listed({ends(found.value("gradient_s"), "on the left", "on the right"),
+                   ends(found.value("gradient_t"), "at the top", "at the bottom")});
+  }
+  if (found.mode == "edge")
+    return found.value("edge") == 0 ? "" : times(found.value("edge")) + "on the border";
+  if (found.value("patch") == 0) return {};
+  return times(found.value("patch")) + "at " +
+         place_on_cloth({found.value("patch_s") * found.mesh.width_m,
+                         found.value("patch_t") * found.mesh.height_m});
+}
+
 }  // namespace
 
 EffectDescription describe() {
@@ -100,16 +120,17 @@ EffectDescription describe() {
                      amplitude("edge", 5), place("edge_width", 0.15, 0.05, 0.5),
                      amplitude("gradient_s", 0.9), amplitude("gradient_t", 0.9)},
       .test = EffectTest::profiled,
-      .modes = {
-          {.name = "patch",
-           .amplitudes = {"patch"},
-           .shapes = {{.parameter = "patch_s", .values = {0.2, 0.5, 0.8}, .over_cloth = true},
-                      {.parameter = "patch_t", .values = {0.2, 0.5, 0.8}, .over_cloth = true},
-                      {.parameter = "patch_radius", .values = {0.2, 0.4}, .over_cloth = true}}},
-          {.name = "edge",
-           .amplitudes = {"edge"},
-           .shapes = {{.parameter = "edge_width", .values = {0.1, 0.25}, .over_cloth = true}}},
-          {.name = "gradient", .amplitudes = {"gradient_s", "gradient_t"}, .shapes = {}}}};
+      .modes =
+          {{.name = "patch",
+            .amplitudes = {"patch"},
+            .shapes = {{.parameter = "patch_s", .values = {0.2, 0.5, 0.8}, .over_cloth = true},
+                       {.parameter = "patch_t", .values = {0.2, 0.5, 0.8}, .over_cloth = true},
+                       {.parameter = "patch_radius", .values = {0.2, 0.4}, .over_cloth = true}}},
+           {.name = "edge",
+            .amplitudes = {"edge"},
+            .shapes = {{.parameter = "edge_width", .values = {0.1, 0.25}, .over_cloth = true}}},
+           {.name = "gradient", .amplitudes = {"gradient_s", "gradient_t"}, .shapes = {}}},
+      .in_words = in_words};
 }
 
 std::unique_ptr<Effect> make() {

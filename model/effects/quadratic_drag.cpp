@@ -1,3 +1,6 @@
+#include <cmath>
+
+#include "model/cloth/wording.h"
 #include "model/effects/vertex_law.h"
 
 /// Adds drag that grows with the square of the speed, normal to the surface and along it. At every
@@ -39,6 +42,17 @@ struct Law {
   }
 };
 
+/// A cloth of sigma (kg/m2) falls at sqrt(2 sigma g / c): flat with c_n, edge-on with c_t. Over the
+/// density of air the coefficients are those of drag.
+std::string in_words(const FittedEffect& found) {
+  const bool flat = found.mode != "tangential";
+  const double c_kg_per_m3 = found.value(flat ? "c_n" : "c_t");
+  if (!(c_kg_per_m3 > 0 && found.gravity() > 0)) return {};
+  return "drag coefficient " + rounded(c_kg_per_m3 / kAirDensity_kg_per_m3) +
+         " in air: " + (flat ? "lying flat" : "edge-on") + ", the cloth falls at " +
+         rounded(std::sqrt(2 * found.weight_pa() / c_kg_per_m3)) + " m/s at most";
+}
+
 }  // namespace
 
 EffectDescription describe() {
@@ -49,7 +63,8 @@ EffectDescription describe() {
           {{.name = "c_n", .unit = "kg/m3", .neutral = 0, .lower = 0, .upper = 10, .typical = 0.1},
            {.name = "c_t", .unit = "kg/m3", .neutral = 0, .lower = 0, .upper = 2, .typical = 0.02}},
       .modes = {{.name = "normal", .amplitudes = {"c_n"}, .shapes = {}},
-                {.name = "tangential", .amplitudes = {"c_t"}, .shapes = {}}}};
+                {.name = "tangential", .amplitudes = {"c_t"}, .shapes = {}}},
+      .in_words = in_words};
 }
 
 std::unique_ptr<Effect> make() {

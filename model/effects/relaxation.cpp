@@ -1,4 +1,7 @@
+#include <numbers>
+
 #include "model/cloth/network_bound.h"
+#include "model/cloth/wording.h"
 #include "model/effects/spring_law.h"
 
 /// Relaxes stress by a Maxwell arm, a spring and a dashpot in series, beside every spring:
@@ -34,6 +37,14 @@ struct Law {
   }
 };
 
+/// A sudden stretch's extra stress falls as exp(-t / time).
+std::string in_words(const FittedEffect& found) {
+  const double ratio = found.value("ratio");
+  if (!(ratio > 0)) return {};
+  return rounded(1 + ratio) + " times as stiff at once; half of the excess is gone after " +
+         rounded(std::numbers::ln2 * found.value("time")) + " s";
+}
+
 }  // namespace
 
 EffectDescription describe() {
@@ -51,7 +62,8 @@ EffectDescription describe() {
           .test = EffectTest::profiled,
           .modes = {{.name = "",
                      .amplitudes = {"ratio"},
-                     .shapes = {{.parameter = "time", .values = {0.02, 0.07, 0.25, 1}}}}}};
+                     .shapes = {{.parameter = "time", .values = {0.02, 0.07, 0.25, 1}}}}},
+          .in_words = in_words};
 }
 
 std::unique_ptr<Effect> make() {

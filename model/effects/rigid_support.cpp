@@ -1,3 +1,6 @@
+#include <cmath>
+
+#include "model/cloth/wording.h"
 #include "model/effects/support_law.h"
 
 /// Holds two held points with motions of their own by one rigid body, which keeps their distance.
@@ -33,6 +36,23 @@ struct Law {
   }
 };
 
+/// The distance goes the share of the way to (1 + slack) times that of the two points in the flat
+/// cloth.
+std::string in_words(const FittedEffect& found) {
+  std::vector<Eigen::Vector2d> driven_m;
+  for (const FittedEffect::HeldPlace& place : found.held)
+    if (place.driven) driven_m.push_back(place.at_m);
+  const double share = found.value("share"), slack = found.value("slack");
+  if (driven_m.size() != 2 || share == 0) return {};
+  const double flat_m = (driven_m[1] - driven_m[0]).norm();
+  const std::string beside = slack == 0 ? "as over the flat cloth"
+                                        : millimetres(std::abs(slack) * flat_m) +
+                                              (slack < 0 ? " less" : " more") +
+                                              " than over the flat cloth";
+  return "the two held points are drawn to " + millimetres((1 + slack) * flat_m) + " apart, " +
+         beside + ", " + rounded(100 * share) + " % of the way";
+}
+
 }  // namespace
 
 EffectDescription describe() {
@@ -52,7 +72,8 @@ EffectDescription describe() {
                  .amplitudes = {"share"},
                  .shapes = {{.parameter = "slack", .values = {-0.08, -0.04, -0.02, 0}}}}},
       .driven_points = {2, 2},
-      .remedy = "track the body that holds both points, and declare the paths that it gives"};
+      .remedy = "track the body that holds both points, and declare the paths that it gives",
+      .in_words = in_words};
 }
 
 std::unique_ptr<Effect> make() {

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "model/cloth/wording.h"
 #include "model/effects/lane_by_lane.h"
 #include "model/effects/near_pairs.h"
 #include "model/effects/vertex_law.h"
@@ -114,6 +115,25 @@ struct Law {
   }
 };
 
+/// Two layers press each other apart by pi stiffness z (d - z)^2 / d^2, which falls with their
+/// distance z from d / 3 on. Tells at which z that carries a layer's weight.
+std::string in_words(const FittedEffect& found) {
+  const double stiffness = found.value("stiffness"), d_m = found.value("thickness");
+  const double weight_pa = found.weight_pa();
+  if (!(stiffness > 0)) return {};
+  const auto carries = [&](double z_m) {
+    const double gap = (d_m - z_m) / d_m;
+    return std::numbers::pi * stiffness * z_m * gap * gap >= weight_pa;
+  };
+  double near_m = d_m / 3, far_m = d_m;
+  if (!carries(near_m)) return "too soft for one layer to carry another";
+  for (int n = 0; n < 50; ++n) {
+    const double middle_m = (near_m + far_m) / 2;
+    (carries(middle_m) ? near_m : far_m) = middle_m;
+  }
+  return "one layer rests on another " + millimetres(near_m) + " away";
+}
+
 }  // namespace
 
 EffectDescription describe() {
@@ -134,7 +154,8 @@ EffectDescription describe() {
           .test = EffectTest::finite,
           .modes = {{.name = "",
                      .amplitudes = {"stiffness"},
-                     .shapes = {{.parameter = "thickness", .values = {0.01, 0.03}}}}}};
+                     .shapes = {{.parameter = "thickness", .values = {0.01, 0.03}}}}},
+          .in_words = in_words};
 }
 
 std::unique_ptr<Effect> make() {

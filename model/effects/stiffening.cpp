@@ -1,6 +1,7 @@
 #include <algorithm>
 
 #include "model/cloth/network_bound.h"
+#include "model/cloth/wording.h"
 #include "model/effects/spring_law.h"
 
 /// Bends the tension curve. With e = (l - l0) / l0 the elongation,
@@ -40,6 +41,17 @@ struct Law {
   }
 };
 
+/// At the elongation `strain` the term is half of its amplitude times k l0 strain.
+std::string in_words(const FittedEffect& found) {
+  const bool stretched = found.mode != "compressed";
+  const double amplitude = found.value(stretched ? "stretched" : "compressed");
+  if (amplitude == 0) return {};
+  const double factor = 1 + (stretched ? 0.5 : -0.5) * amplitude;
+  return std::string(stretched ? "stretched" : "compressed") + " by " +
+         rounded(100 * found.value("strain")) + " %, it " + (stretched ? "pulls " : "pushes ") +
+         rounded(factor) + " times as hard as its stiffness says";
+}
+
 }  // namespace
 
 EffectDescription describe() {
@@ -67,7 +79,8 @@ EffectDescription describe() {
                           .scale = ParameterScale::logarithmic}},
           .test = EffectTest::profiled,
           .modes = {{.name = "stretched", .amplitudes = {"stretched"}, .shapes = {strains}},
-                    {.name = "compressed", .amplitudes = {"compressed"}, .shapes = {strains}}}};
+                    {.name = "compressed", .amplitudes = {"compressed"}, .shapes = {strains}}},
+          .in_words = in_words};
 }
 
 std::unique_ptr<Effect> make() {

@@ -1,3 +1,4 @@
+#include "model/cloth/wording.h"
 #include "model/effects/support_law.h"
 
 /// Lets the held points drift, all alike, beside their known motion: shift(t) = velocity t, with t
@@ -20,6 +21,13 @@ struct Law {
   }
 };
 
+std::string in_words(const FittedEffect& found) {
+  const Eigen::Vector3d shift_m = found.end_s * found.vector("velocity");
+  if (shift_m.isZero(0)) return {};
+  return millimetres(shift_m.norm()) + " " + at_held_point(found, found.value("point")) +
+         " by the end, towards " + unit_vector(shift_m);
+}
+
 }  // namespace
 
 EffectDescription describe() {
@@ -34,7 +42,8 @@ EffectDescription describe() {
           .test = EffectTest::profiled,
           .modes = alike_and_single(
               {.name = "", .amplitudes = {"velocity_x", "velocity_y", "velocity_z"}, .shapes = {}}),
-          .remedy = kDeclareMotion};
+          .remedy = kDeclareMotion,
+          .in_words = in_words};
 }
 
 std::unique_ptr<Effect> make() {

@@ -1,3 +1,4 @@
+#include "model/cloth/wording.h"
 #include "model/effects/harmonic.h"
 #include "model/effects/support_law.h"
 
@@ -27,6 +28,14 @@ struct Law {
   }
 };
 
+std::string in_words(const FittedEffect& found) {
+  const Eigen::Vector3d amplitude_m = found.vector("amplitude");
+  if (amplitude_m.isZero(0)) return {};
+  return millimetres(amplitude_m.norm()) + " to either side along " + unit_vector(amplitude_m) +
+         ", " + rounded(found.value("frequency")) + " times a second, " +
+         at_held_point(found, found.value("point"));
+}
+
 }  // namespace
 
 EffectDescription describe() {
@@ -44,7 +53,8 @@ EffectDescription describe() {
       .parameters = std::move(parameters),
       .test = EffectTest::profiled,
       .modes = alike_and_single(Harmonic::modes("amplitude").front()),
-      .remedy = kDeclareMotion};
+      .remedy = kDeclareMotion,
+      .in_words = in_words};
 }
 
 std::unique_ptr<Effect> make() {

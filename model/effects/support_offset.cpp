@@ -1,3 +1,4 @@
+#include "model/cloth/wording.h"
 #include "model/effects/support_law.h"
 
 /// Holds points that follow a motion beside the places it gives, all by the same constant:
@@ -27,6 +28,13 @@ struct Law {
   }
 };
 
+std::string in_words(const FittedEffect& found) {
+  const Eigen::Vector3d offset_m = found.vector("offset");
+  if (offset_m.isZero(0)) return {};
+  return millimetres(offset_m.norm()) + " towards " + unit_vector(offset_m) + ", " +
+         at_held_point(found, found.value("point"));
+}
+
 }  // namespace
 
 EffectDescription describe() {
@@ -42,7 +50,8 @@ EffectDescription describe() {
           .modes = alike_and_single(
               {.name = "", .amplitudes = {"offset_x", "offset_y", "offset_z"}, .shapes = {}}),
           .driven_points = {1, std::numeric_limits<int>::max()},
-          .remedy = "track or survey the cloth where it is held, not beside it"};
+          .remedy = "track or survey the cloth where it is held, not beside it",
+          .in_words = in_words};
 }
 
 std::unique_ptr<Effect> make() {

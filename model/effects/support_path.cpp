@@ -1,3 +1,7 @@
+#include <algorithm>
+#include <string>
+
+#include "model/cloth/wording.h"
 #include "model/effects/support_law.h"
 
 /// Moves the held points along a smooth free path, all alike, beside their known motion. With T =
@@ -46,6 +50,33 @@ struct Law {
   }
 };
 
+/// Tells how far the points are at the last frame, and at most. Between knots they go straight, so
+/// that they are furthest at a knot or at the end.
+std::string in_words(const FittedEffect& found) {
+  std::array<double, kCount> p;
+  for (int k = 0; k < kKnots; ++k) {
+    const Eigen::Vector3d knot_m = found.vector("shift_" + std::to_string(k + 1));
+    std::ranges::copy(knot_m, p.begin() + 3 * k);
+  }
+  p[from] = found.value("from");
+  p[until] = found.value("until");
+  p[point] = 0;  // as at any point that moves
+  const auto shift_m = [&](double time_s) {
+    std::array<double, 0> nothing;
+    const Vector3<double> shift = Law::shift<double>({.end_time_s = time_s}, p, nothing);
+    return Eigen::Vector3d(shift.x, shift.y, shift.z);
+  };
+  const Eigen::Vector3d end_m = shift_m(found.end_s);
+  double most_m = end_m.norm();
+  for (int k = 1; k <= kKnots; ++k) {
+    const double time_s = p[from] + k * (p[until] - p[from]) / kKnots;
+    if (time_s < found.end_s) most_m = std::max(most_m, shift_m(time_s).norm());
+  }
+  if (most_m == 0) return {};
+  const std::string at = at_held_point(found, found.value("point"));
+  return millimetres(end_m.norm()) + " " + at + " by the end, " + millimetres(most_m) + " at most";
+}
+
 }  // namespace
 
 EffectDescription describe() {
@@ -54,7 +85,8 @@ EffectDescription describe() {
       .summary = "held points along a smooth path, through shift_k at from + k/4 (until - from)",
       .parameters = {},
       .test = EffectTest::profiled,
-      .remedy = kDeclareMotion};
+      .remedy = kDeclareMotion,
+      .in_words = in_words};
   EffectMode alike{.name = "",
                    .amplitudes = {},
                    .shapes = {{.parameter = "until", .values = {1}, .of_duration = true}}};

@@ -1,3 +1,4 @@
+#include "model/cloth/wording.h"
 #include "model/effects/support_law.h"
 
 /// Lets the held points creep where the cloth pulls them, with the velocity
@@ -43,6 +44,15 @@ struct Law {
   }
 };
 
+/// Pulls are told by the mass (g) whose weight they are.
+std::string in_words(const FittedEffect& found) {
+  const double mobility = found.value("mobility"), gram_n = 1e-3 * found.gravity();
+  if (!(mobility > 0 && gram_n > 0)) return {};
+  return "holds a pull of up to " + rounded(found.value("threshold") / gram_n) + " g, creeps by " +
+         millimetres(mobility * gram_n) + " a second for each gram beyond, " +
+         at_held_point(found, found.value("point"));
+}
+
 }  // namespace
 
 EffectDescription describe() {
@@ -66,7 +76,8 @@ EffectDescription describe() {
       .modes = alike_and_single({.name = "",
                                  .amplitudes = {"mobility"},
                                  .shapes = {{.parameter = "threshold", .values = {0, 0.05, 0.2}}}}),
-      .remedy = kDeclareMotion};
+      .remedy = kDeclareMotion,
+      .in_words = in_words};
 }
 
 std::unique_ptr<Effect> make() {

@@ -1,3 +1,6 @@
+#include <numbers>
+
+#include "model/cloth/wording.h"
 #include "model/effects/vertex_law.h"
 
 /// Damps viscously by the surrounding air: F = -rate m v at every vertex.
@@ -22,6 +25,13 @@ struct Law {
   }
 };
 
+/// A speed falls as exp(-rate t).
+std::string in_words(const FittedEffect& found) {
+  const double rate_per_s = found.value("rate");
+  if (!(rate_per_s > 0)) return {};
+  return "half of a speed is gone after " + rounded(std::numbers::ln2 / rate_per_s) + " s";
+}
+
 }  // namespace
 
 EffectDescription describe() {
@@ -33,7 +43,8 @@ EffectDescription describe() {
                           .lower = 0,
                           .upper = 30,
                           .typical = 0.1,
-                          .scale = ParameterScale::linear}}};
+                          .scale = ParameterScale::linear}},
+          .in_words = in_words};
 }
 
 std::unique_ptr<Effect> make() {

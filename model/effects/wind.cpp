@@ -1,3 +1,6 @@
+#include <cmath>
+
+#include "model/cloth/wording.h"
 #include "model/effects/vertex_law.h"
 
 /// Lets wind press on the surface: F = A [n . (q - c v)] n at every vertex.
@@ -28,6 +31,22 @@ struct Law {
   }
 };
 
+/// A pressure is told as the dynamic pressure rho u^2 / 2 of a wind u in air. A drag is told by the
+/// speed sigma g / c at which it carries a cloth of sigma (kg/m2) that falls flat.
+std::string in_words(const FittedEffect& found) {
+  if (found.mode == "drag") {
+    const double c_pa_s_per_m = found.value("c");
+    if (!(c_pa_s_per_m > 0 && found.gravity() > 0)) return {};
+    return "lying flat, the cloth falls at " + rounded(found.weight_pa() / c_pa_s_per_m) +
+           " m/s at most";
+  }
+  const Eigen::Vector3d q_pa = found.vector("q");
+  if (q_pa.isZero(0)) return {};
+  const double speed_m_per_s = std::sqrt(2 * q_pa.norm() / kAirDensity_kg_per_m3);
+  return rounded(q_pa.norm()) + " Pa towards " + unit_vector(q_pa) + ", as of a wind of " +
+         rounded(speed_m_per_s) + " m/s";
+}
+
 }  // namespace
 
 EffectDescription describe() {
@@ -53,7 +72,8 @@ EffectDescription describe() {
                          pressure("q_y"),
                          pressure("q_z")},
           .modes = {{.name = "pressure", .amplitudes = {"q_x", "q_y", "q_z"}, .shapes = {}},
-                    {.name = "drag", .amplitudes = {"c"}, .shapes = {}}}};
+                    {.name = "drag", .amplitudes = {"c"}, .shapes = {}}},
+          .in_words = in_words};
 }
 
 std::unique_ptr<Effect> make() {

@@ -8,6 +8,7 @@
 #include "apps/report/diagnosis/diagnosis_tables.h"
 #include "apps/terminal/json_file.h"
 #include "apps/terminal/version.h"
+#include "fit/problem/effect_words.h"
 #include "fit/problem/effects_of.h"
 
 namespace clothfit {
@@ -133,6 +134,9 @@ void write_diagnosis(const Diagnosis& diagnosis, const std::string& command,
       if (std::ranges::find(alike, term.effect) == alike.end()) alike.push_back(term.effect);
     one["class"] = alike;
     one["parameters"] = found_json(accepted.trial.hypothesis, diagnosis.found());
+    if (const std::string words = words_of(accepted.trial.hypothesis, diagnosis.found());
+        !words.empty())
+      one["in_words"] = words;
     if (const std::string remedy = describe_effect(accepted.trial.hypothesis.effect).remedy;
         !remedy.empty())
       one["remedy"] = remedy;

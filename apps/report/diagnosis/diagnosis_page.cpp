@@ -11,6 +11,7 @@
 #include "apps/report/page/html.h"
 #include "apps/terminal/number_text.h"
 #include "apps/terminal/version.h"
+#include "fit/problem/effect_words.h"
 #include "fit/problem/effects_of.h"
 
 namespace clothfit {
@@ -136,8 +137,11 @@ std::string what_was_missing(const Diagnosis& diagnosis) {
     const Trial& trial = accepted.trial;
     content += fmt::format("<h3>{}</h3>\n", escape_xml(trial.hypothesis.title()));
     content += paragraph(describe_effect(trial.hypothesis.effect).summary + ".");
+    const std::string values = found_text(trial.hypothesis, diagnosis.found().result);
+    const std::string told = words_of(trial.hypothesis, diagnosis.found());
     content += fmt::format("<p class=\"found\"><strong>{}</strong></p>\n",
-                           escape_xml(found_text(trial.hypothesis, diagnosis.found().result)));
+                           escape_xml(told.empty() ? values : told));
+    if (!told.empty()) content += paragraph(values + ".");
     if (const std::string remedy = remedy_text(trial.hypothesis); !remedy.empty())
       content += paragraph(remedy);
     content += paragraph(fmt::format(
@@ -232,6 +236,12 @@ std::string planted(const Diagnosis& diagnosis) {
   return content;
 }
 
+std::string parameters(const Diagnosis& diagnosis) {
+  return html_table(short_parameter_table(diagnosis.found().result),
+                    "Of the model with what was accepted. The errors count what it still lacks. "
+                    "Where several recordings were fitted, what is each one's own is the first's.");
+}
+
 std::string wide(const std::string& html) {
   return "<div class=\"wide\">" + html + "</div>\n";
 }
@@ -255,6 +265,10 @@ std::string words() {
          "to "
          "be worth a name. A smaller amplitude may be there, and this recording does not show "
          "it.</dd>\n"
+         "<dt>sigma, 90 %</dt><dd>One standard deviation of a parameter, and the interval that "
+         "would hold it in 90 of 100 such recordings.</dd>\n"
+         "<dt>undetermined</dt><dd>These data allow any value in a wide range; the reason stands "
+         "beside it, and the value is not a measurement.</dd>\n"
          "<dt>held out</dt><dd>Frames that no fit and no decision has seen; both models are "
          "compared with them once.</dd>\n"
          "</dl>\n";
@@ -290,6 +304,7 @@ std::string diagnosis_page_html(const Diagnosis& diagnosis, std::span<const Reco
                   wide(html_table(before_after_table(diagnosis),
                                   "Root mean square of one coordinate's residual. The last three "
                                   "columns are guesses that need no model.")));
+  body += section("Parameters", parameters(diagnosis));
   body += section("Where and when it is off", maps(diagnosis, recordings));
   body +=
       section("Which force is missing", residual_force_html(diagnosis.residual_force, recording));

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "apps/terminal/number_text.h"
+#include "fit/problem/effect_words.h"
 #include "fit/problem/effects_of.h"
 
 namespace clothfit {
@@ -265,6 +266,11 @@ std::string found_text(const Hypothesis& term, const FitResult& result) {
   for (const auto& [name, value] : term.shape)
     known += (known.empty() ? "" : ", ") + name + " " + significant(value, 3);
   return text + " (at " + known + ")";
+}
+
+std::string accepted_text(const Hypothesis& term, const FitReport& found) {
+  const std::string words = words_of(term, found), values = found_text(term, found.result);
+  return term.title() + ": " + (words.empty() ? values : words + "\n  " + values);
 }
 
 }  // namespace clothfit

@@ -58,6 +58,10 @@ Table adequacy_table(const Diagnosis& diagnosis);
 /// sigma, and its shape where that was taken for known.
 std::string found_text(const Hypothesis& term, const FitResult& result);
 
+/// Writes what a fit has found of a term in lines for the terminal: "wind (pressure): 0.250 Pa ..."
+/// with its values below, or these alone where its effect has no words for them.
+std::string accepted_text(const Hypothesis& term, const FitReport& found);
+
 /// Writes "Remedy: level the camera." for a term whose effect has one; nothing for others.
 std::string remedy_text(const Hypothesis& term);
 

@@ -48,6 +48,21 @@ TEST(FoundText, NamesAShapeThatWasTakenForKnown) {
   EXPECT_EQ(found_text(hem, {}), "");
 }
 
+TEST(AcceptedText, TellsAnEffectInWordsAndItsValuesBelow) {
+  FitReport found;
+  found.model.cloth = {.width_m = 0.4, .height_m = 0.3, .mass_kg = 0.0144};
+  found.model.mesh_columns = found.model.mesh_rows = 9;
+  found.result.effects = {
+      {"viscous_damping", {{.name = "rate", .unit = "1/s", .value = 1.5, .sigma = 0.02}}},
+      {"spring_damping", {{.name = "shear", .unit = "s", .value = 1e-3, .sigma = 1e-4}}}};
+
+  EXPECT_EQ(accepted_text({.effect = "viscous_damping", .amplitudes = {"rate"}}, found),
+            "viscous_damping: half of a speed is gone after 0.462 s\n"
+            "  rate = 1.500 ± 0.020 1/s");
+  EXPECT_EQ(accepted_text({.effect = "spring_damping", .amplitudes = {"shear"}}, found),
+            "spring_damping: shear = 0.00100 ± 0.00010 s");
+}
+
 TEST(ShortCandidateTable, ListsFourAmplitudesOfMany) {
   Diagnosis diagnosis;
   diagnosis.scores.push_back(
