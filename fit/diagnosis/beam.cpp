@@ -26,6 +26,12 @@ bool same_hypotheses(const BeamEntry& one, const BeamEntry& other) {
          });
 }
 
+size_t numbers_of(const BeamEntry& entry) {
+  size_t count = 0;
+  for (const Hypothesis& hypothesis : entry.model.hypotheses) count += hypothesis.number_count();
+  return count;
+}
+
 }  // namespace
 
 Beam::Beam(BeamEntry first, size_t width, size_t most_effects)
@@ -53,6 +59,7 @@ void Beam::add(std::vector<BeamEntry> children, double base_cost) {
   std::ranges::move(children, std::back_inserter(entries_));
   std::ranges::stable_sort(entries_, {}, &BeamEntry::cost);
   drop_repeated();
+  put_simplest_first();
   drop_far_behind(base_cost);
   if (std::ranges::none_of(dropped_, &BeamEntry::is_sound)) return;
   BeamEntry sound = best_sound(std::exchange(dropped_, {}), {});
@@ -73,6 +80,17 @@ void Beam::drop_repeated() {
     same->must_still_beat = std::max(same->must_still_beat, own->must_still_beat);
     entries_.erase(own);
   }
+}
+
+void Beam::put_simplest_first() {
+  const double alike = entries_.front().cost + kCriteria.told_apart;
+  const size_t effects = entries_.front().model.hypotheses.size();
+  auto simplest = entries_.begin();
+  for (auto entry = entries_.begin(); entry != entries_.end() && entry->cost < alike; ++entry)
+    if (entry->is_sound() == simplest->is_sound() && entry->model.hypotheses.size() == effects &&
+        numbers_of(*entry) < numbers_of(*simplest))
+      simplest = entry;
+  std::rotate(entries_.begin(), simplest, simplest + 1);
 }
 
 void Beam::drop_far_behind(double base_cost) {

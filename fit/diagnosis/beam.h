@@ -60,9 +60,12 @@ class Beam {
 
  private:
   void drop_repeated();
+  /// Puts first, of the entries that cannot be told from the cheapest, the one with the fewest
+  /// numbers. A gust that hardly changes is a wind.
+  void put_simplest_first();
   void drop_far_behind(double base_cost);
 
-  std::vector<BeamEntry> entries_;  ///< by cost
+  std::vector<BeamEntry> entries_;  ///< by cost, but for the first
   std::vector<BeamEntry> dropped_;
   size_t width_, most_effects_;
 };

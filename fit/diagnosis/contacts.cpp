@@ -205,8 +205,11 @@ Score score_of(const SearchContext& search, const FittedModel& at, const FittedM
               .amplitude = Eigen::VectorXd(2),
               .sigma = Eigen::VectorXd::Constant(2, std::numeric_limits<double>::infinity()),
               .decrease = search.left_by(at) - search.left_by(fitted),
-              .columns = {}};
-  const NamedValues values = fitted.values().front();
+              .columns = {},
+              .fitted = fitted.values()};
+  const PooledPart& part = at.parts.front();
+  score.fitted_share = static_cast<double>(part.frames) / at.problems.front()->first_held_out;
+  const NamedValues& values = score.fitted.front();
   const std::string& effect = score.hypothesis.effect;
   score.amplitude << values.at(effect + ".stiffness"), values.at(effect + ".damping");
   for (auto& [name, value] : score.hypothesis.shape) value = values.at(effect + "." + name);

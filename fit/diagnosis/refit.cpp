@@ -77,11 +77,6 @@ FittedModel fit_from_here(const DiagnosisSetup& setup, const FittedModel& model,
   return fitted;
 }
 
-/// Tells whether a hypothesis is contact. No derivative at neutral says what it does.
-bool is_contact(const Score& score) {
-  return describe_effect(score.hypothesis.effect).touches;
-}
-
 /// A model fitted over a share of the frames.
 using FitOver = std::function<FittedModel(size_t model, double share)>;
 
@@ -156,6 +151,23 @@ std::vector<FittedModel> race_hypotheses(const DiagnosisSetup& setup, const Fitt
       is_early ? early.chi_square(threshold) : 0, least_gain);
 }
 
+/// Leads contact from where it was fitted over few frames to all of them.
+FittedModel lead_contact(const DiagnosisSetup& setup, const FittedModel& model,
+                         const FittedModel& early, const Score& score,
+                         const ProgressCallback& progress) {
+  std::vector<Hypothesis> hypotheses = model.hypotheses;
+  hypotheses.push_back(score.hypothesis);
+  FittedModel whole = model_at(setup, hypotheses, score.fitted);
+  for (size_t n = 0; n < model.parts.size(); ++n)
+    whole.parts[n].correction = correction_of(model, early, n);
+  FittedModel fitted;
+  for (const double share : shares_from(score.fitted_share)) {
+    fitted = refined_over(setup, whole, model, share, progress);
+    if (!fitted.usable()) break;
+  }
+  return fitted;
+}
+
 /// Refines an unrefined fit. Where that does not gain what was predicted, growing horizons are
 /// tried.
 FittedModel fit_from_unrefined(const DiagnosisSetup& setup, const FittedModel& model,
@@ -185,16 +197,16 @@ std::vector<FittedModel> fit_near(const DiagnosisSetup& setup, const FittedModel
   std::vector<double> decrease(scores.size(), 0);
   for_each_index(scores.size(), [&](size_t k) {
     fitted[k] =
-        is_contact(*scores[k])
-            ? race_hypotheses(setup, model, model, {scores[k]}, 1, threshold, progress).front()
-            : fit_from_here(setup, model, *scores[k], {.rounds = 1, .unrefined = true}, progress);
+        scores[k]->fitted.empty()
+            ? fit_from_here(setup, model, *scores[k], {.rounds = 1, .unrefined = true}, progress)
+            : lead_contact(setup, model, model, *scores[k], progress);
     if (fitted[k].usable()) decrease[k] = without - fitted[k].chi_square(threshold);
   });
   if (fitted.empty()) return fitted;
   const double enough = kCriteria.exact_fit_of_best * *std::ranges::max_element(decrease);
   for_each_index(scores.size(), [&](size_t k) {
     if (decrease[k] < enough && decrease[k] > kCriteria.kept_promise * scores[k]->decrease) return;
-    if (is_contact(*scores[k])) return;
+    if (!scores[k]->fitted.empty()) return;
     fitted[k] =
         fit_from_unrefined(setup, model, *scores[k], std::move(fitted[k]), threshold, progress);
   });
@@ -260,12 +272,25 @@ std::vector<FittedModel> fit_with_hypotheses(const DiagnosisSetup& setup, const 
                                              double first_share, double threshold,
                                              const ProgressCallback& progress) {
   if (first_share == 1) return fit_near(setup, model, scores, threshold, progress);
-  std::vector<FittedModel> fitted =
-      race_hypotheses(setup, model, early, scores, first_share, threshold, progress);
+  std::vector<const Score*> racing;
+  for (const Score* score : scores)
+    if (score->fitted.empty()) racing.push_back(score);
+  std::vector<FittedModel> raced =
+      race_hypotheses(setup, model, early, racing, first_share, threshold, progress);
+  std::vector<FittedModel> fitted;
+  size_t contacts = 0;
+  for (const Score* score : scores) {
+    if (score->fitted.empty())
+      fitted.push_back(std::move(raced[fitted.size() - contacts]));
+    else
+      fitted.push_back(lead_contact(setup, model, early, *score, progress));
+    contacts += score->fitted.empty() ? 0 : 1;
+  }
   // Growing horizons can lead astray where no single hypothesis brings the model near the cloth.
   const double without = model.chi_square(threshold);
   for (size_t k = 0; k < fitted.size(); ++k) {
     if (!fitted[k].usable() || fitted[k].chi_square(threshold) < without) continue;
+    if (!scores[k]->fitted.empty()) continue;
     fitted[k] = fit_from_here(setup, model, *scores[k], {}, progress);
   }
   return fitted;

@@ -1,5 +1,6 @@
 #include "fit/diagnosis/residual_force.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <limits>

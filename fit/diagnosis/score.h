@@ -20,6 +20,10 @@ struct Score {
   /// excess, it is a share of chi-square's scatter.
   double share = 0;
   Columns columns;  ///< derivatives of the residuals by the amplitudes
+  /// Of contact, which has no derivative at neutral: where a fit with it stands, and over which
+  /// share of the frames (fit/diagnosis/contacts.h). Empty for all others.
+  std::vector<NamedValues> fitted = {};
+  double fitted_share = 1;
   /// Returns the name of amplitude `k`, and its recording where each has its own.
   std::string amplitude_name(Eigen::Index k) const;
 };

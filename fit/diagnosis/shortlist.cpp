@@ -160,17 +160,33 @@ void add_horizon(const SearchContext& search, const FittedModel& at, double hori
   sort_by_share(best);
 }
 
-/// Adds scores of contact with obstacles that a model does not have.
+/// Adds scores of contact with obstacles that a model does not have. Each is scored over the
+/// horizon at which it explains most: a cloth may meet it late.
 void add_contacts(const SearchContext& search, const DiagnosisSetup& setup,
-                  const FittedModel& before, const FittedModel& at, Shortlist& list) {
-  std::vector<Hypothesis> untested = search.options.contacts;
-  std::erase_if(untested, [&](const Hypothesis& contact) {
-    return std::ranges::find(at.hypotheses, contact.effect, &Hypothesis::effect) !=
-           at.hypotheses.end();
-  });
-  for (const Score& score : score_contacts(search, setup, before, at, untested)) {
+                  const OverHorizons& over, double visible, Shortlist& list) {
+  std::vector<Score> best;
+  const FittedModel* before = &over.before;
+  for (const FittedModel& at : over.shorter) {
+    std::vector<Hypothesis> untested = search.options.contacts;
+    std::erase_if(untested, [&](const Hypothesis& contact) {
+      return std::ranges::find(at.hypotheses, contact.effect, &Hypothesis::effect) !=
+             at.hypotheses.end();
+    });
+    if (at.misfit() > visible) {
+      for (Score& score : score_contacts(search, setup, *before, at, untested)) {
+        const auto same = std::ranges::find_if(
+            best, [&](const Score& known) { return known.hypothesis.same_mode(score.hypothesis); });
+        if (same == best.end())
+          best.push_back(std::move(score));
+        else if (score.share > same->share)
+          *same = std::move(score);
+      }
+    }
+    before = &at;
+  }
+  for (Score& score : best) {
     list.scores.push_back(score);
-    list.best.push_back(score);
+    list.best.push_back(std::move(score));
   }
   sort_by_share(list.best);
 }
@@ -196,8 +212,7 @@ Shortlist over_shares(const SearchContext& search, const DiagnosisSetup& setup,
     const size_t kept = std::min(list.best.size(), static_cast<size_t>(2 * search.options.refits));
     list.best.erase(list.best.begin() + static_cast<std::ptrdiff_t>(kept), list.best.end());
   }
-  if (!shorter.empty() && shorter.front().misfit() > visible)
-    add_contacts(search, setup, over.before, shorter.front(), list);
+  add_contacts(search, setup, over, visible, list);
   if (!shorter.empty()) list.early = std::move(shorter.front());
   return list;
 }

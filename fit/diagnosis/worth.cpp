@@ -29,8 +29,7 @@ double worth_naming(const FittedModel& model, double threshold, double explained
 double price_of_amplitudes(const FittedModel& model) {
   double amplitudes = 0;
   for (const Hypothesis& hypothesis : model.hypotheses)
-    amplitudes += static_cast<double>(hypothesis.amplitudes.size() +
-                                      (hypothesis.fits_shape ? hypothesis.shape.size() : 0));
+    amplitudes += static_cast<double>(hypothesis.number_count());
   return amplitudes * std::log(static_cast<double>(model.residual_count()));
 }
 

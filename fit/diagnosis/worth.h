@@ -20,7 +20,8 @@ double sure_excess(const FittedModel& model, double threshold);
 /// (`explained`, of chi-square).
 double worth_naming(const FittedModel& model, double threshold, double explained = 0);
 
-/// Returns the price of a model's amplitudes and fitted shapes (Bayesian information criterion).
+/// Returns the price of a model's amplitudes and shapes (Bayesian information criterion). The data
+/// choose a shape too, of a grid or by a fit.
 double price_of_amplitudes(const FittedModel& model);
 
 }  // namespace clothfit

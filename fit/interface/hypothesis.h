@@ -22,6 +22,8 @@ struct Hypothesis {
   std::string title() const;  ///< "nonuniform_mass (hem)", "support_drift (single, held point 1)"
   /// Names of the amplitudes in the space of a fit, EFFECT.PARAMETER.
   std::vector<std::string> parameters() const;
+  /// Returns how many numbers the data choose: amplitudes and shapes.
+  size_t number_count() const { return amplitudes.size() + shape.size(); }
   bool same_mode(const Hypothesis& other) const {
     return effect == other.effect && mode == other.mode;
   }

@@ -206,6 +206,13 @@ TEST(EffectWords, TellTheEndOfAPathAndItsFurthestPoint) {
             "6.00 mm at held point 1 (top left corner) by the end, 6.00 mm at most");
 }
 
+TEST(EffectWords, TellWhenAHeldPointMoved) {
+  EXPECT_EQ(words("support_move", "single",
+                  {{"by_z", -0.008}, {"from", 0.2}, {"lasts", 0.6}, {"point", 1}}),
+            "8.00 mm at held point 1 (top left corner) between 0.200 and 0.800 s, towards "
+            "(0.00, 0.00, -1.00)");
+}
+
 TEST(EffectWords, SayNothingOfWeightsWhereThereIsNoGravity) {
   FittedEffect drag = fitted("wind", "drag", {{"c", 0.5}});
   drag.gravity_m_per_s2.setZero();

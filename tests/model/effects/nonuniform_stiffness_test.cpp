@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "tests/model/spring_rig.h"
@@ -13,9 +14,12 @@ constexpr double kUniform_n_per_m = 40;
 
 struct Pattern {
   double patch = 0, patch_s = 0.5, patch_t = 0.5, patch_radius = 0.3, edge = 0, edge_width = 0.15,
-         gradient_s = 0, gradient_t = 0;
+         gradient_s = 0, gradient_t = 0, rectangle = 0, rectangle_s = 0.5, rectangle_t = 0.5,
+         rectangle_half_s = 0.25, rectangle_half_t = 0.25;
   std::vector<double> values() const {
-    return {patch, patch_s, patch_t, patch_radius, edge, edge_width, gradient_s, gradient_t};
+    return {patch,       patch_s,          patch_t,         patch_radius, edge,
+            edge_width,  gradient_s,       gradient_t,      rectangle,    rectangle_s,
+            rectangle_t, rectangle_half_s, rectangle_half_t};
   }
 };
 
@@ -69,6 +73,22 @@ TEST(NonuniformStiffness, APatchIsFullInItsCentreAndNothingOutside) {
     const double from = std::abs((i + 0.5) / 21 - 0.5) / 0.25;
     const double expected = from < 1 ? 2 * std::pow(1 - from * from, 3) : 0;
     EXPECT_NEAR(share[i], expected, 1e-12) << i;  // the tension is a sum of 21
+  }
+}
+
+TEST(NonuniformStiffness, ARectangleIsFullInsideAndNothingOutside) {
+  // The ribbon's first column passes through the rectangle, from t = 0.25 to 0.75.
+  DrivenRibbon ribbon(33, kUniform_n_per_m, "nonuniform_stiffness",
+                      Pattern{.rectangle = 2, .rectangle_s = 0}.values());
+  const Eigen::VectorXd e = Eigen::VectorXd::Constant(32, 0.01);
+
+  const Eigen::VectorXd share =
+      ribbon.tensions_n(e, 0 * e, 1e-3) / (kUniform_n_per_m * 0.01 * ribbon.natural_length_m());
+
+  for (int i = 0; i < 32; ++i) {
+    const double inside = 0.25 - std::abs((i + 0.5) / 32 - 0.5);
+    const double u = std::clamp(16 * inside + 0.5, 0.0, 1.0);
+    EXPECT_NEAR(share[i], 2 * u * u * (3 - 2 * u), 1e-12) << i;
   }
 }
 

@@ -297,7 +297,8 @@ TEST(Undeclared, FindsAPlaceThatACoarserMeshDoesNotShow) {
   scene.truth_mesh = 17;
   scene.markers = 9;
   scene.noise_m = 0.5e-3;
-  scene.hidden = {{"nonuniform_stiffness", {0.1, 0.433, 0.202, 0.232, 0, 0.1, 0, 0}}};
+  scene.hidden = {
+      {"nonuniform_stiffness", {0.1, 0.433, 0.202, 0.232, 0, 0.1, 0, 0, 0, 0.5, 0.5, 0.25, 0.25}}};
   const unsigned long long seed = 1;
   SCOPED_TRACE("seed " + std::to_string(seed));
   const SyntheticRecording recording = make_synthetic_recording(scene, seed);
