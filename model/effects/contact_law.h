@@ -78,7 +78,7 @@ struct Contact {
          .lower = 0,
          .upper = 1e5,
          .typical = 1000},
-        {.name = "damping", .unit = "Pa s/m", .neutral = 0, .lower = 0, .upper = 100, .typical = 1},
+        {.name = "damping", .unit = "Pa s/m", .neutral = 0, .lower = 0, .upper = 500, .typical = 1},
         {.name = "friction",
          .unit = "ratio",
          .neutral = 0,
