@@ -290,13 +290,15 @@ RefineResult second_look(const FitProblem& problem, const FitOptions& options,
 
 /// Fits over all frames on the coarse mesh from `values`, which move there. The fit's own mesh then
 /// follows along its derivatives. The result is not usable where, in the end, the model is not as
-/// far off on both meshes as this asks for.
+/// far off on both meshes as this asks for. A model that followed the cloth over few frames gets no
+/// second look, for its basin is known.
 RefineResult follow_coarse(const FitProblem& coarse_problem, const FitProblem& problem,
-                           const FitOptions& options, Eigen::VectorXd& values,
+                           const FitOptions& options, bool followed, Eigen::VectorXd& values,
                            const ProgressCallback& progress, FitReport& report) {
-  RefineResult found = refine_stage({.problem = coarse_problem, .effort = kFinalEffort}, options,
-                                    values, progress, report);
-  found = second_look(coarse_problem, options, found, progress, report);
+  const Effort& effort = followed ? kRoughEffort : kFinalEffort;
+  RefineResult found = refine_stage({.problem = coarse_problem, .effort = effort}, options, values,
+                                    progress, report);
+  if (!followed) found = second_look(coarse_problem, options, found, progress, report);
   if (!found.usable) return found;
   values = found.values;
   found.usable = mean_square(coarse_problem, values) > options.coarse_beyond;
@@ -337,7 +339,7 @@ RefineResult refine_on(const FitProblem& coarse_problem, const FitProblem& probl
     if (std::isfinite(options.coarse_beyond) &&
         mean_square(coarse_problem, best.values) > options.coarse_beyond) {
       RefineResult followed =
-          follow_coarse(coarse_problem, problem, options, best.values, progress, report);
+          follow_coarse(coarse_problem, problem, options, false, best.values, progress, report);
       if (followed.usable) return followed;
     }
     best.values = away_from_ends(problem, best.values);
@@ -346,6 +348,13 @@ RefineResult refine_on(const FitProblem& coarse_problem, const FitProblem& probl
                   .share = std::max(kSearchShare, approach.least_share),
                   .effort = kApproachEffort}))
       return best;
+  }
+  // What follows the cloth over few frames and not over all lacks something, and any mesh says so.
+  if (follows_it && std::isfinite(options.coarse_beyond)) {
+    Eigen::VectorXd values = start;
+    RefineResult followed =
+        follow_coarse(coarse_problem, problem, options, true, values, progress, report);
+    if (followed.usable) return followed;
   }
   if (!follows_it || approach.by_coarse_mesh) best.values = away_from_ends(problem, best.values);
   for (const double share : kFineShares) {

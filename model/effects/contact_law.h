@@ -12,12 +12,13 @@ namespace clothfit {
 /// The force of an obstacle on a vertex.
 ///
 ///   F = N n - friction N v_t / sqrt(v_t^2 + (friction N / (rate m))^2)
-///   N = A max(stiffness depth - damping v_n, 0) where depth > 0, else 0
+///   N = A max(stiffness depth - damping v_n depth / (depth + soft), 0) where depth > 0, else 0
 ///
-/// depth (m): how far the vertex is inside the obstacle; n: the obstacle's outward unit normal
-/// there; v_n = n . v and v_t = v - v_n n: velocity of the vertex against the obstacle, which
-/// rests; A: the area that belongs to the vertex in the flat cloth; m its mass. The obstacle
-/// pushes, never pulls.
+/// soft = 0.5 mm: over such a depth the dashpot sets in, so that a touch has no jump and the motion
+/// after it has a derivative by the obstacle's place. depth (m): how far the vertex is inside the
+/// obstacle; n: the obstacle's outward unit normal there; v_n = n . v and v_t = v - v_n n: velocity
+/// of the vertex against the obstacle, which rests; A: the area that belongs to the vertex in the
+/// flat cloth; m its mass. The obstacle pushes, never pulls.
 ///
 /// Source: penalty of the depth with a dashpot, Coulomb's friction. Friction is smoothed where
 /// sliding changes its sign, at the speed below which it would damp faster than `rate`: there it is
@@ -26,6 +27,7 @@ namespace clothfit {
 struct Contact {
   static constexpr int kParameters = 3;  ///< stiffness, damping, friction come first
   static constexpr double kFrictionRate_per_s = 2000;
+  static constexpr double kSoft_m = 5e-4;
 
   template <class Real>
   static Vector3<Real> force(const Real& depth_m, const Vector3<Real>& normal,
@@ -35,7 +37,9 @@ struct Contact {
     using std::sqrt;
     const Real none(0.0);
     const Real leaving = dot(normal, velocity_m_per_s);
-    Real pressure = stiffness_pa_per_m * depth_m - damping_pa_s_per_m * leaving;
+    const Real inside = select(depth_m > none, depth_m, none);
+    Real pressure = stiffness_pa_per_m * depth_m -
+                    damping_pa_s_per_m * leaving * (inside / (inside + Real(kSoft_m)));
     // At neutral the force is exactly nothing; its derivative by the stiffness is that of a push.
     pressure = select(pressure < none, none, pressure);
     const Real press_n = Real(area_m2) * select(depth_m > none, pressure, none);
@@ -78,7 +82,7 @@ struct Contact {
          .lower = 0,
          .upper = 1e5,
          .typical = 1000},
-        {.name = "damping", .unit = "Pa s/m", .neutral = 0, .lower = 0, .upper = 500, .typical = 1},
+        {.name = "damping", .unit = "Pa s/m", .neutral = 0, .lower = 0, .upper = 250, .typical = 1},
         {.name = "friction",
          .unit = "ratio",
          .neutral = 0,

@@ -21,6 +21,11 @@ struct Law {
                           at.mass_kg, p[0], p[1], p[2]);
   }
 
+  static bool acts(const VertexSight<double>& at, const std::array<double, kParameters>& p) {
+    const Vector3<double> n = direction(Vector3<double>{p[3], p[4], p[5]});
+    return dot(n, at.position_m) < p[6];
+  }
+
   static EffectRates rates(const Cloth& cloth, const SpringParameters&,
                            const std::vector<double>& parameters) {
     return Contact::rates(cloth, parameters);

@@ -21,6 +21,11 @@ struct Law {
                           at.mass_kg, p[0], p[1], p[2]);
   }
 
+  static bool acts(const VertexSight<double>& at, const std::array<double, kParameters>& p) {
+    const Vector3<double> from_centre = at.position_m - Vector3<double>{p[3], p[4], p[5]};
+    return dot(from_centre, from_centre) < p[6] * p[6];
+  }
+
   static EffectRates rates(const Cloth& cloth, const SpringParameters&,
                            const std::vector<double>& parameters) {
     return Contact::rates(cloth, parameters);

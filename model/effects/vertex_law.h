@@ -239,6 +239,16 @@ auto at_moment(const std::array<Real, count>& parameters, double time_s) {
     return parameters;
 }
 
+/// Tells whether a law does anything at a vertex, or would after a small change. A law may say so
+/// in its acts; derivatives are nothing elsewhere, and are not taken.
+template <class Law, size_t count>
+bool acts(const VertexSight<double>& at, const std::array<double, count>& parameters) {
+  if constexpr (requires { Law::acts(at, parameters); })
+    return Law::acts(at, parameters);
+  else
+    return true;
+}
+
 /// Makes an effect whose force on a vertex follows from its sight. A Law has
 ///   static constexpr int kParameters;
 ///   template <class Real> static Vector3<Real> force(const VertexSight<Real>&,
@@ -247,8 +257,9 @@ auto at_moment(const std::array<Real, count>& parameters, double time_s) {
 /// Where the parameters act through something that changes with time alone, it may have that too.
 /// `force` then gets its result in their place:
 ///   template <class Real> static T at_moment(const std::array<Real, kParameters>&, double time_s);
-/// It may say what it looks at, so that derivatives are taken only by that:
+/// It may say what it looks at, so that derivatives are taken only by that, and where it acts:
 ///   static constexpr LooksAt kLooksAt;
+///   static bool acts(const VertexSight<double>&, const std::array<double, kParameters>&);
 /// Lanes, tangents and the adjoint follow from these.
 template <class Law>
 class VertexLawEffect final : public LawEffect<VertexLawEffect<Law>, Law> {
@@ -266,6 +277,7 @@ class VertexLawEffect final : public LawEffect<VertexLawEffect<Law>, Law> {
                        const EffectValues<SingleLane>& parameters, const EffectMemory<SingleLane>&,
                        EffectLinearisation& derivatives) const override {
     constexpr int kFew = 10;  // parameters in one pass; a second look at the law costs as much
+    const auto values = constants<double, size_t{Law::kParameters}>(parameters);
     if constexpr (Law::kParameters > kFew) {
       linearise_by_many(scene, parameters, derivatives);
     } else {
@@ -273,6 +285,7 @@ class VertexLawEffect final : public LawEffect<VertexLawEffect<Law>, Law> {
       const auto p = at_moment<Law>(Dual::parameters_of(parameters), scene.time_s);
       for_vertices<SingleLane>(
           scene, [&](int k, const AreaStencil& area, const VertexSight<double>& sight) {
+            if (!acts<Law>(sight, values)) return;
             Dual::add_blocks(k, area, scene.position_m,
                              Dual::jacobian(Law::force(Dual::sight(sight), p)), derivatives);
           });
@@ -282,6 +295,7 @@ class VertexLawEffect final : public LawEffect<VertexLawEffect<Law>, Law> {
         constants<MassDual::Number, size_t{Law::kParameters}>(parameters), scene.time_s);
     for_vertices<SingleLane>(
         scene, [&](int k, const AreaStencil&, const VertexSight<double>& sight) {
+          if (!acts<Law>(sight, values)) return;
           MassDual::add_block(k, Law::force(MassDual::sight(sight), fixed), derivatives);
         });
   }
