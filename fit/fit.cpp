@@ -247,6 +247,28 @@ void run_on(const FitInput& input, const FitProblem& problem, const FitOptions& 
     result.observations_used += static_cast<int>(set.rows.size());
 }
 
+/// Returns sigmas that are known from elsewhere, with the intervals of normal numbers; nothing for
+/// the others.
+Uncertainty stated(const FitProblem& problem, const Eigen::VectorXd& values,
+                   const std::map<std::string, double>& known) {
+  const int count = problem.space.size();
+  Uncertainty result{.sigma = Eigen::VectorXd::Zero(count),
+                     .lower = values,
+                     .upper = values,
+                     .correlation = Eigen::MatrixXd::Identity(count, count),
+                     .roughness = Eigen::VectorXd::Ones(count)};
+  for (int p = 0; p < count; ++p) {
+    const FitParameter& parameter = problem.space.parameters[static_cast<size_t>(p)];
+    if (const auto sigma = known.find(parameter.name); sigma != known.end())
+      result.sigma[p] = sigma->second;
+    constexpr double kOfNormal = 1.645;  // half the interval of kIntervalLevel
+    const double half = kOfNormal * result.sigma[p];
+    result.lower[p] = std::max(parameter.lower, values[p] - half);
+    result.upper[p] = std::min(parameter.upper, values[p] + half);
+  }
+  return result;
+}
+
 void forecast(const FitInput& input, const FitProblem& problem, const FitOptions& options,
               FitReport& report) {
   const Eigen::VectorXd values = problem.space.start();
@@ -270,6 +292,9 @@ void identify_all(const FitInput& input, const FitProblem& problem, const FitOpt
   result.time_step_s = refined.time_step_s;
   report.stop = refined.converged ? FitStop::converged : FitStop::reached_limit;
   report.message = refined.message;
+  // What a model says of its sigmas that leaves so much is worth no time.
+  if (2 * refined.cost > options.coarse_beyond)
+    return run_on(input, problem, options, values, stated(problem, values, {}), {}, {}, report);
   const TrajectoryObjective objective(
       problem, problem.first_held_out,
       time_steps_of_run(problem.cloth, parameter_set(problem, values), result.time_step_s));
@@ -316,29 +341,18 @@ FitReport report_at(const FitInput& input, const FitOptions& options,
   options.validate();
   const auto [columns, rows] = mesh_of(input.recording.cloth, options);
   const FitProblem problem = make_problem(input, options, columns, rows);
-  const int count = problem.space.size();
   Eigen::VectorXd values = problem.space.start();
-  Uncertainty uncertainty{.sigma = Eigen::VectorXd::Zero(count),
-                          .lower = values,
-                          .upper = values,
-                          .correlation = Eigen::MatrixXd::Identity(count, count),
-                          .roughness = Eigen::VectorXd::Ones(count)};
-  for (int p = 0; p < count; ++p) {
+  for (int p = 0; p < problem.space.size(); ++p) {
     const FitParameter& parameter = problem.space.parameters[static_cast<size_t>(p)];
     if (const auto value = known.values.find(parameter.name); value != known.values.end())
       values[p] = std::clamp(value->second, parameter.lower, parameter.upper);
-    if (const auto sigma = known.sigma.find(parameter.name); sigma != known.sigma.end())
-      uncertainty.sigma[p] = sigma->second;
-    constexpr double kOfNormal = 1.645;  // half the interval of kIntervalLevel
-    const double half = kOfNormal * uncertainty.sigma[p];
-    uncertainty.lower[p] = std::max(parameter.lower, values[p] - half);
-    uncertainty.upper[p] = std::min(parameter.upper, values[p] + half);
   }
   FitReport report = report_of(input, problem, options);
   report.stop = FitStop::converged;
   report.stages.push_back("nothing fitted here: the values come from a fit elsewhere");
   report.result.time_step_s = own_time_step_s(problem, options, values);
-  run_on(input, problem, options, values, uncertainty, known.marker_offsets, {}, report);
+  run_on(input, problem, options, values, stated(problem, values, known.sigma),
+         known.marker_offsets, {}, report);
   return report;
 }
 

@@ -136,7 +136,7 @@ class Run {
     if (result_.complete)
       result_.limits = detection_limits(model, result_.after, analysis.found.last,
                                         worth_naming(model, threshold, explained));
-    if (result_.changed())
+    if (result_.changed() || model.misfits_grossly())
       reports_.add(analysis.setup, model, &DiagnosedRecording::after);
     else
       for (DiagnosedRecording& recording : reports_.recordings) recording.after = recording.before;

@@ -67,8 +67,11 @@ void RecordingReports::add_fitted(const DiagnosisSetup& setup, const FittedModel
                                   Which which) {
   const std::vector<NamedValues> values = model.values();
   const Loss loss = setup.options.loss;
+  // Sigmas of a model that is to be replaced are worth no time where it misfits grossly.
+  const bool is_passing = which == &DiagnosedRecording::before && model.misfits_grossly();
   const std::vector<NamedValues> sigma =
-      sigma_of(model, judge_adequacy(model, loss), huber_threshold(model, loss));
+      is_passing ? std::vector<NamedValues>(fitted_.size())
+                 : sigma_of(model, judge_adequacy(model, loss), huber_threshold(model, loss));
   for (size_t n = 0; n < fitted_.size(); ++n) {
     FitReport& own = recordings[n].*which;
     own = report_at(fitted_[n], options_on_mesh(setup, model.hypotheses, n),

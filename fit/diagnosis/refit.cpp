@@ -272,22 +272,29 @@ std::vector<FittedModel> fit_with_hypotheses(const DiagnosisSetup& setup, const 
                                              double first_share, double threshold,
                                              const ProgressCallback& progress) {
   if (first_share == 1) return fit_near(setup, model, scores, threshold, progress);
-  std::vector<const Score*> racing;
-  for (const Score* score : scores)
-    if (score->fitted.empty()) racing.push_back(score);
-  std::vector<FittedModel> raced =
-      race_hypotheses(setup, model, early, racing, first_share, threshold, progress);
-  std::vector<FittedModel> fitted;
-  size_t contacts = 0;
-  for (const Score* score : scores) {
-    if (score->fitted.empty())
-      fitted.push_back(std::move(raced[fitted.size() - contacts]));
-    else
-      fitted.push_back(lead_contact(setup, model, early, *score, progress));
-    contacts += score->fitted.empty() ? 0 : 1;
-  }
-  // Growing horizons can lead astray where no single hypothesis brings the model near the cloth.
+  std::vector<FittedModel> fitted(scores.size());
   const double without = model.chi_square(threshold);
+  const auto count = static_cast<double>(model.residual_count());
+  bool is_contact_alone = false;
+  std::vector<size_t> racing;
+  for (size_t k = 0; k < scores.size(); ++k) {
+    if (scores[k]->fitted.empty()) {
+      racing.push_back(k);
+      continue;
+    }
+    fitted[k] = lead_contact(setup, model, early, *scores[k], progress);
+    is_contact_alone = is_contact_alone || (fitted[k].usable() &&
+                                            fitted[k].chi_square(threshold) - count <
+                                                (1 - kCriteria.contact_alone) * (without - count));
+  }
+  // Nothing else can take as much, and none of the others is told from contact by the race.
+  if (is_contact_alone) return fitted;
+  std::vector<const Score*> raced;
+  for (const size_t k : racing) raced.push_back(scores[k]);
+  std::vector<FittedModel> models =
+      race_hypotheses(setup, model, early, raced, first_share, threshold, progress);
+  for (size_t n = 0; n < racing.size(); ++n) fitted[racing[n]] = std::move(models[n]);
+  // Growing horizons can lead astray where no single hypothesis brings the model near the cloth.
   for (size_t k = 0; k < fitted.size(); ++k) {
     if (!fitted[k].usable() || fitted[k].chi_square(threshold) < without) continue;
     if (!scores[k]->fitted.empty()) continue;

@@ -35,9 +35,9 @@ class Asked {
     if (!ask(keeps_its_promise()) || !ask(is_worth_a_name())) return trial_;
 
     measure_left_out();
-    if (!ask(predicts_better()) || !ask(is_clear_of_neutral()) || !ask(matters()) ||
-        !ask(beats_free_forces()))
-      return trial_;
+    if (!ask(predicts_better())) return trial_;
+    measure_clearance();
+    if (!ask(is_clear_of_neutral()) || !ask(matters()) || !ask(beats_free_forces())) return trial_;
     if (!ask(beats_corrections())) trial_.on_credit = takes_good_part();
     return trial_;
   }
@@ -68,6 +68,10 @@ class Asked {
     trial_.without_it = models_.without_left_out.mean;
     trial_.best_trivial =
         std::min(without_physics(models_.without_left_out), models_.without_left_out.free_forces);
+  }
+
+  /// It takes runs by the dozen.
+  void measure_clearance() {
     const Adequacy structure = judge_adequacy(models_.with, search_.setup.options.loss);
     trial_.clear_of_neutral =
         describe_effect(trial_.hypothesis.effect).touches

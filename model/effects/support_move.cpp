@@ -56,7 +56,7 @@ EffectDescription describe() {
           {.name = "",
            .amplitudes = {"by_x", "by_y", "by_z"},
            .shapes = {{.parameter = "from", .values = {0, 0.25, 0.5, 0.75}, .of_duration = true},
-                      {.parameter = "lasts", .values = {0.1, 0.3, 0.6}, .of_duration = true}}}),
+                      {.parameter = "lasts", .values = {0.15, 0.5}, .of_duration = true}}}),
       .remedy = kDeclareMotion,
       .in_words = in_words};
   effect.parameters.push_back(

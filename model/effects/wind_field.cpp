@@ -116,7 +116,7 @@ std::vector<EffectMode> modes() {
   pulse.name = "pulse";
   pulse.shapes = {
       {.parameter = "phase", .values = {-0.375, -0.125, 0.125, 0.375}},
-      {.parameter = "frequency", .values = {0.5, 1, 1.5, 2, 2.5, 3, 3.5, 4}, .per_duration = true}};
+      {.parameter = "frequency", .values = {0.5, 1, 1.5, 2, 3, 4}, .per_duration = true}};
   return {{.name = "cloth", .amplitudes = {"p", "p_s", "p_t"}, .shapes = {}},
           {.name = "world", .amplitudes = {"p", "slope_x", "slope_y", "slope_z"}, .shapes = {}},
           std::move(harmonic),
