@@ -58,7 +58,8 @@ ShapeCandidates shapes_of(const Recording& recording, const EffectDescription& e
                         .mode = mode.name,
                         .amplitudes = mode.amplitudes,
                         .shape = {},
-                        .shape_sigma = {}};
+                        .shape_sigma = {},
+                        .beside = mode.beside};
   ShapeCandidates result{hypothesis};
   for (const ShapeGrid& grid : mode.shapes) {
     if (grid.per_held_point) {

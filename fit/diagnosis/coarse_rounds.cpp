@@ -29,7 +29,7 @@ void refine_near_best(const SearchContext& search, std::vector<BeamEntry>& entri
   for_each_index(entries.size(), [&](size_t k) {
     if (excess_of(entries[k].model) > kCriteria.coarse_near_best * least) return;
     FittedModel refined = entries[k].model;
-    refine_model(refined, search.setup, {}, search.progress);
+    refine_model(refined, search.setup, kNearEnough, search.progress);
     if (refined.usable()) entries[k].model = std::move(refined);
   });
 }

@@ -250,7 +250,7 @@ std::vector<Score> score_contacts(const SearchContext& search, const DiagnosisSe
       return search.left_by(model) >= search.left_by(onward);
     });
     for_each_index(models.size(), [&](size_t k) {
-      refine_model(models[k], mesh, {.rounds = 1}, search.progress);
+      refine_model(models[k], mesh, {.rounds = 1, .linearisations = 3}, search.progress);
     });
     const auto best = std::ranges::min_element(
         models, {}, [&](const FittedModel& model) { return search.left_by(model); });

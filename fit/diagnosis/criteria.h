@@ -38,6 +38,7 @@ struct DiagnosisCriteria {
   double cautious_start = 0.5;
   double exact_fit_of_best = 0.5;
   double race_far_behind = 10;
+  double scored_again_of_best = 0.25;
   double contact_alone = 0.8;
   double race_worth = 0.1;
   double race_of_noise = 0.2;

@@ -106,7 +106,7 @@ void refine_with_discretisation(FittedModel& model, const DiagnosisSetup& setup,
       part.directions.resize(part.linear.residual.size(), 0);
       part.amplitudes.resize(0);
     }
-    refine_model(model, setup, {}, progress);
+    refine_model(model, setup, kNearEnough, progress);
     if (!model.usable() || model.misfits_grossly()) return;
   }
   std::vector<DiscretisationError> errors = discretisation_errors(setup, model);

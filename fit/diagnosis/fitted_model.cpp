@@ -25,10 +25,6 @@ constexpr int kFewestFrames = 8;
 constexpr double kKeptWithin = 0.02;
 constexpr double kUpdatedWithin = 0.15;
 
-/// Exact derivatives of each recording in one fit. A model that takes more of them is wrong, or
-/// near enough: they cost tens of runs.
-constexpr int kMostLinearisations = 8;
-
 void set_neutral(const EffectDescription& effect, const std::vector<Binding>& bindings,
                  Eigen::VectorXd& values) {
   for (size_t k = 0; k < bindings.size(); ++k)
@@ -231,7 +227,7 @@ void refine_model(FittedModel& model, const DiagnosisSetup& setup, const StageOp
     most_spring_steps += final_refinement(*problem, setup.options).most_spring_steps;
   const PooledOptions pooled{
       .iterations = options.iterations,
-      .linearisations = kMostLinearisations * static_cast<int>(model.problems.size()),
+      .linearisations = options.linearisations * static_cast<int>(model.problems.size()),
       .rounds = options.rounds,
       .least_decrease = options.least_decrease,
       .loss = setup.options.loss,

@@ -106,12 +106,18 @@ FittedModel shortened(const FittedModel& model, double share);
 struct StageOptions {
   int rounds = 2;
   int iterations = 20;
+  /// Exact derivatives of each recording in one fit. They cost tens of runs, and a model that takes
+  /// more of them is wrong, or near enough.
+  int linearisations = 8;
   /// A step that promises less than this of half chi-square is the last one. The default moves no
   /// parameter by a seventh of its sigma.
   double least_decrease = 0.01;
   bool own_only = false;   ///< what recordings share stays
   bool unrefined = false;  ///< with the derivatives that it has, updated (fit/refine/pooled_fit.h)
 };
+
+/// A model that lacks much more need not stand at its optimum, which says little.
+inline constexpr StageOptions kNearEnough{.linearisations = 3};
 
 /// Refines a model from where it stands, with the derivatives that it has or new ones.
 void refine_model(FittedModel& model, const DiagnosisSetup& setup, const StageOptions& options,

@@ -31,7 +31,7 @@ bool refine(const SearchContext& search, BeamEntry& entry) {
   FittedModel refined = entry.model;
   // What a model that lacks much says does not depend on errors of its mesh.
   if (refined.misfit() > kCriteria.biased)
-    refine_model(refined, search.setup, {}, search.progress);
+    refine_model(refined, search.setup, kNearEnough, search.progress);
   else
     refine_with_discretisation(refined, search.setup, search.progress);
   if (!refined.usable()) {

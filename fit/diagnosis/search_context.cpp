@@ -33,12 +33,22 @@ bool SearchContext::is_far_off(const FittedModel& model) const {
   return left_by(model) > kCriteria.far_off * static_cast<double>(model.residual_count());
 }
 
+bool SearchContext::may_ask(const FittedModel& model, const Hypothesis& hypothesis) const {
+  const auto has = [&](const std::string& effect) {
+    return std::ranges::find(model.hypotheses, effect, &Hypothesis::effect) !=
+               model.hypotheses.end() ||
+           std::ranges::find(setup.options.effects, effect) != setup.options.effects.end();
+  };
+  const bool is_new = std::ranges::none_of(
+      model.hypotheses, [&](const Hypothesis& own) { return own.same_mode(hypothesis); });
+  return is_new && (hypothesis.beside.empty() || std::ranges::any_of(hypothesis.beside, has));
+}
+
 std::vector<ShapeCandidates> SearchContext::untested(const FittedModel& model) const {
   const NamedValues values = model.values().front();
   std::vector<ShapeCandidates> result;
   for (const ShapeCandidates& shapes : options.hypotheses)
-    if (std::ranges::none_of(model.hypotheses,
-                             [&](const Hypothesis& own) { return own.same_mode(shapes.front()); }))
+    if (may_ask(model, shapes.front()))
       result.push_back(at_shapes_of(model.hypotheses, values, shapes));
   return result;
 }

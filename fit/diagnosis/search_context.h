@@ -51,7 +51,10 @@ struct SearchContext {
   /// Tells whether it leaves so much that its basin may be the wrong one. Its sigmas are then those
   /// of all that it lacks.
   bool is_far_off(const FittedModel& model) const;
-  /// Returns hypotheses that a model does not have, at the shapes that it has for their effects.
+  /// Tells whether a model does not have a hypothesis yet, and has what it refines.
+  bool may_ask(const FittedModel& model, const Hypothesis& hypothesis) const;
+  /// Returns hypotheses that a model does not have and may be asked for, at the shapes that it has
+  /// for their effects.
   std::vector<ShapeCandidates> untested(const FittedModel& model) const;
 };
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <functional>
 #include <initializer_list>
+#include <iterator>
 #include <utility>
 
 #include "fit/diagnosis/adequacy.h"
@@ -33,6 +34,12 @@ void sort_by_share(std::vector<Score>& scores) {
   std::ranges::stable_sort(scores, std::greater<>(), &Score::share);
 }
 
+double most_decrease(const std::vector<Score>& scores) {
+  double most = 0;
+  for (const Score& score : scores) most = std::max(most, score.decrease);
+  return most;
+}
+
 /// Scores hypotheses at the shapes given, and then beside the best ones. A hypothesis that comes
 /// with one shape keeps it. A mode may explain several times as much between the grid's points.
 std::vector<Score> at_best_shapes(const SearchContext& search, const FittedModel& model,
@@ -40,8 +47,7 @@ std::vector<Score> at_best_shapes(const SearchContext& search, const FittedModel
                                   const std::vector<ShapeCandidates>& hypotheses) {
   std::vector<Score> scores = score_hypotheses(model, projection, hypotheses, search.progress);
   for (const double part : kShapeParts) {
-    double most = least_decrease(1);
-    for (const Score& score : scores) most = std::max(most, score.decrease);
+    const double most = std::max(least_decrease(1), most_decrease(scores));
     std::vector<ShapeCandidates> around;
     for (const Score& score : scores) {
       const ShapeCandidates& given =
@@ -221,8 +227,7 @@ Shortlist over_shares(const SearchContext& search, const DiagnosisSetup& setup,
 /// Over all frames a missing effect shows least, for other parameters have taken up much of it.
 bool says_enough(const SearchContext& search, const FittedModel& model, const Shortlist& list) {
   const double above = sure_excess(model, search.threshold);
-  double predicted = 0;
-  for (const Score& score : list.best) predicted = std::max(predicted, score.decrease);
+  const double predicted = most_decrease(list.best);
   return above == 0 || predicted > kCriteria.explained_at_once * above ||
          judge_adequacy(model, search.setup.options.loss).adequate;
 }
@@ -267,21 +272,40 @@ std::vector<Score> score_at_best_shapes(const SearchContext& search, const Diagn
   // cloth wrong altogether. So places are all scored here while nothing has been found yet.
   std::vector<ShapeCandidates> elsewhere;
   for (const ShapeCandidates& shapes : hypotheses)
-    if (shapes.size() > 1 && (!model.hypotheses.empty() || !is_over_cloth(shapes.front())))
-      elsewhere.push_back(shapes);
+    if (!model.hypotheses.empty() || !is_over_cloth(shapes.front())) elsewhere.push_back(shapes);
+  std::vector<Score> far;
   const FittedModel coarse = with_derivatives_of(search.coarse, model);
   if (coarse.usable()) {
     const ModelProjection coarse_projection(coarse, search.setup.options.loss);
-    const std::vector<Score> chosen = at_best_shapes(search, coarse, coarse_projection, elsewhere);
-    for (ShapeCandidates& shapes : hypotheses)
-      for (const Score& score : chosen)
-        if (score.hypothesis.same_mode(shapes.front())) shapes = {score.hypothesis};
+    far = at_best_shapes(search, coarse, coarse_projection, elsewhere);
+    const double near = kCriteria.scored_again_of_best *
+                        (far.empty() ? 0 : std::max(least_decrease(1), most_decrease(far)));
+    for (const Score& score : far) {
+      const auto own = std::ranges::find_if(hypotheses, [&](const ShapeCandidates& shapes) {
+        return score.hypothesis.same_mode(shapes.front());
+      });
+      if (score.decrease < near)
+        hypotheses.erase(own);
+      else
+        *own = {score.hypothesis};
+    }
+    std::erase_if(far, [&](const Score& score) { return score.decrease >= near; });
   }
-  return at_best_shapes(search, model, projection, hypotheses);
+  std::vector<Score> scores = at_best_shapes(search, model, projection, hypotheses);
+  std::ranges::move(without_columns(std::move(far)), std::back_inserter(scores));
+  sort_by_share(scores);
+  return scores;
+}
+
+/// Returns chi-square per residual from which a horizon shows that something is missing. A mesh
+/// that only chooses errs by more than the noise.
+double visible_from(const SearchContext& search) {
+  return search.only_chooses ? kCriteria.biased : kCriteria.visible;
 }
 
 Shortlist make_shortlist(const SearchContext& search, const FittedModel& model) {
-  if (model.misfit() > kCriteria.biased) return over_few_frames(search, model, kCriteria.visible);
+  if (model.misfit() > kCriteria.biased)
+    return over_few_frames(search, model, visible_from(search));
   Shortlist list = over_shares(search, search.setup, model, 1, kCriteria.visible);
   if (says_enough(search, model, list)) return list;
   const double scatter = std::sqrt(2 / static_cast<double>(model.residual_count()));

@@ -18,6 +18,8 @@ struct Hypothesis {
   /// Whole numbers that pick what it acts on, such as a held point (EffectParameter::picks). They
   /// are given, and never fitted or moved.
   std::map<std::string, int> picked = {};
+  /// Effects of which a model must have one for it to be asked (EffectMode::beside).
+  std::vector<std::string> beside = {};
 
   std::string title() const;  ///< "nonuniform_mass (hem)", "support_drift (single, held point 1)"
   /// Names of the amplitudes in the space of a fit, EFFECT.PARAMETER.

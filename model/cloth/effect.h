@@ -65,6 +65,8 @@ struct EffectMode {
   std::string name;                     ///< such as "hem"; empty where an effect has one mode only
   std::vector<std::string> amplitudes;  ///< parameters; at their neutral values the mode is absent
   std::vector<ShapeGrid> shapes;        ///< tried at each combination; all others stay neutral
+  /// Effects that it refines. It is asked only of models that have one of them; none: of all.
+  std::vector<std::string> beside = {};
 };
 
 /// Describes an effect. At the neutral values of all its parameters it leaves the trajectory

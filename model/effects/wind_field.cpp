@@ -109,6 +109,7 @@ std::vector<EffectParameter> parameters() {
 std::vector<EffectMode> modes() {
   EffectMode harmonic = Harmonic::modes("q").front(), pulse = harmonic;
   harmonic.name = "harmonic";
+  harmonic.beside = {"wind", "gust", "wind_field"};
   harmonic.amplitudes = {"h", "h_s", "h_t"};
   // A pulse at any phase is no sum of those at two. Its phase stands first, so that none is taken
   // for a harmonic (Harmonic::is_followed_by). Half a turn more is not the other sign, so phases go
@@ -117,8 +118,14 @@ std::vector<EffectMode> modes() {
   pulse.shapes = {
       {.parameter = "phase", .values = {-0.375, -0.125, 0.125, 0.375}},
       {.parameter = "frequency", .values = {0.5, 1, 1.5, 2, 3, 4}, .per_duration = true}};
-  return {{.name = "cloth", .amplitudes = {"p", "p_s", "p_t"}, .shapes = {}},
-          {.name = "world", .amplitudes = {"p", "slope_x", "slope_y", "slope_z"}, .shapes = {}},
+  return {{.name = "cloth",
+           .amplitudes = {"p", "p_s", "p_t"},
+           .shapes = {},
+           .beside = {"wind", "gust", "wind_field"}},
+          {.name = "world",
+           .amplitudes = {"p", "slope_x", "slope_y", "slope_z"},
+           .shapes = {},
+           .beside = {"wind", "gust", "wind_field"}},
           std::move(harmonic),
           std::move(pulse)};
 }

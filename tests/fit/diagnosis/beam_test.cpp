@@ -40,6 +40,22 @@ std::string extend(Beam& beam, std::vector<BeamEntry> children) {
   return effects;
 }
 
+TEST(Beam, PutsTheSimplestOfThoseAlikeFirst) {
+  const auto with_numbers = [](double cost, const std::string& effect, int numbers) {
+    BeamEntry entry = entry_of(cost, {effect});
+    entry.model.hypotheses.front().amplitudes.resize(static_cast<size_t>(numbers), "a");
+    return entry;
+  };
+  constexpr double kTold = 25;  // chi-square between entries that are told apart
+  Beam alike(entry_of(kBase, {}), 3, 4);
+  EXPECT_EQ(extend(alike, {with_numbers(40, "gust", 5), with_numbers(39 + kTold, "wind", 3)}), "");
+  EXPECT_EQ(effects_of(alike.best()), "wind");
+  Beam told_apart(entry_of(kBase, {}), 3, 4);
+  EXPECT_EQ(extend(told_apart, {with_numbers(40, "gust", 5), with_numbers(41 + kTold, "wind", 3)}),
+            "");
+  EXPECT_EQ(effects_of(told_apart.best()), "gust");
+}
+
 TEST(Beam, ExtendsTheCheapestEntryFirst) {
   Beam beam(entry_of(kBase, {}), 3, 4);
   EXPECT_EQ(extend(beam, {entry_of(50, {"b"}), entry_of(40, {"a"})}), "");

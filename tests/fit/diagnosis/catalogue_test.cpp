@@ -224,7 +224,7 @@ TEST(HypothesesToTest, TryEachCombinationOfShapesWithFrequenciesInTheDuration) {
       EXPECT_EQ(mode.front().shape.at("frequency"), 1);  // half a turn in half a second
     }
     if (mode.front().effect == "wind_field" && mode.front().mode == "pulse") {
-      EXPECT_EQ(mode.size(), 32u);  // 8 frequencies, 4 phases
+      EXPECT_EQ(mode.size(), 24u);  // 6 frequencies, 4 phases
     }
     if (mode.front().effect == "relaxation") {
       EXPECT_GT(mode.front().shape_sigma.at("time"), 0);
