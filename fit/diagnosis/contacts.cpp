@@ -148,6 +148,13 @@ std::vector<Shape> places(const std::string& effect, const std::vector<Push>& pu
     shapes.insert(shapes.end(), more.begin(), more.end());
     if (first.size() == pushes.size()) break;
   }
+  const std::vector<EffectParameter> parameters = describe_effect(effect).parameters;
+  std::erase_if(shapes, [&](const Shape& shape) {
+    return std::ranges::any_of(shape, [&](const auto& number) {
+      const auto range = std::ranges::find(parameters, number.first, &EffectParameter::name);
+      return number.second < range->lower || number.second > range->upper;
+    });
+  });
   return shapes;
 }
 

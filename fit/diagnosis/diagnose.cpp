@@ -151,14 +151,30 @@ class Run {
     search_all_twins(analysis);
     clock_.enter("proposed law");
     if (result_.after.adequate || options_.law_terms == 0) return;
-    result_.law = propose_law(analysis.setup, model,
+    propose_law_for(analysis.setup, model, threshold);
+  }
+
+  /// Proposes a law for what a model leaves. The coarse mesh does for that, corrected by what the
+  /// meshes differ by.
+  void propose_law_for(const DiagnosisSetup& setup, const FittedModel& model, double threshold) {
+    const DiagnosisSetup coarse = with_coarse_mesh(setup);
+    const bool is_coarse = is_coarser(coarse, setup);
+    const FittedModel there = is_coarse ? corrected_on_mesh(coarse, model) : model;
+    if (!there.usable()) return;
+    result_.law = propose_law(is_coarse ? coarse : setup, there,
                               {.most_terms = options_.law_terms,
                                .blocks = static_cast<int>(kCriteria.time_blocks),
                                .without = options_.without,
                                .threshold = threshold},
                               progress_);
-    if (result_.law.found())
-      reports_.add(analysis.setup, result_.law.model, &DiagnosedRecording::with_law);
+    if (!result_.law.found()) return;
+    if (is_coarse) {
+      FittedModel here = model_at(setup, result_.law.model.hypotheses, result_.law.model.values());
+      refine_model(here, setup, kNearEnough, progress_);
+      if (!here.usable()) return;
+      result_.law.model = std::move(here);
+    }
+    reports_.add(setup, result_.law.model, &DiagnosedRecording::with_law);
   }
 
   DiagnosisVerdict verdict() const {

@@ -12,6 +12,7 @@
 #include "fit/diagnosis/discretisation.h"
 #include "fit/diagnosis/expand.h"
 #include "fit/diagnosis/prune.h"
+#include "fit/diagnosis/refit.h"
 #include "fit/diagnosis/shortlist.h"
 #include "fit/diagnosis/worth.h"
 #include "fit/jobs/stop_token.h"
@@ -23,6 +24,25 @@ BeamEntry first_entry(SearchContext& search, FittedModel base) {
   BeamEntry entry{.model = std::move(base), .accepted = {}, .last = {}, .refused = {}};
   begin_at(search, entry);
   return entry;
+}
+
+/// Fits the shapes of a model's hypotheses where it stands, all at once. They were chosen by the
+/// coarse mesh. What that errs by in them would look like another cause.
+void refine_shapes(const SearchContext& search, FittedModel& model) {
+  std::vector<Hypothesis> hypotheses = model.hypotheses;
+  bool any = false;
+  for (size_t k = 0; k < hypotheses.size(); ++k) {
+    Hypothesis& own = hypotheses[k];
+    const bool is_fitted =
+        std::any_of(hypotheses.begin(), hypotheses.begin() + static_cast<std::ptrdiff_t>(k),
+                    [&](const Hypothesis& before) { return share_shape(before, own); });
+    if (own.shape.empty() || own.fits_shape || is_fitted) continue;
+    own.fits_shape = any = true;
+  }
+  if (!any || !is_coarser(search.coarse, search.setup)) return;
+  FittedModel fitted = with_hypotheses(search.setup, model, hypotheses, {});
+  refine_model(fitted, search.setup, kNearEnough, search.progress);
+  if (fitted.usable() && search.cost(fitted) < search.cost(model)) model = std::move(fitted);
 }
 
 /// Refines an entry's model before it is extended. Returns false where that does not work out.
@@ -37,6 +57,12 @@ bool refine(const SearchContext& search, BeamEntry& entry) {
   if (!refined.usable()) {
     entry.finished = true;
     return false;
+  }
+  if (refined.misfit() <= kCriteria.biased) {
+    refine_shapes(search, refined);
+    for (AcceptedEffect& accepted : entry.accepted)
+      for (const Hypothesis& own : refined.hypotheses)
+        if (own.same_mode(accepted.trial.hypothesis)) accepted.trial.hypothesis = own;
   }
   entry.model = std::move(refined);
   entry.cost = search.cost(entry.model);

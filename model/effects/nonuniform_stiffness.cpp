@@ -77,6 +77,7 @@ Real factor(double s, double t, const std::array<Real, kCount>& p) {
 
 struct Law {
   static constexpr int kParameters = kCount, kMemory = 0;
+  static constexpr bool kThroughPlace = true;
 
   template <class Real>
   static Real of_place(double s, double t, const std::array<Real, kCount>& p) {

@@ -65,6 +65,8 @@ void for_springs(const EffectScene<L>& scene, const Visit& visit) {
 ///   // may have, of a spring whose middle is at (s, t), shares of the cloth's width and height:
 ///   template <class Real> static Real of_place(double s, double t,
 ///                                              const std::array<Real, kParameters>&);
+///   // and says with it that its parameters act through that alone, which saves most of the work:
+///   static constexpr bool kThroughPlace = true;
 ///   static EffectRates rates(const Cloth&, const SpringParameters&, const std::vector<double>&);
 /// Lanes, tangents and the adjoint follow from these.
 template <class Law>
@@ -113,85 +115,110 @@ class SpringLawEffect final : public LawEffect<SpringLawEffect<Law>, Law> {
                        const EffectMemory<SingleLane>& memory,
                        EffectLinearisation& derivatives) const override {
     // A tension depends on five numbers of the spring, the parameters and the memory.
-    constexpr int kOwn = 5, kMemory = kOwn + Law::kParameters, kCount = kMemory + Law::kMemory;
+    // Where these act through its place alone, that one number stands for them.
+    constexpr int kOwn = 5, kInner = kThroughPlace ? 1 : Law::kParameters, kMemory = kOwn + kInner,
+                  kCount = kMemory + Law::kMemory;
     using Dual = ceres::Jet<double, kCount>;
+    using OfPlace = ceres::Jet<double, Law::kParameters>;
     std::array<Dual, Law::kParameters> p;
-    for (int n = 0; n < Law::kParameters; ++n)
-      p[static_cast<size_t>(n)] = Dual(parameters[static_cast<size_t>(n)][0], kOwn + n);
-    const std::vector<Dual>* places = nullptr;
-    if constexpr (kHasPlaces) {
-      thread_local Remembered<Dual, Law::kParameters, 1> remembered;
-      places = &remembered.at(scene.cloth.mesh, reals_of<SingleLane, Law::kParameters>(parameters),
-                              [&] { return places_of(scene.cloth, p); });
+    for (int n = 0; n < Law::kParameters; ++n) {
+      const double value = parameters[static_cast<size_t>(n)][0];
+      p[static_cast<size_t>(n)] = kThroughPlace ? Dual(value) : Dual(value, kOwn + n % kInner);
     }
-    for_springs<SingleLane>(scene, [&](int number, const Spring& spring,
-                                       const Vector3<double>& rate_m_per_s,
-                                       const Vector3<double>& direction,
-                                       const SpringSight<double>& sight) {
-      SpringSight<Dual> at;
-      at.length_m = Dual(sight.length_m, 0);
-      at.stretching_m_per_s = Dual(sight.stretching_m_per_s, 1);
-      at.natural_length_m = Dual(sight.natural_length_m, 2);
-      at.stiffness_n_per_m = Dual(sight.stiffness_n_per_m, 3);
-      at.damping_ns_per_m = Dual(sight.damping_ns_per_m, 4);
-      at.type = sight.type;
-      if constexpr (kHasPlaces) at.of_place = (*places)[static_cast<size_t>(number)];
-      at.time_step_s = sight.time_step_s;
-      std::array<Dual, Law::kMemory> remembered;
-      const int first = number * Law::kMemory;
-      for (int m = 0; m < Law::kMemory; ++m)
-        remembered[static_cast<size_t>(m)] = Dual(memory(0, first + m), kMemory + m);
-      const Dual tension = Law::tension(at, p, remembered);
+    const std::vector<OfPlace>* places = nullptr;
+    if constexpr (kHasPlaces) {
+      thread_local Remembered<OfPlace, Law::kParameters, 1> remembered;
+      places =
+          &remembered.at(scene.cloth.mesh, reals_of<SingleLane, Law::kParameters>(parameters), [&] {
+            std::array<OfPlace, Law::kParameters> of;
+            for (int n = 0; n < Law::kParameters; ++n)
+              of[static_cast<size_t>(n)] = OfPlace(parameters[static_cast<size_t>(n)][0], n);
+            return places_of(scene.cloth, of);
+          });
+    }
+    for_springs<SingleLane>(
+        scene, [&](int number, const Spring& spring, const Vector3<double>& rate_m_per_s,
+                   const Vector3<double>& direction, const SpringSight<double>& sight) {
+          SpringSight<Dual> at;
+          at.length_m = Dual(sight.length_m, 0);
+          at.stretching_m_per_s = Dual(sight.stretching_m_per_s, 1);
+          at.natural_length_m = Dual(sight.natural_length_m, 2);
+          at.stiffness_n_per_m = Dual(sight.stiffness_n_per_m, 3);
+          at.damping_ns_per_m = Dual(sight.damping_ns_per_m, 4);
+          at.type = sight.type;
+          if constexpr (kHasPlaces) {
+            const OfPlace& place = (*places)[static_cast<size_t>(number)];
+            at.of_place = Dual(place.a);
+            if constexpr (kThroughPlace)
+              at.of_place.v[kOwn] = 1;
+            else
+              at.of_place.v.template segment<Law::kParameters>(kOwn) = place.v;
+          }
+          at.time_step_s = sight.time_step_s;
+          std::array<Dual, Law::kMemory> remembered;
+          const int first = number * Law::kMemory;
+          for (int m = 0; m < Law::kMemory; ++m)
+            remembered[static_cast<size_t>(m)] = Dual(memory(0, first + m), kMemory + m);
+          const Dual tension = Law::tension(at, p, remembered);
 
-      // dl = u . dL,  d(dl/dt) = u . dV + (V - u (u . V)) . dL / l,  du = (dL - u u . dL) / l
-      const Eigen::Vector3d u(direction.x, direction.y, direction.z);
-      const Eigen::Vector3d rate(rate_m_per_s.x, rate_m_per_s.y, rate_m_per_s.z);
-      const double inverse_length = sight.length_m > 0 ? 1 / sight.length_m : 0;
-      const Eigen::Vector3d turning = (rate - u * u.dot(rate)) * inverse_length;
-      const auto by_position = [&](const Dual& of) -> Eigen::Vector3d {
-        return of.v[0] * u + of.v[1] * turning;
-      };
-      const double ratio = tension.a * inverse_length;
-      const int a = spring.a, b = spring.b;
-      const auto here = static_cast<int>(derivatives.by_spring.size());
-      derivatives.by_spring.push_back({.a = a,
-                                       .b = b,
-                                       .direction = u,
-                                       .w_n_per_m = by_position(tension) - ratio * u,
-                                       .tension_ratio_n_per_m = ratio,
-                                       .damping_ns_per_m = tension.v[1]});
+          // dl = u . dL,  d(dl/dt) = u . dV + (V - u (u . V)) . dL / l,  du = (dL - u u . dL) / l
+          const Eigen::Vector3d u(direction.x, direction.y, direction.z);
+          const Eigen::Vector3d rate(rate_m_per_s.x, rate_m_per_s.y, rate_m_per_s.z);
+          const double inverse_length = sight.length_m > 0 ? 1 / sight.length_m : 0;
+          const Eigen::Vector3d turning = (rate - u * u.dot(rate)) * inverse_length;
+          const auto by_position = [&](const Dual& of) -> Eigen::Vector3d {
+            return of.v[0] * u + of.v[1] * turning;
+          };
+          const double ratio = tension.a * inverse_length;
+          const int a = spring.a, b = spring.b;
+          const auto here = static_cast<int>(derivatives.by_spring.size());
+          derivatives.by_spring.push_back({.a = a,
+                                           .b = b,
+                                           .direction = u,
+                                           .w_n_per_m = by_position(tension) - ratio * u,
+                                           .tension_ratio_n_per_m = ratio,
+                                           .damping_ns_per_m = tension.v[1]});
 
-      const int type = sight.type;
-      const auto parameter_number = [&](int n) {
-        return n == 0   ? ParameterNumber::natural_length(type)
-               : n == 1 ? ParameterNumber::stiffness(type)
-               : n == 2 ? ParameterNumber::damping(type)
-                        : ParameterNumber::own(n - 3);
-      };
-      for (int n = 0; n < 3 + Law::kParameters; ++n)
-        if (tension.v[2 + n] != 0 && derivatives.asks_for(parameter_number(n)))
-          derivatives.tension_by_parameter.push_back({here, parameter_number(n), tension.v[2 + n]});
-      for (int m = 0; m < Law::kMemory; ++m) {
-        derivatives.tension_by_memory.push_back({here, first + m, tension.v[kMemory + m]});
-        const Dual& next = remembered[static_cast<size_t>(m)];
-        derivatives.memory_by_motion.push_back(
-            {first + m, b, by_position(next).transpose(), next.v[1] * u.transpose()});
-        derivatives.memory_by_motion.push_back(
-            {first + m, a, -by_position(next).transpose(), -next.v[1] * u.transpose()});
-        for (int n = 0; n < 3 + Law::kParameters; ++n)
-          if (next.v[2 + n] != 0 && derivatives.asks_for(parameter_number(n)))
-            derivatives.memory_by_parameter.push_back(
-                {first + m, parameter_number(n), next.v[2 + n]});
-        for (int of = 0; of < Law::kMemory; ++of)
-          derivatives.memory_by_memory.push_back({first + m, first + of, next.v[kMemory + of]});
-      }
-    });
+          const int type = sight.type;
+          const auto parameter_number = [&](int n) {
+            return n == 0   ? ParameterNumber::natural_length(type)
+                   : n == 1 ? ParameterNumber::stiffness(type)
+                   : n == 2 ? ParameterNumber::damping(type)
+                            : ParameterNumber::own(n - 3);
+          };
+          const auto by_parameter = [&](const Dual& of, int n) {
+            if constexpr (kThroughPlace)
+              return n < 3 ? of.v[2 + n]
+                           : of.v[kOwn] * (*places)[static_cast<size_t>(number)].v[n - 3];
+            else
+              return of.v[2 + n];
+          };
+          for (int n = 0; n < 3 + Law::kParameters; ++n)
+            if (const double by = by_parameter(tension, n);
+                by != 0 && derivatives.asks_for(parameter_number(n)))
+              derivatives.tension_by_parameter.push_back({here, parameter_number(n), by});
+          for (int m = 0; m < Law::kMemory; ++m) {
+            derivatives.tension_by_memory.push_back({here, first + m, tension.v[kMemory + m]});
+            const Dual& next = remembered[static_cast<size_t>(m)];
+            derivatives.memory_by_motion.push_back(
+                {first + m, b, by_position(next).transpose(), next.v[1] * u.transpose()});
+            derivatives.memory_by_motion.push_back(
+                {first + m, a, -by_position(next).transpose(), -next.v[1] * u.transpose()});
+            for (int n = 0; n < 3 + Law::kParameters; ++n)
+              if (const double by = by_parameter(next, n);
+                  by != 0 && derivatives.asks_for(parameter_number(n)))
+                derivatives.memory_by_parameter.push_back({first + m, parameter_number(n), by});
+            for (int of = 0; of < Law::kMemory; ++of)
+              derivatives.memory_by_memory.push_back({first + m, first + of, next.v[kMemory + of]});
+          }
+        });
   }
 
  private:
   static constexpr bool kHasPlaces = requires(const std::array<double, Law::kParameters>& p) {
     Law::of_place(0.0, 0.0, p);
   };
+  static constexpr bool kThroughPlace = requires { Law::kThroughPlace; };
 
   /// Returns Law::of_place of every spring.
   template <class Real>
