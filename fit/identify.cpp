@@ -363,8 +363,8 @@ RefineResult refine_on(const FitProblem& coarse_problem, const FitProblem& probl
     if (follows_it) break;
   }
   improve({.problem = problem, .effort = kFinalEffort});
-  // The basin that was followed from the start is known.
-  return follows_it && !approach.by_coarse_mesh
+  // The basin that was followed from the start is known. A diagnosis looks for others itself.
+  return follows_it && (!approach.by_coarse_mesh || std::isfinite(options.coarse_beyond))
              ? best
              : second_look(problem, options, best, progress, report);
 }

@@ -41,7 +41,8 @@ struct DiagnosisCriteria {
   double scored_again_of_best = 0.25;
   double contact_alone = 0.8;
   double race_worth = 0.1;
-  double race_of_noise = 0.2;
+  double race_of_noise = 0.1;
+  double coarse_error = 0.5;
   double coarse_worth = 0.5;
   double coarse_near_best = 1.25;
   double coarse_far_behind = 2;

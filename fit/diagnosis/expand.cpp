@@ -110,11 +110,33 @@ std::vector<FittedModel> on_analysed_mesh(const SearchContext& search, const Fit
   return models;
 }
 
+/// Tells whether the coarse mesh errs by less than is missing. Where it errs by more, its fits
+/// follow its own error.
+bool coarse_mesh_will_do(const FittedModel& model, const FittedModel& coarse) {
+  double errs = 0;
+  for (const PooledPart& part : coarse.parts) errs += part.correction.squaredNorm();
+  const auto count = static_cast<double>(model.residual_count());
+  return errs < kCriteria.coarse_error * count * model.misfit();
+}
+
+/// Fits hypotheses on the analysed mesh over growing horizons.
+std::vector<FittedModel> fit_over_horizons(const SearchContext& search, const FittedModel& model,
+                                           const Shortlist& list,
+                                           const std::vector<const Score*>& scores) {
+  FittedModel early = shortened(model, list.share);
+  refine_model(early, search.setup, {.rounds = 1}, search.progress);
+  if (!early.usable()) return std::vector<FittedModel>(scores.size());
+  return fit_with_hypotheses(search.setup, model, early, scores, list.share, search.threshold,
+                             search.progress);
+}
+
 std::vector<Extended> fit_shortlist(const SearchContext& search, const FittedModel& model,
                                     const Shortlist& list) {
   const std::vector<const Score*> scores = worth_fitting(search, model, list);
   std::vector<FittedModel> fitted;
-  if (list.coarse.usable()) {
+  if (list.coarse.usable() && !coarse_mesh_will_do(model, list.coarse)) {
+    fitted = fit_over_horizons(search, model, list, scores);
+  } else if (list.coarse.usable()) {
     fitted = fit_with_hypotheses(search.coarse, list.coarse, list.early, scores, list.share,
                                  search.threshold, search.progress);
     fit_shapes_of_best(search, list.coarse, fitted);

@@ -221,7 +221,7 @@ class Pursuit {
     }
     if (!best.usable()) return false;
     if (best.is_unrefined()) {
-      refine_model(best, setup_, {}, progress_);
+      refine_model(best, setup_, kNearEnough, progress_);
       if (!best.usable()) return false;
       best_validated = validation_of(best);
     }
@@ -235,7 +235,7 @@ class Pursuit {
     const Hypothesis dropped = terms[k];
     terms.erase(terms.begin() + static_cast<std::ptrdiff_t>(k));
     FittedModel fitted = with_hypotheses(setup_, law_.model, terms, {});
-    refine_model(fitted, setup_, {}, progress_);
+    refine_model(fitted, setup_, kNearEnough, progress_);
     if (!fitted.usable()) return false;
     CrossValidation validated = validation_of(fitted);
     if (predicts_better(law_.after, validated)) return false;

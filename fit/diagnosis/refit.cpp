@@ -5,6 +5,7 @@
 #include <limits>
 #include <numeric>
 
+#include "fit/diagnosis/catalogue.h"
 #include "fit/diagnosis/criteria.h"
 #include "fit/diagnosis/discretisation.h"
 #include "fit/diagnosis/horizons.h"
@@ -21,11 +22,13 @@ namespace {
 constexpr double kShortHorizon = 0.4;
 
 /// Returns the model with a hypothesis at a share of its predicted amplitude, not linearised. A
-/// start at half of it is on the right side, and not too far.
+/// start at half of it is on the right side, and not too far. A place on the cloth is fitted from
+/// the shortest horizon on. In the wrong place an amplitude shrinks from horizon to horizon.
 FittedModel cautious_start(const DiagnosisSetup& setup, const FittedModel& model,
                            const Score& score) {
   std::vector<Hypothesis> hypotheses = model.hypotheses;
   hypotheses.push_back(score.hypothesis);
+  hypotheses.back().fits_shape = is_over_cloth(score.hypothesis);
   std::vector<NamedValues> start = model.values();
   const EffectDescription effect = describe_effect(score.hypothesis.effect);
   const size_t each = score.hypothesis.amplitudes.size();
