@@ -49,7 +49,8 @@ FittedModel cautious_start(const DiagnosisSetup& setup, const FittedModel& model
 FittedModel refined_over(const DiagnosisSetup& setup, FittedModel& whole, const FittedModel& from,
                          double share, const ProgressCallback& progress) {
   FittedModel fitted = share < 1 ? shortened(whole, share) : whole;
-  StageOptions stage;
+  // What leads the race is refined further before it is extended.
+  StageOptions stage = is_coarser(with_coarse_mesh(setup), setup) ? kNearEnough : StageOptions();
   if (share < 1) {
     stage.rounds = 1;
     stage.least_decrease = 0;

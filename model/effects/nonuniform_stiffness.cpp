@@ -106,6 +106,18 @@ struct Law {
   }
 };
 
+/// Tells from where to where on the cloth the rectangle reaches.
+std::string extent_of(const FittedEffect& found) {
+  const auto side = [&](const std::string& axis, double length_m) {
+    const double middle = found.value("rectangle_" + axis);
+    const double half = found.value("rectangle_half_" + axis);
+    return millimetres(std::max(0.0, middle - half) * length_m) + " to " +
+           millimetres(std::min(1.0, middle + half) * length_m);
+  };
+  return "from " + side("s", found.mesh.width_m) + " off the left and " +
+         side("t", found.mesh.height_m) + " off the top edge";
+}
+
 /// Tells the factor in the middle of the patch, on the border, or at opposite edges.
 std::string in_words(const FittedEffect& found) {
   const auto times = [](double excess) { return rounded(1 + excess) + " times as stiff "; };
@@ -120,9 +132,10 @@ std::string in_words(const FittedEffect& found) {
   if (found.mode == "edge")
     return found.value("edge") == 0 ? "" : times(found.value("edge")) + "on the border";
   if (found.value(found.mode) == 0) return {};
-  return times(found.value(found.mode)) + "at " +
-         place_on_cloth({found.value(found.mode + "_s") * found.mesh.width_m,
-                         found.value(found.mode + "_t") * found.mesh.height_m});
+  if (found.mode == "rectangle") return times(found.value("rectangle")) + extent_of(found);
+  return times(found.value("patch")) + "at " +
+         place_on_cloth({found.value("patch_s") * found.mesh.width_m,
+                         found.value("patch_t") * found.mesh.height_m});
 }
 
 }  // namespace
