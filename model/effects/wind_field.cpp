@@ -3,6 +3,7 @@
 #include <iterator>
 #include <utility>
 
+#include "model/cloth/wording.h"
 #include "model/effects/harmonic.h"
 #include "model/effects/vertex_law.h"
 
@@ -130,6 +131,35 @@ std::vector<EffectMode> modes() {
           std::move(pulse)};
 }
 
+/// Tells the pressure: its largest over the cloth or in time, and which way it grows in the world.
+std::string in_words(const FittedEffect& found) {
+  const auto of = [&](const char* name) { return found.value(name); };
+  if (found.mode == "pulse") {
+    const Eigen::Vector3d q = found.vector("q");
+    if (q.isZero(0)) return {};
+    return "pulses of " + rounded(q.norm()) + " Pa towards " + unit_vector(q) + ", " +
+           rounded(of("frequency")) + " a second";
+  }
+  if (found.mode == "harmonic") {
+    const double most = std::abs(of("h")) + std::abs(of("h_s")) + std::abs(of("h_t"));
+    if (most == 0) return {};
+    return "to and fro by up to " + rounded(most) + " Pa, " + rounded(of("frequency")) +
+           " times a second";
+  }
+  if (found.mode == "cloth") {
+    const double changes = std::abs(of("p_s")) + std::abs(of("p_t"));
+    if (of("p") == 0 && changes == 0) return {};
+    return "from " + rounded(of("p") - changes) + " to " + rounded(of("p") + changes) +
+           " Pa over the cloth";
+  }
+  const Eigen::Vector3d slope = found.vector("slope");
+  if (of("p") == 0 && slope.isZero(0)) return {};
+  std::string text = rounded(of("p")) + " Pa at the world's origin";
+  if (!slope.isZero(0))
+    text += ", " + rounded(slope.norm()) + " Pa more a metre towards " + unit_vector(slope);
+  return text;
+}
+
 }  // namespace
 
 EffectDescription describe() {
@@ -137,7 +167,8 @@ EffectDescription describe() {
           .summary = "wind that varies over place and time, F = A [P + n . q (1 + w) / 2] n",
           .parameters = parameters(),
           .test = EffectTest::profiled,
-          .modes = modes()};
+          .modes = modes(),
+          .in_words = in_words};
 }
 
 std::unique_ptr<Effect> make() {

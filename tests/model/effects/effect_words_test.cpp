@@ -153,7 +153,7 @@ TEST(EffectWords, TellWhatTheFabricDoes) {
             "3.00 times as stiff at 100 mm from the left, 150 mm from the top");
   EXPECT_EQ(words("nonuniform_stiffness", "rectangle",
                   {{"rectangle", 2}, {"rectangle_s", 0.2}, {"rectangle_half_s", 0.3}}),
-            "3.00 times as stiff from 0.00 mm to 200 mm off the left and 100 mm to 300 mm off the "
+            "3.00 times as stiff from 0 mm to 200 mm off the left and 75.0 mm to 225 mm off the "
             "top edge");
   EXPECT_EQ(words("nonuniform_stiffness", "edge", {{"edge", 0.5}}),
             "1.50 times as stiff on the border");
