@@ -15,6 +15,7 @@ struct Extended {
   const Score* score = nullptr;
   FittedModel model;
   bool from_scratch = false;  ///< identified as if nothing were known
+  bool was_fitted = true;     ///< false where contact alone ended the race before it
 };
 
 /// Returns the model that leaves least. `extended` is not empty.

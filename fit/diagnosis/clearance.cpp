@@ -113,9 +113,9 @@ double clear_of_neutral(const FittedModel& model, const Adequacy& structure, dou
   return clear_by(own.square, own.amplitudes, structure);
 }
 
-double clear_by(double decrease, Eigen::Index amplitudes, const Adequacy& structure) {
+double clear_by(double decrease, Eigen::Index numbers, const Adequacy& structure) {
   return kCriteria.clear_of_neutral *
-         std::sqrt(decrease / inflation(structure) / least_decrease(amplitudes));
+         std::sqrt(decrease / inflation(structure) / least_decrease(numbers));
 }
 
 double rise_without_last(const FittedModel& model, double threshold) {

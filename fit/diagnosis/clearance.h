@@ -17,7 +17,7 @@ double clear_of_neutral(const FittedModel& model, const Adequacy& structure, dou
 
 /// Returns the same from the decrease of chi-square that a hypothesis brings. A touch has no
 /// small amplitude, and its stiffness is hardly known where it is hard; so it is judged by this.
-double clear_by(double decrease, Eigen::Index amplitudes, const Adequacy& structure);
+double clear_by(double decrease, Eigen::Index numbers, const Adequacy& structure);
 
 /// Predicts how much chi-square rises where the last hypothesis is dropped and all else follows.
 /// The prediction is of second order where the model stands.

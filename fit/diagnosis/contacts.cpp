@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "data/algebra/dense_factors.h"
+#include "fit/diagnosis/criteria.h"
 #include "fit/diagnosis/residual_acceleration.h"
 #include "fit/diagnosis/search_context.h"
 #include "fit/jobs/parallel.h"
@@ -17,10 +18,6 @@ namespace {
 /// A hard obstacle: cloth of 0.2 kg/m2 sinks into it by 0.1 mm and does not bounce.
 constexpr double kStiffness_pa_per_m = 2e4, kDamping_pa_s_per_m = 130;
 
-/// Accelerations below so many sigmas are no pushes.
-constexpr double kSure = 6;
-/// An obstacle is met where so many markers are pushed at once.
-constexpr size_t kFewestPushed = 3;
 /// Frames since it was met from which it is placed.
 constexpr int kStretches[] = {2, 4, 8, 1000};
 /// Radii that are tried, as shares of the cloth's width.
@@ -39,10 +36,10 @@ using Shape = std::map<std::string, double>;
 
 std::vector<Push> pushes_in(const FittedModel& model) {
   std::vector<Push> pushes;
-  std::map<int, size_t> of_frame;
+  std::map<int, int> of_frame;
   for (const ResidualAcceleration& of : residual_accelerations(model, 0)) {
     const double size = of.acceleration_m_per_s2.norm();
-    if (size < kSure * of.sigma_m_per_s2) continue;
+    if (size < kCriteria.push_sigmas * of.sigma_m_per_s2) continue;
     pushes.push_back({.frame = of.frame,
                       .at_m = of.observed_m,
                       .along = of.acceleration_m_per_s2 / size,
@@ -50,7 +47,7 @@ std::vector<Push> pushes_in(const FittedModel& model) {
     ++of_frame[of.frame];
   }
   const auto met = std::ranges::find_if(
-      of_frame, [](const auto& frame) { return frame.second >= kFewestPushed; });
+      of_frame, [](const auto& frame) { return frame.second >= kCriteria.fewest_pushed; });
   if (met == of_frame.end()) return {};
   std::erase_if(pushes, [&](const Push& push) { return push.frame < met->first; });
   std::ranges::stable_sort(pushes, {}, &Push::frame);
@@ -203,6 +200,7 @@ FittedModel going_on(const DiagnosisSetup& mesh, const FittedModel& before, cons
     part.linear.residual = objective.residuals({part.values}).front();
     if (part.linear.residual.size() != objective.residual_count()) return at;
   }
+  model.state = FitState::unrefined;  // run, not fitted
   return model;
 }
 

@@ -11,6 +11,7 @@ constexpr const char* kDesign = "set with its step, not varied since";
 constexpr const char* kTrials = "trials of recover --undeclared, seeds 1 to 21";
 /// Recordings for which its step was written. It was set once and not varied on them.
 constexpr const char* kBundled = "set with its step, written for swing_breeze and tags_airdrag";
+constexpr const char* kForeign = "set with its step, written for swing_ball and swing_patch";
 constexpr const char* kRobot = "set with its step, written for the IRI sessions s0623 and s0705";
 
 }  // namespace
@@ -64,6 +65,11 @@ std::vector<CriterionDescription> describe(const DiagnosisCriteria& c) {
       {"scored_again_of_best", c.scored_again_of_best,
        "share of the best decrease on the coarse mesh from which the analysed mesh scores too",
        "effects that the coarse mesh shows badly are ranked by it", kDesign},
+      {"push_sigmas", c.push_sigmas,
+       "standard deviations from which a marker's residual acceleration is a push",
+       "obstacles that are hardly touched are not looked for", kForeign},
+      {"fewest_pushed", c.fewest_pushed, "markers that are pushed at once where an obstacle is met",
+       "obstacles that few markers touch are not looked for", kForeign},
       {"least_decrease", c.least_decrease,
        "decrease of chi-square from which one amplitude is fitted: five sigma",
        "weak effects are not tried", kConvention},
@@ -90,19 +96,22 @@ std::vector<CriterionDescription> describe(const DiagnosisCriteria& c) {
        "share of what is worth a name that the first horizon of a race must bring",
        "effects that show late are not fitted", kDesign},
       {"contact_alone", c.contact_alone,
-       "share of the excess that contact must take for no other hypothesis to be fitted", "time",
-       kDesign},
+       "share of the excess that contact must take for others to be fitted only if it is refused",
+       "time", kForeign},
       {"race_of_noise", c.race_of_noise, "share of the noise that counts as the best one's excess",
-       "time", kDesign},
+       "time", kForeign},
       {"coarse_error", c.coarse_error,
-       "square of what the coarse mesh errs by, as a share of what is missing, up to which it does",
-       "hypotheses are ranked by the coarse mesh's errors", kDesign},
+       "square of what the coarse mesh errs by, as a share of chi-square, up to which it does",
+       "hypotheses are ranked by the coarse mesh's errors", kForeign},
       {"coarse_worth", c.coarse_worth,
        "share of what is worth a name that a hypothesis must bring on the coarse mesh",
        "effects that the coarse mesh shows badly are not fitted", kDesign},
       {"coarse_near_best", c.coarse_near_best,
        "times the best one's excess on the coarse mesh, up to which it is fitted on the analysed",
        "time", kDesign},
+      {"mapping_lost", c.mapping_lost,
+       "times what the coarse mesh leaves, beyond which two maps lead there slowly", "time",
+       kForeign},
       {"coarse_far_behind", c.coarse_far_behind,
        "times the best one's excess on the analysed mesh, up to which others are fitted there too",
        "time", kBundled},

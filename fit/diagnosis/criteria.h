@@ -39,6 +39,9 @@ struct DiagnosisCriteria {
   double exact_fit_of_best = 0.5;
   double race_far_behind = 10;
   double scored_again_of_best = 0.25;
+  double push_sigmas = 6;
+  double fewest_pushed = 3;
+  double mapping_lost = 2;
   double contact_alone = 0.8;
   double race_worth = 0.1;
   double race_of_noise = 0.1;

@@ -169,9 +169,18 @@ class Run {
                               progress_);
     if (!result_.law.found()) return;
     if (is_coarse) {
+      // The law as it is written, so nothing is fitted again.
       FittedModel here = model_at(setup, result_.law.model.hypotheses, result_.law.model.values());
-      refine_model(here, setup, kNearEnough, progress_);
-      if (!here.usable()) return;
+      for (size_t n = 0; n < here.parts.size(); ++n) {
+        here.parts[n].correction = model.parts[n].correction;
+        here.parts[n].directions = model.parts[n].directions;
+        here.parts[n].amplitudes = model.parts[n].amplitudes;
+      }
+      linearise_model(here);
+      if (!here.usable()) {
+        result_.law = {};
+        return;
+      }
       result_.law.model = std::move(here);
     }
     reports_.add(setup, result_.law.model, &DiagnosedRecording::with_law);

@@ -13,6 +13,7 @@
 #include "fit/diagnosis/space_mapping.h"
 #include "fit/diagnosis/worth.h"
 #include "fit/jobs/parallel.h"
+#include "fit/problem/effects_of.h"
 
 namespace clothfit {
 namespace {
@@ -110,8 +111,8 @@ std::vector<FittedModel> on_analysed_mesh(const SearchContext& search, const Fit
   return models;
 }
 
-/// Tells whether the coarse mesh errs by less than is missing. Where it errs by more, its fits
-/// follow its own error.
+/// Tells whether the coarse mesh errs by far less than a model leaves. Where it errs by as much,
+/// its fits follow its own error.
 bool coarse_mesh_will_do(const FittedModel& model, const FittedModel& coarse) {
   double errs = 0;
   for (const PooledPart& part : coarse.parts) errs += part.correction.squaredNorm();
@@ -124,7 +125,7 @@ std::vector<FittedModel> fit_over_horizons(const SearchContext& search, const Fi
                                            const Shortlist& list,
                                            const std::vector<const Score*>& scores) {
   FittedModel early = shortened(model, list.share);
-  refine_model(early, search.setup, {.rounds = 1}, search.progress);
+  if (list.share < 1) refine_model(early, search.setup, {.rounds = 1}, search.progress);
   if (!early.usable()) return std::vector<FittedModel>(scores.size());
   return fit_with_hypotheses(search.setup, model, early, scores, list.share, search.threshold,
                              search.progress);
@@ -134,20 +135,27 @@ std::vector<Extended> fit_shortlist(const SearchContext& search, const FittedMod
                                     const Shortlist& list) {
   const std::vector<const Score*> scores = worth_fitting(search, model, list);
   std::vector<FittedModel> fitted;
+  std::vector<Extended> extended;
+  const auto note_what_was_fitted = [&] {
+    for (size_t k = 0; k < scores.size(); ++k)
+      extended.push_back(
+          {.score = scores[k], .model = {}, .was_fitted = fitted[k].state != FitState::not_run});
+  };
   if (list.coarse.usable() && !coarse_mesh_will_do(model, list.coarse)) {
     fitted = fit_over_horizons(search, model, list, scores);
+    note_what_was_fitted();
   } else if (list.coarse.usable()) {
     fitted = fit_with_hypotheses(search.coarse, list.coarse, list.early, scores, list.share,
                                  search.threshold, search.progress);
+    note_what_was_fitted();
     fit_shapes_of_best(search, list.coarse, fitted);
     fitted = on_analysed_mesh(search, model, list.coarse, std::move(fitted));
   } else {
     fitted = fit_with_hypotheses(search.setup, model, list.early, scores, list.share,
                                  search.threshold, search.progress);
   }
-  std::vector<Extended> extended;
-  for (size_t k = 0; k < scores.size(); ++k)
-    extended.push_back({.score = scores[k], .model = std::move(fitted[k])});
+  if (extended.empty()) note_what_was_fitted();
+  for (size_t k = 0; k < scores.size(); ++k) extended[k].model = std::move(fitted[k]);
   return extended;
 }
 
@@ -257,6 +265,21 @@ std::vector<Hypothesis> alike(const std::vector<BeamEntry>& children, const Beam
   return result;
 }
 
+namespace {
+
+/// Extends an entry by what contact, which was refused, has kept from the race.
+std::vector<BeamEntry> expand_without_contact(SearchContext& search, BeamEntry& entry,
+                                              Shortlist list) {
+  std::erase_if(list.best, [](const Score& score) { return !score.fitted.empty(); });
+  std::vector<Trial> refused = std::move(entry.refused);
+  std::vector<BeamEntry> children = expand(search, entry, list);
+  for (Trial& trial : refused)
+    if (describe_effect(trial.hypothesis.effect).touches) entry.refused.push_back(std::move(trial));
+  return children;
+}
+
+}  // namespace
+
 std::vector<BeamEntry> expand(SearchContext& search, BeamEntry& entry, const Shortlist& list) {
   entry.finished = true;
   entry.refused.clear();
@@ -300,7 +323,9 @@ std::vector<BeamEntry> expand(SearchContext& search, BeamEntry& entry, const Sho
       if (!trial.hypothesis.same_mode(own)) child.accepted.back().refused.push_back(trial);
   }
   for (BeamEntry& child : children) child.accepted.back().alike = alike(children, child);
-  return children;
+  const bool contact_alone = !std::ranges::all_of(extended, &Extended::was_fitted);
+  return children.empty() && contact_alone ? expand_without_contact(search, entry, list)
+                                           : std::move(children);
 }
 
 }  // namespace clothfit

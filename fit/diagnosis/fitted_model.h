@@ -116,7 +116,7 @@ struct StageOptions {
   bool unrefined = false;  ///< with the derivatives that it has, updated (fit/refine/pooled_fit.h)
 };
 
-/// A model that lacks much more need not stand at its optimum, which says little.
+/// A model that still lacks much, or runs a race, need not stand at its optimum.
 inline constexpr StageOptions kNearEnough{.linearisations = 3};
 
 /// Refines a model from where it stands, with the derivatives that it has or new ones.

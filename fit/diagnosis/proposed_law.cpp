@@ -235,7 +235,7 @@ class Pursuit {
     const Hypothesis dropped = terms[k];
     terms.erase(terms.begin() + static_cast<std::ptrdiff_t>(k));
     FittedModel fitted = with_hypotheses(setup_, law_.model, terms, {});
-    refine_model(fitted, setup_, kNearEnough, progress_);
+    refine_model(fitted, setup_, {}, progress_);
     if (!fitted.usable()) return false;
     CrossValidation validated = validation_of(fitted);
     if (predicts_better(law_.after, validated)) return false;

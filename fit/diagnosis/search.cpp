@@ -29,17 +29,17 @@ BeamEntry first_entry(SearchContext& search, FittedModel base) {
 /// Fits the shapes of a model's hypotheses where it stands, all at once. They were chosen by the
 /// coarse mesh. What that errs by in them would look like another cause.
 void refine_shapes(const SearchContext& search, FittedModel& model) {
+  if (!is_coarser(search.coarse, search.setup)) return;
   std::vector<Hypothesis> hypotheses = model.hypotheses;
   bool any = false;
-  for (size_t k = 0; k < hypotheses.size(); ++k) {
-    Hypothesis& own = hypotheses[k];
-    const bool is_fitted =
-        std::any_of(hypotheses.begin(), hypotheses.begin() + static_cast<std::ptrdiff_t>(k),
-                    [&](const Hypothesis& before) { return share_shape(before, own); });
+  for (Hypothesis& own : hypotheses) {
+    const bool is_fitted = std::ranges::any_of(hypotheses, [&](const Hypothesis& other) {
+      return &other != &own && other.fits_shape && share_shape(other, own);
+    });
     if (own.shape.empty() || own.fits_shape || is_fitted) continue;
     own.fits_shape = any = true;
   }
-  if (!any || !is_coarser(search.coarse, search.setup)) return;
+  if (!any) return;
   FittedModel fitted = with_hypotheses(search.setup, model, hypotheses, {});
   refine_model(fitted, search.setup, kNearEnough, search.progress);
   if (fitted.usable() && search.cost(fitted) < search.cost(model)) model = std::move(fitted);

@@ -37,7 +37,10 @@ bool SearchContext::may_ask(const FittedModel& model, const Hypothesis& hypothes
   const auto has = [&](const std::string& effect) {
     return std::ranges::find(model.hypotheses, effect, &Hypothesis::effect) !=
                model.hypotheses.end() ||
-           std::ranges::find(setup.options.effects, effect) != setup.options.effects.end();
+           std::ranges::find(setup.options.effects, effect) != setup.options.effects.end() ||
+           std::ranges::any_of(
+               setup.inputs.front().recording.declared,
+               [&](const DeclaredEffect& declared) { return declared.name == effect; });
   };
   const bool is_new = std::ranges::none_of(
       model.hypotheses, [&](const Hypothesis& own) { return own.same_mode(hypothesis); });

@@ -171,7 +171,7 @@ void add_horizon(const SearchContext& search, const FittedModel& at, double hori
 void add_contacts(const SearchContext& search, const DiagnosisSetup& setup,
                   const OverHorizons& over, double visible, Shortlist& list) {
   // Fits by the dozen are the coarse mesh's work.
-  if (is_coarser(search.coarse, setup)) return;
+  if (!search.only_chooses && is_coarser(search.coarse, setup)) return;
   std::vector<Score> best;
   const FittedModel* before = &over.before;
   for (const FittedModel& at : over.shorter) {

@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "fit/diagnosis/criteria.h"
 #include "fit/diagnosis/discretisation.h"
 #include "fit/diagnosis/horizons.h"
 #include "fit/diagnosis/search_context.h"
@@ -42,7 +43,6 @@ FittedModel mapped_to_analysed_mesh(const SearchContext& search, const FittedMod
                                     double share) {
   constexpr int kMostMaps = 6;
   constexpr double kHardly = 0.01;
-  constexpr double kLost = 2;  // times what the coarse mesh leaves: more maps lead there slowly
   FittedModel here = run_at(search, coarse, share);
   for (int map = 0; map < kMostMaps && here.usable(); ++map) {
     FittedModel next = corrected_on_mesh(search.coarse, here);
@@ -52,7 +52,7 @@ FittedModel mapped_to_analysed_mesh(const SearchContext& search, const FittedMod
     const double gain = search.left_by(here) - search.left_by(there);
     if (!(gain > 0)) break;
     here = std::move(there);
-    if (map == 1 && search.left_by(here) > kLost * search.left_by(coarse)) break;
+    if (map == 1 && search.left_by(here) > kCriteria.mapping_lost * search.left_by(coarse)) break;
     if (gain < kHardly * search.left_by(here)) break;
   }
   return here;

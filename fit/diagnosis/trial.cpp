@@ -48,9 +48,16 @@ class Asked {
     return trial_.criteria.back().passed;
   }
 
+  /// Returns how many numbers the data chose. The place of an obstacle comes from them alone.
+  Eigen::Index numbers_chosen() const {
+    return describe_effect(trial_.hypothesis.effect).touches
+               ? static_cast<Eigen::Index>(trial_.hypothesis.number_count())
+               : models_.score.amplitude.size();
+  }
+
   Criterion keeps_its_promise() const {
     const double least =
-        std::max(least_decrease(models_.score.amplitude.size()),
+        std::max(least_decrease(numbers_chosen()),
                  models_.scored_elsewhere ? 0 : kCriteria.predicted_share * models_.score.decrease);
     return {"decrease", trial_.decrease, least, !(trial_.decrease < least),
             "the fit gains less than half of what was predicted"};
@@ -73,10 +80,9 @@ class Asked {
   /// It takes runs by the dozen.
   void measure_clearance() {
     const Adequacy structure = judge_adequacy(models_.with, search_.setup.options.loss);
-    trial_.clear_of_neutral =
-        describe_effect(trial_.hypothesis.effect).touches
-            ? clear_by(trial_.decrease, models_.score.amplitude.size(), structure)
-            : clear_of_neutral(models_.with, structure, search_.threshold);
+    trial_.clear_of_neutral = describe_effect(trial_.hypothesis.effect).touches
+                                  ? clear_by(trial_.decrease, numbers_chosen(), structure)
+                                  : clear_of_neutral(models_.with, structure, search_.threshold);
   }
 
   Criterion predicts_better() const {

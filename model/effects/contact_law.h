@@ -28,6 +28,8 @@ struct Contact {
   static constexpr int kParameters = 3;  ///< stiffness, damping, friction come first
   static constexpr double kFrictionRate_per_s = 2000;
   static constexpr double kSoft_m = 5e-4;
+  /// At this speed the dashpot that sets in stiffens the contact as much as steps allow for.
+  static constexpr double kFast_m_per_s = 1;
 
   template <class Real>
   static Vector3<Real> force(const Real& depth_m, const Vector3<Real>& normal,
@@ -63,7 +65,7 @@ struct Contact {
     const double most = (1 + friction) * largest_area_per_mass(cloth);
     const bool rubs = friction > 0 && (stiffness > 0 || damping > 0);
     return {.damping_per_s = most * damping + (rubs ? kFrictionRate_per_s : 0),
-            .frequency2_per_s2 = most * stiffness};
+            .frequency2_per_s2 = most * (stiffness + damping * kFast_m_per_s / kSoft_m)};
   }
 
   /// An obstacle in an unknown place, which the parameters named say. It does not rub.

@@ -218,7 +218,12 @@ class SpringLawEffect final : public LawEffect<SpringLawEffect<Law>, Law> {
   static constexpr bool kHasPlaces = requires(const std::array<double, Law::kParameters>& p) {
     Law::of_place(0.0, 0.0, p);
   };
-  static constexpr bool kThroughPlace = requires { Law::kThroughPlace; };
+  static constexpr bool kThroughPlace = [] {
+    if constexpr (requires { Law::kThroughPlace; })
+      return Law::kThroughPlace;
+    else
+      return false;
+  }();
 
   /// Returns Law::of_place of every spring.
   template <class Real>

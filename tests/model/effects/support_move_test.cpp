@@ -9,17 +9,18 @@
 namespace clothfit {
 namespace {
 
-const Eigen::Vector3d kBy_m(0.02, -0.01, 0.03);
-constexpr double kFrom_s = 0.1, kLasts_s = 0.4;
+const Eigen::Vector3d kMovesBy_m(0.02, -0.01, 0.03);
+constexpr double kMovesFrom_s = 0.1, kMoveLasts_s = 0.4;
 
 /// Returns places of both upper corners beside the start after each step of 1 ms, 3 x steps each.
-std::array<Eigen::Matrix3Xd, 2> moves_m(double point, int steps) {
+std::array<Eigen::Matrix3Xd, 2> once_moved_m(double point, int steps) {
   Cloth bare = square_cloth(5);
   bare.held = {held_at(bare.mesh, 0, 0), held_at(bare.mesh, 0.4, 0)};
   const Eigen::Matrix3Xd start = flat_positions(bare.mesh);
   std::array<Eigen::Matrix3Xd, 2> ways{Eigen::Matrix3Xd(3, steps), Eigen::Matrix3Xd(3, steps)};
-  ClothWithEffect(bare, "support_move", {kBy_m.x(), kBy_m.y(), kBy_m.z(), kFrom_s, kLasts_s, point},
-                  start)
+  ClothWithEffect(
+      bare, "support_move",
+      {kMovesBy_m.x(), kMovesBy_m.y(), kMovesBy_m.z(), kMovesFrom_s, kMoveLasts_s, point}, start)
       .after(steps, 1e-3, [&](int step, const ClothWithEffect::State& state) {
         ways[0].col(step - 1) = state.position_m.col(0) - start.col(0);
         ways[1].col(step - 1) = state.position_m.col(4) - start.col(4);
@@ -32,21 +33,22 @@ TEST(SupportMove, KeepsTheContractOfEffects) {
 }
 
 TEST(SupportMove, RestsMovesOnceAndStays) {
-  for (const Eigen::Matrix3Xd& way : moves_m(0, 700)) {
+  for (const Eigen::Matrix3Xd& way : once_moved_m(0, 700)) {
     EXPECT_EQ(way.leftCols(100), Eigen::Matrix3Xd::Zero(3, 100));  // up to 0.1 s
-    EXPECT_LT((way.col(299) - 0.5 * kBy_m).norm(), 1e-14);
-    EXPECT_LT((way.rightCols(200).colwise() - kBy_m).cwiseAbs().maxCoeff(), 1e-14);
+    EXPECT_LT((way.col(299) - 0.5 * kMovesBy_m).norm(), 1e-14);
+    EXPECT_LT((way.rightCols(200).colwise() - kMovesBy_m).cwiseAbs().maxCoeff(), 1e-14);
     const Eigen::Matrix3Xd per_step = way.rightCols(699) - way.leftCols(699);
     // Differences over 1 ms fall short of the largest velocity by 2e-6 of it.
-    EXPECT_NEAR(per_step.colwise().norm().maxCoeff(), 1.5 * kBy_m.norm() / kLasts_s * 1e-3, 1e-9);
+    EXPECT_NEAR(per_step.colwise().norm().maxCoeff(), 1.5 * kMovesBy_m.norm() / kMoveLasts_s * 1e-3,
+                1e-9);
   }
 }
 
 TEST(SupportMove, OfASinglePointLeavesTheOtherWhereItIs) {
-  const auto ways = moves_m(2, 600);
+  const auto ways = once_moved_m(2, 600);
 
   EXPECT_EQ(ways[0], Eigen::Matrix3Xd::Zero(3, 600));
-  EXPECT_LT((ways[1].rightCols(1) - kBy_m).norm(), 1e-14);
+  EXPECT_LT((ways[1].rightCols(1) - kMovesBy_m).norm(), 1e-14);
 }
 
 }  // namespace
