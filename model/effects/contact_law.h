@@ -14,7 +14,7 @@ namespace clothfit {
 ///   F = N n - friction N v_t / sqrt(v_t^2 + (friction N / (rate m))^2)
 ///   N = A max(stiffness depth - damping v_n depth / (depth + soft), 0) where depth > 0, else 0
 ///
-/// soft = 0.5 mm: over such a depth the dashpot sets in, so that a touch has no jump and the motion
+/// soft = 1 mm: over such a depth the dashpot sets in, so that a touch has no jump and the motion
 /// after it has a derivative by the obstacle's place. depth (m): how far the vertex is inside the
 /// obstacle; n: the obstacle's outward unit normal there; v_n = n . v and v_t = v - v_n n: velocity
 /// of the vertex against the obstacle, which rests; A: the area that belongs to the vertex in the
@@ -27,7 +27,7 @@ namespace clothfit {
 struct Contact {
   static constexpr int kParameters = 3;  ///< stiffness, damping, friction come first
   static constexpr double kFrictionRate_per_s = 2000;
-  static constexpr double kSoft_m = 5e-4;
+  static constexpr double kSoft_m = 1e-3;
   /// At this speed the dashpot that sets in stiffens the contact as much as steps allow for.
   static constexpr double kFast_m_per_s = 1;
 

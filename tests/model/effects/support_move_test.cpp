@@ -38,9 +38,9 @@ TEST(SupportMove, RestsMovesOnceAndStays) {
     EXPECT_LT((way.col(299) - 0.5 * kMovesBy_m).norm(), 1e-14);
     EXPECT_LT((way.rightCols(200).colwise() - kMovesBy_m).cwiseAbs().maxCoeff(), 1e-14);
     const Eigen::Matrix3Xd per_step = way.rightCols(699) - way.leftCols(699);
-    // Differences over 1 ms fall short of the largest velocity by 2e-6 of it.
+    // Differences over 1 ms fall short of the largest velocity by 1e-5 of it.
     EXPECT_NEAR(per_step.colwise().norm().maxCoeff(), 1.5 * kMovesBy_m.norm() / kMoveLasts_s * 1e-3,
-                1e-9);
+                3e-9);
   }
 }
 
