@@ -299,15 +299,8 @@ std::vector<Score> score_at_best_shapes(const SearchContext& search, const Diagn
   return scores;
 }
 
-/// Returns chi-square per residual from which a horizon shows that something is missing. A mesh
-/// that only chooses errs by more than the noise.
-double visible_from(const SearchContext& search) {
-  return search.only_chooses ? kCriteria.biased : kCriteria.visible;
-}
-
 Shortlist make_shortlist(const SearchContext& search, const FittedModel& model) {
-  if (model.misfit() > kCriteria.biased)
-    return over_few_frames(search, model, visible_from(search));
+  if (model.misfit() > kCriteria.biased) return over_few_frames(search, model, kCriteria.visible);
   Shortlist list = over_shares(search, search.setup, model, 1, kCriteria.visible);
   if (says_enough(search, model, list)) return list;
   const double scatter = std::sqrt(2 / static_cast<double>(model.residual_count()));

@@ -166,7 +166,8 @@ TEST(HypothesesToTest, AskSingleHeldPointsWhereThereAreTwoThatAnEffectActsOn) {
   const std::vector<HeldPoint> two = input.recording.held;
   ASSERT_EQ(two.size(), 2u);
 
-  for (const char* effect : {"support_drift", "support_motion", "support_move", "support_path", "support_slip"})
+  for (const char* effect :
+       {"support_drift", "support_motion", "support_move", "support_path", "support_slip"})
     EXPECT_THAT(points(effect), ElementsAre(1, 2)) << effect;
   EXPECT_TRUE(points("support_offset").empty());  // no point is driven
 
