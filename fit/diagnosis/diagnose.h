@@ -77,7 +77,7 @@ struct Diagnosis {
 };
 
 /// Says which effect a fitted model lacks. The declared model is fitted to recordings of one cloth,
-/// and structure is looked for in the residual. Every mode of every registered effect is tested.
+/// and structure is looked for in the residual. The modes of registered effects are tested.
 /// Those that explain the structure are added, one after the other. The outcome is judged on frames
 /// and recordings held out, which take part in no decision (docs/theory/diagnosis.md). All
 /// recordings share the parameters of the physics. Where each was placed, measured, or began is its

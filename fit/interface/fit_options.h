@@ -75,7 +75,8 @@ struct FitOptions {
   int drive_knots = 0;
   double work = 1;  ///< > 0; times the limits of work of the refinement's stages
   /// Chi-square per residual, > 0, beyond which the fit's own mesh only follows the coarse one's
-  /// result. Such a model lacks physics that any mesh shows. Infinite: never.
+  /// result. Such a model lacks physics that any mesh shows. Its sigmas are not estimated, and are
+  /// given as 0. Infinite: never.
   double coarse_beyond = std::numeric_limits<double>::infinity();
   double substep_scale = 1;  ///< >= 1; more cuts time finer than stability asks
   bool profile = false;      ///< intervals from the profiled cost where it is no parabola
