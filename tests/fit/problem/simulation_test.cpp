@@ -163,10 +163,10 @@ TEST(Simulation, RestsOnTheObstacleThatAModelFileNames) {
                                             "{stiffness: 2e4, damping: 60, friction: 0.3}}]");
   const Eigen::VectorXd passing = heights_m(falling);
 
-  // Then every vertex sinks in until its area's push, k A depth, carries its mass: 0.1 mm. After a
-  // second the bounce is below rounding.
+  // Then every vertex sinks in until its area's push, k A depth, carries its mass: 0.1 mm. There a
+  // tenth of the dashpot acts. After a second the bounce is below a hundredth of a micrometre.
   const double depth_m = 0.024 / (0.3 * 0.4) * 9.81 / 2e4;
-  EXPECT_LT((resting.array() - (0.7 - depth_m)).abs().maxCoeff(), 1e-12);
+  EXPECT_LT((resting.array() - (0.7 - depth_m)).abs().maxCoeff(), 1e-8);
   EXPECT_LT(passing.maxCoeff(), 0.71 - 0.5 * 9.81);
 }
 
