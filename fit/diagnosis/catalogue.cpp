@@ -51,15 +51,19 @@ ShapeCandidates at_each_number(const ShapeCandidates& narrow, const std::string&
   return wider;
 }
 
+Hypothesis without_shape(const EffectDescription& effect, const EffectMode& mode) {
+  return {.effect = effect.name,
+          .mode = mode.name,
+          .amplitudes = mode.amplitudes,
+          .shape = {},
+          .shape_sigma = {},
+          .beside = mode.beside};
+}
+
 /// Returns all combinations of the values that a mode's shapes are tried at.
 ShapeCandidates shapes_of(const Recording& recording, const EffectDescription& effect,
                           const EffectMode& mode, double duration_s) {
-  Hypothesis hypothesis{.effect = effect.name,
-                        .mode = mode.name,
-                        .amplitudes = mode.amplitudes,
-                        .shape = {},
-                        .shape_sigma = {},
-                        .beside = mode.beside};
+  const Hypothesis hypothesis = without_shape(effect, mode);
   ShapeCandidates result{hypothesis};
   for (const ShapeGrid& grid : mode.shapes) {
     if (grid.per_held_point) {
@@ -166,12 +170,7 @@ std::vector<Hypothesis> empirical_hypotheses(const FitInput& input, const FitOpt
   for (const EffectEntry& entry : effect_registry()) {
     const EffectDescription effect = entry.describe();
     if (!effect.empirical || std::ranges::find(present, effect.name) != present.end()) continue;
-    for (const EffectMode& mode : modes_of(effect))
-      result.push_back({.effect = effect.name,
-                        .mode = mode.name,
-                        .amplitudes = mode.amplitudes,
-                        .shape = {},
-                        .shape_sigma = {}});
+    for (const EffectMode& mode : modes_of(effect)) result.push_back(without_shape(effect, mode));
   }
   return result;
 }
@@ -184,11 +183,7 @@ std::vector<Hypothesis> contacts_to_test(const FitInput& input, const FitOptions
     if (std::ranges::find(present, effect.name) != present.end()) continue;
     for (const EffectMode& mode : effect.modes)
       if (std::ranges::any_of(mode.shapes, &ShapeGrid::from_pushes))
-        result.push_back({.effect = effect.name,
-                          .mode = mode.name,
-                          .amplitudes = mode.amplitudes,
-                          .shape = {},
-                          .shape_sigma = {}});
+        result.push_back(without_shape(effect, mode));
   }
   return result;
 }

@@ -135,17 +135,18 @@ std::vector<Shape> planes(const std::vector<Push>& pushes, double width_m) {
 /// Returns the places where an effect's obstacle may be.
 std::vector<Shape> places(const std::string& effect, const std::vector<Push>& pushes,
                           double width_m) {
+  const std::vector<EffectParameter> parameters = describe_effect(effect).parameters;
+  const bool is_round =
+      std::ranges::find(parameters, "radius", &EffectParameter::name) != parameters.end();
   std::vector<Shape> shapes;
   for (const int stretch : kStretches) {
     std::vector<Push> first;
     for (const Push& push : pushes)
       if (push.frame <= pushes.front().frame + stretch) first.push_back(push);
-    const std::vector<Shape> more =
-        effect == "contact_sphere" ? balls(first, width_m) : planes(first, width_m);
+    const std::vector<Shape> more = is_round ? balls(first, width_m) : planes(first, width_m);
     shapes.insert(shapes.end(), more.begin(), more.end());
     if (first.size() == pushes.size()) break;
   }
-  const std::vector<EffectParameter> parameters = describe_effect(effect).parameters;
   std::erase_if(shapes, [&](const Shape& shape) {
     return std::ranges::any_of(shape, [&](const auto& number) {
       const auto range = std::ranges::find(parameters, number.first, &EffectParameter::name);
@@ -165,6 +166,21 @@ Shape sigma_of(const Shape& shape, double width_m) {
   return sigma;
 }
 
+/// Runs a model over the frames of another one, with its corrections. The model has failed where it
+/// does not run.
+FittedModel run_as(const FittedModel& other, FittedModel model) {
+  model.state = FitState::unrefined;
+  for (size_t n = 0; n < model.parts.size(); ++n) {
+    PooledPart& part = model.parts[n];
+    part.frames = other.parts[n].frames;
+    part.correction = other.parts[n].correction;
+    const TrajectoryObjective objective = model.objective(n);
+    part.linear.residual = objective.residuals({part.values}).front();
+    if (part.linear.residual.size() != objective.residual_count()) model.state = FitState::failed;
+  }
+  return model;
+}
+
 /// Returns the model with a hard obstacle, run over the frames of `at`.
 FittedModel with_obstacle(const DiagnosisSetup& mesh, const FittedModel& at,
                           const std::vector<NamedValues>& values, const Hypothesis& obstacle) {
@@ -175,33 +191,14 @@ FittedModel with_obstacle(const DiagnosisSetup& mesh, const FittedModel& at,
     known[obstacle.effect + ".stiffness"] = kStiffness_pa_per_m;
     known[obstacle.effect + ".damping"] = kDamping_pa_s_per_m;
   }
-  FittedModel model = model_at(mesh, hypotheses, start);
-  model.state = FitState::unrefined;
-  for (size_t n = 0; n < model.parts.size(); ++n) {
-    PooledPart& part = model.parts[n];
-    part.frames = at.parts[n].frames;
-    part.correction = at.parts[n].correction;
-    const TrajectoryObjective objective = model.objective(n);
-    part.linear.residual = objective.residuals({part.values}).front();
-    if (part.linear.residual.size() != objective.residual_count()) model.state = FitState::failed;
-  }
-  return model;
+  return run_as(at, model_at(mesh, hypotheses, start));
 }
 
 /// Returns the model that has not met the obstacle yet, run over the frames of `at`.
 FittedModel going_on(const DiagnosisSetup& mesh, const FittedModel& before, const FittedModel& at) {
   if (!before.usable()) return at;
-  FittedModel model = model_at(mesh, at.hypotheses, before.values());
-  for (size_t n = 0; n < model.parts.size(); ++n) {
-    PooledPart& part = model.parts[n];
-    part.frames = at.parts[n].frames;
-    part.correction = at.parts[n].correction;
-    const TrajectoryObjective objective = model.objective(n);
-    part.linear.residual = objective.residuals({part.values}).front();
-    if (part.linear.residual.size() != objective.residual_count()) return at;
-  }
-  model.state = FitState::unrefined;  // run, not fitted
-  return model;
+  FittedModel model = run_as(at, model_at(mesh, at.hypotheses, before.values()));
+  return model.usable() ? model : at;
 }
 
 /// Fits the obstacle's place along with the model, and scores what that leaves.
