@@ -106,8 +106,7 @@ void print_result(const Diagnosis& diagnosis, const fs::path& folder) {
       fmt::print("  {}\n", separation_text(term, diagnosis.separation_of(n)));
   }
   for (const Hypothesis& trace : traces(diagnosis))
-    fmt::print("A trace, less than {:g} of the noise: {}\n", diagnosis.criteria.trace,
-               trace.title());
+    fmt::print("A trace, little beside the noise or what was found: {}\n", trace.title());
   if (diagnosis.changed()) fmt::print("\n");
   print(before_after_table(diagnosis));
   fmt::print("Parameters of the model found:\n\n");

@@ -12,6 +12,7 @@ constexpr const char* kTrials = "trials of recover --undeclared, seeds 1 to 21";
 /// Recordings for which its step was written. It was set once and not varied on them.
 constexpr const char* kBundled = "set with its step, written for swing_breeze and tags_airdrag";
 constexpr const char* kForeign = "set with its step, written for swing_ball and swing_patch";
+constexpr const char* kTraces = "recover --undeclared --seed 181, and ten foreign recordings";
 constexpr const char* kRobot = "set with its step, written for the IRI sessions s0623 and s0705";
 
 }  // namespace
@@ -138,7 +139,12 @@ std::vector<CriterionDescription> describe(const DiagnosisCriteria& c) {
        kConvention},
       {"trace", c.trace,
        "rms change of the prediction, in units of the noise, below which an effect is a trace",
-       "weak effects are listed as traces and not named", kDesign},
+       "weak effects are listed as traces and not named: at 0.25 three of the first four of "
+       "recover --undeclared --trials 1 --seed 181",
+       kTraces},
+      {"trace_of_accepted", c.trace_of_accepted,
+       "the same, as a share of the change by an effect that was accepted before",
+       "a weak cause beside a strong one is listed as a trace", kTraces},
       {"free_forces_gain", c.free_forces_gain,
        "share of what free forces leave that a hypothesis must take beside them",
        "one of several causes is taken for a force without a law", kTrials},

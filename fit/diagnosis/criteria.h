@@ -60,7 +60,8 @@ struct DiagnosisCriteria {
   // A trial (trial.h)
   double predicted_share = 0.5;
   double clear_of_neutral = 5;
-  double trace = 0.25;
+  double trace = 0.05;
+  double trace_of_accepted = 0.02;
   double free_forces_gain = 0.1;
   double time_blocks = 5;
   double whole_recordings = 3;

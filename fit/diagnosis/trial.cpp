@@ -99,10 +99,15 @@ class Asked {
             "not clear of its neutral value"};
   }
 
+  /// What a model errs by in an effect that it has looks like a small further one.
   Criterion matters() const {
-    const double change = change_of_prediction(models_.with);
-    return {kMatters, change, kCriteria.trace, !(change < kCriteria.trace),
-            "a trace: it changes the prediction by little beside the noise"};
+    double accepted = 0;
+    for (const Hypothesis& before : models_.without.hypotheses)
+      accepted = std::max(accepted, change_of_prediction(models_.without, before));
+    const double least = std::max(kCriteria.trace, kCriteria.trace_of_accepted * accepted);
+    const double change = change_of_prediction(models_.with, models_.with.hypotheses.back());
+    return {kMatters, change, least, !(change < least),
+            "a trace: it changes the prediction by little beside the noise or what was found"};
   }
 
   Criterion beats_free_forces() const {
@@ -149,15 +154,14 @@ class Asked {
 
 }  // namespace
 
-double change_of_prediction(const FittedModel& model) {
-  const Hypothesis& last = model.hypotheses.back();
-  const EffectDescription effect = describe_effect(last.effect);
+double change_of_prediction(const FittedModel& model, const Hypothesis& hypothesis) {
+  const EffectDescription effect = describe_effect(hypothesis.effect);
   double square = 0;
   for (size_t n = 0; n < model.parts.size(); ++n) {
     const PooledPart& part = model.parts[n];
     Eigen::VectorXd neutral = part.values;
-    for (const std::string& name : last.amplitudes) {
-      const int p = model.problems[n]->space.index(last.effect + "." + name);
+    for (const std::string& name : hypothesis.amplitudes) {
+      const int p = model.problems[n]->space.index(hypothesis.effect + "." + name);
       if (p < 0) continue;
       neutral[p] = std::ranges::find(effect.parameters, name, &EffectParameter::name)->neutral;
     }

@@ -61,9 +61,9 @@ struct Compared {
 /// Asks one criterion after the other, the cheap ones first, until one is not passed.
 Trial try_hypothesis(const SearchContext& search, const Compared& models);
 
-/// Returns how much the last hypothesis' amplitudes change a model's prediction, with everything
-/// else as it is: rms in units of the noise.
-double change_of_prediction(const FittedModel& model);
+/// Returns how much a hypothesis' amplitudes change a model's prediction, with everything else as
+/// it is: rms in units of the noise.
+double change_of_prediction(const FittedModel& model, const Hypothesis& hypothesis);
 
 /// Cross-validates a model. `forces_mesh` is that of free forces, where these are asked for.
 CrossValidation left_out_of(const SearchContext& search, const FittedModel& model,

@@ -78,7 +78,7 @@ TEST(ChangeOfPrediction, IsProportionalToASmallAmplitude) {
   const auto change_at = [&](double per_s) {
     model.parts.front().values[rate] = per_s;
     linearise_model(model);
-    return change_of_prediction(model);
+    return change_of_prediction(model, drag_hypothesis());
   };
   EXPECT_EQ(change_at(0), 0);
   const double once = change_at(0.001);
