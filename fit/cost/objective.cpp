@@ -176,7 +176,8 @@ Linearisation TrajectoryObjective::linearise_by(const Eigen::VectorXd& values,
                        of.frame_time_s.begin() + predictor.frames_to_run(frames_)},
       .time_step_s = time_step_s(),
       .velocities = predictor.needs_velocities(),
-      .derivatives_kept_s = of.derivatives_kept_s};
+      .derivatives_kept_s = of.derivatives_kept_s,
+      .fast_derivatives = of.fast_derivatives};
   const TangentResult run = simulate_with_tangents(of.cloth, set, along, schedule);
   result.runs = 1 + static_cast<int>(simulated.size());
   if (!run.run.usable()) return result;

@@ -70,6 +70,7 @@ struct FitProblem {
   double marker_offset_sigma_m =
       0;                          ///< prior of fit/observe/marker_offsets.h; 0: markers have none
   double derivatives_kept_s = 0;  ///< of effects' forces (Schedule)
+  bool fast_derivatives = false;  ///< likewise
   /// Cameras read their rows in turn, in the time that they declare. The frame's time is that of
   /// the middle row, as the effect rolling_shutter has it.
   bool reads_in_rows = false;

@@ -177,6 +177,7 @@ FitProblem make_problem(const FitInput& input, const FitOptions& options, int me
   add_marker_offsets(options, problem);
   // A diagnosis compares models, for which derivatives to half a per cent do.
   if (!options.hypotheses.empty()) problem.derivatives_kept_s = kEmergingInterval_s;
+  problem.fast_derivatives = !options.hypotheses.empty() || problem.start == StartKind::unknown;
   problem.marker_place_m = marker_places(recording.markers);
   problem.vertex_weights = vertex_weights(
       make_surface(mesh.columns, mesh.rows, mesh.width_m, mesh.height_m, problem.marker_place_m));

@@ -155,11 +155,12 @@ void settle(const HeavyAir& heavy, double time_s, std::span<const ParameterSet> 
 
 /// Relaxes one simulation and its derivatives.
 void settle(const HeavyAir& heavy, double time_s, const ParameterSet& set,
-            std::span<const Direction> directions, TangentStepper& stepper, TangentState& state) {
-  state = TangentState::of(heavy.cloth, set, directions);
-  const TangentParameters parameters = TangentParameters::of(heavy.cloth, set, directions);
-  const TangentVectors from_m = stepper.locate(state);
-  TangentVectors target_m = from_m;
+            std::span<const Direction> directions, TangentStepper<>& stepper,
+            TangentState<>& state) {
+  state = TangentState<>::of(heavy.cloth, set, directions);
+  const auto parameters = TangentParameters<>::of(heavy.cloth, set, directions);
+  const TangentVectors<> from_m = stepper.locate(state);
+  TangentVectors<> target_m = from_m;
   for (int n = 0; n < heavy.steps; ++n) {
     for (size_t h = 0; h < heavy.cloth.held.size(); ++h) {
       if (!heavy.cloth.held[h].motion) continue;
@@ -253,9 +254,9 @@ void start_at_rest_with_tangents(const Cloth& cloth, ParameterSet& set,
   tbb::parallel_for(size_t{0}, groups, [&](size_t g) {
     const size_t first = g * kLanes;
     const size_t count = std::min<size_t>(kLanes, directions.size() - first);
-    TangentState state;
+    TangentState<> state;
     const std::span<const Direction> group = std::span(moved).subspan(first, count);
-    TangentStepper stepper(heavy.cloth, group);
+    TangentStepper<> stepper(heavy.cloth, group);
     settle(heavy, time_s, damped, group, stepper, state);
     for (size_t d = 0; d < count; ++d) {
       const auto lane = static_cast<int>(d);

@@ -16,6 +16,9 @@ struct Schedule {
   /// Derivatives of forces that change smoothly are computed once in that time, and kept between
   /// (TangentStepper); 0: in every step.
   double derivatives_kept_s = 0;
+  /// Derivatives along more than 16 directions are had in single precision, at half the cost: they
+  /// are then right to about five digits.
+  bool fast_derivatives = false;
 
   /// Returns the equal steps in the interval that ends at frame `frame` >= 1.
   int substeps(int frame) const;

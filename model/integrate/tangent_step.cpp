@@ -5,14 +5,16 @@
 namespace clothfit {
 namespace {
 
-/// Returns the tangents of one group: at most kLanes directions.
-LaneParameters<> tangents_of(const Cloth& cloth, const ParameterSet& set,
-                             std::span<const Direction> directions) {
-  LaneParameters<> tangent;
+/// Returns the tangents of one group: at most as many directions as lanes.
+template <class L>
+LaneParameters<L> tangents_of(const Cloth& cloth, const ParameterSet& set,
+                              std::span<const Direction> directions) {
+  LaneParameters<L> tangent;
   const auto along = [&](const auto& component) {
-    LaneValue<> lanes = LaneValue<>::Zero();
+    LaneValue<L> lanes = LaneValue<L>::Zero();
     for (size_t d = 0; d < directions.size(); ++d)
-      lanes[static_cast<Eigen::Index>(d)] = component(directions[d]);
+      lanes[static_cast<Eigen::Index>(d)] =
+          static_cast<typename L::Number>(component(directions[d]));
     return lanes;
   };
   for (size_t type = 0; type < kSpringTypes; ++type) {
@@ -45,31 +47,46 @@ LaneParameters<> tangents_of(const Cloth& cloth, const ParameterSet& set,
   return tangent;
 }
 
+template <class L>
 size_t groups_of(std::span<const Direction> directions) {
-  return std::max<size_t>(1, (directions.size() + kLanes - 1) / kLanes);
+  return std::max<size_t>(1, (directions.size() + L::kCount - 1) / L::kCount);
 }
 
+template <class L>
 std::span<const Direction> group_of(std::span<const Direction> directions, size_t group) {
-  const size_t first = std::min(group * kLanes, directions.size());
-  return directions.subspan(first, std::min<size_t>(kLanes, directions.size() - first));
+  const size_t first = std::min(group * L::kCount, directions.size());
+  return directions.subspan(first, std::min<size_t>(L::kCount, directions.size() - first));
+}
+
+/// Returns a number in the precision of the lanes.
+template <class L>
+typename L::Number in_lanes(double value) {
+  return static_cast<typename L::Number>(value);
 }
 
 /// action += derivative * change in every lane.
-template <class Change>
-void add_product(const Eigen::Vector3d& derivative, const Change& change, int on,
-                 LaneVectors<>& action) {
+template <class L, class Change>
+void add_product(const Eigen::Vector3d& derivative_exactly, const Change& change, int on,
+                 LaneVectors<L>& action) {
+  const Eigen::Vector3<typename L::Number> derivative =
+      derivative_exactly.template cast<typename L::Number>();
   action.x.col(on) += derivative.x() * change;
   action.y.col(on) += derivative.y() * change;
   action.z.col(on) += derivative.z() * change;
 }
 
-LaneValue<> product(const Eigen::RowVector3d& derivative, const LaneVectors<>& vectors, int of) {
+template <class L>
+LaneValue<L> product(const Eigen::RowVector3d& derivative_exactly, const LaneVectors<L>& vectors,
+                     int of) {
+  const Eigen::RowVector3<typename L::Number> derivative =
+      derivative_exactly.template cast<typename L::Number>();
   return derivative.x() * vectors.x.col(of) + derivative.y() * vectors.y.col(of) +
          derivative.z() * vectors.z.col(of);
 }
 
 /// Returns the change of the parameter with a ParameterNumber.
-const LaneValue<>& parameter_change(const LaneParameters<>& tangent, size_t effect, int number) {
+template <class L>
+const LaneValue<L>& parameter_change(const LaneParameters<L>& tangent, size_t effect, int number) {
   const auto of_type = [](int from) { return static_cast<size_t>(from % kSpringTypes); };
   if (number < ParameterNumber::stiffness(0))
     return tangent.springs.natural_length_m[of_type(number)];
@@ -84,42 +101,50 @@ const LaneValue<>& parameter_change(const LaneParameters<>& tangent, size_t effe
 }
 
 /// Finds the parameter numbers that change along any direction.
-void find_changing(const TangentParameters& parameters, size_t effect,
+template <class L>
+void find_changing(const TangentParameters<L>& parameters, size_t effect,
                    std::vector<bool>& changing) {
   const auto own = static_cast<int>(parameters.value.effects[effect].size());
   changing.assign(static_cast<size_t>(ParameterNumber::own(own)), false);
   for (int number = 0; number < ParameterNumber::own(own); ++number)
-    for (const LaneParameters<>& tangent : parameters.tangent)
+    for (const LaneParameters<L>& tangent : parameters.tangent)
       if ((parameter_change(tangent, effect, number) != 0).any())
         changing[static_cast<size_t>(number)] = true;
 }
 
 /// Adds a share of the difference of two fields to the derivatives along the direction of one lane.
+template <class L>
 void add_share(double share, const LaneVectors<SingleLane>& to, const LaneVectors<SingleLane>& from,
-               Eigen::Index lane, LaneVectors<>& tangent) {
-  tangent.x.row(lane) += share * (to.x - from.x);
-  tangent.y.row(lane) += share * (to.y - from.y);
-  tangent.z.row(lane) += share * (to.z - from.z);
+               Eigen::Index lane, LaneVectors<L>& tangent) {
+  const auto add = [&](LaneArray<L>& sum, const LaneArray<SingleLane>& a,
+                       const LaneArray<SingleLane>& b) {
+    sum.row(lane) += (share * (a - b)).template cast<typename L::Number>();
+  };
+  add(tangent.x, to.x, from.x);
+  add(tangent.y, to.y, from.y);
+  add(tangent.z, to.z, from.z);
 }
 
 }  // namespace
 
-TangentParameters TangentParameters::of(const Cloth& cloth, const ParameterSet& set,
-                                        std::span<const Direction> directions) {
-  TangentParameters parameters{.value = lane_parameters<SingleLane>(cloth, {&set, 1}),
-                               .tangent = {}};
-  for (size_t g = 0; g < groups_of(directions); ++g)
-    parameters.tangent.push_back(tangents_of(cloth, set, group_of(directions, g)));
+template <class L>
+TangentParameters<L> TangentParameters<L>::of(const Cloth& cloth, const ParameterSet& set,
+                                              std::span<const Direction> directions) {
+  TangentParameters<L> parameters{.value = lane_parameters<SingleLane>(cloth, {&set, 1}),
+                                  .tangent = {}};
+  for (size_t g = 0; g < groups_of<L>(directions); ++g)
+    parameters.tangent.push_back(tangents_of<L>(cloth, set, group_of<L>(directions, g)));
   return parameters;
 }
 
-TangentState TangentState::of(const Cloth& cloth, const ParameterSet& set,
-                              std::span<const Direction> directions) {
-  TangentState state{.value = LaneState<SingleLane>::of(cloth), .tangent = {}};
+template <class L>
+TangentState<L> TangentState<L>::of(const Cloth& cloth, const ParameterSet& set,
+                                    std::span<const Direction> directions) {
+  TangentState<L> state{.value = LaneState<SingleLane>::of(cloth), .tangent = {}};
   set_start(0, set, state.value);
-  for (size_t g = 0; g < groups_of(directions); ++g) {
-    LaneState<>& tangent = state.tangent.emplace_back(LaneState<>::of(cloth));
-    const std::span<const Direction> group = group_of(directions, g);
+  for (size_t g = 0; g < groups_of<L>(directions); ++g) {
+    LaneState<L>& tangent = state.tangent.emplace_back(LaneState<L>::of(cloth));
+    const std::span<const Direction> group = group_of<L>(directions, g);
     for (size_t d = 0; d < group.size(); ++d) {
       const auto lane = static_cast<int>(d);
       if (group[d].start_position_m.cols() > 0)
@@ -127,14 +152,16 @@ TangentState TangentState::of(const Cloth& cloth, const ParameterSet& set,
       if (group[d].start_velocity_m_per_s.cols() > 0)
         tangent.velocity_m_per_s.set_lane(lane, group[d].start_velocity_m_per_s);
       for (size_t e = 0; e < group[d].start_effect_memory.size(); ++e)
-        tangent.effect_memory[e].row(lane) = group[d].start_effect_memory[e].transpose().array();
+        tangent.effect_memory[e].row(lane) =
+            group[d].start_effect_memory[e].transpose().array().template cast<typename L::Number>();
     }
   }
   return state;
 }
 
-TangentStepper::TangentStepper(const Cloth& cloth, std::span<const Direction> directions,
-                               double kept_s)
+template <class L>
+TangentStepper<L>::TangentStepper(const Cloth& cloth, std::span<const Direction> directions,
+                                  double kept_s)
     : cloth_(cloth),
       inverse_mass_per_kg_(cloth.mass_kg.cwiseInverse()),
       held_value_(cloth),
@@ -142,14 +169,14 @@ TangentStepper::TangentStepper(const Cloth& cloth, std::span<const Direction> di
       sweep_(cloth.mesh),
       tangent_sweep_(cloth.mesh),
       limiter_(cloth.mesh, movable_inverse_mass(cloth, held_value_.touched())),
-      next_memory_(LaneState<>::of(cloth).effect_memory),
+      next_memory_(LaneState<L>::of(cloth).effect_memory),
       of_forces_(cloth.effects.size()),
       of_changes_(cloth.effects.size()),
-      changed_n_(LaneVectors<>::zero(cloth.mesh.vertex_count())) {
+      changed_n_(LaneVectors<L>::zero(cloth.mesh.vertex_count())) {
   const auto zero = [&](int count) {
-    return TangentVectors{
+    return TangentVectors<L>{
         LaneVectors<SingleLane>::zero(count),
-        std::vector<LaneVectors<>>(groups_of(directions), LaneVectors<>::zero(count))};
+        std::vector<LaneVectors<L>>(groups_of<L>(directions), LaneVectors<L>::zero(count))};
   };
   force_n_ = zero(cloth.mesh.vertex_count());
   pull_n_ = target_m_ = zero(held_value_.count());
@@ -185,21 +212,25 @@ TangentStepper::TangentStepper(const Cloth& cloth, std::span<const Direction> di
   if (!emerging_.empty()) carried_n_ = emerged_last_n_ = force_n_.tangent;
 }
 
-Eigen::VectorXd TangentStepper::emerging_memory(size_t direction) const {
+template <class L>
+Eigen::VectorXd TangentStepper<L>::emerging_memory(size_t direction) const {
   for (const Emerging& emerging : emerging_)
     if (emerging.direction == direction) return emerging.memory.row(0).matrix();
   return {};
 }
 
-TangentVectors TangentStepper::locate(const TangentState& state) const {
-  TangentVectors places{held_value_.locate(state.value.position_m), {}};
-  for (const LaneState<>& tangent : state.tangent)
+template <class L>
+TangentVectors<L> TangentStepper<L>::locate(const TangentState<L>& state) const {
+  TangentVectors<L> places{held_value_.locate(state.value.position_m), {}};
+  for (const LaneState<L>& tangent : state.tangent)
     places.tangent.push_back(held_tangent_.locate(tangent.position_m));
   return places;
 }
 
-void TangentStepper::step(const TangentParameters& parameters, const TangentVectors& held_target_m,
-                          double time_s, double time_step_s, TangentState& state) {
+template <class L>
+void TangentStepper<L>::step(const TangentParameters<L>& parameters,
+                             const TangentVectors<L>& held_target_m, double time_s,
+                             double time_step_s, TangentState<L>& state) {
   LaneVectors<SingleLane>&position = state.value.position_m,
   &velocity = state.value.velocity_m_per_s;
   const EffectScene<SingleLane> scene{cloth_,
@@ -214,7 +245,7 @@ void TangentStepper::step(const TangentParameters& parameters, const TangentVect
   if (forces) add_effect_forces(parameters, scene, state);
 
   const TangentSweep::State at{parameters.value.springs, position, velocity};
-  const TangentVectors* target_m = &held_target_m;
+  const TangentVectors<L>* target_m = &held_target_m;
   if (!changes_force_ && !shifts_supports_) {
     for (size_t g = 0; g < groups; ++g)
       tangent_sweep_.step_euler(at, parameters.tangent[g].springs,
@@ -250,10 +281,12 @@ void TangentStepper::step(const TangentParameters& parameters, const TangentVect
   apply_limit(parameters, time_step_s, state);
 }
 
-void TangentStepper::add_effect_forces(const TangentParameters& parameters,
-                                       const EffectScene<SingleLane>& scene, TangentState& state) {
+template <class L>
+void TangentStepper<L>::add_effect_forces(const TangentParameters<L>& parameters,
+                                          const EffectScene<SingleLane>& scene,
+                                          TangentState<L>& state) {
   force_n_.value.set_zero();
-  for (LaneVectors<>& tangent : force_n_.tangent) tangent.set_zero();
+  for (LaneVectors<L>& tangent : force_n_.tangent) tangent.set_zero();
   for (size_t e = 0; e < cloth_.effects.size(); ++e) {
     const Effect& effect = *cloth_.effects[e];
     EffectMemory<SingleLane>& memory = state.value.effect_memory[e];
@@ -268,12 +301,13 @@ void TangentStepper::add_effect_forces(const TangentParameters& parameters,
   if (!emerging_.empty()) add_emerging_forces(scene);
 }
 
+template <class L>
 template <class Linearise>
-const EffectLinearisation& TangentStepper::derivatives_of(size_t effect,
-                                                          const TangentParameters& parameters,
-                                                          const EffectScene<SingleLane>& scene,
-                                                          KeptDerivatives& kept,
-                                                          const Linearise& linearise) {
+const EffectLinearisation& TangentStepper<L>::derivatives_of(size_t effect,
+                                                             const TangentParameters<L>& parameters,
+                                                             const EffectScene<SingleLane>& scene,
+                                                             KeptDerivatives& kept,
+                                                             const Linearise& linearise) {
   if (scene.time_s + scene.time_step_s / 2 < kept.taken_s + kept.lasts_s) return kept.of;
   kept.of.clear();
   if (kept.of.looked_at.empty()) find_changing(parameters, effect, kept.of.looked_at);
@@ -282,8 +316,9 @@ const EffectLinearisation& TangentStepper::derivatives_of(size_t effect,
   return kept.of;
 }
 
-void TangentStepper::add_emerging_forces(const EffectScene<SingleLane>& scene) {
-  const auto add_to = [&](Emerging& emerging, std::vector<LaneVectors<>>& tangent) {
+template <class L>
+void TangentStepper<L>::add_emerging_forces(const EffectScene<SingleLane>& scene) {
+  const auto add_to = [&](Emerging& emerging, std::vector<LaneVectors<L>>& tangent) {
     emerged_n_ = force_n_.value;
     emerging.effect->add_force(scene, emerging.parameters, emerging.memory, emerged_n_);
     add_share(emerging.per_change, emerged_n_, force_n_.value, emerging.lane(),
@@ -292,14 +327,15 @@ void TangentStepper::add_emerging_forces(const EffectScene<SingleLane>& scene) {
   // The force is computed half a step early rather than late.
   if (!emerged_once_ || since_emerged_s_ + scene.time_step_s / 2 >= kEmergingInterval_s) {
     std::swap(carried_n_, emerged_last_n_);
-    for (LaneVectors<>& tangent : emerged_last_n_) tangent.set_zero();
+    for (LaneVectors<L>& tangent : emerged_last_n_) tangent.set_zero();
     for (Emerging& emerging : emerging_)
       if (!emerging.remembers()) add_to(emerging, emerged_last_n_);
     // The older force becomes the mean over the steps until the next time, on the straight line
     // through both.
-    const double ahead =
+    const double exactly_ahead =
         emerged_once_ ? (since_emerged_s_ - scene.time_step_s) / (2 * since_emerged_s_) : 0;
-    const auto carry_on = [&](auto& before, const auto& last) {
+    const auto carry_on = [&, ahead = static_cast<typename L::Number>(exactly_ahead)](
+                              auto& before, const auto& last) {
       before = last + ahead * (last - before);
     };
     for (size_t g = 0; g < carried_n_.size(); ++g) {
@@ -320,8 +356,10 @@ void TangentStepper::add_emerging_forces(const EffectScene<SingleLane>& scene) {
     if (emerging.remembers()) add_to(emerging, force_n_.tangent);
 }
 
-void TangentStepper::shift_supports(const TangentParameters& parameters,
-                                    const EffectScene<SingleLane>& scene, TangentState& state) {
+template <class L>
+void TangentStepper<L>::shift_supports(const TangentParameters<L>& parameters,
+                                       const EffectScene<SingleLane>& scene,
+                                       TangentState<L>& state) {
   pull_n_.value.set_zero();
   held_value_.add_pulls(force_n_.value, parameters.value.gravity_m_per_s2, pull_n_.value);
   for (size_t g = 0; g < state.tangent.size(); ++g) {
@@ -353,9 +391,10 @@ void TangentStepper::shift_supports(const TangentParameters& parameters,
   }
 }
 
-void TangentStepper::change_forces(const TangentParameters& parameters,
-                                   const EffectScene<SingleLane>& scene,
-                                   const TangentState& state) {
+template <class L>
+void TangentStepper<L>::change_forces(const TangentParameters<L>& parameters,
+                                      const EffectScene<SingleLane>& scene,
+                                      const TangentState<L>& state) {
   for (size_t e = 0; e < cloth_.effects.size(); ++e) {
     const Effect& effect = *cloth_.effects[e];
     if (!effect.changes_force()) continue;
@@ -364,7 +403,7 @@ void TangentStepper::change_forces(const TangentParameters& parameters,
           effect.linearise_change(scene, parameters.value.effects[e], force_n_.value, of);
         });
     for (size_t g = 0; g < state.tangent.size(); ++g) {
-      LaneVectors<>& tangent = force_n_.tangent[g];
+      LaneVectors<L>& tangent = force_n_.tangent[g];
       changed_n_.set_zero();
       add_products(derivatives.by_force, tangent, changed_n_);
       add_actions(e, derivatives, parameters.tangent[g], state.tangent[g], changed_n_);
@@ -381,52 +420,57 @@ void TangentStepper::change_forces(const TangentParameters& parameters,
   }
 }
 
-void TangentStepper::add_actions(size_t e, const EffectLinearisation& derivatives,
-                                 const LaneParameters<>& parameters, const LaneState<>& state,
-                                 LaneVectors<>& action) {
+template <class L>
+void TangentStepper<L>::add_actions(size_t e, const EffectLinearisation& derivatives,
+                                    const LaneParameters<L>& parameters, const LaneState<L>& state,
+                                    LaneVectors<L>& action) {
   add_products(derivatives.by_motion, state.position_m, state.velocity_m_per_s, action);
   for (const EffectLinearisation::ByParameter& column : derivatives.by_parameter)
     add_product(column.derivative, parameter_change(parameters, e, column.parameter), column.on,
                 action);
-  const EffectMemory<>& memory = state.effect_memory[e];
+  const EffectMemory<L>& memory = state.effect_memory[e];
   for (const EffectLinearisation::ByMemory& column : derivatives.by_memory)
     add_product(column.derivative, memory.col(column.number), column.on, action);
   if (derivatives.by_spring.empty()) return;
   const auto springs = static_cast<Eigen::Index>(derivatives.by_spring.size());
-  if (tension_n_.cols() != springs) tension_n_ = LaneArray<>(kLanes, springs);
+  if (tension_n_.cols() != springs) tension_n_ = LaneArray<L>(L::kCount, springs);
   tension_n_.setZero();
   for (const EffectLinearisation::TensionByParameter& of : derivatives.tension_by_parameter)
-    tension_n_.col(of.spring) += of.derivative * parameter_change(parameters, e, of.parameter);
+    tension_n_.col(of.spring) +=
+        in_lanes<L>(of.derivative) * parameter_change(parameters, e, of.parameter);
   for (const EffectLinearisation::TensionByMemory& of : derivatives.tension_by_memory)
-    tension_n_.col(of.spring) += of.derivative * memory.col(of.number);
+    tension_n_.col(of.spring) += in_lanes<L>(of.derivative) * memory.col(of.number);
   add_products(derivatives.by_spring, tension_n_, state.position_m, state.velocity_m_per_s, action);
 }
 
-void TangentStepper::apply(size_t e, const EffectLinearisation& derivatives,
-                           const LaneParameters<>& parameters, const LaneVectors<>* pull_n,
-                           LaneVectors<>& action, LaneState<>& state) {
+template <class L>
+void TangentStepper<L>::apply(size_t e, const EffectLinearisation& derivatives,
+                              const LaneParameters<L>& parameters, const LaneVectors<L>* pull_n,
+                              LaneVectors<L>& action, LaneState<L>& state) {
   add_actions(e, derivatives, parameters, state, action);
   if (pull_n != nullptr) add_products(derivatives.by_force, *pull_n, action);
 
   if (derivatives.memory_by_memory.empty() && derivatives.by_memory.empty()) return;
-  EffectMemory<>& memory = state.effect_memory[e];
-  EffectMemory<>& next = next_memory_[e];
+  EffectMemory<L>& memory = state.effect_memory[e];
+  EffectMemory<L>& next = next_memory_[e];
   next.setZero();
   for (const EffectLinearisation::MemoryByMemory& entry : derivatives.memory_by_memory)
-    next.col(entry.number) += entry.derivative * memory.col(entry.of);
+    next.col(entry.number) += in_lanes<L>(entry.derivative) * memory.col(entry.of);
   for (const EffectLinearisation::MemoryByMotion& row : derivatives.memory_by_motion)
     next.col(row.number) += product(row.by_position, state.position_m, row.of) +
                             product(row.by_velocity, state.velocity_m_per_s, row.of);
   for (const EffectLinearisation::MemoryByParameter& entry : derivatives.memory_by_parameter)
-    next.col(entry.number) += entry.derivative * parameter_change(parameters, e, entry.parameter);
+    next.col(entry.number) +=
+        in_lanes<L>(entry.derivative) * parameter_change(parameters, e, entry.parameter);
   if (pull_n != nullptr)
     for (const EffectLinearisation::MemoryByForce& row : derivatives.memory_by_force)
       next.col(row.number) += product(row.derivative, *pull_n, row.of);
   memory = next;
 }
 
-void TangentStepper::apply_limit(const TangentParameters& parameters, double time_step_s,
-                                 TangentState& state) {
+template <class L>
+void TangentStepper<L>::apply_limit(const TangentParameters<L>& parameters, double time_step_s,
+                                    TangentState<L>& state) {
   const StrainLimit& limit = cloth_.strain_limit;
   if (limit.mode == StrainLimitMode::off) return;
   const bool correct_velocity = limit.mode == StrainLimitMode::consistent;
@@ -434,28 +478,30 @@ void TangentStepper::apply_limit(const TangentParameters& parameters, double tim
   limiter_.limit(limit, parameters.value.limits, time_step_s, state.value.position_m,
                  state.value.velocity_m_per_s, &moves_);
 
+  using Number = typename L::Number;
   // With longest the length a spring may have, its ends move by shares of (1 - longest / l) L:
   //   d((1 - longest / l) L) = (1 - longest / l) dL + (longest / l^3 (L . dL) - dlongest / l) L
   for (size_t g = 0; g < state.tangent.size(); ++g) {
-    LaneVectors<>&p = state.tangent[g].position_m, &v = state.tangent[g].velocity_m_per_s;
+    LaneVectors<L>&p = state.tangent[g].position_m, &v = state.tangent[g].velocity_m_per_s;
     for (const LimitMove& move : moves_) {
       const int a = move.first, b = move.second;
-      const Eigen::Vector3d& along = move.along_m;
-      const LaneValue<> dx = p.x.col(b) - p.x.col(a), dy = p.y.col(b) - p.y.col(a),
-                        dz = p.z.col(b) - p.z.col(a);
-      const LaneValue<> stretch =
-          (1 - move.excess) * move.inverse_length_per_m * move.inverse_length_per_m *
+      const Eigen::Vector3<Number> along = move.along_m.template cast<Number>();
+      const Number excess = in_lanes<L>(move.excess),
+                   inverse_length = in_lanes<L>(move.inverse_length_per_m);
+      const LaneValue<L> dx = p.x.col(b) - p.x.col(a), dy = p.y.col(b) - p.y.col(a),
+                         dz = p.z.col(b) - p.z.col(a);
+      const LaneValue<L> stretch =
+          (1 - excess) * inverse_length * inverse_length *
               (along.x() * dx + along.y() * dy + along.z() * dz) -
-          move.inverse_length_per_m *
-              parameters.tangent[g].limits.longest_m[static_cast<size_t>(move.type)];
-      const auto shift = [&](LaneArray<>& place, LaneArray<>& speed, const LaneValue<>& d,
-                             double component) {
-        const LaneValue<> change = move.excess * d + component * stretch;
-        place.col(a) += move.first_share * change;
-        place.col(b) -= move.second_share * change;
+          inverse_length * parameters.tangent[g].limits.longest_m[static_cast<size_t>(move.type)];
+      const auto shift = [&](LaneArray<L>& place, LaneArray<L>& speed, const LaneValue<L>& d,
+                             Number component) {
+        const LaneValue<L> change = excess * d + component * stretch;
+        place.col(a) += in_lanes<L>(move.first_share) * change;
+        place.col(b) -= in_lanes<L>(move.second_share) * change;
         if (!correct_velocity) return;
-        speed.col(a) += move.first_share / time_step_s * change;
-        speed.col(b) -= move.second_share / time_step_s * change;
+        speed.col(a) += in_lanes<L>(move.first_share / time_step_s) * change;
+        speed.col(b) -= in_lanes<L>(move.second_share / time_step_s) * change;
       };
       shift(p.x, v.x, dx, along.x());
       shift(p.y, v.y, dy, along.y());
@@ -463,5 +509,13 @@ void TangentStepper::apply_limit(const TangentParameters& parameters, double tim
     }
   }
 }
+
+#define CLOTHFIT_INSTANTIATE(L)         \
+  template struct TangentParameters<L>; \
+  template struct TangentState<L>;      \
+  template class TangentStepper<L>;
+CLOTHFIT_INSTANTIATE(ExactLanes)
+CLOTHFIT_INSTANTIATE(FastLanes)
+#undef CLOTHFIT_INSTANTIATE
 
 }  // namespace clothfit

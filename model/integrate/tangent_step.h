@@ -45,26 +45,29 @@ struct Direction {
   std::optional<EmergingEffect> emerging;
 };
 
-/// The parameters of one simulation and their changes along directions, kLanes in each group.
-/// Missing directions of the last group are zero.
+/// The parameters of one simulation and their changes along directions, as many as lanes in each
+/// group. Missing directions of the last group are zero.
+template <class L = ExactLanes>
 struct TangentParameters {
   LaneParameters<SingleLane> value;
-  std::vector<LaneParameters<>> tangent;  ///< of each group
+  std::vector<LaneParameters<L>> tangent;  ///< of each group
 
   static TangentParameters of(const Cloth& cloth, const ParameterSet& set,
                               std::span<const Direction> directions);
 };
 
 /// Places or motions of one simulation with their changes along the directions of each group.
+template <class L = ExactLanes>
 struct TangentVectors {
   LaneVectors<SingleLane> value;
-  std::vector<LaneVectors<>> tangent;
+  std::vector<LaneVectors<L>> tangent;
 };
 
 /// One simulation and its derivatives along directions.
+template <class L = ExactLanes>
 struct TangentState {
   LaneState<SingleLane> value;
-  std::vector<LaneState<>> tangent;  ///< of each group
+  std::vector<LaneState<L>> tangent;  ///< of each group
 
   /// Returns their start; one group at least.
   static TangentState of(const Cloth& cloth, const ParameterSet& set,
@@ -75,6 +78,7 @@ struct TangentState {
 /// exact for the discrete scheme, the springs at their strain limit included, where it is smooth.
 /// The action of effects is linearised once for all of them. The simulation itself has the bits
 /// that EulerStepper gives it. Holds scratch memory: one object per thread.
+template <class L = ExactLanes>
 class TangentStepper {
  public:
   /// `cloth` must outlive the stepper. `directions` name the effects that emerge along them.
@@ -87,11 +91,11 @@ class TangentStepper {
   Eigen::VectorXd emerging_memory(size_t direction) const;
 
   /// Returns where the held points are.
-  TangentVectors locate(const TangentState& state) const;
+  TangentVectors<L> locate(const TangentState<L>& state) const;
 
   /// Takes one time step, as EulerStepper::step does.
-  void step(const TangentParameters& parameters, const TangentVectors& held_target_m, double time_s,
-            double time_step_s, TangentState& state);
+  void step(const TangentParameters<L>& parameters, const TangentVectors<L>& held_target_m,
+            double time_s, double time_step_s, TangentState<L>& state);
 
  private:
   /// An effect that emerges along the direction of one lane of a group.
@@ -103,8 +107,8 @@ class TangentStepper {
     EffectMemory<SingleLane> memory;
     bool remembers() const { return memory.cols() > 0; }
 
-    size_t group() const { return direction / kLanes; }
-    Eigen::Index lane() const { return static_cast<Eigen::Index>(direction % kLanes); }
+    size_t group() const { return direction / L::kCount; }
+    Eigen::Index lane() const { return static_cast<Eigen::Index>(direction % L::kCount); }
   };
 
   /// Derivatives of one effect's forces, when they were taken, and how long they serve.
@@ -114,46 +118,47 @@ class TangentStepper {
     double taken_s = -std::numeric_limits<double>::infinity();
   };
 
-  void add_effect_forces(const TangentParameters& parameters, const EffectScene<SingleLane>& scene,
-                         TangentState& state);
+  void add_effect_forces(const TangentParameters<L>& parameters,
+                         const EffectScene<SingleLane>& scene, TangentState<L>& state);
   template <class Linearise>
-  const EffectLinearisation& derivatives_of(size_t effect, const TangentParameters& parameters,
+  const EffectLinearisation& derivatives_of(size_t effect, const TangentParameters<L>& parameters,
                                             const EffectScene<SingleLane>& scene,
                                             KeptDerivatives& kept, const Linearise& linearise);
   void add_emerging_forces(const EffectScene<SingleLane>& scene);
-  void shift_supports(const TangentParameters& parameters, const EffectScene<SingleLane>& scene,
-                      TangentState& state);
-  void change_forces(const TangentParameters& parameters, const EffectScene<SingleLane>& scene,
-                     const TangentState& state);
+  void shift_supports(const TangentParameters<L>& parameters, const EffectScene<SingleLane>& scene,
+                      TangentState<L>& state);
+  void change_forces(const TangentParameters<L>& parameters, const EffectScene<SingleLane>& scene,
+                     const TangentState<L>& state);
   /// Adds the products of derivatives of effect `e` with a group's tangents to those of its action.
   void add_actions(size_t e, const EffectLinearisation& derivatives,
-                   const LaneParameters<>& parameters, const LaneState<>& state,
-                   LaneVectors<>& action);
+                   const LaneParameters<L>& parameters, const LaneState<L>& state,
+                   LaneVectors<L>& action);
   /// Adds them and advances the memory too; `pull_n` of held points, or null.
-  void apply(size_t e, const EffectLinearisation& derivatives, const LaneParameters<>& parameters,
-             const LaneVectors<>* pull_n, LaneVectors<>& action, LaneState<>& state);
-  void apply_limit(const TangentParameters& parameters, double time_step_s, TangentState& state);
+  void apply(size_t e, const EffectLinearisation& derivatives, const LaneParameters<L>& parameters,
+             const LaneVectors<L>* pull_n, LaneVectors<L>& action, LaneState<L>& state);
+  void apply_limit(const TangentParameters<L>& parameters, double time_step_s,
+                   TangentState<L>& state);
 
   const Cloth& cloth_;
   Eigen::VectorXd inverse_mass_per_kg_;
   bool changes_force_ = false, shifts_supports_ = false;  ///< any effect
   HeldPlacement<SingleLane> held_value_;
-  HeldPlacement<ExactLanes> held_tangent_;
+  HeldPlacement<L> held_tangent_;
   ClothSweep<SingleLane> sweep_;
   TangentSweep tangent_sweep_;
   StrainLimiter<SingleLane> limiter_;
   std::vector<LimitMove> moves_;  ///< of the last step's strain limit
-  TangentVectors force_n_, pull_n_, target_m_;
+  TangentVectors<L> force_n_, pull_n_, target_m_;
   EffectLinearisation derivatives_;
-  std::vector<EffectMemory<>> next_memory_;              ///< of each effect
+  std::vector<EffectMemory<L>> next_memory_;             ///< of each effect
   std::vector<KeptDerivatives> of_forces_, of_changes_;  ///< of each effect
   std::vector<Emerging> emerging_;
   /// For each group: the emerging force until it is computed again, and when that last was.
-  std::vector<LaneVectors<>> carried_n_, emerged_last_n_;
+  std::vector<LaneVectors<L>> carried_n_, emerged_last_n_;
   double since_emerged_s_ = 0;
   bool emerged_once_ = false;
-  LaneVectors<> changed_n_;
-  LaneArray<> tension_n_;  ///< changes of the pulls of one effect's springs
+  LaneVectors<L> changed_n_;
+  LaneArray<L> tension_n_;  ///< changes of the pulls of one effect's springs
   LaneVectors<SingleLane> emerged_n_, emerged_target_m_;
 };
 

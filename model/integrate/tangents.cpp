@@ -10,6 +10,7 @@ namespace clothfit {
 namespace {
 
 /// Runs one simulation and its derivatives along some directions.
+template <class L>
 TangentResult run_chunk(const Cloth& cloth, const ParameterSet& set,
                         std::span<const Direction> directions, const Schedule& schedule) {
   // A few steps change the derivatives as little as they do the cloth.
@@ -17,10 +18,10 @@ TangentResult run_chunk(const Cloth& cloth, const ParameterSet& set,
   const double kept_s = schedule.derivatives_kept_s > 0 ? std::max(schedule.derivatives_kept_s,
                                                                    kFewSteps * schedule.time_step_s)
                                                         : 0;
-  TangentStepper stepper(cloth, directions, kept_s);
-  const TangentParameters parameters = TangentParameters::of(cloth, set, directions);
-  TangentState state = TangentState::of(cloth, set, directions);
-  TangentVectors target_m = stepper.locate(state);
+  TangentStepper<L> stepper(cloth, directions, kept_s);
+  const auto parameters = TangentParameters<L>::of(cloth, set, directions);
+  auto state = TangentState<L>::of(cloth, set, directions);
+  TangentVectors<L> target_m = stepper.locate(state);
   const auto aim = [&](double time_s) {
     for (size_t h = 0; h < cloth.held.size(); ++h) {
       if (!cloth.held[h].motion) continue;
@@ -33,11 +34,11 @@ TangentResult run_chunk(const Cloth& cloth, const ParameterSet& set,
         const auto& motion = directions[d].held_motion;
         const Eigen::Vector3d change =
             motion.empty() || !motion[h] ? Eigen::Vector3d::Zero() : motion[h](time_s);
-        const auto lane = static_cast<Eigen::Index>(d % kLanes);
-        LaneVectors<>& tangent = target_m.tangent[d / kLanes];
-        tangent.x(lane, column) = change.x();
-        tangent.y(lane, column) = change.y();
-        tangent.z(lane, column) = change.z();
+        const auto lane = static_cast<Eigen::Index>(d % L::kCount);
+        LaneVectors<L>& tangent = target_m.tangent[d / L::kCount];
+        tangent.x(lane, column) = static_cast<typename L::Number>(change.x());
+        tangent.y(lane, column) = static_cast<typename L::Number>(change.y());
+        tangent.z(lane, column) = static_cast<typename L::Number>(change.z());
       }
     }
   };
@@ -66,7 +67,7 @@ TangentResult run_chunk(const Cloth& cloth, const ParameterSet& set,
     result.run.position_m.push_back(std::move(now));
     for (size_t d = 0; d < directions.size(); ++d) {
       Eigen::Matrix3Xd tangent =
-          state.tangent[d / kLanes].position_m.lane(static_cast<int>(d % kLanes));
+          state.tangent[d / L::kCount].position_m.lane(static_cast<int>(d % L::kCount));
       if (!is_running()) tangent.setConstant(NAN);
       result.position_tangent[d].push_back(std::move(tangent));
     }
@@ -77,35 +78,33 @@ TangentResult run_chunk(const Cloth& cloth, const ParameterSet& set,
     };
     result.run.velocity_m_per_s.push_back(kept(state.value.velocity_m_per_s.lane(0)));
     for (size_t d = 0; d < directions.size(); ++d)
-      result.velocity_tangent[d].push_back(
-          kept(state.tangent[d / kLanes].velocity_m_per_s.lane(static_cast<int>(d % kLanes))));
+      result.velocity_tangent[d].push_back(kept(
+          state.tangent[d / L::kCount].velocity_m_per_s.lane(static_cast<int>(d % L::kCount))));
   }
   if (is_running()) result.run.reason = StopReason::reached_end;
   return result;
 }
 
 /// Returns how many directions share a run: they spread over the threads and stay in the cache.
-size_t directions_at_once(size_t directions) {
+size_t directions_at_once(size_t directions, size_t lanes) {
   constexpr size_t kMostGroups = 8;
-  const size_t groups = (directions + kLanes - 1) / kLanes;
+  const size_t groups = (directions + lanes - 1) / lanes;
   const auto threads =
       tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
-  return kLanes * std::clamp<size_t>((groups + threads - 1) / threads, 1, kMostGroups);
+  return lanes * std::clamp<size_t>((groups + threads - 1) / threads, 1, kMostGroups);
 }
 
-}  // namespace
-
-TangentResult simulate_with_tangents(const Cloth& cloth, const ParameterSet& parameters,
-                                     std::span<const Direction> directions,
-                                     const Schedule& schedule) {
-  const size_t chunk = directions_at_once(directions.size());
+template <class L>
+TangentResult run_in_lanes(const Cloth& cloth, const ParameterSet& parameters,
+                           std::span<const Direction> directions, const Schedule& schedule) {
+  const size_t chunk = directions_at_once(directions.size(), L::kCount);
   const size_t chunks = std::max<size_t>(1, (directions.size() + chunk - 1) / chunk);
   std::vector<TangentResult> results(chunks);
   tbb::parallel_for(size_t{0}, chunks, [&](size_t c) {
     const size_t first = c * chunk;
-    results[c] =
-        run_chunk(cloth, parameters,
-                  directions.subspan(first, std::min(chunk, directions.size() - first)), schedule);
+    results[c] = run_chunk<L>(cloth, parameters,
+                              directions.subspan(first, std::min(chunk, directions.size() - first)),
+                              schedule);
   });
   TangentResult result = std::move(results.front());
   for (size_t c = 1; c < chunks; ++c) {
@@ -113,6 +112,17 @@ TangentResult simulate_with_tangents(const Cloth& cloth, const ParameterSet& par
     std::ranges::move(results[c].velocity_tangent, std::back_inserter(result.velocity_tangent));
   }
   return result;
+}
+
+}  // namespace
+
+TangentResult simulate_with_tangents(const Cloth& cloth, const ParameterSet& parameters,
+                                     std::span<const Direction> directions,
+                                     const Schedule& schedule) {
+  // Two groups of exact lanes run side by side in the time of a group of fast ones.
+  const bool fast = schedule.fast_derivatives && directions.size() > 2 * ExactLanes::kCount;
+  return fast ? run_in_lanes<FastLanes>(cloth, parameters, directions, schedule)
+              : run_in_lanes<ExactLanes>(cloth, parameters, directions, schedule);
 }
 
 }  // namespace clothfit

@@ -34,15 +34,18 @@ struct ForceBlock {
 // These functions add products of such derivatives with changes in every lane to `action`. As in
 // TangentSweep the products may be fused with sums.
 
-void add_products(std::span<const MotionBlock> blocks, const LaneVectors<>& position_m,
-                  const LaneVectors<>& velocity_m_per_s, LaneVectors<>& action);
+template <class L>
+void add_products(std::span<const MotionBlock> blocks, const LaneVectors<L>& position_m,
+                  const LaneVectors<L>& velocity_m_per_s, LaneVectors<L>& action);
 
 /// `tension_n` holds dT of each spring.
-void add_products(std::span<const SpringJacobian> springs, const LaneArray<>& tension_n,
-                  const LaneVectors<>& position_m, const LaneVectors<>& velocity_m_per_s,
-                  LaneVectors<>& action);
+template <class L>
+void add_products(std::span<const SpringJacobian> springs, const LaneArray<L>& tension_n,
+                  const LaneVectors<L>& position_m, const LaneVectors<L>& velocity_m_per_s,
+                  LaneVectors<L>& action);
 
-void add_products(std::span<const ForceBlock> blocks, const LaneVectors<>& force_n,
-                  LaneVectors<>& action);
+template <class L>
+void add_products(std::span<const ForceBlock> blocks, const LaneVectors<L>& force_n,
+                  LaneVectors<L>& action);
 
 }  // namespace clothfit

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 
 #include "model/kernels/spring_reach.h"
 
@@ -31,19 +32,23 @@ struct LineariseArrays {
   const double *natural_length_factor, *stiffness_factor;  ///< or null
 };
 
+template <class L>
 struct TangentArrays {
+  using Number = typename L::Number;
   Mesh mesh;
   std::array<LineariseArrays, kSpringTypes> from;
-  const LaneSprings<>& springs;               ///< along the directions
-  bool any_spring;                            ///< whether these are not all zero
-  ConstVectors position_m, velocity_m_per_s;  ///< along the directions
-  double* scratch;
+  const LaneSprings<L>& springs;                              ///< along the directions
+  bool any_spring;                                            ///< whether these are not all zero
+  std::array<const Number*, 3> position_m, velocity_m_per_s;  ///< along the directions
+  Number* scratch;
 };
 
+template <class L>
 struct TangentEuler {
-  MutableVectors position_m, velocity_m_per_s;
-  ConstVectors gravity_m_per_s2;
-  ConstVectors effect_force_n;  ///< or null
+  using Number = typename L::Number;
+  std::array<Number*, 3> position_m, velocity_m_per_s;
+  std::array<const Number*, 3> gravity_m_per_s2;
+  std::array<const Number*, 3> effect_force_n;  ///< or null
   const double* inverse_mass_per_kg;
   double time_step_s;
 };
@@ -130,8 +135,9 @@ HWY_INLINE SpringDerivatives<hn::Vec<D>> differentiate(D d, const LineariseArray
 enum class Constants { still, change, change_by_factors };
 
 /// The derivative of a vertex's position and velocity.
+template <class L>
 struct Motion {
-  Vector3<Vector<ExactLanes>> position, velocity;
+  Vector3<Vector<L>> position, velocity;
 };
 
 template <class V>
@@ -145,46 +151,64 @@ HWY_INLINE V fused_dot(const Vector3<V>& a, const Vector3<V>& b) {
 }
 
 /// The derivatives of the springs that leave eight neighbouring vertices.
+template <class Number>
 struct Chunk {
   static constexpr std::ptrdiff_t kVertices = 8;
-  alignas(64) double direction[kSpringTypes][3][kVertices];
-  alignas(64) double w[kSpringTypes][3][kVertices];
-  alignas(64) double tension_ratio[kSpringTypes][kVertices], elongation[kSpringTypes][kVertices],
+  alignas(64) Number direction[kSpringTypes][3][kVertices];
+  alignas(64) Number w[kSpringTypes][3][kVertices];
+  alignas(64) Number tension_ratio[kSpringTypes][kVertices], elongation[kSpringTypes][kVertices],
       stretching[kSpringTypes][kVertices], stiffness[kSpringTypes][kVertices];
 };
 
+template <class D>
+HWY_INLINE void store_as(const hn::Vec<D>& v, D d, double* to) {
+  hn::StoreU(v, d, to);
+}
+template <class D>
+HWY_INLINE void store_as(const hn::Vec<D>& v, D, float* to) {
+  const hn::Rebind<float, D> narrow;
+  hn::StoreU(hn::DemoteTo(narrow, v), narrow, to);
+}
+
+template <class Number>
 HWY_INLINE void fill(const std::array<LineariseArrays, kSpringTypes>& from, std::ptrdiff_t first,
-                     Chunk& chunk) {
-  const hn::CappedTag<double, Chunk::kVertices> d;
+                     Chunk<Number>& chunk) {
+  const hn::CappedTag<double, Chunk<Number>::kVertices> d;
   for (size_t type = 0; type < kSpringTypes; ++type) {
     if (first >= from[type].count) continue;
-    for (std::ptrdiff_t n = 0; n < Chunk::kVertices;
+    for (std::ptrdiff_t n = 0; n < Chunk<Number>::kVertices;
          n += static_cast<std::ptrdiff_t>(hn::Lanes(d))) {
       const auto spring = differentiate(d, from[type], first + n);
-      hn::Store(spring.u.x, d, chunk.direction[type][0] + n);
-      hn::Store(spring.u.y, d, chunk.direction[type][1] + n);
-      hn::Store(spring.u.z, d, chunk.direction[type][2] + n);
-      hn::Store(spring.w.x, d, chunk.w[type][0] + n);
-      hn::Store(spring.w.y, d, chunk.w[type][1] + n);
-      hn::Store(spring.w.z, d, chunk.w[type][2] + n);
-      hn::Store(spring.tension_ratio, d, chunk.tension_ratio[type] + n);
-      hn::Store(spring.elongation, d, chunk.elongation[type] + n);
-      hn::Store(spring.stretching, d, chunk.stretching[type] + n);
-      hn::Store(spring.stiffness, d, chunk.stiffness[type] + n);
+      store_as(spring.u.x, d, chunk.direction[type][0] + n);
+      store_as(spring.u.y, d, chunk.direction[type][1] + n);
+      store_as(spring.u.z, d, chunk.direction[type][2] + n);
+      store_as(spring.w.x, d, chunk.w[type][0] + n);
+      store_as(spring.w.y, d, chunk.w[type][1] + n);
+      store_as(spring.w.z, d, chunk.w[type][2] + n);
+      store_as(spring.tension_ratio, d, chunk.tension_ratio[type] + n);
+      store_as(spring.elongation, d, chunk.elongation[type] + n);
+      store_as(spring.stretching, d, chunk.stretching[type] + n);
+      store_as(spring.stiffness, d, chunk.stiffness[type] + n);
     }
   }
 }
 
-template <Constants constants, class Sink>
-HWY_INLINE void sweep_tangents(const TangentArrays& arrays, const Sink& sink) {
-  using L = ExactLanes;
+template <Constants constants, class L, class Sink>
+HWY_INLINE void sweep_tangents(const TangentArrays<L>& arrays, const Sink& sink) {
+  using Number = typename L::Number;
   using V = Vector<L>;
+  constexpr std::ptrdiff_t kLaneCount = L::kCount;
   const Tag<L> d;
-  const ConstVectors positions = arrays.position_m, velocities = arrays.velocity_m_per_s;
+  const std::array<const Number*, 3> positions = arrays.position_m,
+                                     velocities = arrays.velocity_m_per_s;
   const std::array<LineariseArrays, kSpringTypes> from = arrays.from;
-  std::fill_n(arrays.scratch, kRowSweepScratchRows * arrays.mesh.columns * kLanes, 0.0);
-  Chunk chunk;
-  for (std::ptrdiff_t lane = 0; lane < kLanes; lane += static_cast<std::ptrdiff_t>(hn::Lanes(d))) {
+  std::fill_n(arrays.scratch, kRowSweepScratchRows * arrays.mesh.columns * kLaneCount, Number{0});
+  Chunk<Number> chunk;
+  std::array<Number, kSpringTypes> damping_ns_per_m;
+  for (size_t type = 0; type < kSpringTypes; ++type)
+    damping_ns_per_m[type] = static_cast<Number>(from[type].damping_ns_per_m);
+  for (std::ptrdiff_t lane = 0; lane < kLaneCount;
+       lane += static_cast<std::ptrdiff_t>(hn::Lanes(d))) {
     V by_natural[kSpringTypes], by_stiffness[kSpringTypes], by_damping[kSpringTypes];
     for (size_t type = 0; type < kSpringTypes; ++type) {
       by_natural[type] = hn::LoadU(d, arrays.springs.natural_length_m[type].data() + lane);
@@ -192,29 +216,31 @@ HWY_INLINE void sweep_tangents(const TangentArrays& arrays, const Sink& sink) {
       by_damping[type] = hn::LoadU(d, arrays.springs.damping_ns_per_m[type].data() + lane);
     }
     const auto motion_at = [&](std::ptrdiff_t element) HWY_ATTR CLOTHFIT_INLINE {
-      return Motion{load(d, positions, element), load(d, velocities, element)};
+      return Motion<L>{load(d, positions, element), load(d, velocities, element)};
     };
     const auto here_at = [&](std::ptrdiff_t vertex, std::ptrdiff_t self) HWY_ATTR CLOTHFIT_INLINE {
-      if (vertex % Chunk::kVertices == 0) fill(from, vertex, chunk);
+      if (vertex % Chunk<Number>::kVertices == 0) fill(from, vertex, chunk);
       return motion_at(self);
     };
-    const auto pull_to = [&](size_t type, std::ptrdiff_t vertex, const Motion& here,
+    const auto pull_to = [&](size_t type, std::ptrdiff_t vertex, const Motion<L>& here,
                              std::ptrdiff_t element) HWY_ATTR CLOTHFIT_INLINE {
-      const std::ptrdiff_t n = vertex % Chunk::kVertices;
-      const auto at = [&](const double* of) HWY_ATTR CLOTHFIT_INLINE { return hn::Set(d, of[n]); };
-      const Motion there = motion_at(element);
+      const std::ptrdiff_t n = vertex % Chunk<Number>::kVertices;
+      const auto at = [&](const Number* of) HWY_ATTR CLOTHFIT_INLINE { return hn::Set(d, of[n]); };
+      const Motion<L> there = motion_at(element);
       const Vector3<V> along = there.position - here.position;
       const Vector3<V> rate = there.velocity - here.velocity;
       const Vector3<V> u{at(chunk.direction[type][0]), at(chunk.direction[type][1]),
                          at(chunk.direction[type][2])};
       const Vector3<V> w{at(chunk.w[type][0]), at(chunk.w[type][1]), at(chunk.w[type][2])};
-      V tension = hn::MulAdd(hn::Set(d, from[type].damping_ns_per_m), fused_dot(u, rate),
-                             fused_dot(w, along));
+      V tension =
+          hn::MulAdd(hn::Set(d, damping_ns_per_m[type]), fused_dot(u, rate), fused_dot(w, along));
       if constexpr (constants != Constants::still) {
         V natural = by_natural[type], stiffness = by_stiffness[type];
         if constexpr (constants == Constants::change_by_factors) {
-          natural = hn::Mul(natural, hn::Set(d, from[type].natural_length_factor[vertex]));
-          stiffness = hn::Mul(stiffness, hn::Set(d, from[type].stiffness_factor[vertex]));
+          natural = hn::Mul(
+              natural, hn::Set(d, static_cast<Number>(from[type].natural_length_factor[vertex])));
+          stiffness = hn::Mul(stiffness,
+                              hn::Set(d, static_cast<Number>(from[type].stiffness_factor[vertex])));
         }
         tension = hn::MulAdd(at(chunk.elongation[type]), stiffness, tension);
         tension = hn::MulAdd(at(chunk.stretching[type]), by_damping[type], tension);
@@ -226,8 +252,8 @@ HWY_INLINE void sweep_tangents(const TangentArrays& arrays, const Sink& sink) {
   }
 }
 
-template <class Sink>
-HWY_INLINE void sweep_tangents(const TangentArrays& arrays, const Sink& sink) {
+template <class L, class Sink>
+HWY_INLINE void sweep_tangents(const TangentArrays<L>& arrays, const Sink& sink) {
   if (!arrays.any_spring)
     sweep_tangents<Constants::still>(arrays, sink);
   else if (arrays.from[0].stiffness_factor == nullptr)
@@ -236,30 +262,52 @@ HWY_INLINE void sweep_tangents(const TangentArrays& arrays, const Sink& sink) {
     sweep_tangents<Constants::change_by_factors>(arrays, sink);
 }
 
-void add_tangents(const TangentArrays& arrays, const MutableVectors& force_n) {
-  using V = Vector<ExactLanes>;
-  const Tag<ExactLanes> d;
-  const MutableVectors out = force_n;
+template <class L>
+HWY_INLINE void add_tangents(const TangentArrays<L>& arrays,
+                             const std::array<typename L::Number*, 3>& force_n) {
+  using V = Vector<L>;
+  const Tag<L> d;
+  const std::array<typename L::Number*, 3> out = force_n;
   sweep_tangents(arrays,
-                 [&](std::ptrdiff_t, std::ptrdiff_t self, const Motion&, const Vector3<V>& sum)
+                 [&](std::ptrdiff_t, std::ptrdiff_t self, const Motion<L>&, const Vector3<V>& sum)
                      HWY_ATTR { store(load(d, out, self) + sum, d, out, self); });
 }
 
-void step_tangents(const TangentArrays& arrays, const TangentEuler& euler) {
-  using V = Vector<ExactLanes>;
-  const Tag<ExactLanes> d;
-  const TangentEuler to = euler;
-  const V h = hn::Set(d, to.time_step_s);
+void add_tangents_exact(const TangentArrays<ExactLanes>& arrays,
+                        const std::array<double*, 3>& force_n) {
+  add_tangents(arrays, force_n);
+}
+void add_tangents_fast(const TangentArrays<FastLanes>& arrays,
+                       const std::array<float*, 3>& force_n) {
+  add_tangents(arrays, force_n);
+}
+
+template <class L>
+HWY_INLINE void step_tangents(const TangentArrays<L>& arrays, const TangentEuler<L>& euler) {
+  using Number = typename L::Number;
+  using V = Vector<L>;
+  const Tag<L> d;
+  const TangentEuler<L> to = euler;
+  const V h = hn::Set(d, static_cast<Number>(to.time_step_s));
   const bool any_effect = to.effect_force_n[0] != nullptr;
-  sweep_tangents(arrays, [&](std::ptrdiff_t vertex, std::ptrdiff_t self, const Motion& motion,
+  sweep_tangents(arrays, [&](std::ptrdiff_t vertex, std::ptrdiff_t self, const Motion<L>& motion,
                              const Vector3<V>& springs) HWY_ATTR {
     const Vector3<V> sum = any_effect ? springs + load(d, to.effect_force_n, self) : springs;
-    const Vector3<V> gravity = load(d, to.gravity_m_per_s2, self % kLanes);
-    const V inverse_mass = hn::Set(d, to.inverse_mass_per_kg[vertex]);
+    const Vector3<V> gravity = load(d, to.gravity_m_per_s2, self % L::kCount);
+    const V inverse_mass = hn::Set(d, static_cast<Number>(to.inverse_mass_per_kg[vertex]));
     const Vector3<V> velocity = fused(h, fused(inverse_mass, sum, gravity), motion.velocity);
     store(velocity, d, to.velocity_m_per_s, self);
     store(fused(h, velocity, motion.position), d, to.position_m, self);
   });
+}
+
+void step_tangents_exact(const TangentArrays<ExactLanes>& arrays,
+                         const TangentEuler<ExactLanes>& euler) {
+  step_tangents(arrays, euler);
+}
+void step_tangents_fast(const TangentArrays<FastLanes>& arrays,
+                        const TangentEuler<FastLanes>& euler) {
+  step_tangents(arrays, euler);
 }
 
 void transpose(const LineariseArrays& from, const TransposedArrays& arrays) {
@@ -332,13 +380,16 @@ HWY_AFTER_NAMESPACE();
 namespace clothfit {
 namespace {
 
-HWY_EXPORT(add_tangents);
-HWY_EXPORT(step_tangents);
+HWY_EXPORT(add_tangents_exact);
+HWY_EXPORT(add_tangents_fast);
+HWY_EXPORT(step_tangents_exact);
+HWY_EXPORT(step_tangents_fast);
 HWY_EXPORT(transpose);
 HWY_EXPORT(shift_and_add);
 HWY_EXPORT(take_back);
 
-bool any_change(const LaneSprings<>& springs) {
+template <class L>
+bool any_change(const LaneSprings<L>& springs) {
   bool any = false;
   for (size_t type = 0; type < kSpringTypes; ++type)
     any = any || (springs.natural_length_m[type] != 0).any() ||
@@ -366,8 +417,9 @@ TangentSweep::TangentSweep(const Mesh& mesh) : mesh_(mesh) {
         exists_[type][static_cast<size_t>(mesh.vertex(i, j))] =
             kSpringReach[type].leaves(mesh, i, j) ? 1 : 0;
   }
-  scratch_.resize(
-      std::max(kRowSweepScratchRows * static_cast<size_t>(mesh.columns) * kLanes, 6 * vertices));
+  const size_t row = kRowSweepScratchRows * static_cast<size_t>(mesh.columns);
+  scratch_.resize(std::max(row * ExactLanes::kCount, 6 * vertices));
+  fast_scratch_.resize(row * FastLanes::kCount);
 }
 
 namespace {
@@ -386,16 +438,18 @@ LineariseArrays linearise_arrays(const Mesh& mesh, size_t type, const TangentSwe
           .stiffness_factor = factors ? at.factors->stiffness[type].data() : nullptr};
 }
 
-TangentArrays tangent_arrays(const Mesh& mesh, const TangentSweep::State& at,
-                             const LaneSprings<>& springs, const LaneVectors<>& position_m,
-                             const LaneVectors<>& velocity_m_per_s, double* scratch) {
-  TangentArrays arrays{.mesh = mesh,
-                       .from = {},
-                       .springs = springs,
-                       .any_spring = any_change(springs),
-                       .position_m = position_m.data(),
-                       .velocity_m_per_s = velocity_m_per_s.data(),
-                       .scratch = scratch};
+template <class L>
+TangentArrays<L> tangent_arrays(const Mesh& mesh, const TangentSweep::State& at,
+                                const LaneSprings<L>& springs, const LaneVectors<L>& position_m,
+                                const LaneVectors<L>& velocity_m_per_s,
+                                typename L::Number* scratch) {
+  TangentArrays<L> arrays{.mesh = mesh,
+                          .from = {},
+                          .springs = springs,
+                          .any_spring = any_change(springs),
+                          .position_m = position_m.data(),
+                          .velocity_m_per_s = velocity_m_per_s.data(),
+                          .scratch = scratch};
   for (size_t type = 0; type < kSpringTypes; ++type)
     arrays.from[type] = linearise_arrays(mesh, type, at);
   return arrays;
@@ -403,30 +457,52 @@ TangentArrays tangent_arrays(const Mesh& mesh, const TangentSweep::State& at,
 
 }  // namespace
 
-void TangentSweep::step_euler(const State& at, const LaneSprings<>& springs,
-                              const LaneVector<>& gravity,
+template <class L>
+void TangentSweep::step_euler(const State& at, const LaneSprings<L>& springs,
+                              const LaneVector<L>& gravity,
                               const Eigen::VectorXd& inverse_mass_per_kg,
-                              const LaneVectors<>* effect_force_n, double time_step_s,
-                              LaneVectors<>& position_m, LaneVectors<>& velocity_m_per_s) {
-  const TangentEuler euler{
-      .position_m = position_m.data(),
-      .velocity_m_per_s = velocity_m_per_s.data(),
-      .gravity_m_per_s2 = {gravity.x.data(), gravity.y.data(), gravity.z.data()},
-      .effect_force_n = effect_force_n != nullptr ? effect_force_n->data() : ConstVectors{},
-      .inverse_mass_per_kg = inverse_mass_per_kg.data(),
-      .time_step_s = time_step_s};
-  HWY_DYNAMIC_DISPATCH(step_tangents)
-  (tangent_arrays(mesh_, at, springs, position_m, velocity_m_per_s, scratch_.data()), euler);
+                              const LaneVectors<L>* effect_force_n, double time_step_s,
+                              LaneVectors<L>& position_m, LaneVectors<L>& velocity_m_per_s) {
+  TangentEuler<L> euler{.position_m = position_m.data(),
+                        .velocity_m_per_s = velocity_m_per_s.data(),
+                        .gravity_m_per_s2 = {gravity.x.data(), gravity.y.data(), gravity.z.data()},
+                        .effect_force_n = {},
+                        .inverse_mass_per_kg = inverse_mass_per_kg.data(),
+                        .time_step_s = time_step_s};
+  if (effect_force_n != nullptr) euler.effect_force_n = effect_force_n->data();
+  const auto arrays = [&](typename L::Number* scratch) {
+    return tangent_arrays<L>(mesh_, at, springs, position_m, velocity_m_per_s, scratch);
+  };
+  if constexpr (std::is_same_v<L, ExactLanes>)
+    HWY_DYNAMIC_DISPATCH(step_tangents_exact)(arrays(scratch_.data()), euler);
+  else
+    HWY_DYNAMIC_DISPATCH(step_tangents_fast)(arrays(fast_scratch_.data()), euler);
 }
 
-void TangentSweep::add_spring_forces(const State& at, const LaneSprings<>& springs,
-                                     const LaneVectors<>& position_m,
-                                     const LaneVectors<>& velocity_m_per_s,
-                                     LaneVectors<>& force_n) {
-  HWY_DYNAMIC_DISPATCH(add_tangents)
-  (tangent_arrays(mesh_, at, springs, position_m, velocity_m_per_s, scratch_.data()),
-   force_n.data());
+template <class L>
+void TangentSweep::add_spring_forces(const State& at, const LaneSprings<L>& springs,
+                                     const LaneVectors<L>& position_m,
+                                     const LaneVectors<L>& velocity_m_per_s,
+                                     LaneVectors<L>& force_n) {
+  const auto arrays = [&](typename L::Number* scratch) {
+    return tangent_arrays<L>(mesh_, at, springs, position_m, velocity_m_per_s, scratch);
+  };
+  if constexpr (std::is_same_v<L, ExactLanes>)
+    HWY_DYNAMIC_DISPATCH(add_tangents_exact)(arrays(scratch_.data()), force_n.data());
+  else
+    HWY_DYNAMIC_DISPATCH(add_tangents_fast)(arrays(fast_scratch_.data()), force_n.data());
 }
+
+#define CLOTHFIT_INSTANTIATE(L)                                                               \
+  template void TangentSweep::step_euler(                                                     \
+      const State&, const LaneSprings<L>&, const LaneVector<L>&, const Eigen::VectorXd&,      \
+      const LaneVectors<L>*, double, LaneVectors<L>&, LaneVectors<L>&);                       \
+  template void TangentSweep::add_spring_forces(const State&, const LaneSprings<L>&,          \
+                                                const LaneVectors<L>&, const LaneVectors<L>&, \
+                                                LaneVectors<L>&);
+CLOTHFIT_INSTANTIATE(ExactLanes)
+CLOTHFIT_INSTANTIATE(FastLanes)
+#undef CLOTHFIT_INSTANTIATE
 
 void TangentSweep::add_transposed(const State& at, const LaneVectors<SingleLane>& by_force,
                                   LaneVectors<SingleLane>& by_position,

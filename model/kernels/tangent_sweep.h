@@ -19,6 +19,8 @@ namespace clothfit {
 ///   dF = T / l dL + u (w . dL + c u . dV + (l - l0) dk - k dl0 + (u . V) dc),
 ///   w = (k - T / l) u + c / l (V - u (u . V)).
 ///
+/// Directions lie in exact or in fast lanes; the state is in double precision.
+///
 /// Products may be fused with sums, so derivatives differ in their last bits between processors
 /// with and without such an operation.
 ///
@@ -38,14 +40,16 @@ class TangentSweep {
   /// Computes the derivative of ClothSweep::step_euler along a direction in every lane. State and
   /// parameters change by `position_m`, `velocity_m_per_s`, `springs` (derivatives of the types'
   /// constants) and `gravity`, the forces of effects by `effect_force_n` (may be null).
-  void step_euler(const State& at, const LaneSprings<>& springs, const LaneVector<>& gravity,
-                  const Eigen::VectorXd& inverse_mass_per_kg, const LaneVectors<>* effect_force_n,
-                  double time_step_s, LaneVectors<>& position_m, LaneVectors<>& velocity_m_per_s);
+  template <class L>
+  void step_euler(const State& at, const LaneSprings<L>& springs, const LaneVector<L>& gravity,
+                  const Eigen::VectorXd& inverse_mass_per_kg, const LaneVectors<L>* effect_force_n,
+                  double time_step_s, LaneVectors<L>& position_m, LaneVectors<L>& velocity_m_per_s);
 
   /// Computes the derivative of ClothSweep::add_spring_forces, likewise.
-  void add_spring_forces(const State& at, const LaneSprings<>& springs,
-                         const LaneVectors<>& position_m, const LaneVectors<>& velocity_m_per_s,
-                         LaneVectors<>& force_n);
+  template <class L>
+  void add_spring_forces(const State& at, const LaneSprings<L>& springs,
+                         const LaneVectors<L>& position_m, const LaneVectors<L>& velocity_m_per_s,
+                         LaneVectors<L>& force_n);
 
   /// A number for every spring, by type and by the vertex it leaves.
   using PerSpring = std::array<std::vector<double>, kSpringTypes>;
@@ -80,6 +84,7 @@ class TangentSweep {
   Mesh mesh_;
   std::array<AlignedNumbers<double>, kSpringTypes> exists_;  ///< 1 where a spring leaves a vertex
   AlignedNumbers<double> scratch_;
+  AlignedNumbers<float> fast_scratch_;
 };
 
 }  // namespace clothfit

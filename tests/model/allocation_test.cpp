@@ -90,10 +90,10 @@ long allocations_in_ten_steps(StrainLimitMode mode) {
 
 long allocations_in_ten_steps_with_tangents() {
   const Busy busy(StrainLimitMode::off);
-  TangentStepper stepper(busy.cloth);
-  const TangentParameters parameters = TangentParameters::of(busy.cloth, busy.set, {});
-  TangentState state = TangentState::of(busy.cloth, busy.set, {});
-  const TangentVectors target = stepper.locate(state);
+  TangentStepper<> stepper(busy.cloth);
+  const auto parameters = TangentParameters<>::of(busy.cloth, busy.set, {});
+  auto state = TangentState<>::of(busy.cloth, busy.set, {});
+  const TangentVectors<> target = stepper.locate(state);
   // Effects list the blocks of their derivatives that are not zero. The lists have room for all
   // once the cloth moves.
   for (int n = 0; n < 10; ++n) stepper.step(parameters, target, n * 1e-4, 1e-4, state);

@@ -116,6 +116,43 @@ TEST(Tangents, AgreeWithCentralDifferencesUnderEveryEffect) {
   }
 }
 
+/// Checks that single precision changes many tangents by little, and the run not at all.
+void expect_five_digits(const Swing& swing, Uniform& uniform) {
+  std::vector<Direction> directions;
+  for (int d = 0; d < 17; ++d) directions.push_back(random_direction(swing.cloth, uniform));
+  Schedule fast = swing.schedule;
+  fast.fast_derivatives = true;
+  const TangentResult exact =
+      simulate_with_tangents(swing.cloth, swing.set, directions, swing.schedule);
+  const TangentResult found = simulate_with_tangents(swing.cloth, swing.set, directions, fast);
+
+  EXPECT_EQ(found.run.position_m, exact.run.position_m);
+  ASSERT_EQ(found.position_tangent.size(), directions.size());
+  EXPECT_NE(found.position_tangent, exact.position_tangent);
+  for (size_t d = 0; d < directions.size(); ++d) {
+    const Eigen::Matrix3Xd& expected = exact.position_tangent[d].back();
+    EXPECT_LT((found.position_tangent[d].back() - expected).norm(), 1e-5 * expected.norm());
+  }
+}
+
+TEST(Tangents, InSinglePrecisionAreRightToFiveDigitsUnderEveryEffect) {
+  for (const EffectEntry& entry : effect_registry()) {
+    SCOPED_TRACE(entry.name);
+    Uniform uniform(9);
+    const Swing swing = swing_under(entry, uniform);
+    expect_five_digits(swing, uniform);
+  }
+}
+
+TEST(Tangents, InSinglePrecisionAreRightToFiveDigitsAtTheStrainLimit) {
+  Uniform uniform(9);
+  Swing swing(uniform);
+  swing.cloth.strain_limit.mode = StrainLimitMode::consistent;
+  swing.set.springs.critical_elongation.fill(0.03);
+  swing.schedule.frame_time_s = {0, 0.002, 0.004};
+  expect_five_digits(swing, uniform);
+}
+
 TEST(Tangents, WithDerivativesThatAreKeptErrByTheMotionInThatTime) {
   Uniform uniform(5);
   Swing swing(uniform);
@@ -188,6 +225,23 @@ TEST(Tangents, AlongAnEmergingEffectAreThoseOfAClothThatHasItAtItsNeutralValues)
       }
     }
   }
+}
+
+TEST(Tangents, AlongEmergingEffectsInSinglePrecisionAreRightToFiveDigits) {
+  Uniform uniform(9);
+  const Swing swing(uniform);
+  std::vector<Direction> directions;
+  for (int d = 0; d < 17; ++d)
+    directions.push_back(TwoWays(swing.cloth, swing.set, {"viscous_damping", "rate"}).emerging);
+  Schedule fast = swing.schedule;
+  fast.fast_derivatives = true;
+  const auto last = [&](const Schedule& schedule) {
+    return simulate_with_tangents(swing.cloth, swing.set, directions, schedule)
+        .position_tangent.back()
+        .back();
+  };
+  const Eigen::Matrix3Xd exact = last(swing.schedule), found = last(fast);
+  EXPECT_LT((found - exact).norm(), 1e-5 * exact.norm());
 }
 
 // The two know nothing of each other: the tangent along both is the sum.
