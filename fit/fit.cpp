@@ -55,7 +55,7 @@ FurtherLooks look_further(const FitInput& input, const TrajectoryObjective& obje
   if (options.two_meshes) {
     const Mesh& mesh = problem.cloth.mesh;
     const int least = problem.start == StartKind::unknown
-                          ? std::max(kSmallestMesh, options.start_nodes + 1)
+                          ? std::max(kSmallestMesh, vertices_for_start(options.start_nodes))
                           : kSmallestMesh;
     const auto [columns, rows] = other_mesh_of(mesh.columns, mesh.rows, least);
     const FitProblem other = make_problem(input, options, columns, rows);

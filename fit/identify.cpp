@@ -96,6 +96,10 @@ constexpr Effort kSecondLookEffort{.rounds = 3,
 /// look where it is not needed costs less than one that is missed.
 constexpr double kNoiseDeviations = 1;
 
+bool starts_in_motion(const FitProblem& problem) {
+  return problem.start == StartKind::unknown;
+}
+
 int horizon_frames(const FitProblem& problem, double share) {
   const int wanted = static_cast<int>(std::lround(share * problem.first_held_out));
   return std::clamp(wanted, std::min(kFewestFrames, problem.first_held_out),
@@ -106,7 +110,8 @@ int horizon_frames(const FitProblem& problem, double share) {
 int coarse(const FitProblem& problem, const FitOptions& options, int count) {
   if (problem.spring_set != SpringSet::fabric) return count;
   int smallest = kSmallestMesh;
-  if (problem.start == StartKind::unknown) smallest = std::max(smallest, options.start_nodes + 1);
+  if (starts_in_motion(problem))
+    smallest = std::max(smallest, vertices_for_start(options.start_nodes));
   return std::max(std::min(count, smallest), (count - 1) / kCoarsening + 1);
 }
 
@@ -270,7 +275,7 @@ RefineResult second_look(const FitProblem& problem, const FitOptions& options,
                          FitReport& report) {
   if (!first.usable || is_noise_alone(problem, first)) return first;
   // A start in motion has hundreds of numbers, which few frames do not determine.
-  if (problem.start == StartKind::unknown) return first;
+  if (starts_in_motion(problem)) return first;
   const auto look = [&](double share, const Effort& effort, const Eigen::VectorXd& start) {
     return refine_stage({.problem = problem, .share = share, .effort = effort}, options, start,
                         progress, report);
@@ -359,7 +364,14 @@ RefineResult refine_on(const FitProblem& coarse_problem, const FitProblem& probl
   if (!follows_it || approach.by_coarse_mesh) best.values = away_from_ends(problem, best.values);
   for (const double share : kFineShares) {
     if (share < approach.least_share) continue;
-    if (!improve({.problem = problem, .share = share, .effort = kRoughEffort})) return best;
+    // Derivatives by the many corrections of a start cost least on the coarse mesh.
+    const Stage rough = starts_in_motion(problem)
+                            ? Stage{.problem = problem,
+                                    .derivatives_of = &coarse_problem,
+                                    .share = share,
+                                    .effort = kApproachEffort}
+                            : Stage{.problem = problem, .share = share, .effort = kRoughEffort};
+    if (!improve(rough)) return best;
     if (follows_it) break;
   }
   improve({.problem = problem, .effort = kFinalEffort});
@@ -414,7 +426,7 @@ RefineResult search_and_refine(const FitProblem& coarse_problem, const FitProble
                                const FitOptions& options, const ProgressCallback& progress,
                                FitReport& report, std::vector<Candidate>& candidates) {
   Eigen::VectorXd start = problem.space.start();
-  if (problem.start == StartKind::unknown) {
+  if (starts_in_motion(problem)) {
     // A search needs to know where the cloth begins: from the middle of the ranges, over the first
     // frames, which say more of the start than of the fabric.
     const RefineResult first =

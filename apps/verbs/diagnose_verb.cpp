@@ -207,7 +207,8 @@ void add_diagnose_verb(Verb program) {
       .check(check_seed)
       .shows_default();
   verb.add_option("--start-nodes", &options.fit.start_nodes,
-                  "Nodes per side of the corrections of a start in motion (start: unknown)")
+                  "Nodes per side of the corrections of a start in motion (start: unknown); 0: 4 "
+                  "where the first shape is smooth, else 8")
       .shows_default();
   verb.add_option("--loss", &flags->loss,
                   "What large residuals weigh: less than others, or as much")

@@ -183,7 +183,8 @@ void add_fit_verb(Verb program) {
                   "18 numbers with its strain limit")
       .one_of({"fabric", "louchet5", "louchet18"});
   verb.add_option("--start-nodes", &options->fit.start_nodes,
-                  "Nodes per side of the corrections of a start in motion (start: unknown)")
+                  "Nodes per side of the corrections of a start in motion (start: unknown); 0: 4 "
+                  "where the first shape is smooth, else 8")
       .shows_default();
   verb.add_option("--loss", &flags->loss,
                   "What large residuals weigh: less than others, or as much")

@@ -16,7 +16,7 @@ DiagnosisSetup with_other_mesh(const DiagnosisSetup& setup) {
   int least = kSmallestMesh;
   for (const FitInput& input : setup.inputs)
     if (input.recording.start == StartKind::unknown)
-      least = std::max(least, setup.options.start_nodes + 1);
+      least = std::max(least, vertices_for_start(setup.options.start_nodes));
   DiagnosisSetup other = setup;
   std::tie(other.columns, other.rows) = other_mesh_of(setup.columns, setup.rows, least);
   return other;

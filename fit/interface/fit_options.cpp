@@ -48,7 +48,8 @@ void FitOptions::validate() const {
   require(cost == LeadingCost::trajectory || !forecast, "cost",
           "a fit: without FitOptions::forecast");
   require(substep_scale >= 1 && std::isfinite(substep_scale), "substep_scale", "1 or more");
-  require(start_nodes >= 2 && start_nodes <= 30, "start_nodes", "2 to 30 nodes a side");
+  require(start_nodes == 0 || (start_nodes >= 2 && start_nodes <= 30), "start_nodes",
+          "2 to 30 nodes a side, or 0 (as the first shape asks for)");
   require(marker_offset_sigma_m >= 0 && std::isfinite(marker_offset_sigma_m),
           "marker_offset_sigma_m", "a length in metres, 0 (none) or more");
   require(marker_offset_sigma_m == 0 || !forecast, "marker_offset_sigma_m",

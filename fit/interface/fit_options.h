@@ -67,7 +67,9 @@ struct FitOptions {
   /// optimum. Parameters without a value start where they would otherwise.
   std::optional<std::map<std::string, double>> start;
   Loss loss = Loss::huber;
-  int start_nodes = 8;  ///< a side, for the corrections of a start that is unknown
+  /// Nodes a side, for the corrections of a start that is unknown; 0: 4 where the first shape is
+  /// smooth, else 8.
+  int start_nodes = 0;
   /// Standard deviation of constant offsets of the markers (fit/observe/marker_offsets.h); 0: none.
   double marker_offset_sigma_m = 0;
   /// Knots of the corrections of tracked held points (fit/problem/drive_correction.h), 4 to 1000.

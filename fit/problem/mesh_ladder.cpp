@@ -2,7 +2,13 @@
 
 #include <algorithm>
 
+#include "fit/problem/start_state.h"
+
 namespace clothfit {
+
+int vertices_for_start(int nodes) {
+  return (nodes > 0 ? nodes : StartStateOptions::kManyNodes) + 1;
+}
 
 std::pair<int, int> other_mesh_of(int columns, int rows, int least) {
   const auto coarser = [](int count) { return (count - 1) / 2 + 1; };

@@ -28,7 +28,9 @@ struct StartState {
 };
 
 struct StartStateOptions {
-  int nodes = 8;                      ///< a side of the cloth, >= 2; more follow finer folds
+  /// Nodes a side where the guessed shape is smooth, and where it is not.
+  static constexpr int kFewNodes = 4, kManyNodes = 8;
+  int nodes = 0;                      ///< a side of the cloth, >= 2; 0: few or many
   double position_sigma_m = 0.03;     ///< for the correction at a node where the guess is good
   double velocity_sigma_m_per_s = 1;  ///< the same
 };

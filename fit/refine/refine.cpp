@@ -21,6 +21,9 @@ namespace {
 /// An optimum whose stable time step is not this much above the one taken leans on it.
 constexpr double kRoom = 1.05;
 
+/// A start in motion is found when a round lowers the cost by less than this share of it.
+constexpr double kFlat = 1e-4;
+
 constexpr const char* kOutOfWork = "not converged at the limit of work";
 
 /// The residuals and, when it asks for it, their Jacobian at the point that Ceres looks at,
@@ -427,10 +430,14 @@ RefineResult refine(const FitProblem& problem, const ObjectiveMaker& make_object
     const bool has_room =
         !objective->needs_stable_step() ||
         (largest.run_s > kRoom * taken.run_s && (!rests || largest.rest_s > kRoom * taken.rest_s));
+    // Of the many numbers of a start in motion some are hardly determined. Rounds would follow them
+    // for long, with derivatives that are exact where a round begins.
+    const bool is_flat =
+        problem.start == StartKind::unknown &&
+        round.summary.initial_cost - round.summary.final_cost < kFlat * round.summary.initial_cost;
     const bool same_scale = round.robust_scale_end > 0.8 * round.robust_scale;
-    result.converged = has_room && settled &&
-                       !(options.exact_in_the_end && round.derivatives_updated) &&
-                       (same_scale || moved < 1e-3);
+    const bool is_exact = !(options.exact_in_the_end && round.derivatives_updated);
+    result.converged = has_room && settled && (is_flat || is_exact) && (same_scale || moved < 1e-3);
     if (result.converged) break;
     if (spring_steps_left <= 0) {
       result.message = kOutOfWork;

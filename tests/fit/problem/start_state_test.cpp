@@ -21,8 +21,10 @@ struct CutRecording {
   FitInput input;
   Tracks3d exact;
 
-  explicit CutRecording(double noise_m) {
-    const SyntheticCloth truth{.frames = 50 + kCut, .held_out_from = 50, .noise_m = noise_m};
+  int first = 0;  ///< frame of the whole recording
+
+  explicit CutRecording(double noise_m, int first_frame = kCut) : first(first_frame) {
+    const SyntheticCloth truth{.frames = 50 + first, .held_out_from = 50, .noise_m = noise_m};
     input = synthetic_input(truth);
     input.recording.start = StartKind::unknown;
     cut(input.tracks3d);
@@ -34,9 +36,9 @@ struct CutRecording {
   }
 
   template <class Tracks>
-  static void cut(Tracks& tracks) {
-    std::erase_if(tracks, [](const auto& row) { return row.frame < kCut; });
-    for (auto& row : tracks) row.frame -= kCut;
+  void cut(Tracks& tracks) const {
+    std::erase_if(tracks, [&](const auto& row) { return row.frame < first; });
+    for (auto& row : tracks) row.frame -= first;
   }
 
   /// Returns the place of a marker, NaN where there is none.
@@ -72,6 +74,18 @@ GuessError guess_error(const CutRecording& recording, ObservationKind kind) {
   error.velocity_m_per_s = std::sqrt(error.velocity_m_per_s);
   error.speed_m_per_s = std::sqrt(error.speed_m_per_s);
   return error;
+}
+
+int corrected_nodes(int first_frame, ObservationKind kind) {
+  const CutRecording recording(5e-4, first_frame);
+  return make_problem(recording.input, {.observations = kind}, 9, 9).start_state.nodes();
+}
+
+TEST(StartState, HasMoreCorrectionsWhereTheFirstShapeIsWavy) {
+  for (const ObservationKind kind : {ObservationKind::tracks3d, ObservationKind::tracks2d}) {
+    EXPECT_EQ(corrected_nodes(3, kind), 16) << "a twentieth of a second into the swing";
+    EXPECT_EQ(corrected_nodes(kCut, kind), 64);
+  }
 }
 
 TEST(StartState, IsGuessedFromTracksInSpace) {
