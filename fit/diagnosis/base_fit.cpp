@@ -73,7 +73,9 @@ void fit_base(Analysis& analysis, const ProgressCallback& progress) {
   // A coarse mesh does unless a finer one may be analysed, for then optima are compared.
   const bool coarse_will_do =
       is_coarser(with_coarse_mesh(setup), setup) && is_coarser(with_other_mesh(setup), setup);
-  if (coarse_will_do) options.coarse_beyond = kCriteria.grossly_misfitting;
+  if (coarse_will_do)
+    options.coarse_beyond =
+        grossly_misfitting(setup.inputs.front().recording.start == StartKind::unknown);
 
   analysis.first = fit(setup.inputs.front(), options, progress);
   if (analysis.first.stop == FitStop::cancelled) throw StopRequested();

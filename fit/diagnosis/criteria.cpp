@@ -12,7 +12,9 @@ constexpr const char* kTrials = "trials of recover --undeclared, seeds 1 to 21";
 /// Recordings for which its step was written. It was set once and not varied on them.
 constexpr const char* kBundled = "set with its step, written for swing_breeze and tags_airdrag";
 constexpr const char* kForeign = "set with its step, written for swing_ball and swing_patch";
-constexpr const char* kTraces = "recover --undeclared --seed 181, and ten foreign recordings";
+constexpr const char* kTraces =
+    "trials of recover --undeclared, seed 181, and ten foreign recordings";
+constexpr const char* kMoving = "set with its step, written for swing_moving and swing_moving_drag";
 constexpr const char* kRobot = "set with its step, written for the IRI sessions s0623 and s0705";
 
 }  // namespace
@@ -46,6 +48,9 @@ std::vector<CriterionDescription> describe(const DiagnosisCriteria& c) {
       {"grossly_misfitting", c.grossly_misfitting,
        "chi-square per residual beyond which a coarser mesh chooses and no direction is asked for",
        "time, where the model lacks something large", kBundled},
+      {"grossly_misfitting_in_motion", c.grossly_misfitting_in_motion,
+       "the same where the cloth starts in motion, for its start makes up for much",
+       "time, where the model lacks something large", kMoving},
       {"far_off", c.far_off, "chi-square per residual beyond which the basin may be the wrong one",
        "a hypothesis is credited with the basin that it led to", kRobot},
       {"biased", c.biased, "chi-square per residual beyond which scores over all frames are biased",
@@ -139,8 +144,7 @@ std::vector<CriterionDescription> describe(const DiagnosisCriteria& c) {
        kConvention},
       {"trace", c.trace,
        "rms change of the prediction, in units of the noise, below which an effect is a trace",
-       "weak effects are listed as traces and not named: at 0.25 three of the first four of "
-       "recover --undeclared --trials 1 --seed 181",
+       "weak effects are listed as traces and not named: at 0.25 three of the first four trials",
        kTraces},
       {"trace_of_accepted", c.trace_of_accepted,
        "the same, as a share of the change by an effect that was accepted before",

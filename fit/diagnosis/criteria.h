@@ -20,6 +20,7 @@ struct DiagnosisCriteria {
   double finer_mesh_gain = 0.05;
   double believable_error = 3;
   double grossly_misfitting = 30;
+  double grossly_misfitting_in_motion = 6;
   double far_off = 3;
   double biased = 3;
 

@@ -12,6 +12,7 @@
 #include "fit/identify.h"
 #include "fit/measurement_effects/measurement_effect.h"
 #include "fit/measurement_effects/registry.h"
+#include "fit/problem/mesh_ladder.h"
 #include "fit/problem/parameterised_model.h"
 #include "fit/problem/prior_cost.h"
 #include "model/cloth/stability.h"
@@ -103,9 +104,15 @@ double FittedModel::misfit() const {
   return residual().squaredNorm() / static_cast<double>(residual_count());
 }
 
+double grossly_misfitting(bool starts_in_motion) {
+  return starts_in_motion ? kCriteria.grossly_misfitting_in_motion : kCriteria.grossly_misfitting;
+}
+
 bool FittedModel::misfits_grossly() const {
+  const bool starts_in_motion = std::ranges::any_of(
+      problems, [](const auto& problem) { return problem->start == StartKind::unknown; });
   return residual().squaredNorm() >
-         kCriteria.grossly_misfitting * static_cast<double>(residual_count());
+         grossly_misfitting(starts_in_motion) * static_cast<double>(residual_count());
 }
 
 double FittedModel::chi_square(double threshold) const {
@@ -261,7 +268,7 @@ DiagnosisSetup with_coarse_mesh(const DiagnosisSetup& setup) {
   constexpr int kSmallest = 9;
   DiagnosisSetup coarse = setup;
   if (setup.options.spring_set != SpringSet::fabric) return coarse;
-  const int smallest = std::max(kSmallest, setup.options.start_nodes + 1);
+  const int smallest = std::max(kSmallest, vertices_for_start(setup.options.start_nodes));
   for (int* count : {&coarse.columns, &coarse.rows})
     *count = std::min(*count, std::max(smallest, (*count + 1) / 2));
   return coarse;

@@ -13,6 +13,9 @@
 
 namespace clothfit {
 
+/// Returns chi-square per residual beyond which a model misfits grossly.
+double grossly_misfitting(bool starts_in_motion);
+
 /// Parameters of one recording's problem by name.
 using NamedValues = std::map<std::string, double>;
 
