@@ -19,9 +19,8 @@ struct TangentResult {
 /// Simulates one parameter set together with the derivatives of its positions along every
 /// direction. Each step is differentiated forwards: exact for the discrete scheme wherever it is
 /// smooth. Directions that share a run share its cost and the linearisation of effects; such groups
-/// run in parallel. The bits of a result do not depend on the number of threads, nor on the other
-/// directions, but for whether Schedule::fast_derivatives takes them for many. `run` has the bits
-/// that simulate() gives.
+/// run in parallel. Bits depend on no other direction, but for Schedule::fast_derivatives, nor on
+/// the number of threads; `run` has the bits that simulate() gives.
 TangentResult simulate_with_tangents(const Cloth& cloth, const ParameterSet& parameters,
                                      std::span<const Direction> directions,
                                      const Schedule& schedule);
