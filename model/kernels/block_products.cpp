@@ -1,5 +1,7 @@
 #include "model/kernels/block_products.h"
 
+#include <type_traits>
+
 // This source is compiled once for each instruction set, in a namespace of its own.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "model/kernels/block_products.cpp"
@@ -150,27 +152,42 @@ HWY_EXPORT(add_force_products_exact);
 HWY_EXPORT(add_force_products_fast);
 }  // namespace
 
-#define CLOTHFIT_INSTANTIATE(L, name)                                                         \
-  template <>                                                                                 \
-  void add_products(std::span<const MotionBlock> blocks, const LaneVectors<L>& position_m,    \
-                    const LaneVectors<L>& velocity_m_per_s, LaneVectors<L>& action) {         \
-    HWY_DYNAMIC_DISPATCH(add_motion_products_##name)                                          \
-    (blocks, position_m.data(), velocity_m_per_s.data(), action.data());                      \
-  }                                                                                           \
-  template <>                                                                                 \
-  void add_products(std::span<const SpringJacobian> springs, const LaneArray<L>& tension_n,   \
-                    const LaneVectors<L>& position_m, const LaneVectors<L>& velocity_m_per_s, \
-                    LaneVectors<L>& action) {                                                 \
-    HWY_DYNAMIC_DISPATCH(add_spring_products_##name)                                          \
-    (springs, tension_n.data(), position_m.data(), velocity_m_per_s.data(), action.data());   \
-  }                                                                                           \
-  template <>                                                                                 \
-  void add_products(std::span<const ForceBlock> blocks, const LaneVectors<L>& force_n,        \
-                    LaneVectors<L>& action) {                                                 \
-    HWY_DYNAMIC_DISPATCH(add_force_products_##name)(blocks, force_n.data(), action.data());   \
-  }
-CLOTHFIT_INSTANTIATE(ExactLanes, exact)
-CLOTHFIT_INSTANTIATE(FastLanes, fast)
+template <class L>
+void add_products(std::span<const MotionBlock> blocks, const LaneVectors<L>& position_m,
+                  const LaneVectors<L>& velocity_m_per_s, LaneVectors<L>& action) {
+  if constexpr (std::is_same_v<L, ExactLanes>) HWY_DYNAMIC_DISPATCH(add_motion_products_exact)
+  (blocks, position_m.data(), velocity_m_per_s.data(), action.data());
+  else HWY_DYNAMIC_DISPATCH(add_motion_products_fast)(blocks, position_m.data(),
+                                                      velocity_m_per_s.data(), action.data());
+}
+
+template <class L>
+void add_products(std::span<const SpringJacobian> springs, const LaneArray<L>& tension_n,
+                  const LaneVectors<L>& position_m, const LaneVectors<L>& velocity_m_per_s,
+                  LaneVectors<L>& action) {
+  if constexpr (std::is_same_v<L, ExactLanes>) HWY_DYNAMIC_DISPATCH(add_spring_products_exact)
+  (springs, tension_n.data(), position_m.data(), velocity_m_per_s.data(), action.data());
+  else HWY_DYNAMIC_DISPATCH(add_spring_products_fast)(springs, tension_n.data(), position_m.data(),
+                                                      velocity_m_per_s.data(), action.data());
+}
+
+template <class L>
+void add_products(std::span<const ForceBlock> blocks, const LaneVectors<L>& force_n,
+                  LaneVectors<L>& action) {
+  if constexpr (std::is_same_v<L, ExactLanes>)
+    HWY_DYNAMIC_DISPATCH(add_force_products_exact)(blocks, force_n.data(), action.data());
+  else
+    HWY_DYNAMIC_DISPATCH(add_force_products_fast)(blocks, force_n.data(), action.data());
+}
+
+#define CLOTHFIT_INSTANTIATE(L)                                                              \
+  template void add_products(std::span<const MotionBlock>, const LaneVectors<L>&,            \
+                             const LaneVectors<L>&, LaneVectors<L>&);                        \
+  template void add_products(std::span<const SpringJacobian>, const LaneArray<L>&,           \
+                             const LaneVectors<L>&, const LaneVectors<L>&, LaneVectors<L>&); \
+  template void add_products(std::span<const ForceBlock>, const LaneVectors<L>&, LaneVectors<L>&);
+CLOTHFIT_INSTANTIATE(ExactLanes)
+CLOTHFIT_INSTANTIATE(FastLanes)
 #undef CLOTHFIT_INSTANTIATE
 
 }  // namespace clothfit

@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "model/effects/registry.h"
+#include "tests/model/instruction_sets.h"
 #include "tests/model/swing.h"
 
 namespace clothfit {
@@ -140,6 +141,16 @@ TEST(Tangents, InSinglePrecisionAreRightToFiveDigitsUnderEveryEffect) {
     SCOPED_TRACE(entry.name);
     Uniform uniform(9);
     const Swing swing = swing_under(entry, uniform);
+    expect_five_digits(swing, uniform);
+  }
+}
+
+TEST(Tangents, InSinglePrecisionAreRightToFiveDigitsOnEveryInstructionSet) {
+  for (const InstructionSet& set : instruction_sets()) {
+    SCOPED_TRACE(set);
+    const OnInstructionSet on(set);
+    Uniform uniform(9);
+    const Swing swing(uniform);
     expect_five_digits(swing, uniform);
   }
 }
