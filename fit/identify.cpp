@@ -257,14 +257,25 @@ bool is_noise_alone(const FitProblem& problem, const RefineResult& result) {
   return 2 * result.cost < 1 + kNoiseDeviations * std::sqrt(2 / residuals);
 }
 
-/// The residuals' mean square over all fitted frames; infinite where the model does not run.
-double mean_square(const FitProblem& problem, const Eigen::VectorXd& values) {
+/// Returns the residuals over all fitted frames; none where the model does not run.
+Eigen::VectorXd residuals_of_all(const FitProblem& problem, const Eigen::VectorXd& values) {
   const TimeSteps stable = stable_time_steps(problem.cloth, parameter_set(problem, values))
                                .times(1 / RefineOptions().stability_margin);
   const TrajectoryObjective whole(problem, problem.first_held_out, stable);
-  const Eigen::VectorXd residual = whole.residuals({values}).front();
-  return residual.size() == 0 ? std::numeric_limits<double>::infinity()
-                              : residual.squaredNorm() / static_cast<double>(residual.size());
+  return whole.residuals({values}).front();
+}
+
+/// Tells whether residuals' mean square exceeds a limit. That of a model that does not run does.
+bool leaves_more_than(double limit, const Eigen::VectorXd& residual) {
+  return residual.size() == 0 ||
+         residual.squaredNorm() > limit * static_cast<double>(residual.size());
+}
+
+/// Tells whether two meshes leave the same: what they differ by is less than what either leaves.
+/// Else the misfit is that of a mesh, which fine measurements show, and says nothing of the model.
+bool leave_the_same(const Eigen::VectorXd& one, const Eigen::VectorXd& other) {
+  return one.size() == other.size() &&
+         (one - other).squaredNorm() < std::min(one.squaredNorm(), other.squaredNorm());
 }
 
 /// Looks for a better optimum where this one leaves more than noise. The model may be wrong, or the
@@ -295,8 +306,8 @@ RefineResult second_look(const FitProblem& problem, const FitOptions& options,
 
 /// Fits over all frames on the coarse mesh from `values`, which move there. The fit's own mesh then
 /// follows along its derivatives. The result is not usable where, in the end, the model is not as
-/// far off on both meshes as this asks for. A model that followed the cloth over few frames gets no
-/// second look, for its basin is known.
+/// far off on both meshes as this asks for, or each mesh is off in its own way. A model that
+/// followed the cloth over few frames gets no second look, for its basin is known.
 RefineResult follow_coarse(const FitProblem& coarse_problem, const FitProblem& problem,
                            const FitOptions& options, bool followed, Eigen::VectorXd& values,
                            const ProgressCallback& progress, FitReport& report) {
@@ -306,12 +317,16 @@ RefineResult follow_coarse(const FitProblem& coarse_problem, const FitProblem& p
   if (!followed) found = second_look(coarse_problem, options, found, progress, report);
   if (!found.usable) return found;
   values = found.values;
-  found.usable = mean_square(coarse_problem, values) > options.coarse_beyond;
+  const Eigen::VectorXd left = residuals_of_all(coarse_problem, values);
+  found.usable = leaves_more_than(options.coarse_beyond, left);
   if (!found.usable) return found;
   RefineResult led = refine_stage(
       {.problem = problem, .derivatives_of = &coarse_problem, .effort = kApproachEffort}, options,
       away_from_ends(problem, values), progress, report);
-  led.usable = led.usable && mean_square(problem, led.values) > options.coarse_beyond;
+  if (!led.usable) return led;
+  const Eigen::VectorXd left_there = residuals_of_all(problem, led.values);
+  led.usable =
+      leaves_more_than(options.coarse_beyond, left_there) && leave_the_same(left, left_there);
   return led;
 }
 
@@ -342,7 +357,7 @@ RefineResult refine_on(const FitProblem& coarse_problem, const FitProblem& probl
           !improve({.problem = coarse_problem, .share = share, .effort = kTrendEffort}))
         return best;
     if (std::isfinite(options.coarse_beyond) &&
-        mean_square(coarse_problem, best.values) > options.coarse_beyond) {
+        leaves_more_than(options.coarse_beyond, residuals_of_all(coarse_problem, best.values))) {
       RefineResult followed =
           follow_coarse(coarse_problem, problem, options, false, best.values, progress, report);
       if (followed.usable) return followed;
