@@ -65,22 +65,18 @@ class Folds {
   const TrajectoryObjective& objective(size_t recording) const { return objectives_[recording]; }
   bool has_forces() const { return forces_.usable(); }
 
-  /// Returns residuals of all recordings where block `b` took no part.
+  /// Returns residuals of all recordings where block `b` took no part. Where the whole step leaves
+  /// more of what was seen, as far from an optimum, half of it is taken, and so on.
   std::vector<Eigen::VectorXd> residuals_without(int b) const {
+    constexpr int kHalvings = 4;
     const std::vector<Eigen::VectorXd> ways = ways_without(b, 0);
-    std::vector<Eigen::VectorXd> result(model_.parts.size());
-    for (size_t n = 0; n < model_.parts.size(); ++n) {
-      const PooledPart& part = model_.parts[n];
-      result[n] = objectives_[n].residuals({values_after(n, ways[n])}).front();
-      // Where the step leads out of what is stable, the model stays.
-      if (result[n].size() != objectives_[n].residual_count()) result[n] = part.linear.residual;
-      if (part.correction.size() > 0) result[n] += part.correction;
-      const Eigen::Index amplitudes = part.amplitudes.size();
-      if (amplitudes > 0)
-        result[n] +=
-            part.directions * (part.amplitudes + ways[n].segment(part.values.size(), amplitudes));
+    const double stays = seen_cost(b, residuals_after(ways, 0), ways, 0);
+    double share = 1;
+    for (int k = 0; k < kHalvings; ++k, share /= 2) {
+      std::vector<Eigen::VectorXd> moved = residuals_after(ways, share);
+      if (seen_cost(b, moved, ways, share) <= stays) return moved;
     }
-    return result;
+    return residuals_after(ways, 0);
   }
 
   /// Returns the same to first order and with free forces, which are known to be about
@@ -100,6 +96,41 @@ class Folds {
   }
 
  private:
+  /// Returns residuals of all recordings where a share of the way is gone.
+  std::vector<Eigen::VectorXd> residuals_after(const std::vector<Eigen::VectorXd>& ways,
+                                               double share) const {
+    std::vector<Eigen::VectorXd> result(model_.parts.size());
+    for (size_t n = 0; n < model_.parts.size(); ++n) {
+      const PooledPart& part = model_.parts[n];
+      result[n] = part.linear.residual;
+      if (share > 0) {
+        Eigen::VectorXd moved =
+            objectives_[n].residuals({values_after(n, share * ways[n])}).front();
+        // Where the step leads out of what is stable, the model stays.
+        if (moved.size() == objectives_[n].residual_count()) result[n] = std::move(moved);
+      }
+      if (part.correction.size() > 0) result[n] += part.correction;
+      if (part.amplitudes.size() > 0)
+        result[n] += part.directions * amplitudes_after(n, share * ways[n]);
+    }
+    return result;
+  }
+
+  /// Returns twice the cost of a share of the way: of observations out of block `b`, and priors.
+  double seen_cost(int b, const std::vector<Eigen::VectorXd>& residuals,
+                   const std::vector<Eigen::VectorXd>& ways, double share) const {
+    double sum = 0;
+    for (size_t n = 0; n < residuals.size(); ++n) {
+      for (const Objective::Block& row : objectives_[n].blocks())
+        if (block_of(n, row) != b)
+          sum += huber_square(residuals[n].segment(row.offset, row.dimension).norm(), threshold_);
+      sum += 2 * prior_cost(*problems_[n], values_after(n, share * ways[n])).cost;
+      if (model_.parts[n].amplitudes.size() > 0)
+        sum += amplitudes_after(n, share * ways[n]).squaredNorm();
+    }
+    return sum;
+  }
+
   Normal normal_of(size_t n, Loss loss) const {
     const PooledPart& part = model_.parts[n];
     const Eigen::VectorXd residual = residual_of(part);
@@ -244,6 +275,12 @@ class Folds {
     }
     information.diagonal().tail(kEach * forces_.stretches).array() +=
         1 / (sigma_m_per_s2 * sigma_m_per_s2);
+  }
+
+  /// Returns the amplitudes of a recording's directions moved by `way`.
+  Eigen::VectorXd amplitudes_after(size_t n, const Eigen::VectorXd& way) const {
+    const PooledPart& part = model_.parts[n];
+    return part.amplitudes + way.segment(part.values.size(), part.amplitudes.size());
   }
 
   /// Returns a recording's parameters moved by `way`, within their ranges.
