@@ -306,15 +306,13 @@ RefineResult second_look(const FitProblem& problem, const FitOptions& options,
 
 /// Fits over all frames on the coarse mesh from `values`, which move there. The fit's own mesh then
 /// follows along its derivatives. The result is not usable where, in the end, the model is not as
-/// far off on both meshes as this asks for, or each mesh is off in its own way. A model that
-/// followed the cloth over few frames gets no second look, for its basin is known.
+/// far off on both meshes as this asks for, or each mesh is off in its own way. No second look is
+/// taken: who asks for this looks for other basins with what the model lacks.
 RefineResult follow_coarse(const FitProblem& coarse_problem, const FitProblem& problem,
-                           const FitOptions& options, bool followed, Eigen::VectorXd& values,
+                           const FitOptions& options, Eigen::VectorXd& values,
                            const ProgressCallback& progress, FitReport& report) {
-  const Effort& effort = followed ? kRoughEffort : kFinalEffort;
-  RefineResult found = refine_stage({.problem = coarse_problem, .effort = effort}, options, values,
-                                    progress, report);
-  if (!followed) found = second_look(coarse_problem, options, found, progress, report);
+  RefineResult found = refine_stage({.problem = coarse_problem, .effort = kRoughEffort}, options,
+                                    values, progress, report);
   if (!found.usable) return found;
   values = found.values;
   const Eigen::VectorXd left = residuals_of_all(coarse_problem, values);
@@ -359,7 +357,7 @@ RefineResult refine_on(const FitProblem& coarse_problem, const FitProblem& probl
     if (std::isfinite(options.coarse_beyond) &&
         leaves_more_than(options.coarse_beyond, residuals_of_all(coarse_problem, best.values))) {
       RefineResult followed =
-          follow_coarse(coarse_problem, problem, options, false, best.values, progress, report);
+          follow_coarse(coarse_problem, problem, options, best.values, progress, report);
       if (followed.usable) return followed;
     }
     best.values = away_from_ends(problem, best.values);
@@ -373,7 +371,7 @@ RefineResult refine_on(const FitProblem& coarse_problem, const FitProblem& probl
   if (follows_it && std::isfinite(options.coarse_beyond)) {
     Eigen::VectorXd values = start;
     RefineResult followed =
-        follow_coarse(coarse_problem, problem, options, true, values, progress, report);
+        follow_coarse(coarse_problem, problem, options, values, progress, report);
     if (followed.usable) return followed;
   }
   if (!follows_it || approach.by_coarse_mesh) best.values = away_from_ends(problem, best.values);
