@@ -132,7 +132,7 @@ int run_diagnose(DiagnoseFlags flags, const std::string& command) {
   }
   for (const std::string& prior : flags.priors) fit.priors.push_back(parse_prior(prior));
   flags.options.plants = parse_plant(flags.plant);
-  flags.options.reinject = true;
+  flags.options.reinject = flags.options.plants > 0;
   flags.options.is_enough = interrupted;
   fit.loss = flags.loss == "squared" ? Loss::squared : Loss::huber;
   flags.options.validate();
