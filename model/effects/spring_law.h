@@ -83,21 +83,15 @@ class SpringLawEffect final : public LawEffect<SpringLawEffect<Law>, Law> {
     using Real = RealOf<L>;
     const auto p = reals_of<L, Law::kParameters>(parameters);
     const std::vector<Real>* places = nullptr;
-    if constexpr (kHasPlaces && L::kCount == 1) {
-      constexpr size_t kKept = 64;  // shapes that are scored together
-      thread_local Remembered<double, Law::kParameters, kKept> remembered;
-      places = &remembered.at(scene.cloth.mesh, p, [&] { return places_of(scene.cloth, p); });
+    if constexpr (kHasPlaces) {
+      constexpr size_t kKept = L::kCount == 1 ? 64 : 1;  // shapes that are scored together
+      thread_local Remembered<Real, Law::kParameters * L::kCount, kKept> remembered;
+      places = &remembered.at(scene.cloth.mesh, numbers_in<L>(parameters),
+                              [&] { return places_of(scene.cloth, p); });
     }
     for_springs<L>(scene, [&](int number, const Spring& spring, const Vector3<Real>&,
                               const Vector3<Real>& u, SpringSight<Real>& sight) {
-      if constexpr (kHasPlaces) {
-        if constexpr (L::kCount == 1) {
-          sight.of_place = (*places)[static_cast<size_t>(number)];
-        } else {
-          const auto [s, t] = middle_of(scene.cloth.mesh, spring);
-          sight.of_place = Law::of_place(s, t, p);
-        }
-      }
+      if constexpr (kHasPlaces) sight.of_place = (*places)[static_cast<size_t>(number)];
       std::array<Real, Law::kMemory> remembered;
       for (int m = 0; m < Law::kMemory; ++m)
         remembered[static_cast<size_t>(m)] =
@@ -224,6 +218,18 @@ class SpringLawEffect final : public LawEffect<SpringLawEffect<Law>, Law> {
     else
       return false;
   }();
+
+  /// Returns the parameters of all lanes, one after the other.
+  template <class L>
+  static std::array<double, Law::kParameters * L::kCount> numbers_in(
+      const EffectValues<L>& parameters) {
+    std::array<double, Law::kParameters * L::kCount> numbers;
+    auto next = numbers.begin();
+    for (size_t p = 0; p < Law::kParameters; ++p)
+      for (int lane = 0; lane < L::kCount; ++lane)
+        *next++ = static_cast<double>(parameters[p][lane]);
+    return numbers;
+  }
 
   /// Returns Law::of_place of every spring.
   template <class Real>
