@@ -1,7 +1,9 @@
 #include "fit/diagnosis/adequacy.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <numbers>
 #include <utility>
@@ -10,6 +12,7 @@
 #include "fit/diagnosis/criteria.h"
 #include "fit/diagnosis/hypothesis_derivatives.h"
 #include "fit/diagnosis/projection.h"
+#include "fit/jobs/parallel.h"
 
 namespace clothfit {
 namespace {
@@ -50,9 +53,12 @@ Correlation correlation(double products, double squares, double count) {
   return {products / squares, products / (squares / count * std::sqrt(count))};
 }
 
-/// Returns cos(pi k x), a smooth function for x from 0 to 1.
-double wave(int k, double x) {
-  return std::cos(std::numbers::pi * k * x);
+/// Returns cos(pi k x) for k below `count`, smooth functions for each x from 0 to 1: count x
+/// places.
+Eigen::MatrixXd waves(int count, const Eigen::VectorXd& x) {
+  Eigen::MatrixXd result(count, x.size());
+  for (int k = 0; k < count; ++k) result.row(k) = (std::numbers::pi * k * x).array().cos();
+  return result;
 }
 
 /// Returns smooth functions of place and time for each coordinate of each set of observations. They
@@ -62,9 +68,13 @@ Eigen::MatrixXd smooth_functions(const TrajectoryObjective& objective, int along
   const Eigen::Vector2d first = problem.marker_place_m.rowwise().minCoeff();
   const Eigen::Vector2d extent =
       (problem.marker_place_m.rowwise().maxCoeff() - first).cwiseMax(1e-9);
-  const double begin_s = problem.frame_time_s.front();
-  const double length_s =
-      problem.frame_time_s[static_cast<size_t>(objective.frames() - 1)] - begin_s;
+  const Eigen::Map<const Eigen::VectorXd> time_s(problem.frame_time_s.data(), objective.frames());
+  const double length_s = std::max(time_s[time_s.size() - 1] - time_s[0], 1e-9);
+  const auto along_axis = [&](Eigen::Index axis) -> Eigen::VectorXd {
+    return (problem.marker_place_m.row(axis).array() - first[axis]) / extent[axis];
+  };
+  const Eigen::MatrixXd over_s = waves(along, along_axis(0)), over_t = waves(along, along_axis(1)),
+                        over_time = waves(in_time, (time_s.array() - time_s[0]) / length_s);
   int kinds = 0;
   std::vector<int> first_kind;
   for (const ObservationSet& set : problem.observations) {
@@ -74,20 +84,16 @@ Eigen::MatrixXd smooth_functions(const TrajectoryObjective& objective, int along
   const int each = along * along * in_time;
   Eigen::MatrixXd functions =
       Eigen::MatrixXd::Zero(objective.residual_count(), static_cast<Eigen::Index>(each) * kinds);
-  for (const Objective::Block& block : objective.blocks()) {
-    const Eigen::Vector2d x =
-        (problem.marker_place_m.col(block.marker) - first).cwiseQuotient(extent);
-    const double t = (problem.frame_time_s[static_cast<size_t>(block.frame)] - begin_s) /
-                     std::max(length_s, 1e-9);
+  for (const Objective::Block& block : objective.blocks())
     for (int c = 0; c < block.dimension; ++c) {
       Eigen::Index column =
           static_cast<Eigen::Index>(first_kind[static_cast<size_t>(block.set)] + c) * each;
       for (int i = 0; i < along; ++i)
         for (int j = 0; j < along; ++j)
           for (int k = 0; k < in_time; ++k)
-            functions(block.offset + c, column++) = wave(i, x[0]) * wave(j, x[1]) * wave(k, t);
+            functions(block.offset + c, column++) =
+                over_s(i, block.marker) * over_t(j, block.marker) * over_time(k, block.frame);
     }
-  }
   return functions;
 }
 
@@ -143,7 +149,9 @@ Taken taken_by_smooth(const FittedModel& model, const ModelProjection& projectio
     for (size_t m = 0; m < model.parts.size(); ++m)
       if (m != n) functions[m] = Eigen::MatrixXd::Zero(functions[m].rows(), functions[n].cols());
     const Eigen::MatrixXd left = projection.columns(functions);
-    const Eigen::MatrixXd information = left.transpose() * left;
+    Eigen::MatrixXd information = Eigen::MatrixXd::Zero(left.cols(), left.cols());
+    information.selfadjointView<Eigen::Lower>().rankUpdate(left.transpose());
+    information.triangularView<Eigen::StrictlyUpper>() = information.transpose();
     const LeastNormFactors solver(information);
     const Eigen::VectorXd pull = left.transpose() * projection.residual();
     taken.square += pull.dot(solver.solve(pull));
@@ -155,8 +163,11 @@ Taken taken_by_smooth(const FittedModel& model, const ModelProjection& projectio
 void add_smooth(const FittedModel& model, const ModelProjection& projection, Adequacy& result) {
   const double chi_square = projection.residual().squaredNorm();
   constexpr std::pair<int, int> kSets[] = {{1, 4}, {2, 4}, {2, 8}, {3, 6}};
-  for (const auto& [waves, in_time_waves] : kSets) {
-    const Taken taken = taken_by_smooth(model, projection, waves, in_time_waves);
+  std::array<Taken, std::size(kSets)> taken_by_set;
+  for_each_index(std::size(kSets), [&](size_t k) {
+    taken_by_set[k] = taken_by_smooth(model, projection, kSets[k].first, kSets[k].second);
+  });
+  for (const Taken& taken : taken_by_set) {
     if (taken.rank == 0) continue;
     const double score = (taken.square - taken.rank) / std::sqrt(2 * taken.rank);
     if (score <= result.smooth_score) continue;
