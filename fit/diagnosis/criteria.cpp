@@ -167,13 +167,18 @@ std::vector<CriterionDescription> describe(const DiagnosisCriteria& c) {
       {"of_noise", c.of_noise, "share of the noise that is worth a name where much is missing",
        "one of several causes is refused", "tags_onecam"},
       {"form_known", c.form_known, "relative error of the form of an accepted effect",
-       "a weak cause beside a strong one is refused", kTrials},
+       "a weak cause beside a strong one is refused", "set once, on swing_hem"},
 
       {"beam_far_behind", c.beam_far_behind,
        "share of the best entry's gain below which an entry is not extended",
        "a cause that needs another one first is missed", kTrials},
       {"told_apart", c.told_apart, "chi-square within which two effects are not told apart",
        "more effects are named beside the right one", kConvention},
+
+      {"changes_alike", c.changes_alike,
+       "squared multiple correlation of what two hypotheses change, from which the simpler is "
+       "fitted",
+       "an effect is named by a form of it that has too many numbers", kDesign},
 
       {"term_worth_a_fit", c.term_worth_a_fit,
        "share of the best prediction from which a term of a law is fitted",

@@ -72,11 +72,14 @@ struct DiagnosisCriteria {
   double of_excess = 1.0 / 3;
   double of_all = 0.05;
   double of_noise = 0.25;
-  double form_known = 0.01;
+  double form_known = 0.05;
 
   // The beam (beam.h, expand.h)
   double beam_far_behind = 0.5;
   double told_apart = 25;
+
+  // Simpler hypotheses, at the end (simplify.h)
+  double changes_alike = 0.5;
 
   // The proposed law (proposed_law.h)
   double term_worth_a_fit = 0.8;

@@ -8,6 +8,7 @@
 #include "fit/diagnosis/criteria.h"
 #include "fit/diagnosis/discretisation.h"
 #include "fit/diagnosis/refit.h"
+#include "fit/diagnosis/rival.h"
 #include "fit/diagnosis/search_context.h"
 #include "fit/diagnosis/shortlist.h"
 #include "fit/diagnosis/space_mapping.h"
@@ -61,6 +62,28 @@ void fit_shapes_of_best(const SearchContext& search, const FittedModel& without,
     FittedModel with_shape = with_shape_fitted(search, search.coarse, models[k]);
     if (!with_shape.usable()) return;
     if (search.cost(with_shape) < search.cost(models[k])) models[k] = std::move(with_shape);
+  });
+}
+
+/// Fits hypotheses once more that change residuals much like the best one's and leave more, from
+/// where that one led. Where much is missing, a fit from far away ends where it happens to.
+void start_from_best(const SearchContext& search, const DiagnosisSetup& setup,
+                     const FittedModel& without, std::vector<FittedModel>& models) {
+  if (models.empty() || !search.is_far_off(without)) return;
+  const FittedModel best = *std::ranges::min_element(
+      models, {}, [&](const FittedModel& m) { return search.left_by(m); });
+  if (!best.usable() || describe_effect(best.hypotheses.back().effect).touches) return;
+  const size_t last = best.hypotheses.size() - 1;
+  const Change change = change_by(setup, best, last);
+  if (change.of_residuals.size() == 0) return;
+  for_each_index(models.size(), [&](size_t k) {
+    if (models[k].hypotheses.empty() ||
+        search.left_by(models[k]) < search.left_by(best) + kCriteria.told_apart)
+      return;
+    const Hypothesis& rival = models[k].hypotheses.back();
+    if (describe_effect(rival.effect).touches || share_shape(rival, best.hypotheses.back())) return;
+    FittedModel again = with_rival(setup, best, last, change, rival, kNearEnough, search.progress);
+    if (search.left_by(again) < search.left_by(models[k])) models[k] = std::move(again);
   });
 }
 
@@ -148,11 +171,13 @@ std::vector<Extended> fit_shortlist(const SearchContext& search, const FittedMod
     fitted = fit_with_hypotheses(search.coarse, list.coarse, list.early, scores, list.share,
                                  search.threshold, search.progress);
     note_what_was_fitted();
+    start_from_best(search, search.coarse, list.coarse, fitted);
     fit_shapes_of_best(search, list.coarse, fitted);
     fitted = on_analysed_mesh(search, model, list.coarse, std::move(fitted));
   } else {
     fitted = fit_with_hypotheses(search.setup, model, list.early, scores, list.share,
                                  search.threshold, search.progress);
+    if (search.only_chooses) start_from_best(search, search.setup, model, fitted);
   }
   if (extended.empty()) note_what_was_fitted();
   for (size_t k = 0; k < scores.size(); ++k) extended[k].model = std::move(fitted[k]);

@@ -13,7 +13,11 @@
 namespace clothfit {
 namespace {
 
-/// Fits the model without its hypothesis `k`. Others of the same effect keep its shape.
+/// A fit that is near enough may yet fall by this factor, counted from the model with all.
+constexpr double kFallsBy = 10;
+
+/// Fits the model without its hypothesis `k`. Others of the same effect keep its shape. Where it
+/// leaves far more than is worth a name, it is not fitted to the end.
 FittedModel without(const SearchContext& search, const FittedModel& model, size_t k) {
   std::vector<Hypothesis> hypotheses = model.hypotheses;
   const Hypothesis dropped = hypotheses[k];
@@ -24,7 +28,11 @@ FittedModel without(const SearchContext& search, const FittedModel& model, size_
     hypothesis.fits_shape = hypothesis.fits_shape || dropped.fits_shape;
   }
   FittedModel result = with_hypotheses(search.setup, model, hypotheses, {});
-  refine_model(result, search.setup, {}, search.progress);
+  refine_model(result, search.setup, kNearEnough, search.progress);
+  if (!result.usable()) return result;
+  const double rise = search.left_by(result) - search.left_by(model);
+  if (rise < kFallsBy * search.worth(result))
+    refine_model(result, search.setup, {}, search.progress);
   return result;
 }
 

@@ -14,6 +14,7 @@
 #include "fit/diagnosis/prune.h"
 #include "fit/diagnosis/refit.h"
 #include "fit/diagnosis/shortlist.h"
+#include "fit/diagnosis/simplify.h"
 #include "fit/diagnosis/worth.h"
 #include "fit/jobs/stop_token.h"
 
@@ -176,6 +177,7 @@ SearchResult conclude(SearchContext& search, BeamEntry best, SearchResult result
       if (refined.usable()) best.model = std::move(refined);
     }
     prune(search, best);
+    simplify(search, best);
     if (best.last.empty())
       best.last =
           score_at_best_shapes(search, search.setup, best.model, search.untested(best.model));

@@ -15,8 +15,8 @@ double sure_excess(const FittedModel& model, double threshold);
 /// Four things bound it. Noise is known to three tenths of a per cent at best. A model whose
 /// numerics err leaves structure that many hypotheses follow a little, so a third of the sure
 /// excess is asked. Where much is missing that no single hypothesis explains, a twentieth of
-/// chi-square and a quarter of the noise are enough. The form of an accepted effect is known to a
-/// per cent, so what its error may leave is worth no name beside hypotheses that explain much
+/// chi-square and a quarter of the noise are enough. The form of an accepted effect is known to
+/// five per cent, so what its error may leave is worth no name beside hypotheses that explain much
 /// (`explained`, of chi-square).
 double worth_naming(const FittedModel& model, double threshold, double explained = 0);
 
