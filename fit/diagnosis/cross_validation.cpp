@@ -42,11 +42,12 @@ class Folds {
         space_(problems_),
         whole_(whole),
         blocks_(whole ? static_cast<int>(model.parts.size()) : blocks),
-        threshold_(threshold),
+        threshold_(setup.options.loss == Loss::huber ? threshold
+                                                     : std::numeric_limits<double>::infinity()),
         forces_(std::move(forces)) {
     for (size_t n = 0; n < model.parts.size(); ++n) {
       objectives_.push_back(model.objective(n));
-      normals_.push_back(normal_of(n, setup.options.loss));
+      normals_.push_back(normal_of(n));
     }
   }
 
@@ -131,13 +132,11 @@ class Folds {
     return sum;
   }
 
-  Normal normal_of(size_t n, Loss loss) const {
+  Normal normal_of(size_t n) const {
     const PooledPart& part = model_.parts[n];
     const Eigen::VectorXd residual = residual_of(part);
     const Eigen::VectorXd root_weight =
-        huber_weights(objectives_[n], residual,
-                      loss == Loss::huber ? threshold_ : std::numeric_limits<double>::infinity())
-            .cwiseSqrt();
+        huber_weights(objectives_[n], residual, threshold_).cwiseSqrt();
     const Eigen::Index fitted = part.linear.residual_by_coordinate.cols(),
                        unforced = first_force(n, 0),
                        all = unforced + (has_forces() ? forces_.columns[n].cols() : 0);
@@ -295,7 +294,7 @@ class Folds {
   PooledSpace space_;
   bool whole_;
   int blocks_;
-  double threshold_;
+  double threshold_;  ///< of the fit's loss
   FreeForces forces_;
   std::vector<TrajectoryObjective> objectives_;
   std::vector<Normal> normals_;

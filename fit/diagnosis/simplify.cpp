@@ -21,8 +21,8 @@ namespace {
 /// What a fit that is near enough leaves beyond the accepted one may yet fall by this factor.
 constexpr double kFallsBy = 10;
 
-/// Returns the trial of a simpler hypothesis: that of the accepted one, measured anew where it is
-/// the model with the hypothesis that is measured.
+/// Returns the trial of a simpler hypothesis: that of the accepted one, with what is measured of
+/// the model with the hypothesis.
 Trial trial_of_simpler(const SearchContext& search, const Trial& accepted, const FittedModel& model,
                        size_t k, double rise, double least) {
   Trial trial = accepted;

@@ -185,10 +185,10 @@ TEST(Candidates, TellWhatIsTheSameByConstructionOnlyWhereSupportsMove) {
   const FitInput input = synthetic_input({});
   struct Case {
     Hypothesis hypothesis, other;
-    double same;  ///< sigmas: the scheme's own error of first order differs
+    double same;  ///< sigmas: single precision rounds, and the scheme's own error differs
   };
   for (const Case& of :
-       {Case{kGravityTilt, kWorldTilt, 1e-3}, Case{kGravityScale, kFrameRate, 1}}) {
+       {Case{kGravityTilt, kWorldTilt, 1e-2}, Case{kGravityScale, kFrameRate, 1}}) {
     SCOPED_TRACE(of.hypothesis.title());
     const FittedModel model = model_with(setup_of(input, kInSpace), {of.hypothesis});
     EXPECT_GT(hypothesis_distance(model, of.hypothesis, drag_hypothesis()), 5);

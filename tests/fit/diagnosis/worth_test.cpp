@@ -73,9 +73,9 @@ TEST(WorthNaming, IsMoreBesideAHypothesisThatExplainsMuch) {
   const FittedModel model = that_leaves(setup, 1);
   const auto count = static_cast<double>(model.residual_count());
 
-  // A form that is known to a per cent leaves a ten-thousandth of what it explains.
-  EXPECT_NEAR(worth_naming(model, kSquaresOnly, 100 * count), 0.01 * count, 1e-9 * count);
-  EXPECT_NEAR(worth_naming(model, kSquaresOnly, 10 * count), 0.003 * count, 1e-9 * count);
+  // A form that is known to five per cent leaves a four-hundredth of what it explains.
+  EXPECT_NEAR(worth_naming(model, kSquaresOnly, 4 * count), 0.01 * count, 1e-9 * count);
+  EXPECT_NEAR(worth_naming(model, kSquaresOnly, count), 0.003 * count, 1e-9 * count);
 }
 
 TEST(WorthNaming, CountsLargeResidualsAsTheFitDoes) {
