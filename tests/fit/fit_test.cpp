@@ -109,6 +109,23 @@ TEST(Fit, OnlyFollowsTheCoarseMeshWhereTheModelIsGrosslyMisfitting) {
   EXPECT_LT(followed.result.errors.at(0).fitted.rms, 1.2 * left);
 }
 
+// The noise is so small that a coarser mesh errs by many times as much.
+TEST(Fit, LeavesTheCoarseMeshWhereOnlyThatMisfits) {
+  const SyntheticCloth truth{
+      .mesh = 9, .markers = 5, .frames = 20, .held_out_from = 16, .noise_m = 5e-6};
+  FitOptions options = quick();
+  options.coarse_beyond = 10;
+  options.start = named(truth.fabric);
+  for (auto& [name, value] : *options.start) value *= 1.1;
+  const FitReport report = fit(synthetic_input(truth), options, {});
+
+  ASSERT_TRUE(report.usable()) << report.message;
+  EXPECT_TRUE(std::ranges::any_of(report.stages, [](const std::string& stage) {
+    return stage.starts_with("refinement on 9 x 9 over");
+  }));
+  EXPECT_LT(report.result.errors.at(0).fitted.rms, 5e-5);  // the truth has another time step
+}
+
 TEST(Fit, GivesTheSameBitsForAnyNumberOfThreads) {
   const FitInput input =
       synthetic_input({.mesh = 5, .markers = 5, .frames = 16, .held_out_from = 12});
