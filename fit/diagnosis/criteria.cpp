@@ -176,9 +176,10 @@ std::vector<CriterionDescription> describe(const DiagnosisCriteria& c) {
        "more effects are named beside the right one", kConvention},
 
       {"changes_alike", c.changes_alike,
-       "squared multiple correlation of what two hypotheses change, from which the simpler is "
-       "fitted",
-       "an effect is named by a form of it that has too many numbers", kDesign},
+       "squared multiple correlation of what two hypotheses change, from which one is fitted where "
+       "the other led",
+       "an effect is named by a form of it that has too many numbers",
+       "set with its step, written for swing_breeze"},
 
       {"term_worth_a_fit", c.term_worth_a_fit,
        "share of the best prediction from which a term of a law is fitted",

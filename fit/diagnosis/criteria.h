@@ -78,7 +78,7 @@ struct DiagnosisCriteria {
   double beam_far_behind = 0.5;
   double told_apart = 25;
 
-  // Simpler hypotheses, at the end (simplify.h)
+  // One hypothesis in place of another (rival.h)
   double changes_alike = 0.5;
 
   // The proposed law (proposed_law.h)

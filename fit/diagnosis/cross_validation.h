@@ -28,9 +28,9 @@ struct CrossValidation {
 /// the start. With `whole` each of several recordings is left out as a whole instead. Its own
 /// parameters then follow the shared ones as its observations ask. Each time the model takes one
 /// Gauss-Newton step from its optimum to that of the other observations, and is run again. The step
-/// is exact where the model is linear, and cut where it leaves more of what it sees. It moves the
-/// amplitudes of the discretisation's errors too.
-/// Squares beyond `threshold` sigmas count linearly (Huber).
+/// is exact where the model is linear, and halved where it leaves more of what it sees. It moves
+/// the amplitudes of the discretisation's errors too. Squares beyond `threshold` sigmas count
+/// linearly (Huber).
 ///
 /// Free forces are asked for by the mesh that their derivatives are taken from, the model's own or
 /// a coarser one. The same least squares finds them to first order, together with all else. They

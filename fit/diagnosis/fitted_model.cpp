@@ -12,6 +12,7 @@
 #include "fit/identify.h"
 #include "fit/measurement_effects/measurement_effect.h"
 #include "fit/measurement_effects/registry.h"
+#include "fit/problem/effects_of.h"
 #include "fit/problem/mesh_ladder.h"
 #include "fit/problem/parameterised_model.h"
 #include "fit/problem/prior_cost.h"
@@ -194,6 +195,20 @@ FittedModel restored(const DiagnosisSetup& setup, const ModelFit& fit) {
     model.parts[n].steps = fit.recordings[n].steps;
   }
   return model;
+}
+
+void set_amplitudes(const Hypothesis& hypothesis, const Eigen::VectorXd& beyond_neutral,
+                    std::vector<NamedValues>& values) {
+  const EffectDescription effect = describe_effect(hypothesis.effect);
+  const size_t each = hypothesis.amplitudes.size();
+  for (size_t n = 0; n < values.size(); ++n)
+    for (size_t k = 0; k < each; ++k) {
+      const std::string& name = hypothesis.amplitudes[k];
+      const auto own = static_cast<size_t>(beyond_neutral.size()) > each ? n * each + k : k;
+      values[n][hypothesis.effect + "." + name] =
+          std::ranges::find(effect.parameters, name, &EffectParameter::name)->neutral +
+          beyond_neutral[static_cast<Eigen::Index>(own)];
+    }
 }
 
 int frames_of_share(const FitProblem& problem, double share) {

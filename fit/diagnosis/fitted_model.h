@@ -99,6 +99,11 @@ FittedModel model_at(const DiagnosisSetup& setup, const std::vector<Hypothesis>&
 /// Makes the model where a fit stands. It is not linearised.
 FittedModel restored(const DiagnosisSetup& setup, const ModelFit& fit);
 
+/// Sets a hypothesis' amplitudes in values by name, counted from neutral. Those of the measurement
+/// are each recording's own: they come one recording after the other.
+void set_amplitudes(const Hypothesis& hypothesis, const Eigen::VectorXd& beyond_neutral,
+                    std::vector<NamedValues>& values);
+
 /// Returns how many frames are such a share of a recording's fitted ones: a handful at least.
 int frames_of_share(const FitProblem& problem, double share);
 
@@ -121,6 +126,8 @@ struct StageOptions {
 
 /// A model that still lacks much, or runs a race, need not stand at its optimum.
 inline constexpr StageOptions kNearEnough{.linearisations = 3};
+/// What it leaves there beyond another model may yet fall by this factor.
+inline constexpr double kNearEnoughFallsBy = 10;
 
 /// Refines a model from where it stands, with the derivatives that it has or new ones.
 void refine_model(FittedModel& model, const DiagnosisSetup& setup, const StageOptions& options,

@@ -13,9 +13,6 @@
 namespace clothfit {
 namespace {
 
-/// A fit that is near enough may yet fall by this factor, counted from the model with all.
-constexpr double kFallsBy = 10;
-
 /// Fits the model without its hypothesis `k`. Others of the same effect keep its shape. Where it
 /// leaves far more than is worth a name, it is not fitted to the end.
 FittedModel without(const SearchContext& search, const FittedModel& model, size_t k) {
@@ -31,7 +28,7 @@ FittedModel without(const SearchContext& search, const FittedModel& model, size_
   refine_model(result, search.setup, kNearEnough, search.progress);
   if (!result.usable()) return result;
   const double rise = search.left_by(result) - search.left_by(model);
-  if (rise < kFallsBy * search.worth(result))
+  if (rise < kNearEnoughFallsBy * search.worth(result))
     refine_model(result, search.setup, {}, search.progress);
   return result;
 }

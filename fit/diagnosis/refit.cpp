@@ -12,7 +12,6 @@
 #include "fit/diagnosis/worth.h"
 #include "fit/identify.h"
 #include "fit/jobs/parallel.h"
-#include "fit/problem/effects_of.h"
 #include "fit/problem/problem.h"
 
 namespace clothfit {
@@ -30,17 +29,7 @@ FittedModel cautious_start(const DiagnosisSetup& setup, const FittedModel& model
   hypotheses.push_back(score.hypothesis);
   hypotheses.back().fits_shape = is_over_cloth(score.hypothesis);
   std::vector<NamedValues> start = model.values();
-  const EffectDescription effect = describe_effect(score.hypothesis.effect);
-  const size_t each = score.hypothesis.amplitudes.size();
-  for (size_t n = 0; n < start.size(); ++n) {
-    for (size_t k = 0; k < each; ++k) {
-      const std::string& name = score.hypothesis.amplitudes[k];
-      const auto own = static_cast<size_t>(score.amplitude.size()) > each ? n * each + k : k;
-      start[n][score.hypothesis.effect + "." + name] =
-          std::ranges::find(effect.parameters, name, &EffectParameter::name)->neutral +
-          kCriteria.cautious_start * score.amplitude[static_cast<Eigen::Index>(own)];
-    }
-  }
+  set_amplitudes(score.hypothesis, kCriteria.cautious_start * score.amplitude, start);
   return model_at(setup, hypotheses, start);
 }
 

@@ -1,12 +1,10 @@
 #include "fit/diagnosis/rival.h"
 
-#include <algorithm>
 #include <utility>
 #include <vector>
 
 #include "fit/diagnosis/criteria.h"
 #include "fit/diagnosis/hypothesis_derivatives.h"
-#include "fit/problem/effects_of.h"
 
 namespace clothfit {
 namespace {
@@ -55,21 +53,12 @@ FittedModel with_rival(const DiagnosisSetup& setup, const FittedModel& model, si
   if (jacobian.rows() != change.of_residuals.size() || jacobian.cols() == 0) return {};
   if (squared_multiple_correlation(change.of_residuals, jacobian) < kCriteria.changes_alike)
     return {};
-  const Eigen::VectorXd amplitude = jacobian.colPivHouseholderQr().solve(change.of_residuals);
 
+  const Eigen::VectorXd amplitude = jacobian.colPivHouseholderQr().solve(change.of_residuals);
   std::vector<Hypothesis> hypotheses = model.hypotheses;
   hypotheses[k] = rival;
   std::vector<NamedValues> values = model.values();
-  const EffectDescription effect = describe_effect(rival.effect);
-  const size_t each = rival.amplitudes.size();
-  for (size_t n = 0; n < values.size(); ++n)
-    for (size_t a = 0; a < each; ++a) {
-      const auto own = static_cast<size_t>(amplitude.size()) > each ? n * each + a : a;
-      const std::string& name = rival.amplitudes[a];
-      values[n][rival.effect + "." + name] =
-          std::ranges::find(effect.parameters, name, &EffectParameter::name)->neutral +
-          amplitude[static_cast<Eigen::Index>(own)];
-    }
+  set_amplitudes(rival, amplitude, values);
   FittedModel result = model_at(setup, hypotheses, values);
   for (size_t n = 0; n < result.parts.size(); ++n) {
     result.parts[n].frames = model.parts[n].frames;

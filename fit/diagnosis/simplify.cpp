@@ -7,7 +7,6 @@
 #include "fit/diagnosis/adequacy.h"
 #include "fit/diagnosis/beam.h"
 #include "fit/diagnosis/clearance.h"
-#include "fit/diagnosis/criteria.h"
 #include "fit/diagnosis/rival.h"
 #include "fit/diagnosis/search_context.h"
 #include "fit/diagnosis/trial.h"
@@ -18,11 +17,8 @@
 namespace clothfit {
 namespace {
 
-/// What a fit that is near enough leaves beyond the accepted one may yet fall by this factor.
-constexpr double kFallsBy = 10;
-
-/// Returns the trial of a simpler hypothesis: that of the accepted one, with what is measured of
-/// the model with the hypothesis.
+/// Returns the trial of a simpler hypothesis. It is that of the accepted one, whose model without
+/// the hypothesis is the same; what it measures of the model with it is measured once more.
 Trial trial_of_simpler(const SearchContext& search, const Trial& accepted, const FittedModel& model,
                        size_t k, double rise, double least) {
   Trial trial = accepted;
@@ -97,8 +93,11 @@ void put_simpler(const SearchContext& search, BeamEntry& entry, size_t k,
     const auto rise = [&] {
       return search.left_by(simple) - entry.model.chi_square(search.threshold);
     };
-    const auto least = [&] { return std::max(least_decrease(numbers), search.worth(simple)); };
-    if (!simple.usable() || rise() >= kFallsBy * least()) continue;
+    // That a form is not exact is no reason to prefer another one.
+    const auto least = [&] {
+      return std::max(least_decrease(numbers), worth_naming(simple, search.threshold));
+    };
+    if (!simple.usable() || rise() >= kNearEnoughFallsBy * least()) continue;
     refine_model(simple, search.setup, {}, search.progress);
     if (!simple.usable() || rise() >= least()) continue;
     Trial trial = trial_of_simpler(search, accepted.trial, simple, k, rise(), least());

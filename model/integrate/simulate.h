@@ -16,7 +16,7 @@ struct Schedule {
   /// Derivatives of forces that change smoothly are computed once in that time, and kept between
   /// (TangentStepper); 0: in every step.
   double derivatives_kept_s = 0;
-  /// Derivatives along more than 16 directions are had in single precision, at half the cost: they
+  /// Derivatives along more than 8 directions are had in single precision, at half the cost: they
   /// are then right to about five digits.
   bool fast_derivatives = false;
 

@@ -280,6 +280,29 @@ TEST(CrossValidation, KnowsNoConstantOfAMarkerThatOneBlockAloneSees) {
   EXPECT_NEAR(found.last_residual, square, 1e-9);
 }
 
+// Drag that the derivatives take for weaker by 0.4 makes steps two and a half times too long.
+TEST(CrossValidation, HalvesAStepThatLeavesMoreOfWhatItSees) {
+  constexpr double kTooMuch_per_s = 0.6, kUnderstated = 0.4;
+  SyntheticCloth cloth = kValidatedCloth;
+  cloth.drag_rate_per_s = 1;
+  const FitInput input = synthetic_input(cloth);
+  SyntheticCloth thicker = cloth;
+  thicker.drag_rate_per_s += kTooMuch_per_s;
+  const DiagnosisSetup setup = validated_setup({&input, 1});
+  FittedModel model = true_model(setup, thicker, {drag_hypothesis()});
+  Linearisation& linear = model.parts.front().linear;
+  const int drag = model.problems.front()->space.index("viscous_damping.rate");
+  const auto fabric = linear.residual_by_coordinate.cols();
+  for (int p = 0; p < fabric; ++p)
+    linear.residual_by_coordinate.col(p) *= p == drag ? kUnderstated : 0;
+  const double stays = linear.residual.squaredNorm() / static_cast<double>(linear.residual.size());
+
+  const CrossValidation found = cross_validate(setup, model, kValidationBlocks, kSquares);
+
+  ASSERT_GT(stays, 10);  // a whole step would leave about twice as much
+  EXPECT_LT(found.mean, 0.5 * stays);
+}
+
 // One marker of the first frame lies 50 sigmas off, and a constant that all residuals share is
 // fitted. The squared loss lets the marker move the constant by 50 sigmas over the number of
 // residuals, Huber's loss with its threshold of 3 by about 3 sigmas. In its own block it counts
