@@ -25,6 +25,7 @@ int run(int argc, char** argv) {
   clothfit::add_demo_verb(program);
   clothfit::add_calibrate_verb(program);
   clothfit::add_track_verb(program);
+  clothfit::add_check_verb(program);
   clothfit::add_fit_verb(program);
   clothfit::add_diagnose_verb(program);
   clothfit::add_simulate_verb(program);

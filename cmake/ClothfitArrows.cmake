@@ -39,6 +39,8 @@ set(CLOTHFIT_ARROWS
   "fit/problem          -> data/algebra data calib/camera model/topology model/fabric
                            model/cloth model/effects model/integrate fit/interface fit/observe
                            fit/measurement_effects"
+  "fit/preflight        -> data calib/camera model/topology fit/interface fit/observe
+                           fit/measurement_effects fit/problem"
   "fit/cost             -> data/algebra data model/cloth model/integrate fit/interface
                            fit/observe fit/problem"
   "fit/search           -> data/algebra data fit/interface fit/jobs fit/problem fit/cost"
@@ -78,7 +80,7 @@ set(CLOTHFIT_ARROWS
                            apps/study/foreign"
   "apps/verbs           -> data model/topology model/fabric model/cloth model/effects
                            model/integrate fit/interface fit/jobs fit/measurement_effects
-                           fit/problem fit fit/diagnosis apps/terminal apps/steps
+                           fit/problem fit/preflight fit fit/diagnosis apps/terminal apps/steps
                            apps/report/page apps/report/fit apps/report/diagnosis
                            apps/study/trials apps/study/louchet1995 apps/study/recordings
                            apps/study/foreign apps/report/study"

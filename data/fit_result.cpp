@@ -47,6 +47,14 @@ Json to_json(const std::vector<ParameterEstimate>& parameters) {
   return list;
 }
 
+Json to_json(const Finding& finding) {
+  return {{"check", finding.check},
+          {"found", finding.found},
+          {"where", finding.where},
+          {"expected", finding.expected},
+          {"remedy", finding.remedy}};
+}
+
 Json to_json(const ErrorSummary& error) {
   return {{"rms", finite(error.rms)},
           {"rms_distance", finite(error.rms_distance)},
@@ -219,6 +227,15 @@ Basin read_basin(const JsonValue& json) {
   return basin;
 }
 
+Finding read_warning(const JsonValue& json) {
+  return {.check = json.at("check").text(),
+          .state = FindingState::warning,
+          .found = json.at("found").text(),
+          .where = json.text_or_empty("where"),
+          .expected = json.text_or_empty("expected"),
+          .remedy = json.text_or_empty("remedy")};
+}
+
 Json parse(const std::filesystem::path& file) {
   const std::string text = read_text(file);
   try {
@@ -263,7 +280,11 @@ void write_fit_result(const FitResult& result, const std::filesystem::path& file
   Json rejected = Json::object();
   for (const auto& [reason, count] : result.observations_rejected) rejected[reason] = count;
 
+  Json warnings = Json::array();
+  for (const Finding& warning : result.warnings) warnings.push_back(to_json(warning));
+
   Json json = {{"format", kFormat},
+               {"warnings", warnings},
                {"recording", result.recording},
                {"version", result.version},
                {"command", result.command},
@@ -329,6 +350,9 @@ FitResult read_fit_result(const std::filesystem::path& file) {
   if (json.has("basins"))
     for (const JsonValue& basin : json.at("basins").items())
       result.basins.push_back(read_basin(basin));
+  if (json.has("warnings"))
+    for (const JsonValue& warning : json.at("warnings").items())
+      result.warnings.push_back(read_warning(warning));
   const JsonValue errors = json.at("errors");
   if (errors.is_list())
     for (const JsonValue& kind : errors.items()) result.errors.push_back(read_errors(kind));

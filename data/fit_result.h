@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "data/finding.h"
+
 namespace clothfit {
 
 enum class ParameterState { fitted, fixed, undetermined };
@@ -112,6 +114,7 @@ struct FitResult {
   std::vector<Basin> basins;  ///< best first; empty without a search
   std::vector<ObservationErrors> errors;
   std::optional<CloudErrors> clouds;  ///< where the recording has any
+  Findings warnings;                  ///< of the checks before the fit (fit/preflight/preflight.h)
   int observations_used = 0;
   std::map<std::string, int> observations_rejected;  ///< reason -> count
 };

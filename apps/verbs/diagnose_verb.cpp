@@ -21,6 +21,7 @@
 #include "apps/terminal/progress_line.h"
 #include "apps/terminal/text_table.h"
 #include "apps/terminal/version.h"
+#include "apps/verbs/checked_input.h"
 #include "apps/verbs/verb.h"
 #include "data/input_error.h"
 #include "data/number_text.h"
@@ -94,7 +95,10 @@ void write_results(const Diagnosis& diagnosis, std::span<const Recording> record
 
 void print_result(const Diagnosis& diagnosis, const fs::path& folder) {
   const auto print = [](const Table& table) { fmt::print("{}\n", text_table(table)); };
-  fmt::print("\n{}\n\n", diagnosis_sentence(diagnosis));
+  fmt::print("\n");
+  for (const DiagnosedRecording& recording : diagnosis.recordings)
+    fmt::print("{}", warnings_text(recording.after.result.warnings));
+  fmt::print("{}\n\n", diagnosis_sentence(diagnosis));
   if (!diagnosis.complete) fmt::print("{}\n\n", incomplete_text(diagnosis));
   if (diagnosis.seen_elsewhere)
     fmt::print("Markers seen elsewhere: {}\n", seen_elsewhere_text(*diagnosis.seen_elsewhere));
@@ -143,16 +147,19 @@ int run_diagnose(DiagnoseFlags flags, const std::string& command) {
 
   OutputFolder out(out_folder(flags.out, recordings.front().name + ".diagnosis"));
   Diagnosis diagnosis;
+  std::vector<Findings> warnings;
   {
     ProgressLine line;
     const ProgressCallback progress = watch(line);
     std::vector<FitInput> inputs;
     for (Recording& recording : recordings) {
       const fs::path steps = out.path() / "steps";
-      recording = complete_recording(
-          recording, fit.observations, {},
+      CheckedInput checked = checked_input(
+          recording, fit.observations,
           recordings.size() > 1 ? steps / std::to_string(inputs.size()) : steps, progress);
-      inputs.push_back(read_fit_input(recording, fit.observations));
+      recording = checked.input.recording;
+      inputs.push_back(std::move(checked.input));
+      warnings.push_back(std::move(checked.findings));
     }
     const std::span<const FitInput> all(inputs);
     diagnosis = diagnose(all.first(flags.recordings.size()), all.subspan(flags.recordings.size()),
@@ -161,8 +168,10 @@ int run_diagnose(DiagnoseFlags flags, const std::string& command) {
   if (diagnosis.stop == FitStop::cancelled || (interrupted() && diagnosis.complete))
     throw Cancelled();
   if (!diagnosis.usable()) throw NoResult("no diagnosis: " + diagnosis.message);
-  for (DiagnosedRecording& recording : diagnosis.recordings)
-    for (FitReport* report : {&recording.before, &recording.after, &recording.with_law}) {
+  for (size_t n = 0; n < diagnosis.recordings.size(); ++n)
+    for (FitReport* report : {&diagnosis.recordings[n].before, &diagnosis.recordings[n].after,
+                              &diagnosis.recordings[n].with_law}) {
+      report->result.warnings = warnings[n];
       report->result.version = program_version();
       report->result.command = command;
     }

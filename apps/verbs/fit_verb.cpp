@@ -20,6 +20,7 @@
 #include "apps/terminal/progress_line.h"
 #include "apps/terminal/text_table.h"
 #include "apps/terminal/version.h"
+#include "apps/verbs/checked_input.h"
 #include "apps/verbs/verb.h"
 #include "data/input_error.h"
 #include "data/number_text.h"
@@ -105,7 +106,7 @@ void write_results(const FitReport& report, const Recording& recording, const fs
 void print_result(const FitReport& report, const fs::path& folder) {
   const Table parameters = short_parameter_table(report.result);
   const Table errors = short_error_table(report.result);
-  fmt::print("\n{}\n", text_table(parameters));
+  fmt::print("\n{}{}\n", warnings_text(report.result.warnings), text_table(parameters));
   fmt::print("Errors (rms per coordinate):\n\n{}\n", text_table(errors));
   const Table clouds = cloud_table(report.result);
   if (!clouds.rows.empty()) fmt::print("{}\n", text_table(clouds));
@@ -121,20 +122,20 @@ int run_fit(const FitVerbOptions& options) {
   const Recording given = read_recording(recording_folder(options.recording));
 
   OutputFolder out(out_folder(options.out, given.name + ".fit"));
-  Recording recording;
+  CheckedInput checked;
   FitReport report;
   {
     ProgressLine line;
     const ProgressCallback progress = watch(line);
-    recording =
-        complete_recording(given, options.fit.observations, {}, out.path() / "steps", progress);
-    const FitInput input = read_fit_input(recording, options.fit.observations);
-    report = fit(input, options.fit, progress);
+    checked = checked_input(given, options.fit.observations, out.path() / "steps", progress);
+    report = fit(checked.input, options.fit, progress);
   }
+  const Recording& recording = checked.input.recording;
   if (report.stop == FitStop::cancelled || interrupted())
     throw Cancelled(how_to_go_on(options.fit));
   if (!report.usable()) throw NoResult("no fit: " + report.message);
 
+  report.result.warnings = std::move(checked.findings);
   report.result.version = program_version();
   report.result.command = options.command;
   report.result.seconds =

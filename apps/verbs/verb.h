@@ -14,6 +14,7 @@ struct ParameterPrior;
 /// Each adds its verb, with its options and its action, to the command line.
 void add_calibrate_verb(Verb program);
 void add_track_verb(Verb program);
+void add_check_verb(Verb program);
 void add_fit_verb(Verb program);
 void add_diagnose_verb(Verb program);
 void add_simulate_verb(Verb program);

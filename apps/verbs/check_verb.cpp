@@ -1,0 +1,86 @@
+#include <fmt/format.h>
+
+#include <memory>
+#include <string>
+
+#include "apps/terminal/exit_code.h"
+#include "apps/terminal/option_flags.h"
+#include "apps/terminal/progress_line.h"
+#include "apps/verbs/checked_input.h"
+#include "apps/verbs/verb.h"
+#include "data/output_folder.h"
+
+namespace clothfit {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct CheckVerbOptions {
+  fs::path recording;
+  std::string observations = "automatic";
+};
+
+const char* verdict(FindingState state) {
+  switch (state) {
+    case FindingState::passed:
+      return "ok";
+    case FindingState::warning:
+      return "WARNING";
+    case FindingState::refused:
+      return "WRONG";
+  }
+  return "";
+}
+
+void print_findings(const Findings& findings) {
+  for (const Finding& finding : findings) {
+    fmt::print("{:<8} {:<12} {}\n", verdict(finding.state), finding.check,
+               with_flags(finding.found));
+    constexpr const char* kFurther = "                      ";
+    if (!finding.expected.empty())
+      fmt::print("{}expected: {}\n", kFurther, with_flags(finding.expected));
+    if (!finding.remedy.empty()) fmt::print("{}remedy: {}\n", kFurther, with_flags(finding.remedy));
+    if (!finding.where.empty()) fmt::print("{}in {}\n", kFurther, finding.where);
+  }
+}
+
+int run_check(const CheckVerbOptions& options) {
+  const ObservationKind kind = parse_observations(options.observations);
+  const Recording given = read_recording(recording_folder(options.recording));
+  Findings findings;
+  {
+    // Pictures are tracked into a folder that goes when this is over.
+    const OutputFolder scratch(out_folder({}, given.name + ".check"));
+    ProgressLine line;
+    findings = check_input(given, kind, scratch.path() / "steps", watch(line)).findings;
+  }
+  print_findings(findings);
+  const auto wrong = with_state(findings, FindingState::refused).size(),
+             warned = with_state(findings, FindingState::warning).size();
+  if (wrong > 0)
+    fmt::print("\nNot to be fitted as it stands: {} wrong, {} to look at.\n", wrong, warned);
+  else if (warned > 0)
+    fmt::print("\nCan be fitted, with {} to look at.\n", warned);
+  else
+    fmt::print("\nNothing contradicts what the recording declares.\n");
+  return wrong > 0 ? kExitBadInput : kExitGood;
+}
+
+}  // namespace
+
+void add_check_verb(Verb program) {
+  const auto options = std::make_shared<CheckVerbOptions>();
+  Verb verb = program.add_verb(
+      "check", "Hold what a recording declares against its own data, before any fit");
+  verb.add_option("recording", &options->recording, "Folder of the recording")
+      .required()
+      .type_name("RECORDING");
+  verb.add_option("--observations", &options->observations,
+                  "What to look at: 3D tracks where there are any, unless told otherwise")
+      .one_of({"automatic", "tracks3d", "tracks2d"})
+      .shows_default();
+  verb.footer("Example:\n  clothfit check data/recordings/swing_plain");
+  verb.runs([options] { return run_check(*options); });
+}
+
+}  // namespace clothfit

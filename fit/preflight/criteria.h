@@ -1,0 +1,98 @@
+#pragma once
+
+namespace clothfit {
+
+/// Thresholds of the checks that hold a recording against its own data. Beside each stand what it
+/// decides, and what raising it costs. "Share" is of the root of the cloth's area. All were set
+/// with their check. Afterwards they were held against the bundled and foreign recordings and the
+/// robot's (docs/log.md), none of which may be warned of without a reason.
+struct PreflightCriteria {
+  // Declarations (declarations.cpp)
+  /// kg/m2 of cloth, from silk gauze to coated canvas. Wider: grams pass for kilograms of a large
+  /// sheet.
+  double least_areal_density = 0.01, most_areal_density = 3;
+  /// m/s2; a convention. Wider: other units of gravity pass.
+  double least_gravity = 0.5, most_gravity = 30;
+  /// s between frames. Wider: milliseconds and numbers of frames pass for seconds.
+  double longest_interval = 2, shortest_interval = 1e-5;
+  /// Ratio of the sides of a cell. Raised: columns and rows may be exchanged.
+  double cells_alike = 2.5;
+
+  // Units (units.cpp)
+  /// Ratio of distances in space and on the cloth that is refused. Raised: feet pass for metres of
+  /// a crumpled sheet.
+  double scale_refused = 1.5;
+  /// The same of a flat sheet, beyond 1, that is warned of. Raised: errors of the print's scale
+  /// pass that change stiffness by as much.
+  double scale_warned = 0.05;
+  /// Ratio of a camera's distances from reference and cloth. Raised: decimetres pass.
+  double reference_distance = 8;
+
+  // The first sheet (first_sheet.cpp)
+  /// Median of what markers lie beside the place between their neighbours, as a share of the
+  /// distance to the nearest. Up to the first they are in order, beyond the second they are not,
+  /// whatever order would be better. Raised: exchanged corners of small tags pass.
+  double ordered = 0.1, disordered = 0.5;
+  /// Another order must leave this share of that.
+  double better_order = 0.4;
+  /// Share by which nine of ten markers may lie beside a flat sheet, beyond the noise. Raised:
+  /// starts are taken for flat that are not, and stiffness makes up for it.
+  double sheet_warned = 0.015, sheet_refused = 0.08;
+  /// Share by which cameras may see the sheet apart. Raised: their poses may be off.
+  double cameras_apart = 0.05;
+
+  // Gravity and the release (release.cpp)
+  /// m/s2 of gravity across the sheet that are needed to see it. Lowered: noise decides.
+  double in_view = 1.5;
+  /// Frames that a sheet may stand still before its release. Raised: damping makes up for them.
+  double still_frames = 1.5;
+  /// m/s of a sheet in frame 0. Raised: sheets in motion pass for released ones.
+  double moving_speed = 0.15;
+  /// Ratio of the acceleration to the expected one, or its inverse, that is warned of and refused.
+  /// A wind of a tenth of the weight is to be diagnosed and passes. Raised: frame rates pass that
+  /// are wrong by the root of it.
+  double gravity_warned = 2, gravity_refused = 3;
+
+  // Time (timing.cpp)
+  /// Ratio of all markers' velocities in one interval to those about it. Lowered: a kick is taken
+  /// for a missing frame. Raised: one missing frame is 2.
+  double jump = 1.7;
+  /// The same of a frame that repeats the last. Raised: a halt is taken for a copy.
+  double repeat = 0.12;
+  /// Ratio of what velocities there are off by to the median of all intervals. Lowered: rough
+  /// motion and uncertain clocks are taken for missing frames.
+  double out_of_step = 3;
+  /// Likeness of the velocities before and after. Raised: frames missing in quick motion pass.
+  double alike_intervals = 0.6;
+  /// Share of the cloth by which markers must move in an interval, in the mean. Raised: slow motion
+  /// is not looked at.
+  double moves = 0.003;
+
+  // Held points (held_points.cpp)
+  /// Sigmas by which a marker at a fixed point may stray, and share of the cloth. Raised: clips
+  /// that slip pass, and are left to the diagnosis.
+  double held_sigmas = 5, held_share = 0.01;
+  /// Share from which the point is not held at all. Lowered: a clip that slips is refused.
+  double held_refused = 0.15;
+  /// Sigmas within which a marker rests. Raised: hardly moving ones are taken for held.
+  double still_sigmas = 4;
+
+  // Tracks of markers (marker_tracks.cpp)
+  /// Shares of the distance to the nearest marker. Beyond the first one lies astray, within the
+  /// second it lies in another's place. Raised, lowered: exchanged neighbours pass.
+  double out_of_place = 0.6, in_place = 0.35;
+  /// Frames in which two must be exchanged. Raised: short exchanges pass.
+  int exchanged_frames = 3;
+  /// Frames in which a track must repeat itself, or that of another marker.
+  int frozen_frames = 10;
+
+  // Obstacles (obstacle_checks.cpp)
+  /// Share of the markers that must be inside at the start. Raised: a cloth that starts inside
+  /// passes.
+  double inside_share = 0.5;
+};
+
+/// The one set that the product uses.
+inline constexpr PreflightCriteria kPreflight{};
+
+}  // namespace clothfit
