@@ -75,6 +75,7 @@ struct ModelDescription {
   double critical_elongation = 0;
   Eigen::Vector3d gravity_m_per_s2{0, 0, -9.81};
   std::optional<SurfaceMesh> obstacle;  ///< touched by the effect contact_mesh
+  std::filesystem::path obstacle_file;  ///< that it was read from; empty where it was not
   std::vector<ModelHeldPoint> held;
   std::vector<DeclaredEffect> effects;  ///< a parameter that is left out is at its neutral value
   StartKind start = StartKind::released_flat;

@@ -220,6 +220,7 @@ ModelDescription read_model(const std::filesystem::path& file) {
     model.gravity_m_per_s2 = read_gravity(*gravity);
   if (const YamlValue* obstacle = map.find("obstacle")) {
     files.file(*obstacle);
+    model.obstacle_file = files.shown(*obstacle);
     model.obstacle = read_obj(files.shown(*obstacle));
   }
   if (const YamlValue* held = map.find("held")) {

@@ -21,6 +21,8 @@
 #include "data/input_error.h"
 #include "data/number_text.h"
 #include "data/output_folder.h"
+#include "fit/preflight/obstacle_checks.h"
+#include "fit/preflight/preflight.h"
 #include "fit/problem/simulation.h"
 #include "model/cloth/stability.h"
 #include "model/fabric/fabric_conversion.h"
@@ -309,9 +311,19 @@ int run_simulate(const SimulateVerbOptions& options) {
     out.emplace(name);
     model = requested_model(options.request, out->path() / "steps", progress);
     const Simulation simulation = make_simulation(model);
+    for (const std::string& assumed : simulation.assumed) spdlog::warn("{}", assumed);
     if (simulation.cloth.obstacle && !has_effect(model, "contact_mesh"))
       spdlog::warn(
           "the cloth passes through the obstacle: the effect contact_mesh is not declared");
+    const std::string obstacle_file =
+        model.obstacle_file.empty() ? model.where(0) : model.obstacle_file.string();
+    if (model.obstacle) {
+      const Findings findings =
+          check_obstacle(*model.obstacle, obstacle_file, simulation.cloth.mesh,
+                         simulation.parameters.start_position_m);
+      refuse_wrong(findings);
+      for (const Finding& finding : findings) spdlog::warn("{}", sentence(finding));
+    }
     const StepChoice choice = choose_step(simulation, model, options.time_step_s);
     require_possible(choice, simulation, model, options.allow_unstable);
     said = fmt::format(
@@ -328,6 +340,10 @@ int run_simulate(const SimulateVerbOptions& options) {
       spdlog::warn("a spring stretched to {} times its natural length: no fabric does",
                    significant(stretch, 3));
     warn_of_strain(model, result, choice);
+    if (model.obstacle)
+      if (const auto pierced = check_pierced(*model.obstacle, obstacle_file, simulation.cloth.mesh,
+                                             result.position_m))
+        spdlog::warn("{}", sentence(*pierced));
 
     model.time_step_s = choice.time_step_s;
     write_model(model, out->path());

@@ -3,16 +3,24 @@
 
 #include <algorithm>
 #include <memory>
+#include <nlohmann/json.hpp>
+#include <utility>
 
 #include "apps/steps/calibrate_step.h"
+#include "apps/steps/steps.h"
 #include "apps/steps/track_step.h"
 #include "apps/terminal/exit_code.h"
+#include "apps/terminal/json_file.h"
 #include "apps/terminal/number_text.h"
+#include "apps/terminal/option_flags.h"
 #include "apps/terminal/progress_line.h"
 #include "apps/terminal/text_table.h"
+#include "apps/verbs/checked_input.h"
 #include "apps/verbs/verb.h"
 #include "data/input_error.h"
 #include "data/output_folder.h"
+#include "data/text_file.h"
+#include "fit/preflight/preflight.h"
 
 namespace clothfit {
 namespace {
@@ -43,9 +51,35 @@ void print_tracks(const CameraTracks& tracks, const Recording& recording) {
   if (tracks.placement) fmt::print("\n{}\n", tracks.placement->message);
 }
 
+/// Holds the tracks against what the recording declares; nothing where a camera has no place.
+Findings check_tracks(const TrackStepResult& step, const Recording& given) {
+  for (const CameraTracks& tracks : step.cameras)
+    if (!tracks.not_placed.empty()) return {};
+  const FitInput input = read_fit_input(step.recording, ObservationKind::tracks2d);
+  return findings_of(input, given, ObservationKind::tracks2d);
+}
+
+/// Adds what was found wrong or doubtful to a JSON file, as fit.json has it.
+void add_findings(const Findings& findings, const fs::path& file) {
+  auto json = nlohmann::ordered_json::parse(read_text(file));
+  for (const auto& [state, key] : {std::pair(FindingState::warning, "warnings"),
+                                   std::pair(FindingState::refused, "refused")}) {
+    json[key] = nlohmann::ordered_json::array();
+    for (const Finding& finding : with_state(findings, state))
+      json[key].push_back({{"check", finding.check},
+                           {"found", finding.found},
+                           {"where", finding.where},
+                           {"expected", finding.expected},
+                           {"remedy", finding.remedy}});
+  }
+  write_json(json, file);
+}
+
 int run_track(const TrackVerbOptions& options) {
   options.track.validate();
-  Recording recording = read_recording(recording_folder(options.recording));
+  const Recording given = read_recording(recording_folder(options.recording));
+  refuse_wrong(check_declarations(given));
+  Recording recording = given;
   const std::vector<std::string> cameras = cameras_to_track(recording, true);
   if (cameras.empty())
     throw InputError((recording.folder / "recording.yaml").string(), "no camera has pictures",
@@ -63,6 +97,8 @@ int run_track(const TrackVerbOptions& options) {
     }
     step = track_step(recording, cameras, options.track, out.path(), watch(line));
   }
+  const Findings findings = check_tracks(step, given);
+  add_findings(findings, out.path() / "tracks.json");
   out.publish();
 
   for (const CameraTracks& tracks : step.cameras) {
@@ -72,6 +108,11 @@ int run_track(const TrackVerbOptions& options) {
                    tracks.not_placed);
   }
   fmt::print("\nRecording with tracks: {}\n", shown_path(out.final_path()));
+  for (const Finding& warning : with_state(findings, FindingState::warning))
+    spdlog::warn("{}", with_flags(sentence(warning)));
+  // The tracks are what the pictures show and stay. What is declared beside them is to be
+  // corrected.
+  refuse_wrong(findings);
   return kExitGood;
 }
 

@@ -43,6 +43,8 @@ class CheckList {
                          .remedy = std::move(remedy)});
   }
 
+  void add(Finding finding) { findings_.push_back(std::move(finding)); }
+
   const std::string& file() const { return file_; }
   const Findings& findings() const { return findings_; }
   bool refused() const { return !with_state(findings_, FindingState::refused).empty(); }

@@ -12,6 +12,8 @@ namespace clothfit {
 void check_declarations(const Recording& recording, CheckList& list);
 /// Distances between markers in space against those on the cloth; cameras' distances.
 void check_units(const RecordedMotion& motion, CheckList& list);
+/// A flat sheet's width and height, and its size to a few per cent, once markers are in order.
+void check_proportions(const RecordedMotion& motion, CheckList& list);
 /// The flat sheet in frame 0: markers and tags in the order that is declared, cameras that agree.
 void check_first_sheet(const RecordedMotion& motion, CheckList& list);
 /// Frames that are missing, repeated or out of step.

@@ -90,6 +90,9 @@ struct PreflightCriteria {
   /// Share of the markers that must be inside at the start. Raised: a cloth that starts inside
   /// passes.
   double inside_share = 0.5;
+  /// Share of the start's vertices that must lie behind an open surface. Lowered: cloth that hangs
+  /// over its rim is warned of.
+  double behind_share = 0.9;
 };
 
 /// The one set that the product uses.

@@ -245,7 +245,8 @@ void check_cameras(const RecordedMotion& motion, CheckList& list) {
 void check_first_sheet(const RecordedMotion& motion, CheckList& list) {
   bool in_order = true;
   for (int s = 0; s < motion.sets(); ++s) in_order = check_order(motion, s, list) && in_order;
-  if (!in_order || motion.recording().start != StartKind::released_flat) return;
+  if (in_order) check_proportions(motion, list);
+  if (list.refused() || motion.recording().start != StartKind::released_flat) return;
   std::vector<ObservationSet> sets;
   for (int s = 0; s < motion.sets(); ++s) sets.push_back(motion.set(s));
   const auto world_from_sheet = place_flat_sheet(sets, motion.marker_m(), 1);

@@ -72,6 +72,27 @@ bool crosses(const Eigen::Vector3d& from, const Eigen::Vector3d& to, const Eigen
          normal.dot((a - c).cross(at - c)) > 0;
 }
 
+Finding inside_out(double volume_m3, const std::string& where) {
+  return {.check = "obstacle",
+          .state = FindingState::refused,
+          .found = fmt::format("its faces point inwards (it encloses {:.3g} m3)", volume_m3),
+          .where = where,
+          .expected = "corners counterclockwise as seen from outside",
+          .remedy = "turn its faces round"};
+}
+
+/// A few may touch it; a cloth that starts inside is thrown out.
+Finding inside_at_start(size_t count, size_t of, const char* what, const std::string& where) {
+  const bool most = static_cast<double>(count) > kPreflight.inside_share * static_cast<double>(of);
+  return {
+      .check = "obstacle",
+      .state = most ? FindingState::refused : FindingState::warning,
+      .found = fmt::format("{} of {} {} of the cloth lie inside it at the start", count, of, what),
+      .where = where,
+      .expected = "a cloth that starts outside",
+      .remedy = "are both in metres and in the world's axes?"};
+}
+
 bool boxes_meet(const Eigen::Vector3d& low, const Eigen::Vector3d& high,
                 const Eigen::Vector3d& other_low, const Eigen::Vector3d& other_high) {
   return (low.array() <= other_high.array()).all() && (other_low.array() <= high.array()).all();
@@ -125,6 +146,30 @@ std::vector<bool> inside(const SurfaceMesh& surface, const Eigen::Matrix3Xd& poi
   return result;
 }
 
+double share_behind(const SurfaceMesh& surface, const Eigen::Matrix3Xd& point_m) {
+  int behind = 0, told = 0;
+  for (const auto& point : point_m.colwise()) {
+    double nearest_m = INFINITY, height_m = 0;
+    for (const auto& face : surface.triangle.colwise()) {
+      const Eigen::Vector3d a = surface.vertex_m.col(face[0]), b = surface.vertex_m.col(face[1]),
+                            c = surface.vertex_m.col(face[2]);
+      const Eigen::Vector3d normal = (b - a).cross(c - a).stableNormalized();
+      const double height = normal.dot(point - a);
+      const Eigen::Vector3d foot = point - height * normal;
+      const bool over = normal.dot((b - a).cross(foot - a)) >= 0 &&
+                        normal.dot((c - b).cross(foot - b)) >= 0 &&
+                        normal.dot((a - c).cross(foot - c)) >= 0;
+      if (!over || std::abs(height) >= nearest_m) continue;
+      nearest_m = std::abs(height);
+      height_m = height;
+    }
+    if (!std::isfinite(nearest_m)) continue;
+    ++told;
+    if (height_m < 0) ++behind;
+  }
+  return told > 0 ? static_cast<double>(behind) / told : 0;
+}
+
 std::optional<double> narrowest_part_m(const SurfaceMesh& surface) {
   const std::vector<int> place = places_of(surface);
   std::vector<int> parent(place.size());
@@ -160,8 +205,47 @@ std::optional<int> frame_pierced(const SurfaceMesh& surface, const Mesh& mesh,
   return std::nullopt;
 }
 
-double largest_cell_m(const Mesh& mesh) {
-  return std::max(mesh.width_m / (mesh.columns - 1), mesh.height_m / (mesh.rows - 1));
+Findings check_obstacle(const SurfaceMesh& surface, const std::string& where, const Mesh& mesh,
+                        const Eigen::Matrix3Xd& start_m) {
+  if (const auto volume_m3 = enclosed_volume_m3(surface)) {
+    if (*volume_m3 < 0) return {inside_out(*volume_m3, where)};
+    const std::vector<bool> is_inside = inside(surface, start_m);
+    if (const auto count = std::ranges::count(is_inside, true); count > 0)
+      return {inside_at_start(static_cast<size_t>(count), is_inside.size(), "vertices", where)};
+  } else if (const double share = share_behind(surface, start_m); share > kPreflight.behind_share) {
+    return {{.check = "obstacle",
+             .state = FindingState::warning,
+             .found = fmt::format("{:.0f} % of the cloth starts behind its faces", 100 * share),
+             .where = where,
+             .expected = "corners counterclockwise as seen from the side of the cloth",
+             .remedy = "turn its faces round"}};
+  }
+  const double cell_m =
+      std::max(mesh.width_m / (mesh.columns - 1), mesh.height_m / (mesh.rows - 1));
+  const auto narrow_m = narrowest_part_m(surface);
+  if (!narrow_m || *narrow_m >= cell_m) return {};
+  return {
+      {.check = "obstacle",
+       .state = FindingState::warning,
+       .found = fmt::format("it has parts {:.3g} mm wide, and cells of the cloth are {:.3g} mm",
+                            1e3 * *narrow_m, 1e3 * cell_m),
+       .where = where,
+       .expected = "parts wider than a cell: vertices alone touch it, and cloth may fall through",
+       .remedy = fmt::format("a finer mesh, of {} columns or more",
+                             static_cast<int>(std::ceil(mesh.width_m / *narrow_m)) + 1)}};
+}
+
+std::optional<Finding> check_pierced(const SurfaceMesh& surface, const std::string& where,
+                                     const Mesh& mesh,
+                                     const std::vector<Eigen::Matrix3Xd>& position_m) {
+  const auto frame = frame_pierced(surface, mesh, position_m);
+  if (!frame) return std::nullopt;
+  return Finding{.check = "obstacle",
+                 .state = FindingState::warning,
+                 .found = fmt::format("the cloth goes through it, in frame {} first", *frame),
+                 .where = where,
+                 .expected = "a cloth that stays outside: vertices alone touch an obstacle",
+                 .remedy = "a finer mesh, or a stiffer contact"};
 }
 
 void check_obstacle(const RecordedMotion& motion, CheckList& list) {
@@ -171,10 +255,7 @@ void check_obstacle(const RecordedMotion& motion, CheckList& list) {
   const std::string file =
       recording.obstacle_file ? recording.obstacle_file->string() : list.file();
   const auto volume_m3 = enclosed_volume_m3(surface);
-  if (volume_m3 && *volume_m3 < 0)
-    return list.add("obstacle", FindingState::refused, file,
-                    fmt::format("its faces point inwards (it encloses {:.3g} m3)", *volume_m3),
-                    "corners counterclockwise as seen from outside", "turn its faces round");
+  if (volume_m3 && *volume_m3 < 0) return list.add(inside_out(*volume_m3, file));
   if (motion.set(0).camera || motion.first_frame(0) < 0) return;
   // Whether the cloth comes near it is seen in 3D tracks alone.
   double nearest_m = INFINITY;
@@ -199,12 +280,9 @@ void check_obstacle(const RecordedMotion& motion, CheckList& list) {
   for (Eigen::Index m = 0; m < first.cols(); ++m)
     if (first.col(m).allFinite()) seen.push_back(m);
   const std::vector<bool> is_inside = inside(surface, first(Eigen::all, seen));
-  const auto count = std::ranges::count(is_inside, true);
-  if (count > 0 &&
-      static_cast<double>(count) > kPreflight.inside_share * static_cast<double>(seen.size()))
-    list.add("obstacle", FindingState::refused, file,
-             fmt::format("{} of {} markers lie inside it in the first frame", count, seen.size()),
-             "a cloth that starts outside", "metres and the world's axes, as the tracks have?");
+  const auto count = static_cast<size_t>(std::ranges::count(is_inside, true));
+  if (static_cast<double>(count) > kPreflight.inside_share * static_cast<double>(seen.size()))
+    list.add(inside_at_start(count, seen.size(), "markers", file));
 }
 
 }  // namespace clothfit

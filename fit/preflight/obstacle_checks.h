@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "data/finding.h"
 #include "data/obj_mesh.h"
 #include "model/topology/mesh.h"
 
@@ -18,6 +19,10 @@ std::optional<double> enclosed_volume_m3(const SurfaceMesh& surface);
 /// point.
 std::vector<bool> inside(const SurfaceMesh& surface, const Eigen::Matrix3Xd& point_m);
 
+/// Returns the share of points (m, world; 3 x n) that lie behind the face nearest to them, of those
+/// that lie before or behind one. 0 where none does.
+double share_behind(const SurfaceMesh& surface, const Eigen::Matrix3Xd& point_m);
+
 /// Returns the second smallest side of the box around the thinnest part of a surface, m: the width
 /// of a post or a rod. A part is what is joined by shared places. Nothing without a face.
 std::optional<double> narrowest_part_m(const SurfaceMesh& surface);
@@ -27,7 +32,15 @@ std::optional<double> narrowest_part_m(const SurfaceMesh& surface);
 std::optional<int> frame_pierced(const SurfaceMesh& surface, const Mesh& mesh,
                                  const std::vector<Eigen::Matrix3Xd>& position_m);
 
-/// Returns the largest side of a cell of the flat mesh, m.
-double largest_cell_m(const Mesh& mesh);
+/// Holds the obstacle of a model against the cloth that is to touch it, where that starts (3 x
+/// vertices, world). `where` names the surface's file.
+Findings check_obstacle(const SurfaceMesh& surface, const std::string& where, const Mesh& mesh,
+                        const Eigen::Matrix3Xd& start_m);
+
+/// Says that the cloth went through the obstacle in a run (frame_pierced); nothing where it did
+/// not.
+std::optional<Finding> check_pierced(const SurfaceMesh& surface, const std::string& where,
+                                     const Mesh& mesh,
+                                     const std::vector<Eigen::Matrix3Xd>& position_m);
 
 }  // namespace clothfit

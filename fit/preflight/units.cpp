@@ -52,36 +52,24 @@ double scale_along(const RecordedMotion& motion, const Eigen::MatrixXd& place, i
   return ratios.empty() ? 0 : median(ratios);
 }
 
-/// Says that width and height took each other's place, or that the sheet is stretched.
-void check_sides(const RecordedMotion& motion, const Eigen::MatrixXd& place, double scale,
-                 CheckList& list) {
-  const double along_s = scale_along(motion, place, 0), along_t = scale_along(motion, place, 1);
-  if (!(along_s > 0 && along_t > 0)) return;
-  const ClothDescription& cloth = motion.recording().cloth;
-  const double ratio = along_s / along_t;
-  const double of_exchanged = std::pow(cloth.height_m / cloth.width_m, 2);
-  const std::string found = fmt::format(
-      "neighbouring markers are {:.3g} times as far apart along s as on the cloth, {:.3g} along t",
-      along_s, along_t);
-  constexpr double kSides = 1.2;
-  if (std::max(ratio, 1 / ratio) > kSides) {
-    const bool exchanged = std::abs(std::log(ratio / of_exchanged)) < std::log(1.1);
-    return list.refuse("units", found, "1 and 1",
-                       exchanged ? "size is [width along s, height along t]: are they exchanged?"
-                                 : "look at the cloth's size and at s and t of the markers");
-  }
-  if (std::abs(scale - 1) > kPreflight.scale_warned)
-    return list.warn("units", found, "1 and 1 where the sheet is flat",
-                     "measure the cloth's size and the print's scale");
-  list.pass(
-      "units",
-      fmt::format("neighbouring markers are {:.3f} times as far apart as on the cloth", scale));
+/// Ratio of the markers' spread in space to that on the cloth, whatever their order.
+double spread_ratio(const RecordedMotion& motion, const Eigen::MatrixXd& place) {
+  std::vector<int> seen;
+  for (const int m : motion.tracked())
+    if (place.col(m).allFinite()) seen.push_back(m);
+  const auto spread = [](const Eigen::MatrixXd& points) {
+    return (points.colwise() - points.rowwise().mean().eval()).norm();
+  };
+  return spread(place(Eigen::all, seen)) / spread(motion.marker_m()(Eigen::all, seen));
 }
 
 void check_scale(const RecordedMotion& motion, int s, CheckList& list) {
   const double scale = motion.units_per_m(s);
   if (!(scale > 0)) return;
-  if (scale > kPreflight.scale_refused || scale < 1 / kPreflight.scale_refused) {
+  const double spread = spread_ratio(motion, motion.places(s, motion.first_frame(s)));
+  // Markers in another order are far from their neighbours, and spread as far as ever.
+  const double refused = kPreflight.scale_refused;
+  if (std::min(scale, spread) > refused || std::max(scale, spread) < 1 / refused) {
     const std::string asked = scale > 1 ? asked_unit(scale, "are the tracks")
                                         : asked_unit(1 / scale, "are the cloth's size, s and t");
     return list.refuse("units",
@@ -89,9 +77,6 @@ void check_scale(const RecordedMotion& motion, int s, CheckList& list) {
                                    motion.first_frame(s), scale),
                        "about 1: the cloth's size, s, t and 3D tracks are all in metres", asked);
   }
-  // A shape that is not flat shortens distances, and may do so along one side.
-  if (motion.recording().start == StartKind::released_flat)
-    return check_sides(motion, motion.places(s, motion.first_frame(s)), scale, list);
   list.pass(
       "units",
       fmt::format("neighbouring markers are {:.3f} times as far apart as on the cloth", scale));
@@ -130,6 +115,31 @@ void check_units(const RecordedMotion& motion, CheckList& list) {
       check_reference(motion, s, list);
     else
       check_scale(motion, s, list);
+  }
+}
+
+void check_proportions(const RecordedMotion& motion, CheckList& list) {
+  // A shape that is not flat shortens distances, and may do so along one side.
+  if (motion.recording().start != StartKind::released_flat || motion.set(0).camera) return;
+  if (motion.first_frame(0) < 0) return;
+  const Eigen::MatrixXd place = motion.places(0, motion.first_frame(0));
+  const double along_s = scale_along(motion, place, 0), along_t = scale_along(motion, place, 1);
+  if (!(along_s > 0 && along_t > 0)) return;
+  const ClothDescription& cloth = motion.recording().cloth;
+  const double ratio = along_s / along_t;
+  const double of_exchanged = std::pow(cloth.height_m / cloth.width_m, 2);
+  const std::string found = fmt::format(
+      "neighbouring markers are {:.3g} times as far apart along s as on the cloth, {:.3g} along t",
+      along_s, along_t);
+  constexpr double kSides = 1.2;
+  if (std::max(ratio, 1 / ratio) > kSides) {
+    const bool exchanged = std::abs(std::log(ratio / of_exchanged)) < std::log(1.1);
+    list.refuse("units", found, "1 and 1",
+                exchanged ? "size is [width along s, height along t]: are they exchanged?"
+                          : "look at the cloth's size and at s and t of the markers");
+  } else if (std::abs(motion.units_per_m(0) - 1) > kPreflight.scale_warned) {
+    list.warn("units", found, "1 and 1 where the sheet is flat",
+              "measure the cloth's size and the print's scale");
   }
 }
 

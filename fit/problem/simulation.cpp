@@ -82,6 +82,22 @@ void require_possible(const std::string& effect, const EffectParameter& paramete
                    fmt::format("{} or more ({})", parameter.neutral, parameter.unit));
 }
 
+/// Adds stiffness, and damping where none is given, to the numbers of a contact.
+void add_default_contact(const ModelDescription& model, const std::string& effect,
+                         std::map<std::string, double>& numbers,
+                         std::vector<std::string>& assumed) {
+  constexpr double kSinksIn_m = 1e-4;
+  constexpr double kOfCritical = 1.0 / 3;
+  const double density = *model.cloth.mass_kg / (model.cloth.width_m * model.cloth.height_m);
+  const double gravity = std::max(model.gravity_m_per_s2.norm(), 1.0);
+  const double stiffness = density * gravity / kSinksIn_m;
+  numbers["stiffness"] = stiffness;
+  numbers.emplace("damping", kOfCritical * 2 * std::sqrt(stiffness * density));
+  assumed.push_back(
+      fmt::format("{} has no stiffness: {:.3g} Pa/m is taken, with a damping of {:.3g} Pa s/m",
+                  effect, stiffness, numbers.at("damping")));
+}
+
 }  // namespace
 
 std::map<std::string, double> named(const Fabric& fabric) {
@@ -130,11 +146,14 @@ Simulation make_simulation(const ModelDescription& model) {
     add_effect(cloth, effect.name, where);
     const EffectDescription& description = cloth.effect_descriptions.back();
     const std::map<std::string, double> given = by_parameter(description, where, effect.parameters);
+    std::map<std::string, double> all = given;
+    if (effect.name.starts_with("contact_") && !given.contains("stiffness"))
+      add_default_contact(model, effect.name, all, simulation.assumed);
     std::vector<double> numbers;
     for (const EffectParameter& parameter : description.parameters) {
-      const auto value = given.find(parameter.name);
-      if (value != given.end()) require_possible(effect.name, parameter, value->second, where);
-      numbers.push_back(value != given.end() ? value->second : parameter.neutral);
+      const auto value = all.find(parameter.name);
+      if (value != all.end()) require_possible(effect.name, parameter, value->second, where);
+      numbers.push_back(value != all.end() ? value->second : parameter.neutral);
     }
     set.effects.push_back(std::move(numbers));
   }

@@ -22,6 +22,7 @@ struct Simulation {
   ParameterSet parameters;       ///< starts from the placed sheet, or in motion
   StartKind start = StartKind::released_flat;
   std::vector<double> frame_time_s;
+  std::vector<std::string> assumed;  ///< numbers that the model does not give, each in a sentence
 };
 
 /// Returns a fabric's numbers by the names of their parameters.
@@ -30,8 +31,10 @@ std::map<std::string, double> named(const Fabric& fabric);
 /// Returns springs as a model file has them.
 ModelSprings springs_of(const SpringParameters& springs);
 
-/// Makes a model ready to run. Throws InputError for an unknown effect or parameter of an effect,
-/// and for contact_mesh without an obstacle.
+/// Makes a model ready to run. A contact without a stiffness would touch nothing: it gets one into
+/// which the cloth sinks by a tenth of a millimetre under its own weight, and a third of the
+/// damping that lets it not bounce. Throws InputError for an unknown effect or parameter of an
+/// effect, and for contact_mesh without an obstacle.
 Simulation make_simulation(const ModelDescription& model);
 
 /// Describes a fitted, or given, model of a recording as a model file has it. This is the cloth on
