@@ -48,7 +48,8 @@ set(CLOTHFIT_ARROWS
                            fit/cost"
   "fit/uncertainty      -> data/algebra data fit/interface fit/jobs fit/problem fit/cost
                            fit/refine"
-  "fit                  -> data model/cloth fit/interface fit/jobs fit/observe fit/problem fit/cost
+  "fit/verdict          -> data fit/interface"
+  "fit                  -> data model/cloth fit/interface fit/verdict fit/jobs fit/observe fit/problem fit/cost
                            fit/search fit/refine fit/uncertainty"
   "fit/diagnosis        -> data/algebra data calib/camera model/cloth model/effects
                            model/integrate fit/interface fit/jobs fit/observe
@@ -80,8 +81,8 @@ set(CLOTHFIT_ARROWS
                            apps/study/foreign"
   "apps/verbs           -> data model/topology model/fabric model/cloth model/effects
                            model/integrate fit/interface fit/jobs fit/measurement_effects
-                           fit/problem fit/preflight fit fit/diagnosis apps/terminal apps/steps
-                           apps/report/page apps/report/fit apps/report/diagnosis
+                           fit/problem fit/preflight fit/verdict fit fit/diagnosis apps/terminal
+                           apps/steps apps/report/page apps/report/fit apps/report/diagnosis
                            apps/study/trials apps/study/louchet1995 apps/study/recordings
                            apps/study/foreign apps/report/study"
   "apps                 -> data apps/terminal apps/verbs"

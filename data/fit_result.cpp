@@ -62,15 +62,26 @@ Json to_json(const ErrorSummary& error) {
 }
 
 Json to_json(const ObservationErrors& errors) {
-  return {{"kind", errors.kind},
-          {"unit", errors.unit},
-          {"fitted", to_json(errors.fitted)},
-          {"held_out", to_json(errors.held_out)},
-          {"noise", finite(errors.noise)},
-          {"trivial",
-           {{"first_frame", finite(errors.trivial.first_frame)},
-            {"last_velocity", finite(errors.trivial.last_velocity)},
-            {"rigid", finite(errors.trivial.rigid)}}}};
+  Json json = {{"kind", errors.kind},
+               {"unit", errors.unit},
+               {"fitted", to_json(errors.fitted)},
+               {"held_out", to_json(errors.held_out)},
+               {"noise", finite(errors.noise)},
+               {"discretisation", finite(errors.discretisation)},
+               {"trivial",
+                {{"first_frame", finite(errors.trivial.first_frame)},
+                 {"last_velocity", finite(errors.trivial.last_velocity)},
+                 {"rigid", finite(errors.trivial.rigid)}}}};
+  if (errors.fitted_without) json["fitted_without"] = to_json(*errors.fitted_without);
+  if (errors.held_out_without) json["held_out_without"] = to_json(*errors.held_out_without);
+  return json;
+}
+
+Json to_json(const ContradictingMarker& marker) {
+  return {{"marker", marker.marker},
+          {"kind", marker.kind},
+          {"frames", {marker.first_frame, marker.last_frame}},
+          {"off", finite(marker.off)}};
 }
 
 Json to_json(const CloudErrors::Summary& clouds) {
@@ -167,11 +178,13 @@ ParameterEstimate read_parameter(const JsonValue& json) {
   const JsonValue state = json.at("state");
   const std::string word = state.text();
   const std::vector<ParameterState> states = {ParameterState::fitted, ParameterState::fixed,
-                                              ParameterState::undetermined};
+                                              ParameterState::undetermined, ParameterState::ratio,
+                                              ParameterState::misfit};
   const auto found = std::find_if(states.begin(), states.end(),
                                   [&](ParameterState s) { return to_string(s) == word; });
   if (found == states.end())
-    state.refuse("is `" + word + "`", "`fitted`, `fixed` or `undetermined`");
+    state.refuse("is `" + word + "`",
+                 "`fitted`, `fixed`, `undetermined`, `ratio` or `model does not fit`");
   parameter.state = *found;
   parameter.reason = json.text_or_empty("reason");
   parameter.interval_90 = read_interval(json, "interval_90");
@@ -199,6 +212,10 @@ ObservationErrors read_errors(const JsonValue& json) {
   errors.fitted = read_error(json.at("fitted"));
   errors.held_out = read_error(json.at("held_out"));
   errors.noise = json.at("noise").number();
+  if (json.has("discretisation")) errors.discretisation = json.at("discretisation").number();
+  if (json.has("fitted_without")) errors.fitted_without = read_error(json.at("fitted_without"));
+  if (json.has("held_out_without"))
+    errors.held_out_without = read_error(json.at("held_out_without"));
   const JsonValue trivial = json.at("trivial");
   errors.trivial.first_frame = trivial.at("first_frame").number();
   errors.trivial.last_velocity = trivial.at("last_velocity").number();
@@ -225,6 +242,24 @@ Basin read_basin(const JsonValue& json) {
   for (const std::string& name : parameters.keys())
     basin.parameters.push_back({.name = name, .value = parameters.at(name).number()});
   return basin;
+}
+
+FitVerdict read_verdict(const JsonValue& json) {
+  for (const FitVerdict verdict : {FitVerdict::good, FitVerdict::usable_with_care,
+                                   FitVerdict::model_lacks, FitVerdict::do_not_use})
+    if (json.text() == to_string(verdict)) return verdict;
+  json.refuse("is no verdict", "good, usable_with_care, model_lacks or do_not_use");
+}
+
+ContradictingMarker read_contradicting(const JsonValue& json) {
+  const JsonValue list = json.at("frames");
+  const std::vector<JsonValue> frames = list.items();
+  if (frames.size() != 2) list.refuse("is no stretch of frames", "the first and the last");
+  return {.marker = json.at("marker").text(),
+          .kind = json.at("kind").text(),
+          .first_frame = frames[0].count(),
+          .last_frame = frames[1].count(),
+          .off = json.at("off").number()};
 }
 
 Finding read_warning(const JsonValue& json) {
@@ -259,9 +294,63 @@ std::string to_string(ParameterState state) {
       return "fixed";
     case ParameterState::undetermined:
       return "undetermined";
+    case ParameterState::ratio:
+      return "ratio";
+    case ParameterState::misfit:
+      return "model does not fit";
   }
   assert(false && "every state has a word");
   return {};
+}
+
+std::string to_string(FitVerdict verdict) {
+  switch (verdict) {
+    case FitVerdict::good:
+      return "good";
+    case FitVerdict::usable_with_care:
+      return "usable_with_care";
+    case FitVerdict::model_lacks:
+      return "model_lacks";
+    case FitVerdict::do_not_use:
+      return "do_not_use";
+  }
+  assert(false && "every verdict has a word");
+  return {};
+}
+
+bool scales_with_mass(const std::string& unit) {
+  // Force, pressure and mass do; a compliance is the inverse of one and stands below a bar.
+  const auto starts = [&](const char* text) { return unit.starts_with(text); };
+  return starts("N") || starts("Pa") || starts("kg");
+}
+
+ParameterEstimate scaled(ParameterEstimate parameter, double factor) {
+  const auto scale = [&](std::optional<Interval>& interval) {
+    if (interval) interval = {.lower = factor * interval->lower, .upper = factor * interval->upper};
+  };
+  parameter.value *= factor;
+  parameter.sigma *= factor;
+  scale(parameter.interval_90);
+  scale(parameter.bootstrap_90);
+  if (parameter.mesh_shift) *parameter.mesh_shift *= factor;
+  return parameter;
+}
+
+FitResult at_density(FitResult result, std::optional<double> areal_density) {
+  const auto assumed =
+      std::ranges::find(result.parameters, "areal_density", &ParameterEstimate::name);
+  if (assumed == result.parameters.end()) return result;
+  const double density = areal_density.value_or(assumed->value);
+  const std::string mark = kPerArealDensity;
+  const auto turn = [&](ParameterEstimate& parameter) {
+    if (!parameter.unit.ends_with(mark)) return;
+    parameter = scaled(parameter, density);
+    parameter.unit.erase(parameter.unit.size() - mark.size());
+  };
+  for (ParameterEstimate& parameter : result.parameters) turn(parameter);
+  for (EffectEstimate& effect : result.effects)
+    for (ParameterEstimate& parameter : effect.parameters) turn(parameter);
+  return result;
 }
 
 void write_fit_result(const FitResult& result, const std::filesystem::path& file) {
@@ -280,11 +369,20 @@ void write_fit_result(const FitResult& result, const std::filesystem::path& file
   Json rejected = Json::object();
   for (const auto& [reason, count] : result.observations_rejected) rejected[reason] = count;
 
+  Json contradicting = Json::array();
+  for (const ContradictingMarker& marker : result.contradicting)
+    contradicting.push_back(to_json(marker));
   Json warnings = Json::array();
   for (const Finding& warning : result.warnings) warnings.push_back(to_json(warning));
 
   Json json = {{"format", kFormat},
+               {"verdict", to_string(result.verdict)},
+               {"verdict_reason", result.verdict_reason},
+               {"next_command", result.next_command},
+               {"usable", result.usable()},
+               {"converged", result.converged},
                {"warnings", warnings},
+               {"contradicting_markers", contradicting},
                {"recording", result.recording},
                {"version", result.version},
                {"command", result.command},
@@ -350,6 +448,13 @@ FitResult read_fit_result(const std::filesystem::path& file) {
   if (json.has("basins"))
     for (const JsonValue& basin : json.at("basins").items())
       result.basins.push_back(read_basin(basin));
+  if (json.has("verdict")) result.verdict = read_verdict(json.at("verdict"));
+  result.verdict_reason = json.text_or_empty("verdict_reason");
+  result.next_command = json.text_or_empty("next_command");
+  if (json.has("converged")) result.converged = json.at("converged").truth();
+  if (json.has("contradicting_markers"))
+    for (const JsonValue& marker : json.at("contradicting_markers").items())
+      result.contradicting.push_back(read_contradicting(marker));
   if (json.has("warnings"))
     for (const JsonValue& warning : json.at("warnings").items())
       result.warnings.push_back(read_warning(warning));

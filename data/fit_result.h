@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cmath>
 #include <filesystem>
 #include <map>
 #include <optional>
@@ -11,8 +12,23 @@
 
 namespace clothfit {
 
-enum class ParameterState { fitted, fixed, undetermined };
+enum class ParameterState {
+  fitted,
+  fixed,
+  undetermined,
+  ratio,  ///< to the mass per area, which is not known; its unit is one "per kg/m2"
+  misfit  ///< the model leaves too much of the data for any interval to be true
+};
 std::string to_string(ParameterState state);
+
+/// What a fit is good for.
+enum class FitVerdict {
+  good,              ///< it predicts as well as these data can show
+  usable_with_care,  ///< it predicts, not quite to the floor; or nothing was held out
+  model_lacks,       ///< it predicts something, and lacks physics that these data show
+  do_not_use         ///< a guess predicts better, or nothing is determined
+};
+std::string to_string(FitVerdict verdict);
 
 /// Ends of an interval, in a parameter's unit.
 struct Interval {
@@ -32,6 +48,13 @@ struct ParameterEstimate {
   /// Value on a mesh of another resolution less this one, where that was asked for.
   std::optional<double> mesh_shift = std::nullopt;
 };
+
+/// Follows the unit of what is given as a ratio to the mass per area.
+inline constexpr const char* kPerArealDensity = " per kg/m2";
+/// Says whether numbers in a unit scale with the mass of a cloth that moves the same way.
+bool scales_with_mass(const std::string& unit);
+/// Returns an estimate with all its numbers times a factor.
+ParameterEstimate scaled(ParameterEstimate parameter, double factor);
 
 struct EffectEstimate {
   std::string name;
@@ -74,6 +97,21 @@ struct ObservationErrors {
   ErrorSummary held_out;  ///< count 0 when nothing was held out
   double noise = 0;       ///< standard deviation per coordinate
   TrivialErrors trivial;
+  /// Root mean square that mesh and time step are thought to make; 0 where that was not estimated.
+  double discretisation = 0;
+  /// Errors without the markers that contradict all others, where there are any.
+  std::optional<ErrorSummary> fitted_without = std::nullopt, held_out_without = std::nullopt;
+
+  /// Returns what no model on this mesh can do better than.
+  double floor() const { return std::hypot(noise, discretisation); }
+};
+
+/// A marker that lies far off the model over a stretch of frames in which the others do not.
+struct ContradictingMarker {
+  std::string marker;
+  std::string kind;  ///< of the observations, as in ObservationErrors
+  int first_frame = 0, last_frame = 0;
+  double off = 0;  ///< rms distance there, in the unit of the observations
 };
 
 /// Distance of the model's surface from measured clouds (fit/observe/cloud_errors.h).
@@ -114,10 +152,23 @@ struct FitResult {
   std::vector<Basin> basins;  ///< best first; empty without a search
   std::vector<ObservationErrors> errors;
   std::optional<CloudErrors> clouds;  ///< where the recording has any
-  Findings warnings;                  ///< of the checks before the fit (fit/preflight/preflight.h)
+  FitVerdict verdict = FitVerdict::usable_with_care;
+  std::string verdict_reason;  ///< one sentence
+  std::string next_command;    ///< that asks what is missing, ready to copy; empty of a usable fit
+  bool converged = true;
+  std::vector<ContradictingMarker> contradicting;
+  Findings warnings;  ///< of the checks before the fit (fit/preflight/preflight.h)
   int observations_used = 0;
   std::map<std::string, int> observations_rejected;  ///< reason -> count
+
+  bool usable() const {
+    return verdict == FitVerdict::good || verdict == FitVerdict::usable_with_care;
+  }
 };
+
+/// Turns ratios to the mass per area into numbers for a cloth of that density (kg/m2); without one
+/// for the density that the fit assumed.
+FitResult at_density(FitResult result, std::optional<double> areal_density);
 
 /// Writes fit.json; numbers that are not finite are a programming error.
 void write_fit_result(const FitResult& result, const std::filesystem::path& file);

@@ -21,6 +21,7 @@
 #include "fit/problem/springs_on_limit.h"
 #include "fit/uncertainty/parameter_estimates.h"
 #include "fit/uncertainty/uncertainty.h"
+#include "fit/verdict/contradicting.h"
 #include "model/cloth/stability.h"
 
 namespace clothfit {
@@ -240,6 +241,7 @@ void run_on(const FitInput& input, const FitProblem& problem, const FitOptions& 
   predictor.offset_markers(
       marker_offsets(problem, input.recording.markers, known_offsets, predictor, markers, report));
   fill_residuals(problem, predictor, markers, report);
+  name_contradicting(input.recording.markers, report);
   if (!input.clouds.empty())
     result.clouds =
         cloud_errors(input.clouds, problem.cloth.mesh, run.position_m, problem.first_held_out);
@@ -292,12 +294,15 @@ void identify_all(const FitInput& input, const FitProblem& problem, const FitOpt
   result.time_step_s = refined.time_step_s;
   report.stop = refined.converged ? FitStop::converged : FitStop::reached_limit;
   report.message = refined.message;
-  // What a model says of its sigmas that leaves so much is worth no time.
-  if (2 * refined.cost > options.coarse_beyond)
-    return run_on(input, problem, options, values, stated(problem, values, {}), {}, {}, report);
   const TrajectoryObjective objective(
       problem, problem.first_held_out,
       time_steps_of_run(problem.cloth, parameter_set(problem, values), result.time_step_s));
+  // What a model says of its sigmas that leaves so much is worth no time.
+  if (2 * refined.cost > options.coarse_beyond) {
+    const Eigen::VectorXd residual = objective.residuals({values}).front();
+    if (residual.size() == 0 || misfit_of_most_markers(problem, residual) > options.coarse_beyond)
+      return run_on(input, problem, options, values, stated(problem, values, {}), {}, {}, report);
+  }
   const Uncertainty uncertainty = estimate_uncertainty(
       objective, values,
       {.loss = options.loss, .bootstrap = options.bootstrap, .seed = options.seed},

@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <memory>
 #include <span>
 
@@ -238,7 +240,8 @@ Eigen::VectorXd away_from_ends(const FitProblem& problem, const Eigen::VectorXd&
   for (int p = 0; p < space.size(); ++p) {
     const FitParameter& parameter = space.parameters[static_cast<size_t>(p)];
     if (parameter.scale != ParameterScale::logarithmic) continue;
-    const bool at_end = values[p] < kEnd * parameter.lower || values[p] > parameter.upper / kEnd;
+    const bool at_end =
+        values[p] < kEnd * parameter.searched_from() || values[p] > parameter.upper / kEnd;
     if (at_end) result[p] = start[p];
   }
   if (result == values) return values;
@@ -265,10 +268,10 @@ Eigen::VectorXd residuals_of_all(const FitProblem& problem, const Eigen::VectorX
   return whole.residuals({values}).front();
 }
 
-/// Tells whether residuals' mean square exceeds a limit. That of a model that does not run does.
-bool leaves_more_than(double limit, const Eigen::VectorXd& residual) {
-  return residual.size() == 0 ||
-         residual.squaredNorm() > limit * static_cast<double>(residual.size());
+/// Tells whether what a model leaves of most markers exceeds a limit. That of one that does not run
+/// does.
+bool leaves_more_than(double limit, const FitProblem& problem, const Eigen::VectorXd& residual) {
+  return residual.size() == 0 || misfit_of_most_markers(problem, residual) > limit;
 }
 
 /// Tells whether two meshes leave the same: what they differ by is less than what either leaves.
@@ -316,15 +319,15 @@ RefineResult follow_coarse(const FitProblem& coarse_problem, const FitProblem& p
   if (!found.usable) return found;
   values = found.values;
   const Eigen::VectorXd left = residuals_of_all(coarse_problem, values);
-  found.usable = leaves_more_than(options.coarse_beyond, left);
+  found.usable = leaves_more_than(options.coarse_beyond, coarse_problem, left);
   if (!found.usable) return found;
   RefineResult led = refine_stage(
       {.problem = problem, .derivatives_of = &coarse_problem, .effort = kApproachEffort}, options,
       away_from_ends(problem, values), progress, report);
   if (!led.usable) return led;
   const Eigen::VectorXd left_there = residuals_of_all(problem, led.values);
-  led.usable =
-      leaves_more_than(options.coarse_beyond, left_there) && leave_the_same(left, left_there);
+  led.usable = leaves_more_than(options.coarse_beyond, problem, left_there) &&
+               leave_the_same(left, left_there);
   return led;
 }
 
@@ -355,7 +358,8 @@ RefineResult refine_on(const FitProblem& coarse_problem, const FitProblem& probl
           !improve({.problem = coarse_problem, .share = share, .effort = kTrendEffort}))
         return best;
     if (std::isfinite(options.coarse_beyond) &&
-        leaves_more_than(options.coarse_beyond, residuals_of_all(coarse_problem, best.values))) {
+        leaves_more_than(options.coarse_beyond, coarse_problem,
+                         residuals_of_all(coarse_problem, best.values))) {
       RefineResult followed =
           follow_coarse(coarse_problem, problem, options, best.values, progress, report);
       if (followed.usable) return followed;
@@ -469,6 +473,33 @@ RefineResult search_and_refine(const FitProblem& coarse_problem, const FitProble
 }
 
 }  // namespace
+
+double misfit_of_most_markers(const FitProblem& problem, const Eigen::VectorXd& residual) {
+  constexpr double kLeftOut = 0.1;
+  const TrajectoryObjective whole(problem, problem.first_held_out,
+                                  std::numeric_limits<double>::infinity());
+  assert(residual.size() == whole.residual_count());
+  struct OfMarker {
+    double square = 0;
+    int residuals = 0;
+  };
+  std::map<int, OfMarker> by_marker;
+  for (const Objective::Block& block : whole.blocks()) {
+    OfMarker& sum = by_marker[block.marker];
+    sum.square += residual.segment(block.offset, block.dimension).squaredNorm();
+    sum.residuals += block.dimension;
+  }
+  std::vector<OfMarker> sums;
+  for (const auto& [marker, sum] : by_marker) sums.push_back(sum);
+  std::ranges::sort(sums, {}, [](const OfMarker& sum) { return sum.square / sum.residuals; });
+  const auto kept = sums.size() - static_cast<size_t>(kLeftOut * static_cast<double>(sums.size()));
+  OfMarker most;
+  for (size_t k = 0; k < kept; ++k) {
+    most.square += sums[k].square;
+    most.residuals += sums[k].residuals;
+  }
+  return most.square / std::max(1, most.residuals);
+}
 
 RefineOptions final_refinement(const FitProblem& problem, const FitOptions& options) {
   return refine_options_of(kFinalEffort, problem, options);

@@ -28,6 +28,7 @@
 #include "data/output_folder.h"
 #include "data/text_file.h"
 #include "fit/diagnosis/diagnose.h"
+#include "fit/verdict/verdict.h"
 
 namespace clothfit {
 namespace {
@@ -71,6 +72,20 @@ std::vector<Recording> read_recordings(const DiagnoseFlags& flags) {
         recordings.back().held_out_from_frame.reset();
     }
   return recordings;
+}
+
+/// Judges the models found as fits are. Their floor has what the test of adequacy took for the
+/// error of mesh and time step.
+void judge_found(Diagnosis& diagnosis) {
+  const double discretisation = std::sqrt(diagnosis.after.discretisation_square);
+  for (DiagnosedRecording& recording : diagnosis.recordings)
+    for (FitReport* report : {&recording.after, &recording.with_law}) {
+      if (!report->usable()) continue;
+      for (ObservationErrors& errors : report->result.errors)
+        errors.discretisation = errors.noise * discretisation;
+      report->result.converged = report->stop == FitStop::converged;
+      judge(report->result);
+    }
 }
 
 void write_results(const Diagnosis& diagnosis, std::span<const Recording> recordings,
@@ -175,6 +190,7 @@ int run_diagnose(DiagnoseFlags flags, const std::string& command) {
       report->result.version = program_version();
       report->result.command = command;
     }
+  judge_found(diagnosis);
   write_results(diagnosis, recordings, command, out.path());
   if (interrupted() && diagnosis.complete) throw Cancelled();
   out.publish();

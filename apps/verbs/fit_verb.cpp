@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <chrono>
+#include <iterator>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -26,7 +28,9 @@
 #include "data/number_text.h"
 #include "data/output_folder.h"
 #include "data/text_file.h"
+#include "fit/diagnosis/base_fit.h"
 #include "fit/fit.h"
+#include "fit/verdict/verdict.h"
 
 namespace clothfit {
 namespace {
@@ -61,7 +65,8 @@ SpringSet chosen_springs(const std::string& asked, const char* flag, const FitRe
 }
 
 /// Returns an earlier fit's numbers of the cloth; its measurement unknowns belong to its recording.
-std::map<std::string, double> known_values(const FitResult& earlier) {
+std::map<std::string, double> known_values(FitResult earlier) {
+  earlier = at_density(std::move(earlier), std::nullopt);
   std::map<std::string, double> values;
   for (const ParameterEstimate& parameter : earlier.parameters)
     if (parameter.name != "areal_density") values[parameter.name] = parameter.value;
@@ -104,23 +109,104 @@ void write_results(const FitReport& report, const Recording& recording, const fs
 }
 
 void print_result(const FitReport& report, const fs::path& folder) {
+  const FitSummary summary = summarise(report);
+  fmt::print("\n{}{}.\n", warnings_text(report.result.warnings), summary.verdict);
+  if (!report.result.next_command.empty())
+    fmt::print("To ask what is missing: {}\n", report.result.next_command);
+  if (!summary.contradicting.empty()) fmt::print("{}\n", summary.contradicting);
   const Table parameters = short_parameter_table(report.result);
   const Table errors = short_error_table(report.result);
-  fmt::print("\n{}{}\n", warnings_text(report.result.warnings), text_table(parameters));
+  fmt::print("\n{}\n", text_table(parameters));
   fmt::print("Errors (rms per coordinate):\n\n{}\n", text_table(errors));
   const Table clouds = cloud_table(report.result);
   if (!clouds.rows.empty()) fmt::print("{}\n", text_table(clouds));
-  fmt::print("{}.\n\nReport: {}\n", summarise(report).verdict, shown_path(folder / "report.html"));
+  fmt::print("Report: {}\n", shown_path(folder / "report.html"));
+}
+
+/// Mass per area, where the cloth was weighed.
+std::optional<double> areal_density(const Recording& recording) {
+  const ClothDescription& cloth = recording.cloth;
+  if (!cloth.mass_kg) return std::nullopt;
+  return *cloth.mass_kg / (cloth.width_m * cloth.height_m);
+}
+
+/// The command that asks what the model of a recording lacks.
+std::string diagnose_line(const FitVerbOptions& options) {
+  std::string line = "clothfit diagnose " + options.recording.string();
+  for (const std::string& effect : options.fit.effects) line += " --effect " + effect;
+  return line;
+}
+
+/// Tries the other way to spread the cloth's mass over its vertices, from where the fit stands.
+/// Returns a warning where that way explains the recording and the declared one does not.
+std::optional<Finding> try_other_masses(const FitInput& input, FitOptions options,
+                                        const FitReport& report, const ProgressCallback& progress) {
+  FitInput other = input;
+  MassDistribution& masses = other.recording.cloth.masses;
+  const bool by_area = masses == MassDistribution::by_area;
+  masses = by_area ? MassDistribution::equal : MassDistribution::by_area;
+  options.start = report.values;
+  options.checkpoint.clear();
+  options.resume = false;
+  const FitReport fitted = fit(other, options, progress);
+  if (!fitted.usable()) return std::nullopt;
+  const double own = errors_over_floor(report.result).worst(),
+               others = errors_over_floor(fitted.result).worst();
+  constexpr double kClearly = 0.6;
+  if (others > kVerdict.usable || others > kClearly * own) return std::nullopt;
+  return Finding{.check = "masses",
+                 .state = FindingState::warning,
+                 .found = fmt::format(
+                     "with masses: {} the model is off by {:.1f} times the floor, with {} by "
+                     "{:.1f} times",
+                     by_area ? "equal" : "by_area", others, by_area ? "by_area" : "equal", own),
+                 .where = (input.recording.folder / "recording.yaml").string(),
+                 .expected = "masses as the cloth has them: an edge vertex weighs half by area",
+                 .remedy = fmt::format("give masses: {} if that is true of it",
+                                       by_area ? "equal" : "by_area")};
+}
+
+/// Fits, and judges the outcome. What mesh and time step make is looked for where that decides.
+FitReport fit_and_judge(const FitInput& input, FitOptions options,
+                        const ProgressCallback& progress) {
+  const ClothDescription& cloth = input.recording.cloth;
+  options.to_nothing = true;
+  if (!options.forecast && options.cost == LeadingCost::trajectory && !options.two_meshes &&
+      !options.profile && options.bootstrap == 0)
+    options.coarse_beyond = coarse_will_do_beyond(
+        {.inputs = {&input, 1},
+         .options = options,
+         .columns = options.mesh_columns > 0 ? options.mesh_columns : cloth.mesh_columns,
+         .rows = options.mesh_rows > 0 ? options.mesh_rows : cloth.mesh_rows});
+  FitReport report = fit(input, options, progress);
+  if (!report.usable()) return report;
+  FitResult& result = report.result;
+  result.converged = report.stop == FitStop::converged;
+  const double over = errors_over_floor(result).worst();
+  constexpr double kBeyondAnyMesh = 8;  // times the noise
+  if (!options.forecast && over > kVerdict.good && over < kBeyondAnyMesh) {
+    const double square = discretisation_square(input, options, report, progress);
+    for (ObservationErrors& errors : result.errors)
+      errors.discretisation = errors.noise * std::sqrt(square);
+  }
+  if (!options.forecast && errors_over_floor(result).worst() > kVerdict.good)
+    if (const auto masses = try_other_masses(input, options, report, progress))
+      result.warnings.push_back(*masses);
+  judge(result);
+  return report;
 }
 
 }  // namespace
 
-int run_fit(const FitVerbOptions& options) {
+int run_fit(const FitVerbOptions& given_options) {
+  FitVerbOptions options = given_options;
   const auto begin = std::chrono::steady_clock::now();
   options.fit.validate();
   require_new_checkpoint(options.fit);
   const Recording given = read_recording(recording_folder(options.recording));
 
+  if (options.fit.forecast)
+    options.fit.forecast = at_density(std::move(*options.fit.forecast), areal_density(given));
   OutputFolder out(out_folder(options.out, given.name + ".fit"));
   CheckedInput checked;
   FitReport report;
@@ -128,14 +214,20 @@ int run_fit(const FitVerbOptions& options) {
     ProgressLine line;
     const ProgressCallback progress = watch(line);
     checked = checked_input(given, options.fit.observations, out.path() / "steps", progress);
-    report = fit(checked.input, options.fit, progress);
+    report = fit_and_judge(checked.input, options.fit, progress);
   }
   const Recording& recording = checked.input.recording;
   if (report.stop == FitStop::cancelled || interrupted())
     throw Cancelled(how_to_go_on(options.fit));
   if (!report.usable()) throw NoResult("no fit: " + report.message);
+  if (!report.result.usable()) report.result.next_command = diagnose_line(options);
+  if (report.result.verdict == FitVerdict::do_not_use && !options.keep)
+    throw NoResult(
+        fmt::format("do not use: {}; no result was written (--keep writes it). To ask "
+                    "what is missing: {}",
+                    report.result.verdict_reason, report.result.next_command));
 
-  report.result.warnings = std::move(checked.findings);
+  std::ranges::move(checked.findings, std::back_inserter(report.result.warnings));
   report.result.version = program_version();
   report.result.command = options.command;
   report.result.seconds =
@@ -243,6 +335,8 @@ void add_fit_verb(Verb program) {
       .type_name("N");
   verb.add_flag("--two-meshes", options->fit.two_meshes,
                 "Fit again on a mesh of other resolution, and show the difference");
+  verb.add_flag("--keep", options->keep,
+                "Write the result also where the verdict is not to use it, marked as such");
   verb.add_option("--threads", &options->fit.threads, "Threads; 0 for as many as the machine has")
       .shows_default()
       .shapes_no_result();

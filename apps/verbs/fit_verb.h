@@ -12,6 +12,7 @@ namespace clothfit {
 struct FitVerbOptions {
   std::filesystem::path recording;
   FitOptions fit;
+  bool keep = false;          ///< write the result also where it is not to be used
   std::filesystem::path out;  ///< empty: NAME.fit
   /// Verb and options as fit.json keeps them, without those that change no result (--out,
   /// --threads).

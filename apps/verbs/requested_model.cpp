@@ -52,7 +52,7 @@ fs::path fit_file(const fs::path& given) {
 }
 
 GivenParameters parameters_of_fit(const fs::path& fit) {
-  const FitResult result = read_fit_result(fit_file(fit));
+  const FitResult result = at_density(read_fit_result(fit_file(fit)), std::nullopt);
   GivenParameters given{.set = spring_set_named(result.parameter_set), .springs = {}};
   if (!given.set)
     throw InputError(fit_file(fit).string(),

@@ -1,5 +1,7 @@
 #include "fit/diagnosis/base_fit.h"
 
+#include <cmath>
+#include <limits>
 #include <utility>
 
 #include "fit/diagnosis/criteria.h"
@@ -61,6 +63,26 @@ FittedModel on_mesh_to_analyse(FittedModel own, DiagnosisSetup& setup,
 
 }  // namespace
 
+double coarse_will_do_beyond(const DiagnosisSetup& setup) {
+  const bool will_do =
+      is_coarser(with_coarse_mesh(setup), setup) && is_coarser(with_other_mesh(setup), setup);
+  if (!will_do) return std::numeric_limits<double>::infinity();
+  return grossly_misfitting(setup.inputs.front().recording.start == StartKind::unknown);
+}
+
+double discretisation_square(const FitInput& input, const FitOptions& options,
+                             const FitReport& report, const ProgressCallback& progress) {
+  const DiagnosisSetup setup{.inputs = {&input, 1},
+                             .options = options,
+                             .columns = report.result.mesh_columns,
+                             .rows = report.result.mesh_rows};
+  FittedModel model = fitted_to_all(setup, report, progress);
+  if (!model.usable() || model.misfits_grossly()) return 0;
+  refine_with_discretisation(model, setup, progress);
+  if (!model.usable()) return 0;
+  return model.parts.front().directions.squaredNorm() / static_cast<double>(model.residual_count());
+}
+
 void fit_base(Analysis& analysis, const ProgressCallback& progress) {
   // A model that lacks something large is drawn far away, at ever shorter time steps. Its optimum
   // says no more than what a part of the work finds.
@@ -70,12 +92,8 @@ void fit_base(Analysis& analysis, const ProgressCallback& progress) {
   const ClothDescription& cloth = setup.inputs.front().recording.cloth;
   setup.columns = options.mesh_columns > 0 ? options.mesh_columns : cloth.mesh_columns;
   setup.rows = options.mesh_rows > 0 ? options.mesh_rows : cloth.mesh_rows;
-  // A coarse mesh does unless a finer one may be analysed, for then optima are compared.
-  const bool coarse_will_do =
-      is_coarser(with_coarse_mesh(setup), setup) && is_coarser(with_other_mesh(setup), setup);
-  if (coarse_will_do)
-    options.coarse_beyond =
-        grossly_misfitting(setup.inputs.front().recording.start == StartKind::unknown);
+  options.coarse_beyond = coarse_will_do_beyond(setup);
+  const bool coarse_will_do = std::isfinite(options.coarse_beyond);
 
   analysis.first = fit(setup.inputs.front(), options, progress);
   if (analysis.first.stop == FitStop::cancelled) throw StopRequested();

@@ -80,6 +80,9 @@ struct FitOptions {
   /// result. Such a model lacks physics that any mesh shows. Its sigmas are not estimated, and are
   /// given as 0. Infinite: never.
   double coarse_beyond = std::numeric_limits<double>::infinity();
+  /// Shear and flexion may vanish, as in limp cloth. A model that lacks something runs there too,
+  /// so a diagnosis does not allow it.
+  bool to_nothing = false;
   double substep_scale = 1;  ///< >= 1; more cuts time finer than stability asks
   bool profile = false;      ///< intervals from the profiled cost where it is no parabola
   int bootstrap = 0;         ///< replicates of a bootstrap over blocks; 0: none, else 19 or more

@@ -30,10 +30,13 @@ struct FitParameter {
   std::string unit;
   ParameterRole role = ParameterRole::springs;
   ParameterScale scale = ParameterScale::linear;
-  double lower = 0;    ///< widest bounds, in `unit`
-  double upper = 0;    ///< > lower
-  double start = 0;    ///< a fit begins here unless a search finds better
-  double typical = 1;  ///< for linear parameters: the size of a change that matters
+  double lower = 0;         ///< widest bounds, in `unit`
+  double upper = 0;         ///< > lower
+  double search_lower = 0;  ///< a search looks from here on; 0: from `lower`
+  double start = 0;         ///< a fit begins here unless a search finds better
+  double typical = 1;       ///< for linear parameters: the size of a change that matters
+
+  double searched_from() const { return search_lower > 0 ? search_lower : lower; }
 };
 
 /// The parameters of one fit, in a fixed order. Refinement works in `coordinates`, in which a step

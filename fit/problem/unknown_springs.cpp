@@ -36,6 +36,12 @@ Range range_of(const SpringNumber& number, SpringSet set, double unit_n_per_m, d
   return {0.01 * unit_n_per_m, 25 * unit_n_per_m};
 }
 
+/// Says whether a number may vanish. Limp cloth has hardly any flexion or shear.
+bool may_vanish(const SpringNumber& number, SpringSet set) {
+  return set == SpringSet::fabric && number.type > structural_s &&
+         number.quantity == SpringQuantity::stiffness;
+}
+
 class SpringUnknowns final : public UnknownGroup {
  public:
   void declare(const ProblemSource& source, FitProblem& problem) const override {
@@ -63,14 +69,19 @@ class SpringUnknowns final : public UnknownGroup {
       } else {
         const Range range = range_of(number, problem.spring_set, unit_n_per_m,
                                      flat_m[static_cast<size_t>(number.type)]);
+        // At a thousandth of the range's lower end it does nothing to the motion.
+        constexpr double kNothing = 1e-3;
+        const bool vanishes = options.to_nothing && may_vanish(number, problem.spring_set);
         binding.parameter = problem.space.size();
-        problem.space.parameters.push_back({.name = number.name,
-                                            .unit = number.unit,
-                                            .role = ParameterRole::springs,
-                                            .scale = ParameterScale::logarithmic,
-                                            .lower = range.lower,
-                                            .upper = range.upper,
-                                            .start = std::sqrt(range.lower * range.upper)});
+        problem.space.parameters.push_back(
+            {.name = number.name,
+             .unit = number.unit,
+             .role = ParameterRole::springs,
+             .scale = ParameterScale::logarithmic,
+             .lower = vanishes ? kNothing * range.lower : range.lower,
+             .upper = range.upper,
+             .search_lower = range.lower,
+             .start = std::sqrt(range.lower * range.upper)});
       }
       problem.spring_numbers.push_back(binding);
     }

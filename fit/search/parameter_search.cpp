@@ -28,7 +28,7 @@ struct SearchSpace {
       if (!is_physical(parameter.role)) continue;
       searched.push_back(p);
       ranges.push_back({.name = parameter.name,
-                        .lower = parameter.lower,
+                        .lower = parameter.searched_from(),
                         .upper = parameter.upper,
                         .log_scale = parameter.scale == ParameterScale::logarithmic});
     }

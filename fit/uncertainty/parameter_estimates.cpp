@@ -24,9 +24,13 @@ ParameterEstimate estimate(const FitParameter& parameter, const std::string& nam
   const double relative = sigma / value;
   if (logarithmic && !(relative < kUndeterminedLogSigma)) {
     result.state = ParameterState::undetermined;
-    result.reason = fmt::format("the motion hardly depends on it (sigma {:.0f} % of the value)",
-                                100 * std::min(relative, 1e4));
-    result.sigma = std::min(sigma, 1e4 * value);
+    const bool vanishes = value < parameter.searched_from();
+    result.reason =
+        vanishes ? fmt::format("it is 0 within its error: at most {:.2g} {} (two sigma)",
+                               value + 2 * sigma, parameter.unit)
+                 : fmt::format("the motion hardly depends on it (sigma {:.0f} % of the value)",
+                               100 * std::min(relative, 1e4));
+    if (!vanishes) result.sigma = std::min(sigma, 1e4 * value);
   } else if (!logarithmic && is_physical(parameter.role) &&
              !(sigma < kUndeterminedRangeShare * (parameter.upper - parameter.lower))) {
     result.state = ParameterState::undetermined;
@@ -49,6 +53,20 @@ ParameterEstimate estimate(const FitParameter& parameter, const std::string& nam
     }
   }
   return result;
+}
+
+/// Turns what scales with the mass into ratios to it.
+void give_ratios(double areal_density, FitResult& result) {
+  const auto turn = [&](ParameterEstimate& parameter) {
+    const bool given = parameter.state == ParameterState::fixed;
+    if (given || !scales_with_mass(parameter.unit) || parameter.name == "areal_density") return;
+    parameter = scaled(parameter, 1 / areal_density);
+    parameter.unit += kPerArealDensity;
+    if (parameter.state == ParameterState::fitted) parameter.state = ParameterState::ratio;
+  };
+  for (ParameterEstimate& parameter : result.parameters) turn(parameter);
+  for (EffectEstimate& effect : result.effects)
+    for (ParameterEstimate& parameter : effect.parameters) turn(parameter);
 }
 
 ParameterEstimate constant(const std::string& name, const std::string& unit, double value,
@@ -98,6 +116,19 @@ void explain_by_correlation(const ParameterSpace& space, const Uncertainty& unce
   const FitParameter& alike = space.parameters[static_cast<size_t>(other)];
   parameter.reason += fmt::format("; it can hardly be told from {}{} (correlation {:.3f})",
                                   alike.name, what_it_is(alike.role), correlation);
+}
+
+/// Withdraws a parameter that another one at an end of its range moves by more than it is sure.
+void explain_by_bound(const ParameterSpace& space, const Uncertainty& uncertainty, int p,
+                      ParameterEstimate& parameter) {
+  if (uncertainty.bound_by < 0 || parameter.state != ParameterState::fitted) return;
+  const double shift = std::abs(uncertainty.bound_shift[p]);
+  const double own = std::sqrt(std::max(0.0, std::pow(uncertainty.sigma[p], 2) - shift * shift));
+  if (!(shift > own)) return;
+  parameter.state = ParameterState::undetermined;
+  parameter.reason = fmt::format(
+      "it trades with {}, which ended at an end of its range, and would move by {:.2g} beyond that",
+      space.parameters[static_cast<size_t>(uncertainty.bound_by)].name, shift);
 }
 
 /// Adds the intervals of the p-th parameter.
@@ -158,6 +189,7 @@ void fill_parameters(const FitProblem& problem, const FitOptions& options,
         estimate(problem.space.parameters[static_cast<size_t>(p)], name, values[p],
                  uncertainty.sigma[p], uncertainty.roughness[p]);
     explain_by_correlation(problem.space, uncertainty, p, parameter);
+    explain_by_bound(problem.space, uncertainty, p, parameter);
     add_intervals(p, uncertainty, looks, parameter);
     return parameter;
   };
@@ -167,8 +199,8 @@ void fill_parameters(const FitProblem& problem, const FitOptions& options,
   if (problem.mass_assumed) {
     density.state = ParameterState::undetermined;
     density.reason =
-        "the cloth was not weighed and nothing but gravity loads it: only ratios to mass are "
-        "determined; stiffness refers to this assumed value";
+        "the cloth was not weighed: only ratios to mass are determined, and the model that is "
+        "written takes this value";
   }
   result.parameters.push_back(density);
 
@@ -203,6 +235,7 @@ void fill_parameters(const FitProblem& problem, const FitOptions& options,
         result.nuisance.push_back(constant(term.description.name + "." + parameter.name,
                                            parameter.unit, binding.constant, "declared"));
       }
+  if (problem.mass_assumed) give_ratios(density.value, result);
 }
 
 }  // namespace clothfit

@@ -7,6 +7,7 @@
 
 #include "data/algebra/dense_factors.h"
 #include "fit/cost/huber.h"
+#include "fit/problem/box.h"
 #include "fit/problem/prior_cost.h"
 #include "fit/uncertainty/block_bootstrap.h"
 #include "fit/uncertainty/cluster_covariance.h"
@@ -73,6 +74,35 @@ void add_bootstrap(const ParameterSpace& space, const Eigen::VectorXd& values,
   if (change.lower.allFinite() && change.upper.allFinite())
     set_ends(space, here + change.lower, here + change.upper, result.bootstrap_lower,
              result.bootstrap_upper);
+}
+
+/// Returns how far coordinates would move if those at an end of their range, which the gradient
+/// pushes outwards, could leave it. Those ends move themselves by nothing. `bound_by` is the one
+/// that moves the others most, or -1.
+Eigen::VectorXd shift_by_bounds(const FitProblem& problem, const Eigen::VectorXd& values,
+                                const Eigen::VectorXd& gradient, const Eigen::MatrixXd& inverse,
+                                const Eigen::VectorXd& sigma, int& bound_by) {
+  const ParameterSpace& space = problem.space;
+  const Eigen::VectorXd here = space.coordinates(values);
+  const Box box = box_of(space);
+  Eigen::VectorXd shift = Eigen::VectorXd::Zero(here.size());
+  std::vector<Eigen::Index> bound;
+  double most = 0;
+  for (Eigen::Index p = 0; p < here.size(); ++p) {
+    const FitParameter& parameter = space.parameters[static_cast<size_t>(p)];
+    // At its neutral value an effect does nothing, and that is the end of what is possible.
+    if (parameter.role == ParameterRole::effect || !box.blocks(p, here[p], gradient[p])) continue;
+    const Eigen::VectorXd moved = -gradient[p] * inverse.col(p);
+    shift += moved;
+    bound.push_back(p);
+    for (Eigen::Index q = 0; q < here.size(); ++q) {
+      if (q == p || std::abs(moved[q]) <= most * sigma[q]) continue;
+      most = std::abs(moved[q]) / sigma[q];
+      bound_by = static_cast<int>(p);
+    }
+  }
+  for (const Eigen::Index p : bound) shift[p] = 0;
+  return shift;
 }
 
 /// Adds intervals from standard deviations and the shift of coordinates.
@@ -168,6 +198,9 @@ Uncertainty estimate_uncertainty(const TrajectoryObjective& objective,
   result.inverse_hessian = inverse;
   const Eigen::VectorXd shift =
       -inverse * (weighted.transpose() * (2 * (half_step_residual - fit.residual)));
+  const Eigen::VectorXd bound_shift =
+      shift_by_bounds(problem, values, weighted.transpose() * fit.residual + prior.gradient,
+                      inverse, sigma, result.bound_by);
   fit.residual -= fit.jacobian * (inverse * (weighted.transpose() * fit.residual + prior.gradient));
   Eigen::VectorXd robust_variance;
   const Eigen::VectorXi block = add_robust_part(objective, fit, result, robust_variance);
@@ -177,10 +210,12 @@ Uncertainty estimate_uncertainty(const TrajectoryObjective& objective,
   result.step_shift = shift.cwiseProduct(slope);
   result.noise_sigma = sigma.cwiseProduct(slope);
   result.robust_sigma = robust_variance.cwiseSqrt().cwiseProduct(slope);
-  result.sigma = (covariance.diagonal().cwiseMax(robust_variance) + shift.cwiseAbs2())
+  result.bound_shift = bound_shift.cwiseProduct(slope);
+  const Eigen::VectorXd both = (shift.cwiseAbs2() + bound_shift.cwiseAbs2()).cwiseSqrt();
+  result.sigma = (covariance.diagonal().cwiseMax(robust_variance) + both.cwiseAbs2())
                      .cwiseSqrt()
                      .cwiseProduct(slope);
-  add_interval(problem.space, values, sigma, robust_variance.cwiseSqrt(), shift, result);
+  add_interval(problem.space, values, sigma, robust_variance.cwiseSqrt(), both, result);
   result.usable = true;
   return result;
 }

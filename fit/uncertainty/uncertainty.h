@@ -42,6 +42,10 @@ struct Uncertainty {
   /// The distance that each parameter would move (in its unit) if the time step went to zero. It is
   /// the discretisation's share, part of sigma.
   Eigen::VectorXd step_shift;
+  /// The distance that each parameter would move (in its unit) if those at an end of their range
+  /// could leave it, as the residuals ask for; 0 where none does. It is part of sigma.
+  Eigen::VectorXd bound_shift;
+  int bound_by = -1;  ///< the parameter at its end that moves the others most
   /// Tells how much steeper derivatives are over a hair's breadth than over two per cent. It is
   /// about 1 where the cost is a smooth basin. It is far larger where the cost is rough, as of
   /// folding cloth without enough damping, and a sigma from derivatives means nothing.
@@ -61,6 +65,9 @@ struct Uncertainty {
 /// bound, pulls at all blocks alike and is no scatter. There is no sandwich where observations lie
 /// in fewer than two blocks, or coordinates cannot be told apart. The first estimate stands alone
 /// then.
+///
+/// A bound that binds moves the others too: by H^-1 times the gradient that it holds up. This is
+/// added in square.
 ///
 /// Neither sees what all markers share. One such thing can be measured: the time step. Residuals at
 /// half the step differ by d. The scheme is of first order, so at step zero they would differ by 2

@@ -211,6 +211,33 @@ TEST_F(Program, RefusesAMissingColumn) {
   expect_refused("fit", "tracks3d.csv:1: ");
 }
 
+TEST_F(Program, ChecksARecordingAgainstItself) {
+  copy_bundled("swing_plain");
+  const ProgramRun sound = run_program({"check", recording_.string()}, here_);
+  EXPECT_EQ(sound.exit_code, 0) << sound.error;
+  EXPECT_THAT(sound.out, HasSubstr("ok       units"));
+  EXPECT_THAT(sound.out, HasSubstr("Nothing contradicts"));
+
+  spoil_yaml("mass: 0.0347", "mass: 34.7");
+  const ProgramRun wrong = run_program({"check", recording_.string()}, here_);
+  EXPECT_EQ(wrong.exit_code, 3);
+  EXPECT_THAT(wrong.out, HasSubstr("WRONG    mass"));
+  EXPECT_THAT(wrong.out, HasSubstr("is it in grams? give kilograms"));
+  EXPECT_THAT(names_in(here_), IsEmpty());
+}
+
+TEST_F(Program, FitsAndDiagnosesNothingThatContradictsItself) {
+  copy_bundled("swing_plain");
+  spoil_yaml("gravity: [0.0, 0.0, -9.81]", "gravity: [0.0, 0.0, 9.81]");
+  for (const char* verb : {"fit", "diagnose"}) {
+    const ProgramRun run = run_program({verb, recording_.string()}, here_);
+    EXPECT_EQ(run.exit_code, 3) << verb;
+    EXPECT_THAT(run.error, HasSubstr("recording.yaml: ")) << verb;
+    EXPECT_THAT(run.error, HasSubstr("gravity turned round, [0, 0, -9.81],")) << verb;
+    EXPECT_THAT(names_in(here_), IsEmpty()) << verb;
+  }
+}
+
 TEST_F(Program, RefusesAnEmptyFolderOfPictures) {
   write_text(recording_ / "recording.yaml", picture_recording("{name: front, images: frames}"));
   write_text(recording_ / "markers.csv", "marker,s,t,tag,corner\na,0.1,0.1,0,0\n");

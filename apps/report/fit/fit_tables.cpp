@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <optional>
@@ -20,8 +21,20 @@ void for_each_parameter(const FitResult& result, const Visit& visit) {
   for (const ParameterEstimate& parameter : result.nuisance) visit("measurement", parameter);
 }
 
+Table without_empty_columns(const Table& table) {
+  Table kept;
+  kept.rows.resize(table.rows.size());
+  for (size_t c = 0; c < table.header.size(); ++c) {
+    if (std::ranges::all_of(table.rows, [&](const auto& row) { return row[c].empty(); })) continue;
+    kept.header.push_back(table.header[c]);
+    for (size_t r = 0; r < table.rows.size(); ++r) kept.rows[r].push_back(table.rows[r][c]);
+  }
+  return kept;
+}
+
 std::string relative_text(const ParameterEstimate& parameter) {
-  const bool meaningful = parameter.state != ParameterState::fixed && parameter.value != 0;
+  const bool meaningful = parameter.state != ParameterState::fixed && parameter.sigma > 0 &&
+                          parameter.state != ParameterState::misfit && parameter.value != 0;
   if (!meaningful) return "";
   return significant(100 * parameter.sigma / std::abs(parameter.value), 2) + "%";
 }
@@ -88,11 +101,12 @@ Table short_parameter_table(const FitResult& result) {
   if (on_two_meshes) table.header.insert(table.header.end() - 2, "other mesh");
   for_each_parameter(result, [&](const std::string& group, const ParameterEstimate& parameter) {
     const std::string name = group == "base" ? parameter.name : group + ": " + parameter.name;
-    const bool fixed = parameter.state == ParameterState::fixed;
+    const bool no_sigma = parameter.state == ParameterState::fixed ||
+                          parameter.state == ParameterState::misfit || parameter.sigma == 0;
     std::string state = to_string(parameter.state);
     if (!parameter.reason.empty()) state += ": " + parameter.reason;
     std::vector<std::string> row = {name, value_text(parameter.value, parameter.sigma),
-                                    fixed ? "" : significant(parameter.sigma, 2),
+                                    no_sigma ? "" : significant(parameter.sigma, 2),
                                     relative_text(parameter),
                                     interval_text(parameter.interval_90, parameter.sigma) +
                                         (parameter.interval_by_profile ? " (profile)" : "")};
@@ -104,6 +118,35 @@ Table short_parameter_table(const FitResult& result) {
     row.insert(row.end(), {parameter.unit, state});
     table.rows.push_back(std::move(row));
   });
+  return without_empty_columns(table);
+}
+
+Table estimated_parameter_table(const FitResult& result, Table& rest) {
+  const Table all = short_parameter_table(result);
+  Table estimated{all.header, {}};
+  rest = estimated;
+  size_t row = 0;
+  for_each_parameter(result, [&](const std::string& group, const ParameterEstimate& parameter) {
+    const bool of_effect = group != "base" && group != "measurement";
+    const bool is_given = of_effect && parameter.state == ParameterState::fixed;
+    (group == "measurement" || is_given ? rest : estimated).rows.push_back(all.rows[row++]);
+  });
+  return estimated;
+}
+
+Table brief_parameter_table(const FitResult& result) {
+  Table table{{"parameter", "value"}, {}};
+  for (const ParameterEstimate& parameter : result.parameters) {
+    const bool has_sigma =
+        parameter.state == ParameterState::fitted || parameter.state == ParameterState::ratio;
+    table.rows.push_back(
+        {parameter.name,
+         has_sigma ? fmt::format("{} ± {} {}", value_text(parameter.value, parameter.sigma),
+                                 significant(parameter.sigma, 2), parameter.unit)
+         : parameter.state == ParameterState::fixed
+             ? fmt::format("{} {}", significant(parameter.value, 3), parameter.unit)
+             : to_string(parameter.state)});
+  }
   return table;
 }
 

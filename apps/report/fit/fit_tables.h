@@ -15,6 +15,10 @@ std::string to_string(FitStop stop);
 Table parameter_table(const FitResult& result);
 /// Lists the same rounded by sigma, for people.
 Table short_parameter_table(const FitResult& result);
+/// Keeps the rows of what was estimated of the cloth and of effects; the others go to `rest`.
+Table estimated_parameter_table(const FitResult& result, Table& rest);
+/// Lists what is the cloth's in two columns: name, and value with sigma and unit or its state.
+Table brief_parameter_table(const FitResult& result);
 
 /// Lists the places in which searches and refinements ended, one a column, best first. There are no
 /// rows without a search.

@@ -26,18 +26,6 @@ BestTrivial best_trivial(const TrivialErrors& trivial) {
                            [](const auto& a, const auto& b) { return a.rms < b.rms; });
 }
 
-/// A held-out error up to this many times the noise counts as "explained to the noise". 10 % more
-/// than noise alone in rms is 20 % in chi-square, which hundreds of observations show.
-constexpr double kNearNoise = 1.1;
-
-enum class Grade { to_the_noise, useful, useless };
-
-Grade grade(const ObservationErrors& errors) {
-  if (!(errors.held_out.rms < best_trivial(errors.trivial).rms)) return Grade::useless;
-  const bool near = errors.noise > 0 && errors.held_out.rms <= kNearNoise * errors.noise;
-  return near ? Grade::to_the_noise : Grade::useful;
-}
-
 /// Returns a kind of observation as a sentence has it.
 std::string kind_words(const std::string& kind) {
   return kind == "tracks3d" ? "the 3D tracks" : "the pictures of camera " + kind;
@@ -65,18 +53,12 @@ std::string error_sentence(const ObservationErrors& errors) {
   return text + ".";
 }
 
-/// Says whether a fit is a forecast, which takes every number of the fabric from elsewhere.
-bool is_forecast(const FitResult& result) {
-  return std::ranges::none_of(result.parameters, [](const ParameterEstimate& parameter) {
-    return parameter.name != "areal_density" && parameter.state != ParameterState::fixed;
-  });
-}
-
 std::string parameter_sentence(const FitResult& result) {
   int fitted = 0;
   std::vector<std::string> undetermined;
   const auto look = [&](const ParameterEstimate& parameter) {
-    if (parameter.state == ParameterState::fitted) ++fitted;
+    if (parameter.state == ParameterState::fitted || parameter.state == ParameterState::ratio)
+      ++fitted;
     if (parameter.state == ParameterState::undetermined) undetermined.push_back(parameter.name);
   };
   for (const ParameterEstimate& parameter : result.parameters) look(parameter);
@@ -89,29 +71,68 @@ std::string parameter_sentence(const FitResult& result) {
   return text + ".";
 }
 
+/// Says whether a fit is a forecast, which takes every number of the fabric from elsewhere.
+bool is_forecast(const FitResult& result) {
+  return std::ranges::none_of(result.parameters, [](const ParameterEstimate& parameter) {
+    return parameter.name != "areal_density" && parameter.state != ParameterState::fixed;
+  });
+}
+
+/// The verdict in a sentence, with how it is known.
+std::string verdict_sentence(const FitResult& result) {
+  const char* grade = "";
+  switch (result.verdict) {
+    case FitVerdict::good:
+      grade = "Good";
+      break;
+    case FitVerdict::usable_with_care:
+      grade = "Usable with care";
+      break;
+    case FitVerdict::model_lacks:
+      grade = is_forecast(result) ? "The model lacks something"
+                                  : "The model lacks something, and its numbers are not the cloth's";
+      break;
+    case FitVerdict::do_not_use:
+      grade = "Do not use";
+      break;
+  }
+  return result.verdict_reason.empty() ? grade
+                                       : fmt::format("{}: {}", grade, result.verdict_reason);
+}
+
+/// Names the markers that contradict all others; empty where none does.
+std::string contradicting_sentence(const FitResult& result) {
+  if (result.contradicting.empty()) return "";
+  std::string names;
+  constexpr size_t kShown = 6;
+  for (size_t k = 0; k < std::min(kShown, result.contradicting.size()); ++k) {
+    const ContradictingMarker& marker = result.contradicting[k];
+    const ShownUnit unit = shown_unit(marker.kind == "tracks3d" ? "m" : "px");
+    names += fmt::format("{}{} ({} {} off in frames {} to {})", k > 0 ? ", " : "", marker.marker,
+                         significant(marker.off * unit.factor, 3), unit.name, marker.first_frame,
+                         marker.last_frame);
+  }
+  if (result.contradicting.size() > kShown) names += ", ...";
+  std::string text = "Markers that contradict all others: " + names + ". Without them";
+  for (const ObservationErrors& errors : result.errors) {
+    if (!errors.fitted_without) continue;
+    const ShownUnit unit = shown_unit(errors.unit);
+    text += fmt::format(" {} is {} {} off in the fitted frames", kind_words(errors.kind),
+                        significant(errors.fitted_without->rms * unit.factor, 3), unit.name);
+    if (errors.held_out_without)
+      text += fmt::format(" and {} {} in those held out",
+                          significant(errors.held_out_without->rms * unit.factor, 3), unit.name);
+  }
+  return text + ".";
+}
+
 }  // namespace
 
 FitSummary summarise(const FitReport& report) {
   const FitResult& result = report.result;
   FitSummary summary;
-
-  bool judged = !result.errors.empty();
-  Grade worst = Grade::to_the_noise;
-  for (const ObservationErrors& errors : result.errors) {
-    judged = judged && errors.held_out.count > 0;
-    if (judged) worst = std::max(worst, grade(errors));
-  }
-  if (!judged) {
-    summary.verdict = "Not judged: nothing was held out";
-  } else if (worst == Grade::to_the_noise) {
-    summary.verdict = "The model predicts frames it never saw as well as they were measured";
-  } else if (worst == Grade::useful) {
-    summary.verdict =
-        "The model predicts frames it never saw better than trivial guesses, but not to the noise";
-  } else {
-    summary.verdict = "Do not use: a trivial guess predicts the held-out frames better";
-  }
-
+  summary.verdict = verdict_sentence(result);
+  summary.contradicting = contradicting_sentence(result);
   summary.paragraph =
       fmt::format("A simulated cloth of {} x {} masses ", result.mesh_columns, result.mesh_rows);
   summary.paragraph +=
@@ -121,13 +142,10 @@ FitSummary summarise(const FitReport& report) {
                 "the recording “{}”; nothing was fitted.",
                 result.observations_used, result.recording)
           : fmt::format("was fitted to {} observations of the recording “{}”. {}",
-                        result.observations_used, result.recording, parameter_sentence(result));
+                        result.observations_used, result.recording,
+                        result.usable() ? parameter_sentence(result) : "");
   for (const ObservationErrors& errors : result.errors)
     summary.paragraph += fmt::format(" {}", error_sentence(errors));
-  if (judged && worst == Grade::useful)
-    summary.paragraph +=
-        " The gap between error and noise is motion that this model does not have, or error of "
-        "cameras and markers.";
   return summary;
 }
 

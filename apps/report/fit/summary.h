@@ -8,8 +8,9 @@ namespace clothfit {
 
 /// The meaning of a fit, for a reader who reads nothing else.
 struct FitSummary {
-  std::string verdict;    ///< one short line
-  std::string paragraph;  ///< plain text
+  std::string verdict;        ///< one sentence, without the full stop
+  std::string contradicting;  ///< markers that contradict all others; or empty
+  std::string paragraph;      ///< plain text
 };
 FitSummary summarise(const FitReport& report);
 

@@ -149,25 +149,36 @@ TEST(FitPageOfNothing, IsStillAPage) {
   const std::string page = fit_page_html(empty, sample.recording, {});
 
   EXPECT_EQ(tag_imbalance(page), "");
-  EXPECT_THAT(page, HasSubstr("Not judged: nothing was held out"));
+  EXPECT_THAT(page, HasSubstr("Usable with care"));
 }
 
-TEST(FitSummary, JudgesByHeldOutErrorBesideNoiseAndTrivialGuesses) {
+TEST(FitSummary, SaysTheVerdictFirst) {
   test::SampleFit sample = test::sample_fit(2);
-  ObservationErrors& errors = sample.report.result.errors[0];
-  errors.noise = 0.3;
-  errors.trivial = {40, 9, 42};
+  FitResult& result = sample.report.result;
+  result.verdict_reason = "it is off by 3.0 times the floor";
+  std::vector<std::string> said;
+  for (const FitVerdict verdict : {FitVerdict::good, FitVerdict::usable_with_care,
+                                   FitVerdict::model_lacks, FitVerdict::do_not_use}) {
+    result.verdict = verdict;
+    said.push_back(summarise(sample.report).verdict);
+  }
 
-  errors.held_out.rms = 0.31;
-  const std::string to_the_noise = summarise(sample.report).verdict;
-  errors.held_out.rms = 1.2;
-  const std::string useful = summarise(sample.report).verdict;
-  errors.held_out.rms = 9.5;
-  const std::string useless = summarise(sample.report).verdict;
+  EXPECT_EQ(said[0], "Good: it is off by 3.0 times the floor");
+  EXPECT_THAT(said[1], HasSubstr("Usable with care: "));
+  EXPECT_THAT(said[2], HasSubstr("its numbers are not the cloth's: "));
+  EXPECT_THAT(said[3], HasSubstr("Do not use: "));
+}
 
-  EXPECT_THAT(to_the_noise, HasSubstr("as well as they were measured"));
-  EXPECT_THAT(useful, HasSubstr("but not to the noise"));
-  EXPECT_THAT(useless, HasSubstr("Do not use"));
+TEST(FitSummary, NamesMarkersThatContradictAllOthers) {
+  test::SampleFit sample = test::sample_fit(3);
+  FitResult& result = sample.report.result;
+  result.contradicting = {{"m16_08", "tracks3d", 20, 71, 0.14}};
+  result.errors.front().fitted_without = ErrorSummary{.rms = 5.2e-4, .count = 10};
+
+  const std::string said = summarise(sample.report).contradicting;
+
+  EXPECT_THAT(said, HasSubstr("m16_08 (140 mm off in frames 20 to 71)"));
+  EXPECT_THAT(said, HasSubstr("0.520 mm off in the fitted frames"));
 }
 
 TEST(FitSummary, SaysMillimetresForPositionsInSpace) {

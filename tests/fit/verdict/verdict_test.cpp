@@ -1,0 +1,153 @@
+// What is said of a fit, from its numbers alone. Whether fits deserve it is checked in
+// tests/fit/recordings_test.cpp.
+
+#include "fit/verdict/verdict.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "fit/verdict/contradicting.h"
+
+namespace clothfit {
+namespace {
+
+FitResult result_with(double fitted, double held_out, double discretisation = 0) {
+  FitResult result;
+  result.parameters = {{"shear", "N/m", 20, 0.5, ParameterState::fitted, "", Interval{19, 21}}};
+  result.errors = {{.kind = "tracks3d",
+                    .unit = "m",
+                    .fitted = {.rms = fitted, .count = 100},
+                    .held_out = {.rms = held_out, .count = held_out > 0 ? 50 : 0},
+                    .noise = 1,
+                    .trivial = {.first_frame = 60, .last_velocity = 80, .rigid = 60},
+                    .discretisation = discretisation}};
+  return result;
+}
+
+FitVerdict verdict_of(FitResult result) {
+  judge(result);
+  return result.verdict;
+}
+
+TEST(Verdict, GradesByTheErrorOverTheFloor) {
+  EXPECT_EQ(verdict_of(result_with(1.0, 1.2)), FitVerdict::good);
+  EXPECT_EQ(verdict_of(result_with(1.0, 1.6)), FitVerdict::usable_with_care);
+  EXPECT_EQ(verdict_of(result_with(1.6, 1.2)), FitVerdict::usable_with_care);
+  EXPECT_EQ(verdict_of(result_with(2.6, 1.2)), FitVerdict::model_lacks);
+  EXPECT_EQ(verdict_of(result_with(1.2, 40)), FitVerdict::model_lacks);
+}
+
+TEST(Verdict, CountsMeshAndTimeStepAsFloor) {
+  EXPECT_EQ(verdict_of(result_with(1.5, 2.2)), FitVerdict::usable_with_care);
+  // The root of 1 + 1.2^2 is 1.56: 2.2 is 1.41 times as much.
+  EXPECT_EQ(verdict_of(result_with(1.5, 2.2, 1.2)), FitVerdict::good);
+}
+
+TEST(Verdict, IsNoBetterThanAGuess) {
+  EXPECT_EQ(verdict_of(result_with(1, 61)), FitVerdict::do_not_use);
+}
+
+TEST(Verdict, NeedsSomethingDetermined) {
+  FitResult result = result_with(1, 1);
+  result.parameters.front().state = ParameterState::undetermined;
+  EXPECT_EQ(verdict_of(result), FitVerdict::do_not_use);
+  result.effects = {{"wind", {{"q_x", "Pa", 0.2, 0.01, ParameterState::fitted, ""}}}};
+  EXPECT_EQ(verdict_of(result), FitVerdict::good);
+}
+
+TEST(Verdict, IsNotGoodWithoutFramesHeldOutOrConvergence) {
+  EXPECT_EQ(verdict_of(result_with(1, 0)), FitVerdict::usable_with_care);
+  FitResult result = result_with(1, 1);
+  result.converged = false;
+  EXPECT_EQ(verdict_of(result), FitVerdict::usable_with_care);
+}
+
+TEST(Verdict, WithdrawsIntervalsOfAModelThatLacksSomething) {
+  FitResult result = result_with(3, 5);
+  judge(result);
+
+  EXPECT_FALSE(result.usable());
+  EXPECT_EQ(result.parameters.front().state, ParameterState::misfit);
+  EXPECT_FALSE(result.parameters.front().interval_90);
+  EXPECT_THAT(result.verdict_reason, testing::HasSubstr("5.0 times"));
+}
+
+TEST(Verdict, LeavesIntervalsOfAGoodOne) {
+  FitResult result = result_with(1, 1.1);
+  judge(result);
+
+  EXPECT_TRUE(result.usable());
+  EXPECT_EQ(result.parameters.front().state, ParameterState::fitted);
+  EXPECT_TRUE(result.parameters.front().interval_90);
+}
+
+TEST(Verdict, BelievesNoIntervalWithoutSigma) {
+  FitResult result = result_with(1, 1);
+  result.parameters.front().sigma = 0;
+  EXPECT_EQ(verdict_of(result), FitVerdict::model_lacks);
+}
+
+/// Forty markers off by about one sigma in twenty frames, and `wrong` of them by 200 from frame 8.
+FitReport report_with(int wrong) {
+  FitReport report;
+  report.residuals.push_back({.kind = "tracks3d", .unit = "m"});
+  for (int f = 0; f < 20; ++f)
+    for (int m = 0; m < 40; ++m) {
+      const double off = m < wrong && f >= 8 ? 200 : 1;
+      report.residuals.back().rows.push_back({.frame = f,
+                                              .marker = m,
+                                              .observed = Eigen::Vector3d(off, 0, 0),
+                                              .predicted = Eigen::Vector3d::Zero(),
+                                              .sigma = 1,
+                                              .held_out = f >= 15});
+    }
+  report.result.errors = {{.kind = "tracks3d",
+                           .unit = "m",
+                           .fitted = {.rms = 30, .count = 600},
+                           .held_out = {.rms = 40, .count = 200},
+                           .noise = 1}};
+  return report;
+}
+
+MarkerSet forty_markers() {
+  MarkerSet markers;
+  for (int m = 0; m < 40; ++m) markers.markers.push_back({.name = std::string("m") + std::to_string(m)});
+  return markers;
+}
+
+TEST(ContradictingMarkers, AreNamedAndLeftOutOfErrorsBeside) {
+  FitReport report = report_with(2);
+  name_contradicting(forty_markers(), report);
+
+  ASSERT_EQ(report.result.contradicting.size(), 2u);
+  EXPECT_EQ(report.result.contradicting.back().marker, "m1");
+  EXPECT_EQ(report.result.contradicting.back().first_frame, 8);
+  EXPECT_EQ(report.result.contradicting.back().last_frame, 19);
+  EXPECT_NEAR(report.result.contradicting.back().off, 200, 1e-9);
+  const ObservationErrors& errors = report.result.errors.front();
+  ASSERT_TRUE(errors.fitted_without && errors.held_out_without);
+  EXPECT_EQ(errors.fitted_without->count, 15 * 38);
+  EXPECT_NEAR(errors.fitted_without->rms_distance, 1, 1e-12);
+  EXPECT_NEAR(errors.held_out_without->rms, 1 / std::sqrt(3), 1e-12);
+}
+
+TEST(ContradictingMarkers, AreNotNamedWhereManyLieOff) {
+  FitReport report = report_with(12);
+  name_contradicting(forty_markers(), report);
+
+  EXPECT_TRUE(report.result.contradicting.empty());
+  EXPECT_FALSE(report.result.errors.front().fitted_without);
+}
+
+TEST(ContradictingMarkers, JudgeTheFitNoMore) {
+  FitReport report = report_with(1);
+  report.result.parameters = {{"shear", "N/m", 20, 0.5, ParameterState::fitted, ""}};
+  report.result.errors.front().trivial = {60, 80, 60};
+  name_contradicting(forty_markers(), report);
+  judge(report.result);
+
+  EXPECT_EQ(report.result.verdict, FitVerdict::good);
+}
+
+}  // namespace
+}  // namespace clothfit
