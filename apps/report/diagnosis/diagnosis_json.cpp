@@ -116,6 +116,15 @@ void write_diagnosis(const Diagnosis& diagnosis, const std::string& command,
                     {"verdict", to_string(diagnosis.verdict)},
                     {"complete", diagnosis.complete},
                     {"seconds", diagnosis.seconds}};
+  json["warnings"] = ordered_json::array();
+  for (const DiagnosedRecording& recording : diagnosis.recordings)
+    for (const Finding& warning : recording.after.result.warnings)
+      json["warnings"].push_back({{"recording", recording.after.result.recording},
+                                  {"check", warning.check},
+                                  {"found", warning.found},
+                                  {"where", warning.where},
+                                  {"expected", warning.expected},
+                                  {"remedy", warning.remedy}});
   json["phases"] = ordered_json::array();
   for (const PhaseTime& phase : diagnosis.phases)
     json["phases"].push_back({{"name", phase.name}, {"seconds", phase.seconds}});

@@ -4,10 +4,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
+#include <span>
+#include <vector>
 
 #include "apps/report/diagnosis/diagnosis_law.h"
 #include "apps/report/diagnosis/diagnosis_tables.h"
 #include "apps/report/fit/fit_figures.h"
+#include "apps/report/fit/notices.h"
 #include "apps/report/page/html.h"
 #include "apps/terminal/number_text.h"
 #include "apps/terminal/version.h"
@@ -23,6 +27,12 @@ std::string names_text(const Diagnosis& diagnosis) {
       std::ranges::count(diagnosis.recordings, false, &DiagnosedRecording::held_out);
   return diagnosis.base().result.recording +
          (fitted > 1 ? fmt::format(" and {} more", fitted - 1) : "");
+}
+
+/// Writes a mode's name as people do.
+std::string plain(std::string title) {
+  std::ranges::replace(title, '_', ' ');
+  return title;
 }
 
 std::string effects_text(const Diagnosis& diagnosis) {
@@ -61,46 +71,169 @@ std::string verdict_text(const Diagnosis& diagnosis) {
 struct Mean {
   std::string kind, unit;
   double before = 0, after = 0, noise = 0;  ///< sums of squares
-  int count = 0, recordings = 0;
+  int count = 0;
   double rms(double sum) const { return std::sqrt(sum / std::max(1, count)); }
 };
 
-std::string before_after_text(const Diagnosis& diagnosis) {
+/// Errors before and after, of what says most: whole recordings held out say more than frames, and
+/// frames more than fitted ones.
+struct MeanErrors {
+  std::vector<Mean> means;
+  std::string where;  ///< of what: "frames that no decision has seen"
+};
+
+MeanErrors mean_errors(const Diagnosis& diagnosis) {
   const std::vector<ErrorsBeforeAfter> all = errors_before_after(diagnosis);
-  // Whole recordings held out say more than frames, and frames more than fitted ones.
   const bool whole = std::ranges::any_of(
       all, [](const ErrorsBeforeAfter& one) { return one.recording->held_out; });
   const bool frames = std::ranges::any_of(
       all, [](const ErrorsBeforeAfter& one) { return one.before->held_out.count > 0; });
-  std::vector<Mean> means;
+  MeanErrors errors{.means = {},
+                    .where = whole    ? "recordings that no fit and no decision has seen"
+                             : frames ? "frames that no decision has seen"
+                                      : "the fitted frames"};
   for (const auto& [recording, before, after] : all) {
     if (whole && !recording->held_out) continue;
     const ErrorSummary& one = frames ? before->held_out : before->fitted;
     const ErrorSummary& other = frames ? after->held_out : after->fitted;
-    auto mean = std::ranges::find(means, before->kind, &Mean::kind);
-    if (mean == means.end())
-      mean = means.insert(means.end(), {.kind = before->kind, .unit = before->unit});
+    auto mean = std::ranges::find(errors.means, before->kind, &Mean::kind);
+    if (mean == errors.means.end())
+      mean = errors.means.insert(errors.means.end(), {.kind = before->kind, .unit = before->unit});
     mean->before += one.count * one.rms * one.rms;
     mean->after += other.count * other.rms * other.rms;
     mean->noise += one.count * before->noise * before->noise;
     mean->count += one.count;
-    ++mean->recordings;
   }
+  return errors;
+}
+
+/// Says how good predictions are, in quantities of people.
+std::string errors_text(const Diagnosis& diagnosis) {
+  const MeanErrors errors = mean_errors(diagnosis);
   std::string text;
-  for (const Mean& mean : means) {
+  for (const Mean& mean : errors.means) {
     const ShownUnit unit = shown_unit(mean.unit);
     const auto shown = [&](double sum) { return significant(mean.rms(sum) * unit.factor, 3); };
-    const std::string where =
-        whole    ? fmt::format("on {} that no fit and no decision has seen",
-                            mean.recordings == 1 ? "a recording"
-                                                    : fmt::format("{} recordings", mean.recordings))
-           : frames ? "on frames that no decision has seen"
-                 : "on the fitted frames";
-    text += fmt::format("{}{}: {} {} before {}, {} after, noise {}", text.empty() ? "" : "; ",
-                        kind_title(mean.kind, mean.unit), shown(mean.before), unit.name, where,
-                        shown(mean.after), shown(mean.noise));
+    const std::string of = errors.means.size() > 1
+                               ? fmt::format("In {}, the", kind_title(mean.kind, mean.unit))
+                               : "The";
+    text += text.empty() ? "" : " ";
+    text +=
+        diagnosis.changed()
+            ? fmt::format(
+                  "{} prediction of {} is off by {} {} without, and by {} {} with what "
+                  "was found; the measurement itself scatters by {} {}.",
+                  of, errors.where, shown(mean.before), unit.name, shown(mean.after), unit.name,
+                  shown(mean.noise), unit.name)
+            : fmt::format(
+                  "{} prediction of {} is off by {} {}; the measurement itself scatters "
+                  "by {} {}.",
+                  of, errors.where, shown(mean.before), unit.name, shown(mean.noise), unit.name);
   }
-  return text + ".";
+  return text;
+}
+
+size_t effects_asked(const Diagnosis& diagnosis) {
+  std::set<std::string> names;
+  for (const Score& score : diagnosis.scores) names.insert(score.hypothesis.effect);
+  return names.size();
+}
+
+/// Says what else could be the cause.
+std::string alike_text(const Diagnosis& diagnosis) {
+  std::set<std::string> alike;
+  for (const AcceptedEffect& accepted : diagnosis.accepted)
+    for (const Hypothesis& other : accepted.alike)
+      if (other.effect != accepted.trial.hypothesis.effect) alike.insert(plain(other.title()));
+  const size_t asked = effects_asked(diagnosis);
+  if (asked == 0) return "";
+  if (alike.empty())
+    return fmt::format("Of {} effects that were asked none else comes near.", asked);
+  return fmt::format("Of {} effects that were asked only {} {} near.", asked,
+                     fmt::join(alike, ", "), alike.size() == 1 ? "comes" : "come");
+}
+
+/// Says what a person may do next: a remedy, a recording that tells more, or the next command.
+std::vector<std::string> next_steps(const Diagnosis& diagnosis) {
+  std::vector<std::string> steps;
+  constexpr double kTold = 5;
+  for (size_t n = 0; n < diagnosis.accepted.size(); ++n) {
+    if (const std::string remedy = remedy_text(diagnosis.accepted[n].trial.hypothesis);
+        !remedy.empty())
+      steps.push_back(remedy);
+    for (const Separation& separation : diagnosis.separation_of(n)) {
+      if (separation.recordings.empty()) continue;
+      const SeparatingRecording& best = separation.recordings.front();
+      steps.push_back(
+          best.sigmas >= kTold
+              ? fmt::format(
+                    "Record the cloth {}, to tell it from {} ({:.0f} sigma apart then, {:.1f} "
+                    "now).",
+                    best.what, plain(separation.from.title()), best.sigmas, separation.now)
+              : fmt::format("No recording that was tried tells it from {}.",
+                            plain(separation.from.title())));
+    }
+  }
+  switch (diagnosis.verdict) {
+    case DiagnosisVerdict::adequate:
+      steps.push_back("Use the model: model.yaml and fit.json beside this page hold it.");
+      break;
+    case DiagnosisVerdict::explained:
+      steps.push_back(
+          "Use the model with it: model.yaml and fit.json beside this page hold it. Or remove the "
+          "cause and record once more.");
+      break;
+    case DiagnosisVerdict::partly_explained:
+    case DiagnosisVerdict::unexplained:
+      steps.push_back(diagnosis.complete
+                          ? "Look at the maps below where and when it is still off, and record the "
+                            "same cloth again, let go otherwise: what stays alike is the cloth's."
+                          : "Give the search more time (--budget): not all effects were tried.");
+      break;
+    case DiagnosisVerdict::not_reached:
+      break;
+  }
+  return steps;
+}
+
+Notice notice_of(DiagnosisVerdict verdict) {
+  switch (verdict) {
+    case DiagnosisVerdict::adequate:
+    case DiagnosisVerdict::explained:
+      return Notice::good;
+    case DiagnosisVerdict::partly_explained:
+      return Notice::care;
+    case DiagnosisVerdict::unexplained:
+      return Notice::lacks;
+    case DiagnosisVerdict::not_reached:
+      return Notice::bad;
+  }
+  return Notice::care;
+}
+
+/// What a reader with a minute needs: the cause in quantities of people, how it is known, what to
+/// do next, and the cloth's numbers beside.
+std::string answer_html(const Diagnosis& diagnosis) {
+  std::string cause;
+  for (const AcceptedEffect& accepted : diagnosis.accepted) {
+    const Hypothesis& term = accepted.trial.hypothesis;
+    const std::string words = words_of(term, diagnosis.found());
+    cause +=
+        fmt::format("<p class=\"found\">{}: <strong>{}</strong></p>\n", escape_xml(term.title()),
+                    escape_xml(words.empty() ? found_text(term, diagnosis.found().result) : words));
+  }
+  if (diagnosis.seen_elsewhere)
+    cause += fmt::format("<p class=\"found\">markers seen elsewhere: <strong>{}</strong></p>\n",
+                         escape_xml(seen_elsewhere_text(*diagnosis.seen_elsewhere)));
+  cause += fmt::format("<p><b>How it is known.</b> {}</p>\n",
+                       escape_xml(errors_text(diagnosis) + " " + alike_text(diagnosis)));
+  cause += "<p><b>What to do next.</b></p>\n<ul>\n";
+  for (const std::string& step : next_steps(diagnosis))
+    cause += fmt::format("<li>{}</li>\n", escape_xml(step));
+  cause += "</ul>\n";
+  if (!diagnosis.complete) cause += paragraph(incomplete_text(diagnosis));
+  return fmt::format("<div class=\"answer\"><div>{}</div><div>{}</div></div>\n", cause,
+                     html_table(brief_parameter_table(diagnosis.found().result), "The cloth"));
 }
 
 /// Lists recordings that would tell an accepted mode from others.
@@ -237,13 +370,16 @@ std::string planted(const Diagnosis& diagnosis) {
 }
 
 std::string parameters(const Diagnosis& diagnosis) {
-  return html_table(short_parameter_table(diagnosis.found().result),
-                    "Of the model with what was accepted. The errors count what it still lacks. "
-                    "Where several recordings were fitted, what is each one's own is the first's.");
-}
-
-std::string wide(const std::string& html) {
-  return "<div class=\"wide\">" + html + "</div>\n";
+  Table rest;
+  const Table estimated = estimated_parameter_table(diagnosis.found().result, rest);
+  return html_table(estimated,
+                    "Of the model with what was accepted. The errors count what it still lacks.") +
+         (rest.rows.empty()
+              ? ""
+              : folded("How it was placed and measured, and what was given",
+                       html_table(rest,
+                                  "Where several recordings were fitted, what is each one's "
+                                  "own is the first's.")));
 }
 
 std::string words() {
@@ -292,44 +428,53 @@ std::string incomplete_text(const Diagnosis& diagnosis) {
 std::string diagnosis_page_html(const Diagnosis& diagnosis, std::span<const Recording> recordings,
                                 const std::string& command) {
   const Recording& recording = recordings.front();
-  std::string body = fmt::format(
-      "<h1>Diagnosis of “{}”</h1>\n<p class=\"meta\">clothfit {} · {} s</p>\n"
-      "<div class=\"verdict\"><strong>{}</strong>\n<p>{}</p>{}</div>\n",
-      escape_xml(names_text(diagnosis)), escape_xml(program_version()),
-      significant(diagnosis.seconds, 3), escape_xml(verdict_text(diagnosis)),
-      escape_xml(before_after_text(diagnosis)),
-      diagnosis.complete ? "" : "<p>" + escape_xml(incomplete_text(diagnosis)) + "</p>");
-  body += section("What was missing", what_was_missing(diagnosis));
-  body += section("Errors before and after",
-                  wide(html_table(before_after_table(diagnosis),
-                                  "Root mean square of one coordinate's residual. The last three "
-                                  "columns are guesses that need no model.")));
-  body += section("Parameters", parameters(diagnosis));
+  std::string body =
+      fmt::format("<h1>Diagnosis of “{}”</h1>\n<p class=\"meta\">clothfit {} · {} s</p>\n",
+                  escape_xml(names_text(diagnosis)), escape_xml(program_version()),
+                  significant(diagnosis.seconds, 3));
+  body += notice_box(notice_of(diagnosis.verdict), plain(verdict_text(diagnosis)),
+                     answer_html(diagnosis));
+  for (const DiagnosedRecording& one : diagnosis.recordings)
+    body += warnings_box(one.after.result.warnings);
   body += section("Where and when it is off", maps(diagnosis, recordings));
-  body +=
-      section("Which force is missing", residual_force_html(diagnosis.residual_force, recording));
+  body += section("Errors before and after",
+                  html_table(before_after_table(diagnosis),
+                             "Root mean square of one coordinate's residual. The last three "
+                             "columns are guesses that need no model."));
+  body += section("Parameters", parameters(diagnosis));
+  body += section("What was missing, in full",
+                  folded("Why each was accepted, and what is alike", what_was_missing(diagnosis)));
+  body += section("Which force is missing",
+                  folded("The residual force, marker by marker",
+                         residual_force_html(diagnosis.residual_force, recording)));
   body += section("Does the residual look like noise?",
-                  html_table(adequacy_table(diagnosis),
-                             "Residuals after everything that was fitted has been taken out."));
-  body +=
-      section("Which modes were asked",
-              wide(html_table(
-                  short_candidate_table(diagnosis),
-                  fmt::format("The most telling of {} modes, scored where the model as declared "
-                              "first misses something: over its first {} frames.",
-                              diagnosis.scores.size(), diagnosis.score_frames))));
+                  folded("The tests, before and after",
+                         html_table(adequacy_table(diagnosis),
+                                    "Residuals after everything that was fitted has been taken "
+                                    "out.")));
+  body += section(
+      "Which modes were asked",
+      folded(fmt::format("The most telling of {} modes", diagnosis.scores.size()),
+             html_table(short_candidate_table(diagnosis),
+                        fmt::format("Scored where the model as declared first misses something: "
+                                    "over its first {} frames.",
+                                    diagnosis.score_frames))));
   const Table trials = trial_table(diagnosis);
   if (!trials.rows.empty())
     body += section("Which were fitted",
-                    wide(html_table(trials, "Round by round: those that the score put first.")));
+                    folded(fmt::format("{} fits, round by round", trials.rows.size()),
+                           html_table(trials, "Those that the score put first.")));
   body += section("A law for what remains", proposed_law_html(diagnosis));
-  body += section(
-      "What would have been seen",
-      wide(html_table(limit_table(diagnosis),
-                      "In the last model: amplitudes that would stand five sigma clear and take "
-                      "enough of the residual to be accepted. Limits are linear, from the "
-                      "derivatives; the estimate is the score's, not a fit's.")) +
-          planted(diagnosis));
+  const Table limits = limit_table(diagnosis);
+  if (!limits.rows.empty())
+    body += section(
+        "What would have been seen",
+        folded(fmt::format("Limits of {} amplitudes", limits.rows.size()),
+               html_table(limits,
+                          "In the last model: amplitudes that would stand five sigma clear and "
+                          "take enough of the residual to be accepted. Limits are linear, from the "
+                          "derivatives; the estimate is the score's, not a fit's.") +
+                   planted(diagnosis)));
   body += section("What the words mean", words());
   body += section("Do it again", fmt::format("<pre>{}</pre>\n<p>Numbers stand in diagnosis.json, "
                                              "candidates.csv, trials.csv and limits.csv beside "

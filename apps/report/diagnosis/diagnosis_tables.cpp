@@ -24,6 +24,10 @@ std::string shape_text(const Hypothesis& term) {
   return text;
 }
 
+bool has_no_unit(const std::string& unit) {
+  return unit.empty() || unit == "1" || unit == "ratio";
+}
+
 std::string sigmas_text(double sigmas) {
   return fmt::format("{:.{}f}", sigmas, sigmas < 9.95 ? 1 : 0);
 }
@@ -247,7 +251,7 @@ std::string found_text(const Hypothesis& term, const FitResult& result) {
     text +=
         fmt::format("{}{} = {} ± {}{}", text.empty() ? "" : ", ", parameter.name,
                     value_text(parameter.value, parameter.sigma), significant(parameter.sigma, 2),
-                    parameter.unit.empty() || parameter.unit == "1" ? "" : " " + parameter.unit);
+                    has_no_unit(parameter.unit) ? "" : " " + parameter.unit);
   };
   const auto of_term = [&](const std::string& name) {
     return std::ranges::find(term.amplitudes, name) != term.amplitudes.end() ||

@@ -7,6 +7,7 @@
 
 #include "apps/report/fit/fit_figures.h"
 #include "apps/report/fit/fit_tables.h"
+#include "apps/report/fit/notices.h"
 #include "apps/report/fit/summary.h"
 #include "apps/report/page/colour_map.h"
 #include "apps/report/page/html.h"
@@ -15,15 +16,33 @@
 namespace clothfit {
 namespace {
 
+Notice notice_of(FitVerdict verdict) {
+  switch (verdict) {
+    case FitVerdict::good:
+      return Notice::good;
+    case FitVerdict::usable_with_care:
+      return Notice::care;
+    case FitVerdict::model_lacks:
+      return Notice::lacks;
+    case FitVerdict::do_not_use:
+      return Notice::bad;
+  }
+  return Notice::care;
+}
+
 std::string heading(const FitReport& report) {
   const FitResult& result = report.result;
   const FitSummary summary = summarise(report);
+  std::string below = paragraph(summary.paragraph);
+  if (!summary.contradicting.empty()) below += paragraph(summary.contradicting);
+  if (!result.next_command.empty())
+    below += "<p>To ask what is missing:</p>\n<pre>" + escape_xml(result.next_command) + "</pre>\n";
   return fmt::format(
-      "<h1>Fit of “{}”</h1>\n<p class=\"meta\">clothfit {} · {} · seed {} · {} s</p>\n"
-      "<div class=\"verdict\"><strong>{}</strong>\n<p>{}</p></div>\n",
-      escape_xml(result.recording), escape_xml(result.version), escape_xml(to_string(report.stop)),
-      result.seed, significant(result.seconds, 3), escape_xml(summary.verdict),
-      escape_xml(summary.paragraph));
+             "<h1>Fit of “{}”</h1>\n<p class=\"meta\">clothfit {} · {} · seed {} · {} s</p>\n",
+             escape_xml(result.recording), escape_xml(result.version),
+             escape_xml(to_string(report.stop)), result.seed, significant(result.seconds, 3)) +
+         notice_box(notice_of(result.verdict), summary.verdict + ".", below) +
+         warnings_box(result.warnings);
 }
 
 std::string errors_section(const FitReport& report) {
@@ -160,6 +179,13 @@ std::string words_section() {
          "far as sigma is right.</dd>\n"
          "<dt>fitted</dt><dd>Estimated from these data.</dd>\n"
          "<dt>fixed</dt><dd>Given, not estimated.</dd>\n"
+         "<dt>ratio</dt><dd>Estimated as a ratio to the mass per area, for the cloth was not "
+         "weighed.</dd>\n"
+         "<dt>model does not fit</dt><dd>The model leaves so much of the data that no interval of "
+         "this number would be true.</dd>\n"
+         "<dt>floor</dt><dd>What no model on this mesh can do better than: the noise, and what "
+         "mesh "
+         "and time step make, added in square.</dd>\n"
          "<dt>undetermined</dt><dd>These data allow any value in a wide range; the reason stands "
          "beside it, and the value is not a measurement.</dd>\n"
          "<dt>tension, shear, flexion</dt><dd>Stiffness of the springs between neighbours, across "
@@ -175,15 +201,22 @@ std::string fit_page_html(const FitReport& report, const Recording& recording,
   std::string body = heading(report);
   if (!report.message.empty())
     body += fmt::format("<p class=\"meta\">{}</p>\n", escape_xml(report.message));
-  body += section("Parameters",
-                  html_table(short_parameter_table(report.result),
-                             "Value with one standard deviation, given the model below."));
+  Table rest;
+  const Table estimated = estimated_parameter_table(report.result, rest);
+  body +=
+      section("Parameters",
+              html_table(estimated, "Value with one standard deviation, given the model below.") +
+                  (rest.rows.empty() ? ""
+                                     : folded("How it was placed and measured, and what was given",
+                                              html_table(rest, ""))));
   body += section("Errors", errors_section(report));
   body += section("Where and when it is off", figures_of(report, recording, pictures));
-  body += section("Which parameters trade against each other", correlation_section(report));
+  if (const std::string correlations = correlation_section(report); !correlations.empty())
+    body +=
+        section("Which parameters trade against each other", folded("Correlations", correlations));
   body += section("Observations", observations_section(report));
   body += section("Model", model_section(report, recording));
-  body += section("Search", search_section(report));
+  body += section("Search", folded("Runs, basins and stages", search_section(report)));
   body += section("What the words mean", words_section());
   body += section("Do it again",
                   fmt::format("<pre>{}</pre>\n<p>The same input, seed and version give the same "

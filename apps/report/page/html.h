@@ -22,6 +22,8 @@ std::string html_table(const Table& table, const std::string& caption);
 std::string section(const std::string& title, const std::string& content);
 std::string paragraph(const std::string& text);
 std::string figure(const std::string& svg, const std::string& caption);
+/// Returns content behind a line that opens it.
+std::string folded(const std::string& line, const std::string& content);
 
 /// Returns `bytes` as a data: URI.
 std::string data_uri(std::string_view media_type, std::string_view bytes);
