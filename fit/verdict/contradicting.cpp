@@ -19,6 +19,8 @@ constexpr double kHardlyWeighed = 15;
 /// Times what half of the markers are off in the same frame.
 constexpr double kBeyondOthers = 8;
 constexpr int kStretch = 5;
+/// Sigmas that half of the markers may be off in the mean: a model that leaves more does not tell.
+constexpr double kExplained = 5;
 /// Share of the markers up to which they are to blame, and not the model.
 constexpr double kFew = 0.1;
 
@@ -42,8 +44,8 @@ struct Stretch {
   double square = 0;
 };
 
-std::map<int, Stretch> longest_stretches(const std::vector<Row>& rows) {
-  const std::map<int, double> usual = usual_by_frame(rows);
+std::map<int, Stretch> longest_stretches(const std::vector<Row>& rows,
+                                         const std::map<int, double>& usual) {
   std::map<int, Stretch> now, longest;
   for (const Row& row : rows) {
     const double off = sigmas(row);
@@ -85,7 +87,11 @@ void name_contradicting(const MarkerSet& markers, FitReport& report) {
     const FitReport::Residuals& residuals = report.residuals[k];
     std::set<int> all, named;
     for (const Row& row : residuals.rows) all.insert(row.marker);
-    const std::map<int, Stretch> found = longest_stretches(residuals.rows);
+    const std::map<int, double> usual = usual_by_frame(residuals.rows);
+    double mean = 0;
+    for (const auto& [frame, off] : usual) mean += off / static_cast<double>(usual.size());
+    if (mean > kExplained) continue;
+    const std::map<int, Stretch> found = longest_stretches(residuals.rows, usual);
     if (found.empty() || static_cast<double>(found.size()) > kFew * static_cast<double>(all.size()))
       continue;
     for (const auto& [marker, stretch] : found) {

@@ -155,6 +155,56 @@ TEST(FitJson, ReadsBackToTheLastBit) {
   }
 }
 
+TEST(FitJson, KeepsVerdictWarningsAndWhatContradicts) {
+  const TemporaryFolder folder;
+  FitResult written = sample_result();
+  written.verdict = FitVerdict::model_lacks;
+  written.verdict_reason = "it is off";
+  written.next_command = "clothfit diagnose x";
+  written.converged = false;
+  written.contradicting = {{"m1", "tracks3d", 20, 71, 0.14}};
+  written.warnings = {{"time", FindingState::warning, "found", "x.yaml:3", "expected", "remedy"}};
+  written.errors.front().discretisation = 0.25;
+  written.errors.front().fitted_without = ErrorSummary{.rms = 0.2, .rms_distance = 0.3, .count = 9};
+  written.parameters.front().state = ParameterState::misfit;
+  written.parameters.back().state = ParameterState::ratio;
+
+  write_fit_result(written, folder / "fit.json");
+  const FitResult read = read_fit_result(folder / "fit.json");
+
+  EXPECT_EQ(read.verdict, FitVerdict::model_lacks);
+  EXPECT_FALSE(read.usable());
+  EXPECT_EQ(read.verdict_reason, "it is off");
+  EXPECT_EQ(read.next_command, "clothfit diagnose x");
+  EXPECT_FALSE(read.converged);
+  ASSERT_EQ(read.contradicting.size(), 1u);
+  EXPECT_EQ(read.contradicting.front().last_frame, 71);
+  ASSERT_EQ(read.warnings.size(), 1u);
+  EXPECT_EQ(sentence(read.warnings.front()), "x.yaml:3: found; expected; remedy");
+  EXPECT_EQ(read.errors.front().discretisation, 0.25);
+  EXPECT_EQ(read.errors.front().fitted_without->count, 9);
+  EXPECT_EQ(read.parameters.front().state, ParameterState::misfit);
+  EXPECT_EQ(read.parameters.back().state, ParameterState::ratio);
+}
+
+TEST(FitResult, ScalesRatiosToTheMassOfACloth) {
+  FitResult result;
+  result.parameters = {
+      {"areal_density", "kg/m2", 0.1, 0, ParameterState::undetermined, "not weighed"},
+      {"shear", "N/m per kg/m2", 90, 2, ParameterState::ratio, "", Interval{86, 94}},
+      {"damping_warp", "s", 0.002, 1e-4, ParameterState::fitted, ""}};
+  result.effects = {{"wind", {{"q_x", "Pa per kg/m2", 1.2, 0.1, ParameterState::ratio, ""}}}};
+
+  const FitResult assumed = at_density(result, std::nullopt), weighed = at_density(result, 0.2);
+
+  EXPECT_DOUBLE_EQ(assumed.parameters[1].value, 9);
+  EXPECT_DOUBLE_EQ(weighed.parameters[1].value, 18);
+  EXPECT_DOUBLE_EQ(weighed.parameters[1].interval_90->upper, 18.8);
+  EXPECT_EQ(weighed.parameters[1].unit, "N/m");
+  EXPECT_DOUBLE_EQ(weighed.effects[0].parameters[0].value, 0.24);
+  EXPECT_DOUBLE_EQ(weighed.parameters[2].value, 0.002);
+}
+
 TEST(FitJson, HasTheKeysOfTheFormat) {
   const TemporaryFolder folder;
   write_fit_result(sample_result(), folder / "fit.json");
@@ -163,10 +213,11 @@ TEST(FitJson, HasTheKeysOfTheFormat) {
 
   std::vector<std::string> keys;
   for (const auto& [key, value] : json.items()) keys.push_back(key);
-  EXPECT_THAT(keys,
-              testing::ElementsAre("format", "recording", "version", "command", "seed", "seconds",
-                                   "model", "parameters", "effects", "nuisance", "basins", "errors",
-                                   "observations", "marker_offsets", "clouds"));
+  EXPECT_THAT(keys, testing::ElementsAre("format", "verdict", "verdict_reason", "next_command",
+                                         "usable", "converged", "warnings", "contradicting_markers",
+                                         "recording", "version", "command", "seed", "seconds",
+                                         "model", "parameters", "effects", "nuisance", "basins",
+                                         "errors", "observations", "marker_offsets", "clouds"));
   EXPECT_EQ(json["format"], "clothfit-fit/1");
   EXPECT_EQ(json["model"]["mesh"]["rows"], 9);
   EXPECT_EQ(json["model"]["time_step_s"], 1.0 / 480);

@@ -89,8 +89,9 @@ std::string verdict_sentence(const FitResult& result) {
       grade = "Usable with care";
       break;
     case FitVerdict::model_lacks:
-      grade = is_forecast(result) ? "The model lacks something"
-                                  : "The model lacks something, and its numbers are not the cloth's";
+      grade = is_forecast(result)
+                  ? "The model lacks something"
+                  : "The model lacks something, and its numbers are not the cloth's";
       break;
     case FitVerdict::do_not_use:
       grade = "Do not use";
@@ -117,8 +118,9 @@ std::string contradicting_sentence(const FitResult& result) {
   for (const ObservationErrors& errors : result.errors) {
     if (!errors.fitted_without) continue;
     const ShownUnit unit = shown_unit(errors.unit);
-    text += fmt::format(" {} is {} {} off in the fitted frames", kind_words(errors.kind),
-                        significant(errors.fitted_without->rms * unit.factor, 3), unit.name);
+    text += fmt::format(" it is {} {} off in the fitted frames of {}",
+                        significant(errors.fitted_without->rms * unit.factor, 3), unit.name,
+                        kind_words(errors.kind));
     if (errors.held_out_without)
       text += fmt::format(" and {} {} in those held out",
                           significant(errors.held_out_without->rms * unit.factor, 3), unit.name);

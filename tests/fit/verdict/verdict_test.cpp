@@ -111,7 +111,8 @@ FitReport report_with(int wrong) {
 
 MarkerSet forty_markers() {
   MarkerSet markers;
-  for (int m = 0; m < 40; ++m) markers.markers.push_back({.name = std::string("m") + std::to_string(m)});
+  for (int m = 0; m < 40; ++m)
+    markers.markers.push_back({.name = std::string("m") + std::to_string(m)});
   return markers;
 }
 
@@ -137,6 +138,14 @@ TEST(ContradictingMarkers, AreNotNamedWhereManyLieOff) {
 
   EXPECT_TRUE(report.result.contradicting.empty());
   EXPECT_FALSE(report.result.errors.front().fitted_without);
+}
+
+TEST(ContradictingMarkers, AreNotNamedByAModelThatDoesNotFit) {
+  FitReport report = report_with(2);
+  for (FitReport::Residuals::Row& row : report.residuals.front().rows) row.sigma = 0.1;
+  name_contradicting(forty_markers(), report);
+
+  EXPECT_TRUE(report.result.contradicting.empty());
 }
 
 TEST(ContradictingMarkers, JudgeTheFitNoMore) {
