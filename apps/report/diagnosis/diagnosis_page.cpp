@@ -218,9 +218,9 @@ std::string answer_html(const Diagnosis& diagnosis) {
   for (const AcceptedEffect& accepted : diagnosis.accepted) {
     const Hypothesis& term = accepted.trial.hypothesis;
     const std::string words = words_of(term, diagnosis.found());
-    cause +=
-        fmt::format("<p class=\"found\">{}: <strong>{}</strong></p>\n", escape_xml(term.title()),
-                    escape_xml(words.empty() ? found_text(term, diagnosis.found().result) : words));
+    cause += fmt::format(
+        "<p class=\"found\">{}: <strong>{}</strong></p>\n", escape_xml(plain(term.title())),
+        escape_xml(words.empty() ? found_text(term, diagnosis.found().result) : words));
   }
   if (diagnosis.seen_elsewhere)
     cause += fmt::format("<p class=\"found\">markers seen elsewhere: <strong>{}</strong></p>\n",
@@ -307,8 +307,10 @@ std::string what_was_missing(const Diagnosis& diagnosis) {
 }
 
 /// Places two figures beside each other.
-std::string side_by_side(const std::string& before, const std::string& after) {
-  return "<div class=\"pair\">" + figure(before, "Before.") + figure(after, "After.") + "</div>\n";
+std::string side_by_side(const std::string& what, const std::string& before,
+                         const std::string& after) {
+  return "<div class=\"pair\">" + figure(before, what + " before.") +
+         figure(after, what + " after.") + "</div>\n";
 }
 
 std::string maps_of(const DiagnosedRecording& of, bool changed, const Recording& recording) {
@@ -327,10 +329,12 @@ std::string maps_of(const DiagnosedRecording& of, bool changed, const Recording&
       content += figure(residual_map_svg(before, recording), "Of each marker over the cloth.");
       continue;
     }
-    content += side_by_side(residual_over_time_svg(before, errors, recording),
-                            residual_over_time_svg(*after, errors_after, recording));
+    content +=
+        side_by_side("Error in each frame,", residual_over_time_svg(before, errors, recording),
+                     residual_over_time_svg(*after, errors_after, recording));
     const double largest = std::max(largest_marker_rms(before), largest_marker_rms(*after));
-    content += side_by_side(residual_map_svg(before, recording, largest),
+    content += side_by_side("Error of each marker over the flat cloth,",
+                            residual_map_svg(before, recording, largest),
                             residual_map_svg(*after, recording, largest));
   }
   return content;

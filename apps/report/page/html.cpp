@@ -58,7 +58,7 @@ ol.stages { padding-left: 1.4rem; font-size: .92rem; }
   .verdict { flex-direction: column; gap: .2rem; } .verdict .sign { text-align: left; }
   .pair, .answer { grid-template-columns: minmax(0, 1fr); }
   dl { grid-template-columns: 1fr; } dd { margin-bottom: .5rem; }
-  figure svg text { font-size: 17px; }
+  figure svg text { font-size: 15px; }
   table.rows thead { display: none; }
   table.rows, table.rows tbody, table.rows tr, table.rows th, table.rows td, table.rows caption { display: block; }
   table.rows tr { border-bottom: 1px solid var(--rule); padding: .4rem 0; }
