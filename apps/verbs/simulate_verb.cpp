@@ -233,6 +233,34 @@ void warn_of_strain(const ModelDescription& model, const SimulateResult& result,
         result.unmet_steps, choice.steps);
 }
 
+std::string obstacle_file(const ModelDescription& model) {
+  return model.obstacle_file.empty() ? model.where(0) : model.obstacle_file.string();
+}
+
+/// Says what the model does not give, and what is wrong with its obstacle. Throws InputError for
+/// one that is inside out, or in which the cloth starts.
+void check_before(const ModelDescription& model, const Simulation& simulation) {
+  for (const std::string& assumed : simulation.assumed) spdlog::warn("{}", assumed);
+  if (!model.obstacle) return;
+  if (!has_effect(model, "contact_mesh"))
+    return spdlog::warn(
+        "the cloth passes through the obstacle: the effect contact_mesh is not declared");
+  const Findings findings =
+      check_obstacle(*model.obstacle, obstacle_file(model), simulation.cloth.mesh,
+                     simulation.parameters.start_position_m);
+  refuse_wrong(findings);
+  for (const Finding& finding : findings) spdlog::warn("{}", sentence(finding));
+}
+
+/// Warns where the cloth went through its obstacle.
+void warn_of_holes(const ModelDescription& model, const Simulation& simulation,
+                   const SimulateResult& result) {
+  if (!model.obstacle || !has_effect(model, "contact_mesh")) return;
+  if (const auto pierced = check_pierced(*model.obstacle, obstacle_file(model),
+                                         simulation.cloth.mesh, result.position_m))
+    spdlog::warn("{}", sentence(*pierced));
+}
+
 Json describe_run(const ModelDescription& model, const Simulation& simulation,
                   const StepChoice& choice, const SimulateResult& result, double stretch,
                   const std::vector<std::string>& files) {
@@ -311,19 +339,7 @@ int run_simulate(const SimulateVerbOptions& options) {
     out.emplace(name);
     model = requested_model(options.request, out->path() / "steps", progress);
     const Simulation simulation = make_simulation(model);
-    for (const std::string& assumed : simulation.assumed) spdlog::warn("{}", assumed);
-    if (simulation.cloth.obstacle && !has_effect(model, "contact_mesh"))
-      spdlog::warn(
-          "the cloth passes through the obstacle: the effect contact_mesh is not declared");
-    const std::string obstacle_file =
-        model.obstacle_file.empty() ? model.where(0) : model.obstacle_file.string();
-    if (model.obstacle) {
-      const Findings findings =
-          check_obstacle(*model.obstacle, obstacle_file, simulation.cloth.mesh,
-                         simulation.parameters.start_position_m);
-      refuse_wrong(findings);
-      for (const Finding& finding : findings) spdlog::warn("{}", sentence(finding));
-    }
+    check_before(model, simulation);
     const StepChoice choice = choose_step(simulation, model, options.time_step_s);
     require_possible(choice, simulation, model, options.allow_unstable);
     said = fmt::format(
@@ -340,10 +356,7 @@ int run_simulate(const SimulateVerbOptions& options) {
       spdlog::warn("a spring stretched to {} times its natural length: no fabric does",
                    significant(stretch, 3));
     warn_of_strain(model, result, choice);
-    if (model.obstacle)
-      if (const auto pierced = check_pierced(*model.obstacle, obstacle_file, simulation.cloth.mesh,
-                                             result.position_m))
-        spdlog::warn("{}", sentence(*pierced));
+    warn_of_holes(model, simulation, result);
 
     model.time_step_s = choice.time_step_s;
     write_model(model, out->path());

@@ -11,7 +11,6 @@
 #include <numeric>
 #include <utility>
 
-#include "fit/observe/sheet_placement.h"
 #include "fit/preflight/checks.h"
 #include "fit/preflight/criteria.h"
 
