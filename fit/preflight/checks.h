@@ -8,6 +8,9 @@ namespace clothfit {
 /// The checks of a recording, each in a file of its own. A check that cannot be made of a recording
 /// adds nothing.
 
+/// Says whether something else than held points may carry the cloth: an obstacle, a contact.
+bool is_carried(const Recording& recording);
+
 /// Mass per area, gravity's size, frame times, the mesh's cells, parameters of declared effects.
 void check_declarations(const Recording& recording, CheckList& list);
 /// Distances between markers in space against those on the cloth; cameras' distances.

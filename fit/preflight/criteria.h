@@ -22,6 +22,8 @@ struct PreflightCriteria {
   /// Ratio of distances in space and on the cloth that is refused. Raised: feet pass for metres of
   /// a crumpled sheet.
   double scale_refused = 1.5;
+  /// The same of a shape that is not flat, below 1. Raised: crumpled cloth is refused.
+  double crumpled = 0.25;
   /// The same of a flat sheet, beyond 1, that is warned of. Raised: errors of the print's scale
   /// pass that change stiffness by as much.
   double scale_warned = 0.05;

@@ -109,6 +109,13 @@ void check_parameters(const Recording& recording, CheckList& list) {
 
 }  // namespace
 
+bool is_carried(const Recording& recording) {
+  return recording.obstacle.has_value() ||
+         std::ranges::any_of(recording.declared, [](const DeclaredEffect& effect) {
+           return effect.name.starts_with("contact");
+         });
+}
+
 void check_declarations(const Recording& recording, CheckList& list) {
   check_mass(recording, list);
   check_gravity_size(recording, list);

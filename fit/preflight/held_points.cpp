@@ -203,11 +203,7 @@ void check_nothing_held(const RecordedMotion& motion, int s,
                         const std::vector<Eigen::MatrixXd>& frames, const std::vector<int>& resting,
                         CheckList& list) {
   const Recording& recording = motion.recording();
-  const bool touches =
-      recording.obstacle || std::ranges::any_of(recording.declared, [](const DeclaredEffect& one) {
-        return one.name.starts_with("contact");
-      });
-  if (touches) return;
+  if (is_carried(recording)) return;
   const double t_s = motion.time_s().back() - motion.time_s().front();
   const double fall_m = 0.5 * recording.gravity_m_per_s2.norm() * t_s * t_s;
   std::vector<double> ways;
@@ -233,6 +229,7 @@ void check_nothing_held(const RecordedMotion& motion, int s,
 
 /// Markers far from what is held that rest while the cloth moves are held by something.
 void check_others(const RecordedMotion& motion, const std::vector<int>& resting, CheckList& list) {
+  if (is_carried(motion.recording())) return;
   std::vector<int> others;
   for (const int m : resting) {
     double nearest_m = INFINITY;

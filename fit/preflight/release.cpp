@@ -371,14 +371,6 @@ std::optional<Eigen::VectorXd> hanging(const RecordedMotion& motion, int most_fr
   return Eigen::VectorXd(middle / seen - held / holding);
 }
 
-/// Says whether something else than held points may carry the cloth.
-bool is_carried(const Recording& recording) {
-  return recording.obstacle.has_value() ||
-         std::ranges::any_of(recording.declared, [](const DeclaredEffect& effect) {
-           return effect.name.starts_with("contact");
-         });
-}
-
 /// The direction along which cloth hangs in the mean, of one or two places that hold it.
 std::optional<Gravity> gravity_it_hangs_along(const Eigen::Vector3d& hangs,
                                               const Eigen::Vector3d& declared) {
@@ -436,10 +428,10 @@ void check_rest(const RecordedMotion& motion, CheckList& list) {
       recording.held, [](const HeldPoint& point) { return point.motion == HeldMotion::fixed; });
   if (recording.start != StartKind::at_rest || !all_fixed || recording.held.empty()) return;
   constexpr double kMoves = 0.02;  // of the cloth's size
-  constexpr int kSoon = 12;
+  constexpr double kSoon_s = 0.2;  // before a person sets something in motion
   const std::vector<double> moved_m = moved_markers(motion).distance_m;
-  const int frames = std::min(kSoon, motion.frames());
-  for (int f = 1; f < frames; ++f) {
+  for (int f = 1; f < motion.frames(); ++f) {
+    if (motion.time_s()[static_cast<size_t>(f)] - motion.time_s()[0] > kSoon_s) return;
     const double moved = moved_m[static_cast<size_t>(f)];
     if (!(moved > kMoves * motion.size_m())) continue;
     const std::string found = fmt::format(
@@ -473,10 +465,9 @@ void check_release(const RecordedMotion& motion, CheckList& list) {
   Eigen::Vector3d normal = world_from_sheet->rotation * Eigen::Vector3d::UnitZ();
   if (normal.dot(recording.gravity_m_per_s2) < 0) normal = -normal;
   const double weight = normal.dot(recording.gravity_m_per_s2);
-  constexpr double kLeast = 0.3;  // gravity in the sheet's plane moves it too
-  if (!check_moment(motion, std::max(weight, kLeast * recording.gravity_m_per_s2.norm()), list))
-    return;
-  if (weight < kPreflight.in_view) return;
+  // A sheet that hangs already need not fall, and one that is carried soon stops.
+  if (weight < kPreflight.in_view || is_carried(recording)) return;
+  if (!check_moment(motion, weight, list)) return;
   const ReleaseSight at{.motion = motion, .world_from_sheet = *world_from_sheet, .weight = weight};
   if (motion.set(0).camera)
     check_fall(at, list);

@@ -69,7 +69,9 @@ void check_scale(const RecordedMotion& motion, int s, CheckList& list) {
   const double spread = spread_ratio(motion, motion.places(s, motion.first_frame(s)));
   // Markers in another order are far from their neighbours, and spread as far as ever.
   const double refused = kPreflight.scale_refused;
-  if (std::min(scale, spread) > refused || std::max(scale, spread) < 1 / refused) {
+  const bool is_flat = motion.recording().start == StartKind::released_flat;
+  const double least = is_flat ? 1 / refused : kPreflight.crumpled;
+  if (std::min(scale, spread) > refused || std::max(scale, spread) < least) {
     const std::string asked = scale > 1 ? asked_unit(scale, "are the tracks")
                                         : asked_unit(1 / scale, "are the cloth's size, s and t");
     return list.refuse("units",

@@ -152,6 +152,22 @@ TEST(Preflight, LeavesAWindToTheDiagnosis) {
   EXPECT_EQ(text_of(check(synthetic_input(cloth))), "");
 }
 
+TEST(Preflight, LetsAClothBeCarried) {
+  FitInput input = sound();
+  input.recording.held.clear();
+  input.recording.declared = {{.name = "contact_plane", .parameters = {{"stiffness", {1000}}}}};
+  EXPECT_EQ(text_of(check(input)), "");
+}
+
+TEST(Preflight, LetsCrumpledClothBeSmall) {
+  FitInput input = sound();
+  input.recording.start = StartKind::unknown;
+  for (Position3d& row : input.tracks3d) row.position_m *= 0.5;
+  EXPECT_EQ(text_of(check(input)), "");
+  for (Position3d& row : input.tracks3d) row.position_m *= 0.2;
+  EXPECT_TRUE(refuses(input, "units", "decimetres"));
+}
+
 /// Puts `still` frames in front that show the first one, each with noise of its own.
 FitInput held_for(int still) {
   FitInput input = sound();
