@@ -89,8 +89,8 @@ MeanErrors mean_errors(const Diagnosis& diagnosis) {
   const bool frames = std::ranges::any_of(
       all, [](const ErrorsBeforeAfter& one) { return one.before->held_out.count > 0; });
   MeanErrors errors{.means = {},
-                    .where = whole    ? "recordings that no fit and no decision has seen"
-                             : frames ? "frames that no decision has seen"
+                    .where = whole    ? "recordings that were kept out of every fit"
+                             : frames ? "frames that were kept out of the fit"
                                       : "the fitted frames"};
   for (const auto& [recording, before, after] : all) {
     if (whole && !recording->held_out) continue;
@@ -148,8 +148,8 @@ std::string alike_text(const Diagnosis& diagnosis) {
   const size_t asked = effects_asked(diagnosis);
   if (asked == 0) return "";
   if (alike.empty())
-    return fmt::format("Of {} effects that were asked none else comes near.", asked);
-  return fmt::format("Of {} effects that were asked only {} {} near.", asked,
+    return fmt::format("None of the others of {} effects that were tried comes near.", asked);
+  return fmt::format("Of {} effects that were tried only {} {} near.", asked,
                      fmt::join(alike, ", "), alike.size() == 1 ? "comes" : "come");
 }
 
@@ -184,10 +184,16 @@ std::vector<std::string> next_steps(const Diagnosis& diagnosis) {
           "cause and record once more.");
       break;
     case DiagnosisVerdict::partly_explained:
+      steps.push_back(diagnosis.complete
+                          ? "The error that is left still has a pattern: something smaller is "
+                            "missing too. Record the same cloth again, released in another way, "
+                            "and diagnose both recordings together."
+                          : "Give the search more time (--budget): not all effects were tried.");
+      break;
     case DiagnosisVerdict::unexplained:
       steps.push_back(diagnosis.complete
-                          ? "Look at the maps below where and when it is still off, and record the "
-                            "same cloth again, let go otherwise: what stays alike is the cloth's."
+                          ? "The maps below show where and when it is off. Record the same cloth "
+                            "again, released in another way, and diagnose both recordings together."
                           : "Give the search more time (--budget): not all effects were tried.");
       break;
     case DiagnosisVerdict::not_reached:
