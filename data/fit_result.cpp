@@ -8,6 +8,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "data/finding_json.h"
 #include "data/input_error.h"
 #include "data/text_file.h"
 
@@ -23,6 +24,10 @@ constexpr const char* kRemedy = "run `clothfit fit` again";
 double finite(double value) {
   assert(std::isfinite(value));
   return value;
+}
+
+Json or_null(double value) {
+  return std::isfinite(value) ? Json(value) : Json(nullptr);
 }
 
 Json to_json(const ParameterEstimate& parameter) {
@@ -47,14 +52,6 @@ Json to_json(const std::vector<ParameterEstimate>& parameters) {
   return list;
 }
 
-Json to_json(const Finding& finding) {
-  return {{"check", finding.check},
-          {"found", finding.found},
-          {"where", finding.where},
-          {"expected", finding.expected},
-          {"remedy", finding.remedy}};
-}
-
 Json to_json(const ErrorSummary& error) {
   return {{"rms", finite(error.rms)},
           {"rms_distance", finite(error.rms_distance)},
@@ -69,9 +66,9 @@ Json to_json(const ObservationErrors& errors) {
                {"noise", finite(errors.noise)},
                {"discretisation", finite(errors.discretisation)},
                {"trivial",
-                {{"first_frame", finite(errors.trivial.first_frame)},
-                 {"last_velocity", finite(errors.trivial.last_velocity)},
-                 {"rigid", finite(errors.trivial.rigid)}}}};
+                {{"first_frame", or_null(errors.trivial.first_frame)},
+                 {"last_velocity", or_null(errors.trivial.last_velocity)},
+                 {"rigid", or_null(errors.trivial.rigid)}}}};
   if (errors.fitted_without) json["fitted_without"] = to_json(*errors.fitted_without);
   if (errors.held_out_without) json["held_out_without"] = to_json(*errors.held_out_without);
   return json;
@@ -138,6 +135,9 @@ class JsonValue {
   double number() const {
     if (!json_.is_number()) refuse("is not a number", "a number");
     return json_.get<double>();
+  }
+  double number_or_nan() const {
+    return json_.is_null() ? std::numeric_limits<double>::quiet_NaN() : number();
   }
   int count() const {
     const bool fits = json_.is_number_unsigned() &&
@@ -217,9 +217,9 @@ ObservationErrors read_errors(const JsonValue& json) {
   if (json.has("held_out_without"))
     errors.held_out_without = read_error(json.at("held_out_without"));
   const JsonValue trivial = json.at("trivial");
-  errors.trivial.first_frame = trivial.at("first_frame").number();
-  errors.trivial.last_velocity = trivial.at("last_velocity").number();
-  errors.trivial.rigid = trivial.at("rigid").number();
+  errors.trivial.first_frame = trivial.at("first_frame").number_or_nan();
+  errors.trivial.last_velocity = trivial.at("last_velocity").number_or_nan();
+  errors.trivial.rigid = trivial.at("rigid").number_or_nan();
   return errors;
 }
 
@@ -318,10 +318,12 @@ std::string to_string(FitVerdict verdict) {
   return {};
 }
 
-bool scales_with_mass(const std::string& unit) {
-  // Force, pressure and mass do; a compliance is the inverse of one and stands below a bar.
+int mass_exponent(const std::string& unit) {
   const auto starts = [&](const char* text) { return unit.starts_with(text); };
-  return starts("N") || starts("Pa") || starts("kg");
+  if (starts("N") || starts("Pa") || starts("kg")) return 1;
+  const bool is_compliance =
+      unit.find("/N") != std::string::npos || unit.find("/(N") != std::string::npos;
+  return is_compliance ? -1 : 0;
 }
 
 ParameterEstimate scaled(ParameterEstimate parameter, double factor) {
@@ -341,11 +343,13 @@ FitResult at_density(FitResult result, std::optional<double> areal_density) {
       std::ranges::find(result.parameters, "areal_density", &ParameterEstimate::name);
   if (assumed == result.parameters.end()) return result;
   const double density = areal_density.value_or(assumed->value);
-  const std::string mark = kPerArealDensity;
   const auto turn = [&](ParameterEstimate& parameter) {
-    if (!parameter.unit.ends_with(mark)) return;
-    parameter = scaled(parameter, density);
-    parameter.unit.erase(parameter.unit.size() - mark.size());
+    for (const auto& [mark, factor] : {std::pair(std::string(kPerArealDensity), density),
+                                       std::pair(std::string(kTimesArealDensity), 1 / density)}) {
+      if (!parameter.unit.ends_with(mark)) continue;
+      parameter = scaled(parameter, factor);
+      parameter.unit.erase(parameter.unit.size() - mark.size());
+    }
   };
   for (ParameterEstimate& parameter : result.parameters) turn(parameter);
   for (EffectEstimate& effect : result.effects)

@@ -51,8 +51,11 @@ struct ParameterEstimate {
 
 /// Follows the unit of what is given as a ratio to the mass per area.
 inline constexpr const char* kPerArealDensity = " per kg/m2";
-/// Says whether numbers in a unit scale with the mass of a cloth that moves the same way.
-bool scales_with_mass(const std::string& unit);
+/// Follows the unit of what is given as a product with it.
+inline constexpr const char* kTimesArealDensity = " times kg/m2";
+/// Returns the power of the cloth's mass that numbers in a unit go with, for cloth that moves the
+/// same way: 1 for force, pressure and mass, -1 for a compliance, else 0.
+int mass_exponent(const std::string& unit);
 /// Returns an estimate with all its numbers times a factor.
 ParameterEstimate scaled(ParameterEstimate parameter, double factor);
 
@@ -82,7 +85,8 @@ struct ErrorSummary {
   int count = 0;  ///< points
 };
 
-/// rms over coordinates of the trivial predictors on the held-out frames.
+/// rms over coordinates of the trivial predictors on the held-out frames. NaN where nothing was
+/// held out, or where one cannot predict it: a marker must be seen before.
 struct TrivialErrors {
   double first_frame = 0;
   double last_velocity = 0;

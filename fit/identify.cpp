@@ -476,6 +476,7 @@ RefineResult search_and_refine(const FitProblem& coarse_problem, const FitProble
 
 double misfit_of_most_markers(const FitProblem& problem, const Eigen::VectorXd& residual) {
   constexpr double kLeftOut = 0.1;
+  constexpr size_t kFewestToLeaveOne = 5;
   const TrajectoryObjective whole(problem, problem.first_held_out,
                                   std::numeric_limits<double>::infinity());
   assert(residual.size() == whole.residual_count());
@@ -492,7 +493,9 @@ double misfit_of_most_markers(const FitProblem& problem, const Eigen::VectorXd& 
   std::vector<OfMarker> sums;
   for (const auto& [marker, sum] : by_marker) sums.push_back(sum);
   std::ranges::sort(sums, {}, [](const OfMarker& sum) { return sum.square / sum.residuals; });
-  const auto kept = sums.size() - static_cast<size_t>(kLeftOut * static_cast<double>(sums.size()));
+  auto left_out = static_cast<size_t>(kLeftOut * static_cast<double>(sums.size()));
+  if (sums.size() >= kFewestToLeaveOne) left_out = std::max<size_t>(left_out, 1);
+  const size_t kept = sums.size() - left_out;
   OfMarker most;
   for (size_t k = 0; k < kept; ++k) {
     most.square += sums[k].square;

@@ -21,7 +21,8 @@ RefineResult identify(const FitInput& input, const FitProblem& problem, const Fi
                       std::vector<Candidate>& candidates);
 
 /// Returns the mean square of whitened residuals over all fitted frames, without the tenth of the
-/// markers that leave most: a few whose tracks are wrong say nothing of the model.
+/// markers that leave most, at least one of five: a few whose tracks are wrong say nothing of the
+/// model.
 double misfit_of_most_markers(const FitProblem& problem, const Eigen::VectorXd& residual);
 
 /// Returns the settings of its last stage.

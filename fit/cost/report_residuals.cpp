@@ -54,7 +54,7 @@ Eigen::MatrixXd held_displacement(const FitProblem& problem, const ObservationSe
   return mean_displacement(held_tracks(problem, set));
 }
 
-/// Fills the trivial predictors' part. Where nothing is held out their errors stay 0.
+/// Fills the trivial predictors' part.
 void add_trivial_predictors(const FitProblem& problem, const ObservationSet& set,
                             FitReport::Residuals& residuals, TrivialErrors& errors) {
   const std::vector<Eigen::MatrixXd> tracks =
@@ -66,12 +66,9 @@ void add_trivial_predictors(const FitProblem& problem, const ObservationSet& set
   residuals.first_frame_by_frame = first.rms_by_frame;
   residuals.last_velocity_by_frame = velocity.rms_by_frame;
   residuals.rigid_by_frame = rigid.rms_by_frame;
-  const auto held_out_rms = [](const TrivialPrediction& prediction) {
-    return prediction.held_out_count > 0 ? prediction.held_out_rms : 0.0;
-  };
-  errors = {.first_frame = held_out_rms(first),
-            .last_velocity = held_out_rms(velocity),
-            .rigid = held_out_rms(rigid)};
+  errors = {.first_frame = first.held_out_rms,
+            .last_velocity = velocity.held_out_rms,
+            .rigid = rigid.held_out_rms};
 }
 
 }  // namespace

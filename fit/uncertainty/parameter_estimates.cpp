@@ -44,8 +44,9 @@ ParameterEstimate estimate(const FitParameter& parameter, const std::string& nam
         "cloth folds and unfolds: sigma means nothing",
         roughness);
   } else if (value - parameter.lower < edge || parameter.upper - value < edge) {
-    const bool at_neutral =
-        parameter.role == ParameterRole::effect && value - parameter.lower < edge;
+    // The lower end of what has no sign is as good as none of it.
+    const bool at_neutral = parameter.role == ParameterRole::effect && parameter.lower >= 0 &&
+                            value - parameter.lower < edge;
     if (!at_neutral) {
       result.state = ParameterState::undetermined;
       result.reason = fmt::format("it ended at the {} end of its range",
@@ -58,10 +59,11 @@ ParameterEstimate estimate(const FitParameter& parameter, const std::string& nam
 /// Turns what scales with the mass into ratios to it.
 void give_ratios(double areal_density, FitResult& result) {
   const auto turn = [&](ParameterEstimate& parameter) {
+    const int exponent = mass_exponent(parameter.unit);
     const bool given = parameter.state == ParameterState::fixed;
-    if (given || !scales_with_mass(parameter.unit) || parameter.name == "areal_density") return;
-    parameter = scaled(parameter, 1 / areal_density);
-    parameter.unit += kPerArealDensity;
+    if (given || exponent == 0 || parameter.name == "areal_density") return;
+    parameter = scaled(parameter, std::pow(areal_density, -exponent));
+    parameter.unit += exponent > 0 ? kPerArealDensity : kTimesArealDensity;
     if (parameter.state == ParameterState::fitted) parameter.state = ParameterState::ratio;
   };
   for (ParameterEstimate& parameter : result.parameters) turn(parameter);
@@ -127,8 +129,11 @@ void explain_by_bound(const ParameterSpace& space, const Uncertainty& uncertaint
   if (!(shift > own)) return;
   parameter.state = ParameterState::undetermined;
   parameter.reason = fmt::format(
-      "it trades with {}, which ended at an end of its range, and would move by {:.2g} beyond that",
-      space.parameters[static_cast<size_t>(uncertainty.bound_by)].name, shift);
+      "it trades with {}, which ended at an end of its range, and would move by {:.2g} times its "
+      "own "
+      "standard deviation beyond that",
+      space.parameters[static_cast<size_t>(uncertainty.bound_by)].name,
+      shift / std::max(own, 1e-4 * shift));
 }
 
 /// Adds the intervals of the p-th parameter.

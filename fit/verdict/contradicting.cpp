@@ -21,8 +21,15 @@ constexpr double kBeyondOthers = 8;
 constexpr int kStretch = 5;
 /// Sigmas that half of the markers may be off in the mean: a model that leaves more does not tell.
 constexpr double kExplained = 5;
-/// Share of the markers up to which they are to blame, and not the model.
+/// Share of the markers up to which they are to blame, and not the model; of few markers it is two.
 constexpr double kFew = 0.1;
+constexpr size_t kFewAtLeast = 2;
+
+bool are_few(size_t found, size_t all) {
+  return static_cast<double>(found) <=
+             std::max(static_cast<double>(kFewAtLeast), kFew * static_cast<double>(all)) &&
+         2 * found < all;
+}
 
 double sigmas(const Row& row) {
   return (row.observed - row.predicted).norm() /
@@ -92,8 +99,7 @@ void name_contradicting(const MarkerSet& markers, FitReport& report) {
     for (const auto& [frame, off] : usual) mean += off / static_cast<double>(usual.size());
     if (mean > kExplained) continue;
     const std::map<int, Stretch> found = longest_stretches(residuals.rows, usual);
-    if (found.empty() || static_cast<double>(found.size()) > kFew * static_cast<double>(all.size()))
-      continue;
+    if (found.empty() || !are_few(found.size(), all.size())) continue;
     for (const auto& [marker, stretch] : found) {
       named.insert(marker);
       report.result.contradicting.push_back(

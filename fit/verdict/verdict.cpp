@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 
 namespace clothfit {
@@ -13,9 +14,10 @@ const ObservationErrors* no_better_than_a_guess(const FitResult& result) {
   for (const ObservationErrors& errors : result.errors) {
     const ErrorSummary& held_out = errors.held_out_without.value_or(errors.held_out);
     if (held_out.count == 0) continue;
-    const double guess =
-        std::min({errors.trivial.first_frame, errors.trivial.last_velocity, errors.trivial.rigid});
-    if (!(held_out.rms < guess)) return &errors;
+    // One that cannot be made is NaN, which fmin passes over.
+    const double guess = std::fmin(errors.trivial.first_frame,
+                                   std::fmin(errors.trivial.last_velocity, errors.trivial.rigid));
+    if (held_out.rms >= guess) return &errors;
   }
   return nullptr;
 }

@@ -193,7 +193,9 @@ TEST(FitResult, ScalesRatiosToTheMassOfACloth) {
       {"areal_density", "kg/m2", 0.1, 0, ParameterState::undetermined, "not weighed"},
       {"shear", "N/m per kg/m2", 90, 2, ParameterState::ratio, "", Interval{86, 94}},
       {"damping_warp", "s", 0.002, 1e-4, ParameterState::fitted, ""}};
-  result.effects = {{"wind", {{"q_x", "Pa per kg/m2", 1.2, 0.1, ParameterState::ratio, ""}}}};
+  result.effects = {
+      {"wind", {{"q_x", "Pa per kg/m2", 1.2, 0.1, ParameterState::ratio, ""}}},
+      {"support_slip", {{"mobility", "m/(N s) times kg/m2", 3, 0.2, ParameterState::ratio, ""}}}};
 
   const FitResult assumed = at_density(result, std::nullopt), weighed = at_density(result, 0.2);
 
@@ -203,6 +205,27 @@ TEST(FitResult, ScalesRatiosToTheMassOfACloth) {
   EXPECT_EQ(weighed.parameters[1].unit, "N/m");
   EXPECT_DOUBLE_EQ(weighed.effects[0].parameters[0].value, 0.24);
   EXPECT_DOUBLE_EQ(weighed.parameters[2].value, 0.002);
+  EXPECT_DOUBLE_EQ(weighed.effects[1].parameters[0].value, 15);
+  EXPECT_EQ(weighed.effects[1].parameters[0].unit, "m/(N s)");
+}
+
+TEST(FitResult, KnowsWhichUnitsGoWithTheMass) {
+  EXPECT_EQ(mass_exponent("N/m"), 1);
+  EXPECT_EQ(mass_exponent("Pa s/m"), 1);
+  EXPECT_EQ(mass_exponent("m/(N s)"), -1);
+  EXPECT_EQ(mass_exponent("m/s2"), 0);
+  EXPECT_EQ(mass_exponent("1/s"), 0);
+}
+
+TEST(FitJson, KeepsAGuessThatCannotBeMade) {
+  const TemporaryFolder folder;
+  FitResult written = sample_result();
+  written.errors.front().trivial.last_velocity = NAN;
+  write_fit_result(written, folder / "fit.json");
+
+  const TrivialErrors read = read_fit_result(folder / "fit.json").errors.front().trivial;
+  EXPECT_TRUE(std::isnan(read.last_velocity));
+  EXPECT_EQ(read.rigid, written.errors.front().trivial.rigid);
 }
 
 TEST(FitJson, HasTheKeysOfTheFormat) {

@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <utility>
 #include <vector>
 
 #include "apps/report/diagnosis/diagnosis_law.h"
 #include "apps/report/diagnosis/diagnosis_tables.h"
 #include "apps/terminal/json_file.h"
 #include "apps/terminal/version.h"
+#include "data/finding_json.h"
 #include "fit/problem/effect_words.h"
 #include "fit/problem/effects_of.h"
 
@@ -118,13 +120,11 @@ void write_diagnosis(const Diagnosis& diagnosis, const std::string& command,
                     {"seconds", diagnosis.seconds}};
   json["warnings"] = ordered_json::array();
   for (const DiagnosedRecording& recording : diagnosis.recordings)
-    for (const Finding& warning : recording.after.result.warnings)
-      json["warnings"].push_back({{"recording", recording.after.result.recording},
-                                  {"check", warning.check},
-                                  {"found", warning.found},
-                                  {"where", warning.where},
-                                  {"expected", warning.expected},
-                                  {"remedy", warning.remedy}});
+    for (const Finding& warning : recording.after.result.warnings) {
+      ordered_json one{{"recording", recording.after.result.recording}};
+      one.update(to_json(warning));
+      json["warnings"].push_back(std::move(one));
+    }
   json["phases"] = ordered_json::array();
   for (const PhaseTime& phase : diagnosis.phases)
     json["phases"].push_back({{"name", phase.name}, {"seconds", phase.seconds}});

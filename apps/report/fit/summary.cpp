@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <vector>
 
 #include "apps/report/fit/fit_tables.h"
@@ -17,13 +18,15 @@ struct BestTrivial {
   const char* name = "";
 };
 
-BestTrivial best_trivial(const TrivialErrors& trivial) {
-  const std::vector<BestTrivial> all = {
+/// Returns the best of those that can be made; nothing where none can.
+std::optional<BestTrivial> best_trivial(const TrivialErrors& trivial) {
+  std::vector<BestTrivial> all = {
       {trivial.first_frame, "that the cloth stays as in its first frame"},
       {trivial.last_velocity, "that it moves on with its last velocity"},
       {trivial.rigid, "that it moves rigidly with its held points"}};
-  return *std::min_element(all.begin(), all.end(),
-                           [](const auto& a, const auto& b) { return a.rms < b.rms; });
+  std::erase_if(all, [](const BestTrivial& one) { return !std::isfinite(one.rms); });
+  if (all.empty()) return std::nullopt;
+  return *std::ranges::min_element(all, {}, &BestTrivial::rms);
 }
 
 /// Returns a kind of observation as a sentence has it.
@@ -37,14 +40,15 @@ std::string error_sentence(const ObservationErrors& errors) {
   std::string text = fmt::format("In {}, it is {} {} rms per coordinate off in the fitted frames",
                                  kind_words(errors.kind), shown(errors.fitted.rms), unit.name);
   if (errors.held_out.count > 0) {
-    const BestTrivial trivial = best_trivial(errors.trivial);
-    text += fmt::format(
-        " and {} {} in the {} observations that it never saw. The best trivial guess there, {}, "
-        "is {} {} off",
-        shown(errors.held_out.rms), unit.name, errors.held_out.count, trivial.name,
-        shown(trivial.rms), unit.name);
-    if (errors.held_out.rms > 0 && trivial.rms > errors.held_out.rms)
-      text += fmt::format(" ({} times as much)", significant(trivial.rms / errors.held_out.rms, 2));
+    text += fmt::format(" and {} {} in the {} observations that it never saw",
+                        shown(errors.held_out.rms), unit.name, errors.held_out.count);
+    if (const auto trivial = best_trivial(errors.trivial)) {
+      text += fmt::format(". The best trivial guess there, {}, is {} {} off", trivial->name,
+                          shown(trivial->rms), unit.name);
+      if (errors.held_out.rms > 0 && trivial->rms > errors.held_out.rms)
+        text +=
+            fmt::format(" ({} times as much)", significant(trivial->rms / errors.held_out.rms, 2));
+    }
   }
   if (errors.noise > 0) {
     text += fmt::format("; the measurements themselves scatter by {} {}", shown(errors.noise),

@@ -6,6 +6,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "fit/verdict/contradicting.h"
 
 namespace clothfit {
@@ -45,6 +47,15 @@ TEST(Verdict, CountsMeshAndTimeStepAsFloor) {
 
 TEST(Verdict, IsNoBetterThanAGuess) {
   EXPECT_EQ(verdict_of(result_with(1, 61)), FitVerdict::do_not_use);
+}
+
+TEST(Verdict, CountsNoGuessThatCannotBeMade) {
+  FitResult result = result_with(1, 1.2);
+  TrivialErrors& guesses = result.errors.front().trivial;
+  guesses.first_frame = guesses.last_velocity = guesses.rigid = NAN;
+  EXPECT_EQ(verdict_of(result), FitVerdict::good);
+  guesses.rigid = 1.1;
+  EXPECT_EQ(verdict_of(result), FitVerdict::do_not_use);
 }
 
 TEST(Verdict, NeedsSomethingDetermined) {
@@ -87,12 +98,12 @@ TEST(Verdict, BelievesNoIntervalWithoutSigma) {
   EXPECT_EQ(verdict_of(result), FitVerdict::model_lacks);
 }
 
-/// Forty markers off by about one sigma in twenty frames, and `wrong` of them by 200 from frame 8.
-FitReport report_with(int wrong) {
+/// Markers off by about one sigma in twenty frames, and `wrong` of them by 200 from frame 8.
+FitReport report_with(int wrong, int markers = 40) {
   FitReport report;
   report.residuals.push_back({.kind = "tracks3d", .unit = "m"});
   for (int f = 0; f < 20; ++f)
-    for (int m = 0; m < 40; ++m) {
+    for (int m = 0; m < markers; ++m) {
       const double off = m < wrong && f >= 8 ? 200 : 1;
       report.residuals.back().rows.push_back({.frame = f,
                                               .marker = m,
@@ -130,6 +141,15 @@ TEST(ContradictingMarkers, AreNamedAndLeftOutOfErrorsBeside) {
   EXPECT_EQ(errors.fitted_without->count, 15 * 38);
   EXPECT_NEAR(errors.fitted_without->rms_distance, 1, 1e-12);
   EXPECT_NEAR(errors.held_out_without->rms, 1 / std::sqrt(3), 1e-12);
+}
+
+TEST(ContradictingMarkers, MayBeOneOfAFew) {
+  FitReport one = report_with(1, 7), half = report_with(2, 4);
+  name_contradicting(forty_markers(), one);
+  name_contradicting(forty_markers(), half);
+
+  EXPECT_EQ(one.result.contradicting.size(), 1u);
+  EXPECT_TRUE(half.result.contradicting.empty());
 }
 
 TEST(ContradictingMarkers, AreNotNamedWhereManyLieOff) {
