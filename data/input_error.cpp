@@ -15,7 +15,11 @@ std::string sentence(const std::string& where, const std::string& problem,
 
 InputError::InputError(const std::string& where, const std::string& problem,
                        const std::string& expected, const std::string& remedy)
-    : std::runtime_error(sentence(where, problem, expected, remedy)) {}
+    : std::runtime_error(sentence(where, problem, expected, remedy)),
+      where_(where),
+      problem_(problem),
+      expected_(expected),
+      remedy_(remedy) {}
 
 InputError::InputError(const std::string& file, int line, const std::string& problem,
                        const std::string& expected, const std::string& remedy)

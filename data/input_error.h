@@ -20,6 +20,14 @@ class InputError : public std::runtime_error {
   /// Refuses line `line` (counted from 1) of `file`.
   InputError(const std::string& file, int line, const std::string& problem,
              const std::string& expected, const std::string& remedy = "");
+
+  const std::string& where() const { return where_; }
+  const std::string& problem() const { return problem_; }
+  const std::string& expected() const { return expected_; }
+  const std::string& remedy() const { return remedy_; }
+
+ private:
+  std::string where_, problem_, expected_, remedy_;
 };
 
 }  // namespace clothfit

@@ -19,6 +19,24 @@ struct ParsedCommandLine {
   std::set<const CLI::Option*> shape_no_result;
 };
 
+namespace {
+
+/// Returns a word as a shell takes it whole.
+std::string in_shell(const std::string& word) {
+  constexpr const char* kPlain =
+      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_./=,:+-@%";
+  if (!word.empty() && word.find_first_not_of(kPlain) == std::string::npos) return word;
+  std::string quoted = "'";
+  for (const char letter : word)
+    if (letter == '\'')
+      quoted += "'\\''";
+    else
+      quoted += letter;
+  return quoted + "'";
+}
+
+}  // namespace
+
 Option Option::required() const {
   option_->required();
   return *this;
@@ -105,19 +123,25 @@ bool Verb::is_given(const std::string& name) const {
 }
 
 std::string Verb::command_text() const {
-  std::string text = app_->get_name();
+  return command_text_as(app_->get_name());
+}
+
+std::string Verb::command_text_as(const std::string& other) const {
+  std::string text = other;
   for (const CLI::App* parent = app_->get_parent(); parent != nullptr;
        parent = parent->get_parent())
     text = parent->get_name() + " " + text;
+  const CLI::App* verb = app_->get_parent()->get_subcommand(other);
   for (const CLI::Option* option : app_->get_options()) {
     if (option->count() == 0 || parsed_->shape_no_result.contains(option)) continue;
-    const bool has_values = option->get_items_expected_max() > 0;
-    if (!has_values) text += " " + option->get_name();
-    if (option->get_positional())
-      for (const std::string& value : option->results()) text += " " + value;
-    else if (has_values)
-      for (const std::string& value : option->results())
-        text += " " + option->get_name() + " " + value;
+    const bool is_argument = option->get_positional();
+    if (!is_argument && verb->get_option_no_throw(option->get_name()) == nullptr) continue;
+    if (option->get_items_expected_max() == 0) {
+      text += " " + option->get_name();
+      continue;
+    }
+    for (const std::string& value : option->results())
+      text += (is_argument ? " " : " " + option->get_name() + " ") + in_shell(value);
   }
   return text;
 }

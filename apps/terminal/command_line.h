@@ -75,7 +75,11 @@ class Verb {
 
   bool is_given(const std::string& name) const;
   /// Returns verb and options as given, for results to keep: "clothfit fit swing_plain --seed 2".
+  /// Words that a shell would take apart are quoted.
   std::string command_text() const;
+  /// Returns the same for a verb beside this one: with the arguments, and with those of the options
+  /// that it has too.
+  std::string command_text_as(const std::string& other) const;
 
  private:
   friend class CommandLine;

@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <stdlib.h>
 
 #include <memory>
 #include <string>
@@ -8,7 +9,7 @@
 #include "apps/terminal/progress_line.h"
 #include "apps/verbs/checked_input.h"
 #include "apps/verbs/verb.h"
-#include "data/output_folder.h"
+#include "data/input_error.h"
 
 namespace clothfit {
 namespace {
@@ -18,6 +19,31 @@ namespace fs = std::filesystem;
 struct CheckVerbOptions {
   fs::path recording;
   std::string observations = "automatic";
+};
+
+/// A folder that pictures are tracked into, which goes when this is over. Where the user works, a
+/// check writes nothing.
+class ScratchFolder {
+ public:
+  ScratchFolder() {
+    const fs::path all = fs::temp_directory_path();
+    std::string name = (all / "clothfit-check-XXXXXX").string();
+    if (mkdtemp(name.data()) == nullptr)
+      throw InputError(all.string(), "no folder can be made there", "room for temporary files",
+                       "set TMPDIR to a folder that can be written");
+    path_ = name;
+  }
+  ~ScratchFolder() {
+    std::error_code ignored;
+    fs::remove_all(path_, ignored);
+  }
+  ScratchFolder(const ScratchFolder&) = delete;
+  ScratchFolder& operator=(const ScratchFolder&) = delete;
+
+  const fs::path& path() const { return path_; }
+
+ private:
+  fs::path path_;
 };
 
 const char* verdict(FindingState state) {
@@ -49,8 +75,7 @@ int run_check(const CheckVerbOptions& options) {
   const Recording given = read_recording(recording_folder(options.recording));
   Findings findings;
   {
-    // Pictures are tracked into a folder that goes when this is over.
-    const OutputFolder scratch(out_folder({}, given.name + ".check"));
+    const ScratchFolder scratch;
     ProgressLine line;
     findings = check_input(given, kind, scratch.path() / "steps", watch(line)).findings;
   }

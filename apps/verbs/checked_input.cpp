@@ -11,13 +11,19 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Names the file that the user has: a step copies files, and makes tracks of its own.
+/// Names the file that the user has, FILE or FILE:LINE: a step copies files, and makes tracks of
+/// its own.
 std::string as_given(const std::string& where, const fs::path& step, const fs::path& given) {
   const fs::path relative = fs::path(where).lexically_relative(step);
   if (step == given || relative.empty() || *relative.begin() == "..") return where;
+  std::string file = relative.string(), line;
+  if (const size_t colon = file.find(':'); colon != std::string::npos) {
+    line = file.substr(colon);
+    file.resize(colon);
+  }
   std::error_code error;
-  return (fs::exists(given / relative, error) ? given / relative : given / "recording.yaml")
-      .string();
+  if (!fs::exists(given / file, error)) return (given / "recording.yaml").string();
+  return (given / file).string() + line;
 }
 
 }  // namespace
@@ -28,6 +34,15 @@ Findings findings_of(const FitInput& input, const Recording& given, ObservationK
     if (!finding.where.empty())
       finding.where = as_given(finding.where, input.recording.folder, given.folder);
   return findings;
+}
+
+Finding finding_of(const InputError& error, const fs::path& step, const fs::path& given) {
+  return {.check = "input",
+          .state = FindingState::refused,
+          .found = error.problem(),
+          .where = as_given(error.where(), step, given),
+          .expected = error.expected(),
+          .remedy = error.remedy()};
 }
 
 CheckedInput check_input(const Recording& given, ObservationKind kind, const fs::path& steps,

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "data/finding.h"
+#include "data/input_error.h"
 #include "data/progress.h"
 #include "data/recording.h"
 #include "fit/interface/fit_input.h"
@@ -29,6 +30,10 @@ CheckedInput checked_input(const Recording& given, ObservationKind kind,
 
 /// Checks a recording that a step has completed. Its files are named as `given`.
 Findings findings_of(const FitInput& input, const Recording& given, ObservationKind kind);
+
+/// Returns what could not be read in the folder of a step as a finding that refuses the recording.
+Finding finding_of(const InputError& error, const std::filesystem::path& step,
+                   const std::filesystem::path& given);
 
 /// Returns a line for each warning, with an empty line behind them; nothing where there are none.
 std::string warnings_text(const Findings& warnings);

@@ -18,6 +18,7 @@ void add_demo_verb(Verb program) {
     options->recording = bundled_recording("tags_onecam");
     if (options->out.empty()) options->out = "demo.fit";
     options->command = "clothfit demo";
+    options->diagnose_command = "clothfit diagnose " + shown_path(options->recording);
     fmt::print("Fitting the bundled recording in {}\n", shown_path(options->recording));
     return run_fit(*options);
   });

@@ -130,13 +130,6 @@ std::optional<double> areal_density(const Recording& recording) {
   return *cloth.mass_kg / (cloth.width_m * cloth.height_m);
 }
 
-/// The command that asks what the model of a recording lacks.
-std::string diagnose_line(const FitVerbOptions& options) {
-  std::string line = "clothfit diagnose " + options.recording.string();
-  for (const std::string& effect : options.fit.effects) line += " --effect " + effect;
-  return line;
-}
-
 /// Tries the other way to spread the cloth's mass over its vertices, from where the fit stands.
 /// Returns a warning where that way explains the recording and the declared one does not.
 std::optional<Finding> try_other_masses(const FitInput& input, FitOptions options,
@@ -146,10 +139,14 @@ std::optional<Finding> try_other_masses(const FitInput& input, FitOptions option
   const bool by_area = masses == MassDistribution::by_area;
   masses = by_area ? MassDistribution::equal : MassDistribution::by_area;
   options.start = report.values;
+  options.bootstrap = 0;
+  options.profile = options.two_meshes = false;
   options.checkpoint.clear();
   options.resume = false;
-  const FitReport fitted = fit(other, options, progress);
+  FitReport fitted = fit(other, options, progress);
   if (!fitted.usable()) return std::nullopt;
+  for (size_t k = 0; k < fitted.result.errors.size(); ++k)
+    fitted.result.errors[k].discretisation = report.result.errors[k].discretisation;
   const double own = errors_over_floor(report.result).worst(),
                others = errors_over_floor(fitted.result).worst();
   constexpr double kClearly = 0.6;
@@ -185,9 +182,13 @@ FitReport fit_and_judge(const FitInput& input, FitOptions options,
   const double over = errors_over_floor(result).worst();
   constexpr double kBeyondAnyMesh = 8;  // times the noise
   if (!options.forecast && over > kVerdict.good && over < kBeyondAnyMesh) {
-    const double square = discretisation_square(input, options, report, progress);
+    const auto square = discretisation_square(input, options, report, progress);
+    if (!square) {
+      report.stop = FitStop::cancelled;
+      return report;
+    }
     for (ObservationErrors& errors : result.errors)
-      errors.discretisation = errors.noise * std::sqrt(square);
+      errors.discretisation = errors.noise * std::sqrt(*square);
   }
   if (!options.forecast && errors_over_floor(result).worst() > kVerdict.good)
     if (const auto masses = try_other_masses(input, options, report, progress))
@@ -220,7 +221,7 @@ int run_fit(const FitVerbOptions& given_options) {
   if (report.stop == FitStop::cancelled || interrupted())
     throw Cancelled(how_to_go_on(options.fit));
   if (!report.usable()) throw NoResult("no fit: " + report.message);
-  if (!report.result.usable()) report.result.next_command = diagnose_line(options);
+  if (!report.result.usable()) report.result.next_command = options.diagnose_command;
   if (report.result.verdict == FitVerdict::do_not_use && !options.keep)
     throw NoResult(
         fmt::format("do not use: {}; no result was written (--keep writes it). To ask "
@@ -367,6 +368,7 @@ void add_fit_verb(Verb program) {
     options->fit.search = flags->search == "cma" ? SearchMethod::cma : SearchMethod::paper;
     options->fit.loss = flags->loss == "squared" ? Loss::squared : Loss::huber;
     options->command = verb.command_text();
+    options->diagnose_command = verb.command_text_as("diagnose");
     return run_fit(*options);
   });
 }

@@ -17,6 +17,7 @@ struct FitVerbOptions {
   /// Verb and options as fit.json keeps them, without those that change no result (--out,
   /// --threads).
   std::string command;
+  std::string diagnose_command;  ///< that asks what the model lacks, with the same options
 };
 
 /// Completes the recording, fits it, writes the result folder, prints the tables. Returns an exit

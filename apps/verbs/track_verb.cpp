@@ -17,6 +17,7 @@
 #include "apps/terminal/text_table.h"
 #include "apps/verbs/checked_input.h"
 #include "apps/verbs/verb.h"
+#include "data/finding_json.h"
 #include "data/input_error.h"
 #include "data/output_folder.h"
 #include "data/text_file.h"
@@ -51,12 +52,17 @@ void print_tracks(const CameraTracks& tracks, const Recording& recording) {
   if (tracks.placement) fmt::print("\n{}\n", tracks.placement->message);
 }
 
-/// Holds the tracks against what the recording declares; nothing where a camera has no place.
+/// Holds the tracks against what the recording declares; nothing where a camera has no place. What
+/// cannot be read beside the tracks is a finding too: they are found already, and stay.
 Findings check_tracks(const TrackStepResult& step, const Recording& given) {
   for (const CameraTracks& tracks : step.cameras)
     if (!tracks.not_placed.empty()) return {};
-  const FitInput input = read_fit_input(step.recording, ObservationKind::tracks2d);
-  return findings_of(input, given, ObservationKind::tracks2d);
+  try {
+    const FitInput input = read_fit_input(step.recording, ObservationKind::tracks2d);
+    return findings_of(input, given, ObservationKind::tracks2d);
+  } catch (const InputError& error) {
+    return {finding_of(error, step.recording.folder, given.folder)};
+  }
 }
 
 /// Adds what was found wrong or doubtful to a JSON file, as fit.json has it.
@@ -66,11 +72,7 @@ void add_findings(const Findings& findings, const fs::path& file) {
                                    std::pair(FindingState::refused, "refused")}) {
     json[key] = nlohmann::ordered_json::array();
     for (const Finding& finding : with_state(findings, state))
-      json[key].push_back({{"check", finding.check},
-                           {"found", finding.found},
-                           {"where", finding.where},
-                           {"expected", finding.expected},
-                           {"remedy", finding.remedy}});
+      json[key].push_back(to_json(finding));
   }
   write_json(json, file);
 }

@@ -70,8 +70,9 @@ double coarse_will_do_beyond(const DiagnosisSetup& setup) {
   return grossly_misfitting(setup.inputs.front().recording.start == StartKind::unknown);
 }
 
-double discretisation_square(const FitInput& input, const FitOptions& options,
-                             const FitReport& report, const ProgressCallback& progress) {
+std::optional<double> discretisation_square(const FitInput& input, const FitOptions& options,
+                                            const FitReport& report,
+                                            const ProgressCallback& progress) try {
   const DiagnosisSetup setup{.inputs = {&input, 1},
                              .options = options,
                              .columns = report.result.mesh_columns,
@@ -81,6 +82,8 @@ double discretisation_square(const FitInput& input, const FitOptions& options,
   refine_with_discretisation(model, setup, progress);
   if (!model.usable()) return 0;
   return model.parts.front().directions.squaredNorm() / static_cast<double>(model.residual_count());
+} catch (const StopRequested&) {
+  return std::nullopt;
 }
 
 void fit_base(Analysis& analysis, const ProgressCallback& progress) {

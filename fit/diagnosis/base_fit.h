@@ -1,5 +1,7 @@
 #pragma once
 
+#include <optional>
+
 #include "fit/diagnosis/analysis.h"
 
 namespace clothfit {
@@ -11,9 +13,11 @@ double coarse_will_do_beyond(const DiagnosisSetup& setup);
 
 /// Returns the mean square, over the noise's, of the error that mesh and time step make of a fit,
 /// as the test of adequacy has it (Adequacy::discretisation_square). 0 where the model misfits
-/// grossly: it is not looked for then. Takes a fit on another mesh from where this one stands.
-double discretisation_square(const FitInput& input, const FitOptions& options,
-                             const FitReport& report, const ProgressCallback& progress);
+/// grossly: it is not looked for then. Nothing where `progress` says to stop. Takes a fit on
+/// another mesh from where this one stands.
+std::optional<double> discretisation_square(const FitInput& input, const FitOptions& options,
+                                            const FitReport& report,
+                                            const ProgressCallback& progress);
 
 /// Fits the declared model to all recordings, on the mesh that is to be analysed. That mesh has
 /// twice the cells a side where the fit leaves clearly less with them. A model that misfits grossly

@@ -12,6 +12,7 @@
 
 #include "data/fit_result.h"
 #include "data/recording.h"
+#include "data/text_file.h"
 #include "data/tracks.h"
 #include "model/topology/surface.h"
 #include "tests/apps/bundled_recordings.h"
@@ -277,6 +278,25 @@ TEST(ProgramTrack, CompletesARecordingThatAFitCanUse) {
   EXPECT_THAT(read_text(*recording.cameras[0].file), HasSubstr("camera_from_world"));
   EXPECT_TRUE(fs::exists(here.path() / "tags_onecam.tracks" / "tracks.json"));
   EXPECT_TRUE(fs::exists(here.path() / "tags_onecam.tracks" / "overlay_front.png"));
+}
+
+TEST(ProgramTrack, LeavesTheTracksOfARecordingWhoseTimesCannotBeRead) {
+  const test::ScratchFolder here("track_times");
+  const fs::path recording = here.path() / "short";
+  fs::copy(kBundled / "tags_onecam", recording, fs::copy_options::recursive);
+  std::string yaml = read_text(recording / "recording.yaml");
+  yaml.replace(yaml.find("frame_rate: "),
+               yaml.find('\n', yaml.find("frame_rate: ")) - yaml.find("frame_rate: "),
+               "times: times.csv");
+  write_text(yaml, recording / "recording.yaml");
+  write_text("frame,time\n0,0\n1,0.02\n", recording / "times.csv");
+
+  const ProgramRun run = run_program({"track", recording.string()}, here.path());
+
+  EXPECT_EQ(run.exit_code, 3);
+  EXPECT_THAT(run.error, HasSubstr((recording / "times.csv").string()));
+  EXPECT_TRUE(fs::exists(here.path() / "short.tracks" / "tracks2d" / "front.csv"));
+  EXPECT_THAT(read_text(here.path() / "short.tracks" / "tracks.json"), HasSubstr("times.csv"));
 }
 
 TEST(ProgramCalibrate, CompletesARecordingThatTrackingCanUse) {

@@ -213,6 +213,8 @@ TEST_F(Program, RefusesAMissingColumn) {
 
 TEST_F(Program, ChecksARecordingAgainstItself) {
   copy_bundled("swing_plain");
+  // A folder of the user's with any name is in nobody's way.
+  fs::create_directories(here_ / (recording_.filename().string() + ".check"));
   const ProgramRun sound = run_program({"check", recording_.string()}, here_);
   EXPECT_EQ(sound.exit_code, 0) << sound.error;
   EXPECT_THAT(sound.out, HasSubstr("ok       units"));
@@ -223,7 +225,7 @@ TEST_F(Program, ChecksARecordingAgainstItself) {
   EXPECT_EQ(wrong.exit_code, 3);
   EXPECT_THAT(wrong.out, HasSubstr("WRONG    mass"));
   EXPECT_THAT(wrong.out, HasSubstr("is it in grams? give kilograms"));
-  EXPECT_THAT(names_in(here_), IsEmpty());
+  EXPECT_EQ(names_in(here_).size(), 1u);
 }
 
 TEST_F(Program, FitsAndDiagnosesNothingThatContradictsItself) {

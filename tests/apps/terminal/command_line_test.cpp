@@ -53,6 +53,23 @@ TEST(CommandLine, RunsTheVerbThatIsNamedWithItsOptions) {
   EXPECT_FALSE(weaver.verb.is_given("--threads"));
 }
 
+TEST(CommandLine, WritesACommandForAnotherVerbAsAShellTakesIt) {
+  Weaver weaver;
+  Verb carpet = weaver.line.program().add_verb("carpet", "Weaves a carpet");
+  std::vector<std::string> colours;
+  carpet.add_option("--colour", &colours, "Colours");
+  std::string text;
+  weaver.verb.runs([&] {
+    text = weaver.verb.command_text_as("carpet");
+    return 0;
+  });
+  const CommandLine::Parsed parsed =
+      weaver.parse({"cloth", "my mother's", "--colour", "red", "--width", "40mm"});
+  ASSERT_TRUE(parsed.action);
+  parsed.action();
+  EXPECT_EQ(text, R"(weave carpet 'my mother'\''s' --colour red)");
+}
+
 TEST(CommandLine, KeepsOfACommandWhatShapesItsResult) {
   Weaver weaver;
   const CommandLine::Parsed parsed =
