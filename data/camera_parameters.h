@@ -16,7 +16,7 @@ struct CameraPose {
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
   Eigen::Vector3d translation_m = Eigen::Vector3d::Zero();
   /// Covariance of (rotation vector (rad), translation (m)), both added on the camera's side:
-  /// camera_from_world = (exp(w), d) * estimate. Absent when the pose is taken as exact.
+  /// camera_from_world = (exp(w), d) * estimate. Absent where it is not known.
   std::optional<Eigen::Matrix<double, 6, 6>> covariance;
 };
 

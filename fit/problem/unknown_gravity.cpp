@@ -5,12 +5,16 @@
 #include "fit/problem/turned.h"
 #include "fit/problem/unknown_group.h"
 
-/// The direction of gravity, where a camera's pose was estimated.
+/// The direction of gravity, where cameras saw the cloth.
 namespace clothfit {
 namespace {
 
-/// Adds two level directions and, where a camera's pose was estimated, gravity's direction as an
-/// unknown. Its prior follows from that estimate. Only gravity's direction in the camera's axes
+/// Standard deviation of a camera's rotation that comes without a covariance, rad: half a degree,
+/// as a spirit level or a person's eye gives.
+constexpr double kUnstatedTilt = 0.01;
+
+/// Adds two level directions and, where a camera saw the cloth, gravity's direction as an unknown.
+/// Its prior follows from the pose's covariance, or from kUnstatedTilt. Only gravity's direction in the camera's axes
 /// matters to a cloth that is placed by what the camera sees. All else of the pose moves the scene
 /// as a whole. With true camera_from_world = exp(w) * estimate, gravity seen through the estimate
 /// is turned by R' w in the world (R the estimated rotation).
@@ -22,12 +26,13 @@ void add_gravity_direction(FitProblem& problem) {
   problem.level_axes.col(1) = problem.level_axes.col(0).cross(down);
 
   const ObservationSet& first = problem.observations.front();
-  if (!first.camera || !first.camera->camera_from_world->covariance) return;
-  const Eigen::Matrix3d rotation = first.camera->camera_from_world->rotation.toRotationMatrix();
-  const Eigen::Matrix<double, 2, 3> level = problem.level_axes.transpose() * rotation.transpose();
-  const Eigen::Matrix2d covariance =
-      level * first.camera->camera_from_world->covariance->topLeftCorner<3, 3>() *
-      level.transpose();
+  if (!first.camera) return;
+  const CameraPose& pose = *first.camera->camera_from_world;
+  const Eigen::Matrix<double, 2, 3> level =
+      problem.level_axes.transpose() * pose.rotation.toRotationMatrix().transpose();
+  Eigen::Matrix3d of_rotation = kUnstatedTilt * kUnstatedTilt * Eigen::Matrix3d::Identity();
+  if (pose.covariance) of_rotation = pose.covariance->topLeftCorner<3, 3>();
+  const Eigen::Matrix2d covariance = level * of_rotation * level.transpose();
   GaussianPrior prior{.indices = {}, .mean = Eigen::Vector2d::Zero(), .sqrt_information = {}};
   prior.sqrt_information = covariance.inverse().llt().matrixU();
   constexpr double kTypicalTilt = 1e-3;
