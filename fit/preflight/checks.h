@@ -9,7 +9,7 @@ namespace clothfit {
 /// adds nothing.
 
 /// Says whether something else than held points may carry the cloth: an obstacle, a contact.
-bool is_carried(const Recording& recording);
+bool is_carried(const RecordedMotion& motion);
 
 /// Mass per area, gravity's size, frame times, the mesh's cells, parameters of declared effects.
 void check_declarations(const Recording& recording, CheckList& list);
@@ -21,7 +21,9 @@ void check_proportions(const RecordedMotion& motion, CheckList& list);
 void check_first_sheet(const RecordedMotion& motion, CheckList& list);
 /// Frames that are missing, repeated or out of step.
 void check_timing(const RecordedMotion& motion, CheckList& list);
-/// Gravity's direction and size, and the moment of release.
+/// Cloth that hangs below what holds it, along gravity.
+void check_hanging(const RecordedMotion& motion, CheckList& list);
+/// The moment of release, and the fall from there by gravity and frame times.
 void check_release(const RecordedMotion& motion, CheckList& list);
 /// Whether held points rest, and nothing else does.
 void check_held_points(const RecordedMotion& motion, CheckList& list);

@@ -38,12 +38,12 @@ void check_mass(const Recording& recording, CheckList& list) {
 
 void check_gravity_size(const Recording& recording, CheckList& list) {
   const double size = recording.gravity_m_per_s2.norm();
-  if (size >= kPreflight.least_gravity && size <= kPreflight.most_gravity) return;
-  const bool in_millimetres = size > 5e3 && size < 2e4, in_g = std::abs(size - 1) < 0.1;
+  if (size >= kPreflight.least_on_ground && size <= kPreflight.most_on_ground) return;
+  const bool in_millimetres = size > 5e3 && size < 2e4, in_g = std::abs(size - 1) < 0.02;
   const char* remedy = in_millimetres ? "is it in mm/s2?" : in_g ? "is it in units of g?" : "";
   const std::string found = fmt::format("gravity is {:.4g} m/s2", size);
   const std::string expected = "9.81 m/s2 on the ground";
-  // Without weight is possible, a thousand times as heavy is not.
+  // Less weight is possible, on a slope or elsewhere; much more is not.
   if (size > kPreflight.most_gravity || in_g)
     list.refuse("gravity", found, expected, remedy);
   else
@@ -108,13 +108,6 @@ void check_parameters(const Recording& recording, CheckList& list) {
 }
 
 }  // namespace
-
-bool is_carried(const Recording& recording) {
-  return recording.obstacle.has_value() ||
-         std::ranges::any_of(recording.declared, [](const DeclaredEffect& effect) {
-           return effect.name.starts_with("contact");
-         });
-}
 
 void check_declarations(const Recording& recording, CheckList& list) {
   check_mass(recording, list);

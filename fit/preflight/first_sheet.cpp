@@ -92,10 +92,14 @@ Eigen::Matrix2Xd reordered(const Eigen::Matrix2Xd& marker_m, const Order& order)
 
 /// Returns by how much markers lie beside where their neighbours on the cloth put them: the median,
 /// as a share of the distance to the nearest one. Empty where that cannot be told.
-std::optional<double> disorder(const Eigen::Matrix2Xd& marker_m, const std::vector<int>& tracked,
-                               const Eigen::MatrixXd& place, double units_per_m) {
+std::optional<double> disorder(const Eigen::Matrix2Xd& marker_m, const RecordedMotion& motion,
+                               int s) {
   constexpr int kNear = 12;
+  // The place among neighbours is hardly noisy, so that one end of the distance is.
+  constexpr double kOfNoise = 0.7;
   constexpr int kFewest = 8, kMost = 400;
+  const std::vector<int>& tracked = motion.tracked();
+  const Eigen::MatrixXd place = motion.places(s, motion.first_frame(s));
   const size_t stride = std::max<size_t>(1, tracked.size() / kMost);
   std::vector<double> shares;
   for (size_t k = 0; k < tracked.size(); k += stride) {
@@ -107,7 +111,9 @@ std::optional<double> disorder(const Eigen::Matrix2Xd& marker_m, const std::vect
     const auto expected = place_among(marker_m, place, near, marker_m.col(m));
     const double spacing_m = (marker_m.col(near.front()) - marker_m.col(m)).norm();
     if (expected && spacing_m > 0)
-      shares.push_back((place.col(m) - *expected).norm() / (units_per_m * spacing_m));
+      shares.push_back(
+          distance_less_noise(place.col(m) - *expected, kOfNoise * motion.set(s).noise) /
+          (motion.units_per_m(s) * spacing_m));
   }
   if (std::ssize(shares) < kFewest) return std::nullopt;
   return median(std::move(shares));
@@ -117,9 +123,8 @@ std::optional<double> disorder(const Eigen::Matrix2Xd& marker_m, const std::vect
 bool check_order(const RecordedMotion& motion, int s, CheckList& list) {
   const int frame = motion.first_frame(s);
   if (frame < 0) return true;
-  const Eigen::MatrixXd place = motion.places(s, frame);
-  const double units_per_m = motion.units_per_m(s);
-  const auto as_declared = disorder(motion.marker_m(), motion.tracked(), place, units_per_m);
+  if (!(motion.units_per_m(s) > 0)) return true;
+  const auto as_declared = disorder(motion.marker_m(), motion, s);
   if (!as_declared) return true;
   const MarkerSet& markers = motion.recording().markers;
   std::vector<Order> orders = corner_orders(markers);
@@ -127,8 +132,7 @@ bool check_order(const RecordedMotion& motion, int s, CheckList& list) {
   double least = *as_declared;
   const Order* best = nullptr;
   for (const Order& order : orders) {
-    const auto found =
-        disorder(reordered(motion.marker_m(), order), motion.tracked(), place, units_per_m);
+    const auto found = disorder(reordered(motion.marker_m(), order), motion, s);
     if (found && *found < kPreflight.better_order * *as_declared && *found < least) {
       least = *found;
       best = &order;
@@ -146,9 +150,9 @@ bool check_order(const RecordedMotion& motion, int s, CheckList& list) {
              fmt::format("{:.2g} if {}", least, best->name), "correct the order in that file");
     return false;
   }
-  if (*as_declared > kPreflight.disordered) {
-    // Crumpled cloth may look like that.
-    const bool is_flat = motion.recording().start == StartKind::released_flat;
+  // Crumpled cloth may look like that.
+  const bool is_flat = motion.recording().start == StartKind::released_flat;
+  if (*as_declared > (is_flat ? kPreflight.disordered : kPreflight.disordered_folded)) {
     list.add("first sheet", is_flat ? FindingState::refused : FindingState::warning, file, found,
              "markers that lie in the tracks as they lie on the cloth",
              "look at names, s and t of the markers: none of the usual exchanges explains it");
@@ -197,13 +201,31 @@ std::vector<double> off_sheet_m(const RecordedMotion& motion, const Rigid3& worl
   return off_m;
 }
 
+/// Returns how far a camera is from the middle of the sheet that it sees.
+double camera_distance_m(const RecordedMotion& motion, int s, const Rigid3& world_from_sheet) {
+  const ClothDescription& cloth = motion.recording().cloth;
+  const Eigen::Vector3d middle(0.5 * cloth.width_m, 0.5 * cloth.height_m, 0);
+  return (camera_from_world(*motion.set(s).camera) * (world_from_sheet * middle)).norm();
+}
+
+/// Returns the distance of the farthest of several cameras. Their poses are off by angles, which
+/// matter where one sheet is to be seen in one place. It is 0 of a single one.
+double farthest_camera_m(const RecordedMotion& motion) {
+  double farthest_m = 0;
+  for (int s = 0; s < motion.sets() && motion.sets() > 1; ++s)
+    if (motion.set(s).camera && motion.flat_sheet())
+      farthest_m = std::max(farthest_m, camera_distance_m(motion, s, *motion.flat_sheet()));
+  return farthest_m;
+}
+
 void check_flat(const RecordedMotion& motion, const Rigid3& world_from_sheet, CheckList& list) {
   double noise_m = 0;
   std::vector<double> off_m = off_sheet_m(motion, world_from_sheet, noise_m);
   if (off_m.empty()) return;
   std::ranges::sort(off_m);
   const double most_m = off_m[off_m.size() * 9 / 10];
-  const double noise = 2.5 * noise_m;  // nine of ten distances in space are below
+  constexpr double kNineOfTen = 2.5;  // sigmas, of distances in space
+  const double noise = kNineOfTen * noise_m + kPreflight.pose_off * farthest_camera_m(motion);
   const double size_m = motion.size_m();
   const std::string found =
       fmt::format("nine of ten of {} markers in frame 0 lie within {:.2g} mm of a flat sheet",
@@ -226,13 +248,18 @@ void check_cameras(const RecordedMotion& motion, CheckList& list) {
   const ClothDescription& cloth = motion.recording().cloth;
   const Eigen::Vector3d middle(0.5 * cloth.width_m, 0.5 * cloth.height_m, 0);
   std::vector<std::pair<std::string, Eigen::Vector3d>> seen;
-  for (int s = 0; s < motion.sets(); ++s)
-    if (const auto sheet = place_flat_sheet(std::vector{motion.set(s)}, motion.marker_m(), 1))
+  double camera_m = 0;
+  for (int s = 0; s < motion.sets() && motion.sets() > 1; ++s)
+    if (const auto sheet = place_flat_sheet(std::vector{motion.set(s)}, motion.marker_m(), 1)) {
       seen.emplace_back(motion.set(s).kind, *sheet * middle);
+      camera_m = std::max(camera_m, camera_distance_m(motion, s, *sheet));
+    }
   for (size_t k = 1; k < seen.size(); ++k) {
     const double apart_m = (seen[k].second - seen[0].second).norm();
-    if (apart_m < kPreflight.cameras_apart * motion.size_m()) continue;
-    const bool far = apart_m > motion.size_m();
+    if (apart_m < std::max(kPreflight.cameras_apart * motion.size_m(),
+                           kPreflight.cameras_apart_far * camera_m))
+      continue;
+    const bool far = apart_m > kPreflight.cameras_refused * camera_m;
     list.add("cameras", far ? FindingState::refused : FindingState::warning, list.file(),
              fmt::format("cameras '{}' and '{}' see the sheet's middle in frame 0 {:.3g} mm apart",
                          seen[0].first, seen[k].first, 1e3 * apart_m),
@@ -249,9 +276,7 @@ void check_first_sheet(const RecordedMotion& motion, CheckList& list) {
   for (int s = 0; s < motion.sets(); ++s) in_order = check_order(motion, s, list) && in_order;
   if (in_order) check_proportions(motion, list);
   if (list.refused() || motion.recording().start != StartKind::released_flat) return;
-  std::vector<ObservationSet> sets;
-  for (int s = 0; s < motion.sets(); ++s) sets.push_back(motion.set(s));
-  const auto world_from_sheet = place_flat_sheet(sets, motion.marker_m(), 1);
+  const std::optional<Rigid3>& world_from_sheet = motion.flat_sheet();
   if (!world_from_sheet) return;
   for (int s = 0; s < motion.sets(); ++s)
     if (!check_side(motion, s, *world_from_sheet, list)) return;

@@ -15,7 +15,16 @@
 namespace clothfit {
 namespace {
 
-constexpr int kMostExchangeFrames = 120;
+constexpr int kMostExchangeFrames = 120, kFewestExchangeFrames = 10;
+constexpr double kMostPlaces = 2e5;  // a marker in a frame each: a second's work
+constexpr double kSigmas = 4;
+
+/// Returns the frames to look at, fewer of many markers.
+std::vector<int> frames_to_look_at(const RecordedMotion& motion) {
+  const auto affordable =
+      static_cast<int>(kMostPlaces / static_cast<double>(motion.tracked().size()));
+  return motion.sampled_frames(std::clamp(affordable, kFewestExchangeFrames, kMostExchangeFrames));
+}
 
 /// The frames in which two markers lie where each other belong.
 struct Exchange {
@@ -44,7 +53,9 @@ Expected expected_places(const RecordedMotion& motion, int s, const Eigen::Matri
         place_among(motion.marker_m(), place, motion.neighbours(m), motion.marker_m().col(m));
     if (!expected) continue;
     result.place.col(m) = *expected;
-    if ((place.col(m) - *expected).norm() > kPreflight.out_of_place * spacing(motion, s, m))
+    const double noise =
+        kSigmas * motion.set(s).noise * std::sqrt(static_cast<double>(place.rows()));
+    if ((place.col(m) - *expected).norm() > kPreflight.out_of_place * spacing(motion, s, m) + noise)
       result.astray.push_back(m);
   }
   return result;
@@ -55,6 +66,10 @@ void add_exchanged(const RecordedMotion& motion, int s, int frame,
                    std::map<Pair, Exchange>& found) {
   const Eigen::MatrixXd place = motion.places(s, frame);
   const Expected expected = expected_places(motion, s, place);
+  // Where many lie astray the cloth is folded, and its tracks are not exchanged.
+  if (static_cast<double>(expected.astray.size()) >
+      std::max(2.0, kPreflight.most_exchanged * static_cast<double>(motion.tracked().size())))
+    return;
   const auto lies_at = [&](int m, int n) {
     const double near = kPreflight.in_place * spacing(motion, s, n);
     return (place.col(m) - expected.place.col(n)).norm() < near;
@@ -95,7 +110,7 @@ std::string tracks_file(const RecordedMotion& motion, int s) {
 
 bool check_exchanged(const RecordedMotion& motion, int s, CheckList& list) {
   std::map<Pair, Exchange> pairs;
-  for (const int f : motion.sampled_frames(kMostExchangeFrames)) add_exchanged(motion, s, f, pairs);
+  for (const int f : frames_to_look_at(motion)) add_exchanged(motion, s, f, pairs);
   std::erase_if(pairs,
                 [](const auto& pair) { return pair.second.frames < kPreflight.exchanged_frames; });
   if (pairs.empty()) return false;
@@ -136,10 +151,9 @@ bool check_frozen(const RecordedMotion& motion, int s, CheckList& list) {
   for (int m = 0; m < motion.markers(); ++m) {
     if (longest[static_cast<size_t>(m)] + 1 < kPreflight.frozen_frames) continue;
     // A held point may rest to the last digit.
-    double held_m = INFINITY;
-    for (const HeldPoint& point : motion.recording().held)
-      held_m = std::min(held_m, point.edge ? 0 : (point.at_m - motion.marker_m().col(m)).norm());
-    if (held_m > 0.1 * motion.size_m()) frozen.push_back(m);
+    if (distance_to_held_m(motion.recording(), motion.marker_m().col(m)) >
+        kPreflight.beside_held * motion.size_m())
+      frozen.push_back(m);
   }
   if (frozen.empty()) return false;
   list.add("markers", FindingState::warning, tracks_file(motion, s),
@@ -155,11 +169,10 @@ bool check_frozen(const RecordedMotion& motion, int s, CheckList& list) {
 
 /// Pairs of markers that lie in one place in many frames: one was followed twice.
 bool check_twice(const RecordedMotion& motion, int s, CheckList& list) {
-  constexpr double kShare = 0.3;  // of the frames that show both
   std::map<Pair, int> together;
   std::vector<int> seen(static_cast<size_t>(motion.markers()));
   const double near = 3 * motion.set(s).noise;
-  for (const int f : motion.sampled_frames(kMostExchangeFrames)) {
+  for (const int f : frames_to_look_at(motion)) {
     const Eigen::MatrixXd place = motion.places(s, f);
     std::vector<int> order;
     for (int m = 0; m < motion.markers(); ++m)
@@ -179,8 +192,8 @@ bool check_twice(const RecordedMotion& motion, int s, CheckList& list) {
     const double flat =
         motion.units_per_m(s) * (motion.marker_m().col(m) - motion.marker_m().col(n)).norm();
     return flat < 3 * near || pair.second < kPreflight.frozen_frames ||
-           pair.second <
-               kShare * std::min(seen[static_cast<size_t>(m)], seen[static_cast<size_t>(n)]);
+           pair.second < kPreflight.twice_share *
+                             std::min(seen[static_cast<size_t>(m)], seen[static_cast<size_t>(n)]);
   });
   if (together.empty()) return false;
   list.add("markers", FindingState::warning, tracks_file(motion, s),
@@ -194,10 +207,25 @@ bool check_twice(const RecordedMotion& motion, int s, CheckList& list) {
   return true;
 }
 
+/// Says that markers show little of the cloth.
+void check_cover(const RecordedMotion& motion, CheckList& list) {
+  const Eigen::Matrix2Xd seen = motion.marker_m()(Eigen::all, motion.tracked());
+  const Eigen::Vector2d box_m = seen.rowwise().maxCoeff() - seen.rowwise().minCoeff();
+  const ClothDescription& cloth = motion.recording().cloth;
+  const double share = box_m.x() * box_m.y() / (cloth.width_m * cloth.height_m);
+  if (share > kPreflight.covered) return;
+  list.add("markers", FindingState::warning, list.file(),
+           fmt::format("markers that were seen lie on {:.0f} % of the cloth", 100 * share),
+           fmt::format("more than {:.0f} %: what the rest does is a guess of the model's",
+                       100 * kPreflight.covered),
+           "spread the markers, or give the size of the part that they lie on");
+}
+
 }  // namespace
 
 void check_marker_tracks(const RecordedMotion& motion, CheckList& list) {
   constexpr int kFewest = 9;  // between fewer no place can be told
+  check_cover(motion, list);
   bool found = false;
   for (int s = 0; s < motion.sets(); ++s) {
     if (std::ssize(motion.tracked()) < kFewest || !(motion.units_per_m(s) > 0)) continue;

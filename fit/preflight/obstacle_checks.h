@@ -15,13 +15,9 @@ namespace clothfit {
 /// where it is not closed.
 std::optional<double> enclosed_volume_m3(const SurfaceMesh& surface);
 
-/// Returns which points (m, world; 3 x n) lie inside a closed surface, whatever way its faces
-/// point.
-std::vector<bool> inside(const SurfaceMesh& surface, const Eigen::Matrix3Xd& point_m);
-
-/// Returns the share of points (m, world; 3 x n) that lie behind the face nearest to them, of those
-/// that lie before or behind one. 0 where none does.
-double share_behind(const SurfaceMesh& surface, const Eigen::Matrix3Xd& point_m);
+/// Returns how deep points (m, world; 3 x n) lie behind a surface, m: 0 on its free side, and
+/// beyond the border of one that is not closed.
+std::vector<double> depth_behind_m(const SurfaceMesh& surface, const Eigen::Matrix3Xd& point_m);
 
 /// Returns the second smallest side of the box around the thinnest part of a surface, m: the width
 /// of a post or a rod. A part is what is joined by shared places. Nothing without a face.
@@ -32,10 +28,11 @@ std::optional<double> narrowest_part_m(const SurfaceMesh& surface);
 std::optional<int> frame_pierced(const SurfaceMesh& surface, const Mesh& mesh,
                                  const std::vector<Eigen::Matrix3Xd>& position_m);
 
-/// Holds the obstacle of a model against the cloth that is to touch it, where that starts (3 x
-/// vertices, world). `where` names the surface's file.
+/// Holds an obstacle against the cloth that is to touch it, where that starts (3 x points, world):
+/// whether its faces point to the cloth, whether the cloth starts in it by more than the noise of
+/// the points, whether it is narrower than a cell of the mesh. `where` names the surface's file.
 Findings check_obstacle(const SurfaceMesh& surface, const std::string& where, const Mesh& mesh,
-                        const Eigen::Matrix3Xd& start_m);
+                        const Eigen::Matrix3Xd& start_m, double noise_m = 0);
 
 /// Says that the cloth went through the obstacle in a run (frame_pierced); nothing where it did
 /// not.

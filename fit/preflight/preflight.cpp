@@ -24,6 +24,7 @@ Findings check_recording(const FitInput& input, ObservationKind kind) {
   check_timing(motion, list);
   check_held_points(motion, list);
   if (list.refused()) return list.findings();
+  check_hanging(motion, list);
   check_release(motion, list);
   check_marker_tracks(motion, list);
   check_obstacle(motion, list);

@@ -2,6 +2,8 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <boost/geometry/geometry.hpp>
+#include <boost/geometry/index/rtree.hpp>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -9,6 +11,7 @@
 
 #include "data/input_error.h"
 #include "data/median.h"
+#include "fit/observe/sheet_placement.h"
 
 namespace clothfit {
 namespace {
@@ -43,6 +46,28 @@ std::vector<ObservationSet> sets_of(const FitInput& input, bool in_space,
   return sets;
 }
 
+/// Returns for each of the markers the `count` others that are nearest on the cloth, the nearest
+/// first.
+std::vector<std::vector<int>> neighbours_of(const Eigen::Matrix2Xd& marker_m,
+                                            const std::vector<int>& markers, int count) {
+  namespace geometry = boost::geometry;
+  using Point = geometry::model::point<double, 2, geometry::cs::cartesian>;
+  const auto point_of = [&](int m) { return Point(marker_m(0, m), marker_m(1, m)); };
+  std::vector<std::pair<Point, int>> points;
+  for (const int m : markers) points.emplace_back(point_of(m), m);
+  const geometry::index::rtree<std::pair<Point, int>, geometry::index::linear<8>> tree(points);
+  std::vector<std::vector<int>> neighbours(static_cast<size_t>(marker_m.cols()));
+  for (const int m : markers) {
+    std::vector<int> near;
+    const auto nearest = geometry::index::nearest(point_of(m), static_cast<unsigned>(count) + 1);
+    for (auto found = tree.qbegin(nearest); found != tree.qend(); ++found)
+      if (found->second != m) near.push_back(found->second);
+    neighbours[static_cast<size_t>(m)] =
+        nearest_markers(marker_m, std::move(near), marker_m.col(m), count);
+  }
+  return neighbours;
+}
+
 std::vector<size_t> rows_by_frame(const ObservationSet& set, int frames) {
   std::vector<size_t> first(static_cast<size_t>(frames) + 1, set.rows.size());
   for (size_t row = set.rows.size(); row-- > 0;)
@@ -63,6 +88,34 @@ std::vector<int> nearest_markers(const Eigen::Matrix2Xd& marker_m, std::vector<i
   std::partial_sort(markers.begin(), end, markers.end(), nearer);
   markers.erase(end, markers.end());
   return markers;
+}
+
+double distance_less_noise(const Eigen::VectorXd& step, double noise) {
+  const double square = step.squaredNorm();
+  const double by_noise = 2 * static_cast<double>(step.size()) * noise * noise;
+  // Noise that was estimated from quick motion may be too large.
+  constexpr double kLeast = 0.25;
+  return std::sqrt(std::max(square - by_noise, kLeast * square));
+}
+
+double distance_to_held_m(const Recording& recording, const Eigen::Vector2d& point_m) {
+  const auto distance_m = [&](const HeldPoint& point) {
+    if (!point.edge) return (point.at_m - point_m).norm();
+    switch (*point.edge) {
+      case ClothEdge::top:
+        return point_m.y();
+      case ClothEdge::bottom:
+        return recording.cloth.height_m - point_m.y();
+      case ClothEdge::left:
+        return point_m.x();
+      case ClothEdge::right:
+        return recording.cloth.width_m - point_m.x();
+    }
+    return 0.0;
+  };
+  double nearest_m = std::numeric_limits<double>::infinity();
+  for (const HeldPoint& point : recording.held) nearest_m = std::min(nearest_m, distance_m(point));
+  return nearest_m;
 }
 
 std::optional<Eigen::VectorXd> place_among(const Eigen::Matrix2Xd& marker_m,
@@ -123,34 +176,36 @@ RecordedMotion::RecordedMotion(const FitInput& input, ObservationKind kind) : in
     for (const Observation& row : set.rows) seen[static_cast<size_t>(row.marker)] = 1;
   for (int m = 0; m < markers(); ++m)
     if (seen[static_cast<size_t>(m)] != 0) tracked_.push_back(m);
-  neighbours_.resize(seen.size());
-  for (const int m : tracked_) {
-    neighbours_[static_cast<size_t>(m)] = nearest(marker_m_.col(m), kNeighbours + 1);
-    std::erase(neighbours_[static_cast<size_t>(m)], m);
-  }
+  neighbours_ = neighbours_of(marker_m_, tracked_, kNeighbours);
   for (const ObservationSet& set : sets_) first_row_.push_back(rows_by_frame(set, frames));
   for (int s = 0; s < sets(); ++s) {
-    int first = -1;
-    for (int f = 0; first < 0 && f < frames; ++f) {
-      const auto& row = first_row_[static_cast<size_t>(s)];
-      if (row[static_cast<size_t>(f) + 1] - row[static_cast<size_t>(f)] >= kFewestToPlace)
-        first = f;
-    }
-    first_frame_.push_back(first);
-    std::vector<double> ratios;
-    if (first >= 0) {
-      constexpr size_t kPairs = 4;
-      const Eigen::MatrixXd place = places(s, first);
-      for (const int m : tracked_)
-        for (size_t k = 0; k < std::min(kPairs, neighbours(m).size()); ++k) {
-          const int n = neighbours(m)[k];
-          const double flat_m = (marker_m_.col(n) - marker_m_.col(m)).norm();
-          const double apart = (place.col(n) - place.col(m)).norm();
-          if (std::isfinite(apart) && flat_m > 0) ratios.push_back(apart / flat_m);
-        }
-    }
-    units_per_m_.push_back(ratios.empty() ? 0 : median(std::move(ratios)));
+    first_frame_.push_back(find_first_frame(s));
+    units_per_m_.push_back(measured_units_per_m(s));
   }
+  flat_sheet_ = place_flat_sheet(sets_, marker_m_, 1);
+}
+
+int RecordedMotion::find_first_frame(int s) const {
+  const std::vector<size_t>& row = first_row_[static_cast<size_t>(s)];
+  for (int f = 0; f < frames(); ++f)
+    if (row[static_cast<size_t>(f) + 1] - row[static_cast<size_t>(f)] >= kFewestToPlace) return f;
+  return -1;
+}
+
+double RecordedMotion::measured_units_per_m(int s) const {
+  if (first_frame(s) < 0) return 0;
+  constexpr size_t kPairs = 4;
+  const Eigen::MatrixXd place = places(s, first_frame(s));
+  std::vector<double> ratios;
+  for (const int m : tracked_)
+    for (size_t k = 0; k < std::min(kPairs, neighbours(m).size()); ++k) {
+      const int n = neighbours(m)[k];
+      const double flat_m = (marker_m_.col(n) - marker_m_.col(m)).norm();
+      const Eigen::VectorXd step = place.col(n) - place.col(m);
+      if (step.allFinite() && flat_m > 0)
+        ratios.push_back(distance_less_noise(step, set(s).noise) / flat_m);
+    }
+  return ratios.empty() ? 0 : median(std::move(ratios));
 }
 
 std::vector<int> RecordedMotion::nearest(const Eigen::Vector2d& point_m, int count) const {

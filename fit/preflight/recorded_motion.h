@@ -4,6 +4,7 @@
 #include <optional>
 #include <vector>
 
+#include "calib/camera/rigid3.h"
 #include "fit/interface/fit_input.h"
 #include "fit/interface/fit_options.h"
 #include "fit/observe/observations.h"
@@ -34,9 +35,14 @@ class RecordedMotion {
   Eigen::MatrixXd places(int s, int frame) const;
   /// Returns the first frame of a set that shows at least four markers, or -1.
   int first_frame(int s) const { return first_frame_[static_cast<size_t>(s)]; }
-  /// Returns how many units a metre of the cloth takes there: the median over neighbouring markers.
-  /// For 3D tracks in metres of a flat sheet it is 1. 0 where no frame shows neighbours.
+  /// Returns how many units a metre of the cloth takes there: the median over neighbouring markers,
+  /// less what noise adds to their distances. For 3D tracks in metres of a flat sheet it is 1. 0
+  /// where no frame shows neighbours.
   double units_per_m(int s) const { return units_per_m_[static_cast<size_t>(s)]; }
+  /// Returns the noise per coordinate, m. `units_per_m` must not be 0.
+  double noise_m(int s) const { return set(s).noise / units_per_m(s); }
+  /// Returns where frame 0 puts the flat sheet (place_flat_sheet), over all sets.
+  const std::optional<Rigid3>& flat_sheet() const { return flat_sheet_; }
   /// Returns frames to look at, evenly spread where there are more than `most`.
   std::vector<int> sampled_frames(int most) const;
 
@@ -49,6 +55,9 @@ class RecordedMotion {
   std::vector<int> nearest(const Eigen::Vector2d& point_m, int count) const;
 
  private:
+  int find_first_frame(int s) const;
+  double measured_units_per_m(int s) const;
+
   const FitInput& input_;
   std::vector<double> time_s_;
   Eigen::Matrix2Xd marker_m_;
@@ -56,9 +65,17 @@ class RecordedMotion {
   std::vector<std::vector<size_t>> first_row_;  ///< [set][frame], and one more
   std::vector<int> first_frame_;
   std::vector<double> units_per_m_;
+  std::optional<Rigid3> flat_sheet_;
   std::vector<int> tracked_;
   std::vector<std::vector<int>> neighbours_;
 };
+
+/// Returns the distance of two observed places without what noise adds to it in the mean. `noise`
+/// is that of a coordinate.
+double distance_less_noise(const Eigen::VectorXd& step, double noise);
+
+/// Returns how far a point of the cloth is from what is held, m; infinite where nothing is.
+double distance_to_held_m(const Recording& recording, const Eigen::Vector2d& point_m);
 
 /// Predicts where a point of the cloth is seen from the markers `near` it, by the affine map that
 /// fits most of them. `place` holds one frame (coordinates x markers, NaN where not seen). Returns

@@ -21,6 +21,9 @@ struct IntervalMotion {
   double step = 0;       ///< the same of the ways, whatever the times say
   double agreement = 0;  ///< cosine between the two
   double evenness = 0;   ///< of the velocities before and after: their product by the larger square
+  double alike = 0;      ///< cosine between the steps before and after
+  double of_least = 1;   ///< the step's size, as a share of the smaller of those two
+  double least = 0;      ///< root mean square of that smaller step, a coordinate, in units
   double shift = 0;      ///< root mean square of what the mean moves a coordinate, in units
   double off = 0;        ///< of the velocities less that mean, in units per second
 };
@@ -31,7 +34,7 @@ IntervalMotion interval_motion(const RecordedMotion& motion, int s, int frame) {
   const Eigen::MatrixXd a = motion.places(s, frame - 1), b = motion.places(s, frame),
                         c = motion.places(s, frame + 1), d = motion.places(s, frame + 2);
   double by_mean = 0, squares = 0, mean_squares = 0, across = 0, before2 = 0, after2 = 0;
-  double off = 0, steps = 0, mean_steps = 0;
+  double off = 0, steps = 0, mean_steps = 0, steps_before = 0, steps_after = 0, steps_across = 0;
   int markers = 0, coordinates = 0;
   for (Eigen::Index m = 0; m < a.cols(); ++m) {
     if (!(a.col(m) + b.col(m) + c.col(m) + d.col(m)).allFinite()) continue;
@@ -44,6 +47,9 @@ IntervalMotion interval_motion(const RecordedMotion& motion, int s, int frame) {
     mean_squares += mean.squaredNorm();
     steps += (c.col(m) - b.col(m)).squaredNorm();
     mean_steps += (b.col(m) - a.col(m) + d.col(m) - c.col(m)).squaredNorm() / 4;
+    steps_before += (b.col(m) - a.col(m)).squaredNorm();
+    steps_after += (d.col(m) - c.col(m)).squaredNorm();
+    steps_across += (b.col(m) - a.col(m)).dot(d.col(m) - c.col(m));
     across += before.dot(after);
     off += (now - mean).squaredNorm();
     before2 += before.squaredNorm();
@@ -53,11 +59,15 @@ IntervalMotion interval_motion(const RecordedMotion& motion, int s, int frame) {
   }
   if (markers < kFewestMarkers || !(mean_squares > 0)) return {};
   const double interval_s = at(frame + 1) - at(frame);
+  const double least_steps = std::min(steps_before, steps_after);
   return {.factor = by_mean / mean_squares,
           .size = std::sqrt(squares / mean_squares),
           .step = mean_steps > 0 ? std::sqrt(steps / mean_steps) : 1,
           .agreement = squares > 0 ? by_mean / std::sqrt(squares * mean_squares) : 0,
           .evenness = across / std::max(before2, after2),
+          .alike = least_steps > 0 ? steps_across / std::sqrt(steps_before * steps_after) : 0,
+          .of_least = least_steps > 0 ? std::sqrt(steps / least_steps) : 1,
+          .least = std::sqrt(least_steps / coordinates),
           .shift = interval_s * std::sqrt(mean_squares / coordinates),
           .off = std::sqrt(off / coordinates)};
 }
@@ -70,57 +80,92 @@ std::string frames_text(const std::vector<int>& frames) {
   return fmt::format("{}{}", fmt::join(shown, ", "), frames.size() > kShown ? ", ..." : "");
 }
 
-void check_set(const RecordedMotion& motion, int s, CheckList& list) {
-  constexpr double kAgrees = 0.9;
+/// Frames that are out of step with those about them.
+struct OutOfStep {
+  std::vector<int> jumps, repeats;  ///< the frame before a jump; a frame that repeats the last
+  double largest = 0;               ///< velocity in a jump, of that before and after
+  bool moves = false;               ///< whether any interval shows motion
+};
+
+OutOfStep out_of_step(const RecordedMotion& motion, int s) {
   const double seen =
       std::max(motion.set(s).noise, kPreflight.moves * motion.size_m() * motion.units_per_m(s));
-  std::vector<int> repeats;
-  int jumps = 0, first_jump = 0;
-  double largest = 0;
   std::vector<IntervalMotion> intervals;
   std::vector<double> usual;
+  OutOfStep found;
   for (int f = 1; f + 2 < motion.frames(); ++f) {
-    intervals.push_back(interval_motion(motion, s, f));
-    if (intervals.back().shift > seen) usual.push_back(intervals.back().off);
+    const IntervalMotion now = interval_motion(motion, s, f);
+    intervals.push_back(now);
+    if (now.shift > seen) usual.push_back(now.off);
+    // Whatever the times say: a copy is not moved at all. Of one to the last digit noise is a copy.
+    const bool is_same = now.least > 0 && now.of_least == 0;
+    if (is_same || (now.least > seen && now.of_least < kPreflight.repeat &&
+                    now.alike > kPreflight.repeats_way))
+      found.repeats.push_back(f + 1);
   }
-  if (usual.empty()) return;
+  found.moves = !usual.empty();
+  if (!found.moves) return found;
   const double rough = kPreflight.out_of_step * median(std::move(usual));
   for (int f = 1; f + 2 < motion.frames(); ++f) {
     const IntervalMotion& now = intervals[static_cast<size_t>(f - 1)];
-    if ((now.off < rough && now.size > 0) || now.shift < seen) continue;
-    if (now.evenness < kPreflight.alike_intervals) continue;
-    if (std::min(now.factor, now.step) > kPreflight.jump && now.agreement > kAgrees) {
-      if (jumps++ == 0) first_jump = f;
-      largest = std::max(largest, now.factor);
-    } else if (std::max(now.size, now.step) < kPreflight.repeat) {
-      repeats.push_back(f + 1);
-    }
+    if (now.off < rough || now.shift < seen || now.evenness < kPreflight.alike_intervals) continue;
+    if (std::min(now.factor, now.step) < kPreflight.jump || now.agreement < kPreflight.jump_agrees)
+      continue;
+    found.jumps.push_back(f);
+    found.largest = std::max(found.largest, now.factor);
   }
+  return found;
+}
+
+/// Says that frames are missing. It is certain where no held point moves and no times are measured,
+/// so that nothing else makes all markers go a whole number of steps at once.
+void report_jumps(const RecordedMotion& motion, const std::string& kind, const OutOfStep& found,
+                  CheckList& list) {
+  const Recording& recording = motion.recording();
+  const bool timed = recording.times_file.has_value();
+  const bool driven = std::ranges::any_of(
+      recording.held, [](const HeldPoint& point) { return point.motion != HeldMotion::fixed; });
+  const double whole = std::round(found.largest);
+  const bool is_whole = std::abs(found.largest - whole) < kPreflight.whole_steps * whole;
+  std::string text = fmt::format(
+      "all markers of {} move {:.1f} times as fast between frames {} and {} as before and after",
+      kind, found.largest, found.jumps.front(), found.jumps.front() + 1);
+  if (found.jumps.size() > 1) text += fmt::format(", and so in {} places", found.jumps.size());
+  const bool certain = is_whole && !timed && !driven;
+  list.add("time", certain ? FindingState::refused : FindingState::warning, list.file(), text,
+           timed ? "times that fit the frames"
+                 : fmt::format("frames that are evenly spaced: {:.0f} seem to be missing there",
+                               std::max(1.0, whole - 1)),
+           timed ? "look at the times file there"
+                 : "give a times.csv with the time of every frame, or number the frames with their "
+                   "gaps");
+}
+
+void report_repeats(const RecordedMotion& motion, const std::string& kind,
+                    const std::vector<int>& repeats, CheckList& list) {
+  const bool every_second =
+      static_cast<double>(repeats.size()) > kPreflight.every_second * motion.frames();
+  list.warn("time",
+            fmt::format("all markers of {} stand still in {} {} while the cloth moves", kind,
+                        repeats.size() > 1 ? fmt::format("{} frames:", repeats.size()) : "frame",
+                        frames_text(repeats)),
+            "every frame of its own",
+            every_second ? "the recording was made at a lower rate: leave out the copies, and give "
+                           "its own frame rate"
+                         : "a frame was written twice: leave out the copies, and number the others "
+                           "as they were taken");
+}
+
+void check_set(const RecordedMotion& motion, int s, CheckList& list) {
   const std::string& kind = motion.set(s).kind;
-  const bool timed = motion.recording().times_file.has_value();
-  if (jumps > 0) {
-    std::string found = fmt::format(
-        "all markers of {} move {:.1f} times as fast between frames {} and {} as before and after",
-        kind, largest, first_jump, first_jump + 1);
-    if (jumps > 1) found += fmt::format(", and so in {} places", jumps);
-    list.refuse("time", found,
-                timed ? "times that fit the frames"
-                      : fmt::format("frames that are evenly spaced: {:.0f} seem to be missing "
-                                    "there",
-                                    std::max(1.0, std::round(largest - 1))),
-                timed ? "look at the times file there"
-                      : "give a times.csv with the time of every frame, or number the frames with "
-                        "their gaps");
-    return;
-  }
-  if (!repeats.empty()) {
-    list.warn("time",
-              fmt::format("all markers of {} stand still in frame{} {} while the cloth moves", kind,
-                          repeats.size() > 1 ? "s" : "", frames_text(repeats)),
-              "every frame of its own", "a frame was written twice: leave out the copies");
-    return;
-  }
-  list.pass("time", fmt::format("markers of {} move evenly from frame to frame", kind));
+  const OutOfStep found = out_of_step(motion, s);
+  // A lost frame with a copy in its place is followed by a jump: the copy explains it.
+  if (!found.repeats.empty())
+    report_repeats(motion, kind, found.repeats, list);
+  else if (!found.jumps.empty())
+    report_jumps(motion, kind, found, list);
+  else if (found.moves)
+    list.pass("time", fmt::format("markers of {} move evenly from frame to frame", kind));
 }
 
 /// Names frames in which nothing was observed, between others.
@@ -142,7 +187,10 @@ void check_gaps(const RecordedMotion& motion, CheckList& list) {
 }  // namespace
 
 void check_timing(const RecordedMotion& motion, CheckList& list) {
-  for (int s = 0; s < motion.sets(); ++s) check_set(motion, s, list);
+  const bool may_drop = std::ranges::any_of(
+      motion.recording().declared,
+      [](const DeclaredEffect& effect) { return effect.name == "dropped_frames"; });
+  for (int s = 0; s < motion.sets() && !may_drop; ++s) check_set(motion, s, list);
   check_gaps(motion, list);
 }
 

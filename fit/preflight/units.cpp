@@ -39,15 +39,16 @@ std::string asked_unit(double factor, const std::string& lengths) {
 
 /// Median ratio of distances in space to those on the cloth, over neighbours of which the line
 /// keeps within a few degrees to an axis of the cloth (0: s, 1: t). 0 where there are none.
-double scale_along(const RecordedMotion& motion, const Eigen::MatrixXd& place, int axis) {
+double scale_along(const RecordedMotion& motion, int s, const Eigen::MatrixXd& place, int axis) {
   constexpr double kAlong = 0.1;
   std::vector<double> ratios;
   for (const int m : motion.tracked())
     for (const int n : motion.neighbours(m)) {
       const Eigen::Vector2d flat = motion.marker_m().col(n) - motion.marker_m().col(m);
       if (std::abs(flat[1 - axis]) > kAlong * std::abs(flat[axis])) continue;
-      const double seen = (place.col(n) - place.col(m)).norm();
-      if (std::isfinite(seen)) ratios.push_back(seen / flat.norm());
+      const Eigen::VectorXd step = place.col(n) - place.col(m);
+      if (step.allFinite())
+        ratios.push_back(distance_less_noise(step, motion.set(s).noise) / flat.norm());
     }
   return ratios.empty() ? 0 : median(ratios);
 }
@@ -63,14 +64,26 @@ double spread_ratio(const RecordedMotion& motion, const Eigen::MatrixXd& place) 
   return spread(place(Eigen::all, seen)) / spread(motion.marker_m()(Eigen::all, seen));
 }
 
+/// Returns what distances in space may be of those on the cloth, at least.
+double least_scale(StartKind start) {
+  switch (start) {
+    case StartKind::released_flat:
+      return 1 / kPreflight.scale_refused;
+    case StartKind::at_rest:
+      return kPreflight.folded;
+    case StartKind::unknown:
+      return kPreflight.crumpled;
+  }
+  return 0;
+}
+
 void check_scale(const RecordedMotion& motion, int s, CheckList& list) {
   const double scale = motion.units_per_m(s);
   if (!(scale > 0)) return;
   const double spread = spread_ratio(motion, motion.places(s, motion.first_frame(s)));
   // Markers in another order are far from their neighbours, and spread as far as ever.
   const double refused = kPreflight.scale_refused;
-  const bool is_flat = motion.recording().start == StartKind::released_flat;
-  const double least = is_flat ? 1 / refused : kPreflight.crumpled;
+  const double least = least_scale(motion.recording().start);
   if (std::min(scale, spread) > refused || std::max(scale, spread) < least) {
     const std::string asked = scale > 1 ? asked_unit(scale, "are the tracks")
                                         : asked_unit(1 / scale, "are the cloth's size, s and t");
@@ -79,9 +92,13 @@ void check_scale(const RecordedMotion& motion, int s, CheckList& list) {
                                    motion.first_frame(s), scale),
                        "about 1: the cloth's size, s, t and 3D tracks are all in metres", asked);
   }
-  list.pass(
-      "units",
-      fmt::format("neighbouring markers are {:.3f} times as far apart as on the cloth", scale));
+  const std::string found =
+      fmt::format("neighbouring markers are {:.3f} times as far apart as on the cloth", scale);
+  // Folds bring markers nearer to each other; nothing but a pull takes them apart.
+  if (motion.recording().start != StartKind::released_flat && scale > 1 + kPreflight.scale_warned)
+    return list.warn("units", found, "at most 1, for cloth that hardly stretches",
+                     "measure the cloth's size and the print's scale");
+  list.pass("units", found);
 }
 
 /// Holds a camera's distance from the sheet against that from the reference points.
@@ -125,7 +142,8 @@ void check_proportions(const RecordedMotion& motion, CheckList& list) {
   if (motion.recording().start != StartKind::released_flat || motion.set(0).camera) return;
   if (motion.first_frame(0) < 0) return;
   const Eigen::MatrixXd place = motion.places(0, motion.first_frame(0));
-  const double along_s = scale_along(motion, place, 0), along_t = scale_along(motion, place, 1);
+  const double along_s = scale_along(motion, 0, place, 0),
+               along_t = scale_along(motion, 0, place, 1);
   if (!(along_s > 0 && along_t > 0)) return;
   const ClothDescription& cloth = motion.recording().cloth;
   const double ratio = along_s / along_t;
@@ -133,8 +151,7 @@ void check_proportions(const RecordedMotion& motion, CheckList& list) {
   const std::string found = fmt::format(
       "neighbouring markers are {:.3g} times as far apart along s as on the cloth, {:.3g} along t",
       along_s, along_t);
-  constexpr double kSides = 1.2;
-  if (std::max(ratio, 1 / ratio) > kSides) {
+  if (std::max(ratio, 1 / ratio) > kPreflight.sides_alike) {
     const bool exchanged = std::abs(std::log(ratio / of_exchanged)) < std::log(1.1);
     list.refuse("units", found, "1 and 1",
                 exchanged ? "size is [width along s, height along t]: are they exchanged?"

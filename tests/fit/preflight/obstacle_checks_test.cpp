@@ -43,15 +43,17 @@ TEST(Obstacles, EncloseNothingWhereTheyAreOpen) {
   EXPECT_FALSE(enclosed_volume_m3(surface));
 }
 
-TEST(Obstacles, HavePointsInsideWhateverWayTheirFacesPoint) {
+TEST(Obstacles, HavePointsBehindThem) {
   Eigen::Matrix3Xd points(3, 3);
-  points.col(0) << 0.1, 0.1, 0.1;
+  points.col(0) << 0.1, 0.12, 0.57;
   points.col(1) << 0.1, 0.1, 0.61;
   points.col(2) << -0.01, 0.2, 0.3;
   const SurfaceMesh surface = box({0, 0, 0}, {0.2, 0.3, 0.6});
+  const auto is = [](double depth_m) { return testing::DoubleNear(depth_m, 1e-12); };
 
-  EXPECT_THAT(inside(surface, points), testing::ElementsAre(true, false, false));
-  EXPECT_THAT(inside(turned_round(surface), points), testing::ElementsAre(true, false, false));
+  EXPECT_THAT(depth_behind_m(surface, points), testing::ElementsAre(is(0.03), is(0), is(0)));
+  EXPECT_THAT(depth_behind_m(turned_round(surface), points),
+              testing::ElementsAre(is(0), is(0.01), is(0.01)));
 }
 
 TEST(Obstacles, AreAsNarrowAsTheirThinnestPart) {
