@@ -295,7 +295,9 @@ EffectDescription describe() {
                      .shapes = {over_cloth("patch_s", {0.2, 0.5, 0.8}),
                                 over_cloth("patch_t", {0.2, 0.5, 0.8}),
                                 over_cloth("patch_radius", {0.05, 0.12})}}},
-          .remedy = "weigh the hem, or declare masses",
+          .remedy =
+              "weigh the hem, or declare it: `declared` of the recording takes what model.yaml "
+              "has under `effects`",
           .in_words = in_words};
 }
 

@@ -285,9 +285,8 @@ TEST(ProgramTrack, LeavesTheTracksOfARecordingWhoseTimesCannotBeRead) {
   const fs::path recording = here.path() / "short";
   fs::copy(kBundled / "tags_onecam", recording, fs::copy_options::recursive);
   std::string yaml = read_text(recording / "recording.yaml");
-  yaml.replace(yaml.find("frame_rate: "),
-               yaml.find('\n', yaml.find("frame_rate: ")) - yaml.find("frame_rate: "),
-               "times: times.csv");
+  const std::string rate = "frame_rate: 60.0";
+  yaml.replace(yaml.find(rate), rate.size(), "file: times.csv");
   write_text(yaml, recording / "recording.yaml");
   write_text("frame,time\n0,0\n1,0.02\n", recording / "times.csv");
 

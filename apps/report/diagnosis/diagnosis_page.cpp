@@ -224,9 +224,11 @@ std::string answer_html(const Diagnosis& diagnosis) {
   for (const AcceptedEffect& accepted : diagnosis.accepted) {
     const Hypothesis& term = accepted.trial.hypothesis;
     const std::string words = words_of(term, diagnosis.found());
-    cause += fmt::format(
-        "<p class=\"found\">{}: <strong>{}</strong></p>\n", escape_xml(plain(term.title())),
-        escape_xml(words.empty() ? found_text(term, diagnosis.found().result) : words));
+    const FitResult& result = diagnosis.found().result;
+    cause += fmt::format("<p class=\"found\">{}: <strong>{}</strong>{}</p>\n",
+                         escape_xml(plain(term.title())),
+                         escape_xml(words.empty() ? found_text(term, result) : words),
+                         escape_xml(words.empty() ? "" : " " + certainty_text(term, result)));
   }
   if (diagnosis.seen_elsewhere)
     cause += fmt::format("<p class=\"found\">markers seen elsewhere: <strong>{}</strong></p>\n",

@@ -44,6 +44,28 @@ std::string amounts_text(const Score& score) {
   return text;
 }
 
+/// Returns a parameter's name in its effect; those of the measurement are named EFFECT.PARAMETER.
+std::string amplitude_name(const Hypothesis& term, const ParameterEstimate& parameter) {
+  const std::string prefix = term.effect + ".";
+  return parameter.name.starts_with(prefix) ? parameter.name.substr(prefix.size()) : parameter.name;
+}
+
+/// Returns what a fit found of a term: its amplitudes, and its shape where that was fitted.
+std::vector<ParameterEstimate> estimates_of(const Hypothesis& term, const FitResult& result) {
+  std::vector<ParameterEstimate> estimates;
+  const auto add = [&](const ParameterEstimate& parameter) {
+    const std::string name = amplitude_name(term, parameter);
+    if (std::ranges::find(term.amplitudes, name) != term.amplitudes.end() ||
+        (term.fits_shape && term.shape.contains(name)))
+      estimates.push_back(parameter);
+  };
+  for (const EffectEstimate& effect : result.effects)
+    if (effect.name == term.effect) std::ranges::for_each(effect.parameters, add);
+  for (const ParameterEstimate& parameter : result.nuisance)
+    if (parameter.name.starts_with(term.effect + ".")) add(parameter);
+  return estimates;
+}
+
 }  // namespace
 
 Table candidate_table(const Diagnosis& diagnosis) {
@@ -240,6 +262,19 @@ std::string seen_elsewhere_text(const SeenElsewhere& seen) {
                      significant(1e3 * seen.rms_m, 3));
 }
 
+std::string certainty_text(const Hypothesis& term, const FitResult& result) {
+  double values = 0, variances = 0;
+  for (const ParameterEstimate& parameter : estimates_of(term, result)) {
+    if (std::ranges::find(term.amplitudes, amplitude_name(term, parameter)) ==
+        term.amplitudes.end())
+      continue;
+    values += parameter.value * parameter.value;
+    variances += parameter.sigma * parameter.sigma;
+  }
+  if (!(values > 0 && variances > 0)) return "";
+  return fmt::format("± {} %", significant(100 * std::sqrt(variances / values), 2));
+}
+
 std::string remedy_text(const Hypothesis& term) {
   const std::string remedy = describe_effect(term.effect).remedy;
   return remedy.empty() ? remedy : "Remedy: " + remedy + ".";
@@ -247,24 +282,11 @@ std::string remedy_text(const Hypothesis& term) {
 
 std::string found_text(const Hypothesis& term, const FitResult& result) {
   std::string text;
-  const auto add = [&](const ParameterEstimate& parameter) {
+  for (const ParameterEstimate& parameter : estimates_of(term, result))
     text +=
         fmt::format("{}{} = {} ± {}{}", text.empty() ? "" : ", ", parameter.name,
                     value_text(parameter.value, parameter.sigma), significant(parameter.sigma, 2),
                     has_no_unit(parameter.unit) ? "" : " " + parameter.unit);
-  };
-  const auto of_term = [&](const std::string& name) {
-    return std::ranges::find(term.amplitudes, name) != term.amplitudes.end() ||
-           (term.fits_shape && term.shape.contains(name));
-  };
-  for (const EffectEstimate& effect : result.effects)
-    if (effect.name == term.effect)
-      for (const ParameterEstimate& parameter : effect.parameters)
-        if (of_term(parameter.name)) add(parameter);
-  for (const ParameterEstimate& parameter : result.nuisance)
-    if (parameter.name.starts_with(term.effect + ".") &&
-        of_term(parameter.name.substr(term.effect.size() + 1)))
-      add(parameter);
   if (term.fits_shape || term.shape.empty()) return text;
   std::string known;
   for (const auto& [name, value] : term.shape)

@@ -207,6 +207,9 @@ TEST(ModelProjection, IsThatOfAllRecordingsAtOnce) {
 // Without priors and directions each parameter takes one number.
 TEST(ModelProjection, TakesANumberForEachParameter) {
   FittedModel model = model_of_noise(0);
+  FitProblem without_priors = *model.problems.front();
+  without_priors.priors.clear();
+  model.problems.front() = std::make_shared<const FitProblem>(std::move(without_priors));
   model.problems.back() = model.problems.front();
   model.parts.back().values = model.parts.front().values;
   model.parts.back().linear.residual_by_coordinate.conservativeResize(

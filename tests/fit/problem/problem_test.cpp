@@ -109,13 +109,18 @@ TEST(Problem, UncertainCameraPoseMakesGravityADirectionWithAPrior) {
   }
 }
 
-TEST(Problem, ExactCameraPoseAddsNoUnknown) {
+TEST(Problem, CameraPoseWithoutCovarianceIsKnownToHalfADegree) {
   const FitInput input = synthetic_input({});
 
   const FitProblem problem = problem_of(input, {.observations = ObservationKind::tracks2d});
 
-  EXPECT_TRUE(problem.tilt.empty());
-  EXPECT_TRUE(problem.priors.empty());
+  ASSERT_EQ(problem.tilt.size(), 2u);
+  ASSERT_EQ(problem.priors.size(), 1u);
+  Eigen::VectorXd values = problem.space.start();
+  values[problem.priors[0].indices[0]] = 0.006;
+  values[problem.priors[0].indices[1]] = -0.008;
+  EXPECT_NEAR(problem.priors[0].residual(values).norm(), 1.0, 1e-9);
+  EXPECT_TRUE(problem_of(input, {.observations = ObservationKind::tracks3d}).tilt.empty());
 }
 
 TEST(Problem, SheetMotionTurnsAboutTheMiddleAndShifts) {

@@ -120,9 +120,10 @@ TEST(StartState, CorrectionsHaveTheDerivativesThatDifferencesShow) {
   const CutRecording recording(5e-4);
   const FitProblem problem = make_problem(
       recording.input, {.observations = ObservationKind::tracks2d, .start_nodes = 3}, 7, 7);
-  EXPECT_EQ(problem.space.size(), 7 + 2 * 3 * 9);
+  constexpr int kFabric = 7, kTilt = 2;
+  EXPECT_EQ(problem.space.size(), kFabric + kTilt + 2 * 3 * 9);
   Eigen::VectorXd values = problem.space.start();
-  for (int p = 7; p < problem.space.size(); ++p) values[p] = 2e-3 * (p % 5 - 2);
+  for (int p = kFabric; p < problem.space.size(); ++p) values[p] = 2e-3 * (p % 5 - 2);
   const TrajectoryObjective objective(problem, 8, 1.0 / 60 / 100);
 
   const Linearisation exact = objective.linearise(values);

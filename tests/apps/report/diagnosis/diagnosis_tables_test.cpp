@@ -63,6 +63,14 @@ TEST(AcceptedText, TellsAnEffectInWordsAndItsValuesBelow) {
             "spring_damping: shear = 0.00100 ± 0.00010 s");
 }
 
+TEST(CertaintyText, IsOfAllAmplitudesTogether) {
+  FitResult found;
+  found.effects = {
+      {"wind", {{"q_x", "Pa", 0.3, 0.03}, {"q_y", "Pa", 0.4, 0.04}, {"q_z", "Pa", 9, 1}}}};
+  EXPECT_EQ(certainty_text({.effect = "wind", .amplitudes = {"q_x", "q_y"}}, found), "± 10 %");
+  EXPECT_EQ(certainty_text({.effect = "gust", .amplitudes = {"q_x"}}, found), "");
+}
+
 TEST(ShortCandidateTable, ListsFourAmplitudesOfMany) {
   Diagnosis diagnosis;
   diagnosis.scores.push_back(
@@ -74,8 +82,10 @@ TEST(ShortCandidateTable, ListsFourAmplitudesOfMany) {
 }
 
 TEST(RemedyText, IsThatOfTheEffectWhereItHasOne) {
-  EXPECT_EQ(remedy_text({.effect = "nonuniform_mass", .mode = "hem"}),
-            "Remedy: weigh the hem, or declare masses.");
+  EXPECT_EQ(
+      remedy_text({.effect = "nonuniform_mass", .mode = "hem"}),
+      "Remedy: weigh the hem, or declare it: `declared` of the recording takes what model.yaml "
+      "has under `effects`.");
   EXPECT_EQ(remedy_text({.effect = "wind", .mode = "pressure"}), "");
 }
 
