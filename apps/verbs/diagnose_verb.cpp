@@ -74,10 +74,10 @@ std::vector<Recording> read_recordings(const DiagnoseFlags& flags) {
   return recordings;
 }
 
-/// Judges the models found as fits are. Their floor has what the test of adequacy took for the
-/// error of mesh and time step.
+/// Judges the models found as fits are. Their floor has what the test of adequacy found of the
+/// error that mesh and time step make.
 void judge_found(Diagnosis& diagnosis) {
-  const double discretisation = std::sqrt(diagnosis.after.discretisation_square);
+  const double discretisation = std::sqrt(diagnosis.after.discretisation_found);
   for (DiagnosedRecording& recording : diagnosis.recordings)
     for (FitReport* report : {&recording.after, &recording.with_law}) {
       if (!report->usable()) continue;

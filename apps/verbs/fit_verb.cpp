@@ -130,6 +130,9 @@ std::optional<double> areal_density(const Recording& recording) {
   return *cloth.mass_kg / (cloth.width_m * cloth.height_m);
 }
 
+/// Work of the trial of other masses, of a fit's. A tenth shows whether they explain a recording.
+constexpr double kWorkOfOtherMasses = 0.1;
+
 /// Tries the other way to spread the cloth's mass over its vertices, from where the fit stands.
 /// Returns a warning where that way explains the recording and the declared one does not.
 std::optional<Finding> try_other_masses(const FitInput& input, FitOptions options,
@@ -139,6 +142,7 @@ std::optional<Finding> try_other_masses(const FitInput& input, FitOptions option
   const bool by_area = masses == MassDistribution::by_area;
   masses = by_area ? MassDistribution::equal : MassDistribution::by_area;
   options.start = report.values;
+  options.work *= kWorkOfOtherMasses;
   options.bootstrap = 0;
   options.profile = options.two_meshes = false;
   options.checkpoint.clear();
@@ -182,7 +186,7 @@ FitReport fit_and_judge(const FitInput& input, FitOptions options,
   const double over = errors_over_floor(result).worst();
   constexpr double kBeyondAnyMesh = 8;  // times the noise
   if (!options.forecast && over > kVerdict.good && over < kBeyondAnyMesh) {
-    const auto square = discretisation_square(input, options, report, progress);
+    const auto square = discretisation_of_fit(input, options, report, progress);
     if (!square) {
       report.stop = FitStop::cancelled;
       return report;

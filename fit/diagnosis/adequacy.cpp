@@ -189,6 +189,13 @@ bool looks_like_noise(const Adequacy& of) {
 
 }  // namespace
 
+double discretisation_found(const FittedModel& model) {
+  double square = 0;
+  for (const PooledPart& part : model.parts)
+    square += (residual_of(part) - part.linear.residual).squaredNorm();
+  return square / static_cast<double>(model.residual_count());
+}
+
 Adequacy judge_adequacy(const FittedModel& model, Loss loss) {
   const ModelProjection projection(model, loss);
   const ModelProjection noise_alone(model, loss, false);
@@ -217,6 +224,7 @@ Adequacy judge_adequacy(const FittedModel& model, Loss loss) {
   double square = 0;
   for (const PooledPart& part : model.parts) square += part.directions.squaredNorm();
   result.discretisation_square = square / static_cast<double>(model.residual_count());
+  result.discretisation_found = discretisation_found(model);
   result.adequate = looks_like_noise(result);
   return result;
 }

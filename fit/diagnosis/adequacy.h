@@ -20,10 +20,16 @@ struct Adequacy {
   /// Mean square of the error that mesh and time step are thought to make, over the noise's square.
   /// Structure that cannot be told from this error does not count.
   double discretisation_square = 0;
+  /// The same of the error that was found: the expected one, and its directions by their
+  /// amplitudes.
+  double discretisation_found = 0;
   bool adequate = false;
 };
 
 /// Judges a linearised model. `loss` says whether large residuals count less (Huber).
 Adequacy judge_adequacy(const FittedModel& model, Loss loss);
+
+/// Returns Adequacy::discretisation_found of a model that was refined with its discretisation.
+double discretisation_found(const FittedModel& model);
 
 }  // namespace clothfit

@@ -4,6 +4,7 @@
 #include <limits>
 #include <utility>
 
+#include "fit/diagnosis/adequacy.h"
 #include "fit/diagnosis/criteria.h"
 #include "fit/diagnosis/discretisation.h"
 #include "fit/diagnosis/refit.h"
@@ -70,7 +71,7 @@ double coarse_will_do_beyond(const DiagnosisSetup& setup) {
   return grossly_misfitting(setup.inputs.front().recording.start == StartKind::unknown);
 }
 
-std::optional<double> discretisation_square(const FitInput& input, const FitOptions& options,
+std::optional<double> discretisation_of_fit(const FitInput& input, const FitOptions& options,
                                             const FitReport& report,
                                             const ProgressCallback& progress) try {
   const DiagnosisSetup setup{.inputs = {&input, 1},
@@ -81,7 +82,7 @@ std::optional<double> discretisation_square(const FitInput& input, const FitOpti
   if (!model.usable() || model.misfits_grossly()) return 0;
   refine_with_discretisation(model, setup, progress);
   if (!model.usable()) return 0;
-  return model.parts.front().directions.squaredNorm() / static_cast<double>(model.residual_count());
+  return discretisation_found(model);
 } catch (const StopRequested&) {
   return std::nullopt;
 }

@@ -11,11 +11,11 @@ namespace clothfit {
 /// coarser one, or a finer one may be analysed.
 double coarse_will_do_beyond(const DiagnosisSetup& setup);
 
-/// Returns the mean square, over the noise's, of the error that mesh and time step make of a fit,
-/// as the test of adequacy has it (Adequacy::discretisation_square). 0 where the model misfits
-/// grossly: it is not looked for then. Nothing where `progress` says to stop. Takes a fit on
-/// another mesh from where this one stands.
-std::optional<double> discretisation_square(const FitInput& input, const FitOptions& options,
+/// Returns the mean square, over the noise's, of the error that mesh and time step were found to
+/// make of a fit (Adequacy::discretisation_found). 0 where the model misfits grossly: it is not
+/// looked for then. Nothing where `progress` says to stop. Takes a fit on another mesh from where
+/// this one stands.
+std::optional<double> discretisation_of_fit(const FitInput& input, const FitOptions& options,
                                             const FitReport& report,
                                             const ProgressCallback& progress);
 

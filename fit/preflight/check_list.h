@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <string>
 #include <utility>
 
@@ -47,6 +48,11 @@ class CheckList {
 
   const std::string& file() const { return file_; }
   const Findings& findings() const { return findings_; }
+  bool warns_of(const std::string& check) const {
+    return std::ranges::any_of(findings_, [&](const Finding& finding) {
+      return finding.check == check && finding.state == FindingState::warning;
+    });
+  }
   bool refused() const { return !with_state(findings_, FindingState::refused).empty(); }
 
  private:

@@ -11,6 +11,9 @@ namespace clothfit {
 /// Says whether something else than held points may carry the cloth: an obstacle, a contact.
 bool is_carried(const RecordedMotion& motion);
 
+/// Says whether an effect of motion is declared, which may push as hard as the weight.
+bool moves_by_effects(const Recording& recording);
+
 /// Mass per area, gravity's size, frame times, the mesh's cells, parameters of declared effects.
 void check_declarations(const Recording& recording, CheckList& list);
 /// Distances between markers in space against those on the cloth; cameras' distances.

@@ -16,6 +16,8 @@ struct PreflightCriteria {
   double least_on_ground = 9.7, most_on_ground = 9.9, most_gravity = 30;
   /// s between frames. Wider: milliseconds and numbers of frames pass for seconds.
   double longest_interval = 2, shortest_interval = 1e-5;
+  /// The same that is warned of. Raised: numbers of frames pass for seconds.
+  double slow_interval = 0.3;
   /// Ratio of the sides of a cell. Raised: columns and rows may be exchanged.
   double cells_alike = 2.5;
 
@@ -46,6 +48,8 @@ struct PreflightCriteria {
   /// Share by which nine of ten markers may lie beside a flat sheet, beyond the noise. Raised:
   /// starts are taken for flat that are not, and stiffness makes up for it.
   double sheet_warned = 0.015, sheet_refused = 0.08;
+  /// Times what nine of ten lie beside it from which a marker strays. Raised: wrong s and t pass.
+  double stray = 5;
   /// Share by which cameras may see the sheet apart, and the same of the farthest camera's
   /// distance, which a small sheet tells no better. Raised: their poses may be off. Beyond the
   /// last, of that distance, they are refused.
@@ -61,9 +65,6 @@ struct PreflightCriteria {
   /// Share by which the middle must lie above or below what holds the cloth. Raised: gravity that
   /// is turned round passes of stiff cloth.
   double above_held = 0.15;
-  /// Times that cloth takes to fall its own size in which it must have come down. Raised: gravity
-  /// that is turned round passes.
-  double falls = 3;
 
   // Gravity and the release (release.cpp)
   /// Share from held points beyond which cloth falls freely at first. Raised: small sheets are not
@@ -77,6 +78,9 @@ struct PreflightCriteria {
   /// of them are taken off what it differs by. Raised, lowered: stiff sheets, which soon turn
   /// round, are judged.
   double release_uncertain = 0.3, release_sigmas = 3;
+  /// Share of the mean square that a fall with the square of the time leaves; a creep leaves 0.06.
+  /// Raised: damped sheets are judged.
+  double no_parabola = 0.03;
   /// Share that a cloth at rest may move in so many seconds, before a person sets it in motion.
   double rests = 0.02, rest_s = 0.2;
   /// m/s2 of gravity across the sheet that are needed to see it. Lowered: noise decides.
@@ -96,8 +100,9 @@ struct PreflightCriteria {
   double jump = 1.7;
   /// Cosine between the velocities in a jump and about it. Lowered: a kick is taken for one.
   double jump_agrees = 0.9;
-  /// Share by which a jump may differ from a whole number of steps, to be refused.
-  double whole_steps = 0.15;
+  /// What a jump may differ from a whole number of steps, by the root of that, to be refused.
+  /// Raised: kicks are.
+  double whole_steps = 0.1;
   /// Ratio of the way of all markers in a frame that repeats the last to the shorter of the ways
   /// before and after, and the cosine between those two. Raised, lowered: a halt is taken for a
   /// copy.
@@ -155,7 +160,7 @@ struct PreflightCriteria {
   double inside_share = 0.5;
   /// Share of the start's vertices that must lie behind an open surface. Lowered: cloth that hangs
   /// over its rim is warned of.
-  double behind_share = 0.9;
+  double behind_share = 0.1;
 };
 
 /// The one set that the product uses.

@@ -64,6 +64,10 @@ void check_intervals(const Recording& recording, CheckList& list) {
                        recording.frame_rate_hz
                            ? "frame_rate is in frames per second, not the interval"
                            : "are the times in milliseconds, or numbers of frames?");
+  if (usual_s > kPreflight.slow_interval)
+    list.warn("time", fmt::format("by {}, frames are {:.4g} s apart", source, usual_s),
+              fmt::format("less than {:g} s, in which cloth swings", kPreflight.slow_interval),
+              "are they numbers of frames, or milliseconds?");
   if (usual_s < kPreflight.shortest_interval)
     list.warn("time", fmt::format("by {}, frames are {:.3g} s apart", source, usual_s),
               fmt::format("more than {:g} s", kPreflight.shortest_interval),
@@ -108,6 +112,12 @@ void check_parameters(const Recording& recording, CheckList& list) {
 }
 
 }  // namespace
+
+bool moves_by_effects(const Recording& recording) {
+  return std::ranges::any_of(recording.declared, [](const DeclaredEffect& effect) {
+    return measurement_effect_named(effect.name) == nullptr;
+  });
+}
 
 void check_declarations(const Recording& recording, CheckList& list) {
   check_mass(recording, list);

@@ -96,10 +96,11 @@ std::optional<double> disorder(const Eigen::Matrix2Xd& marker_m, const RecordedM
                                int s) {
   constexpr int kNear = 12;
   // The place among neighbours is hardly noisy, so that one end of the distance is.
-  constexpr double kOfNoise = 0.7;
+  constexpr double kOfNoise = 0.7, kClear = 4;
   constexpr int kFewest = 8, kMost = 400;
   const std::vector<int>& tracked = motion.tracked();
   const Eigen::MatrixXd place = motion.places(s, motion.first_frame(s));
+  const double noise_m = motion.noise_m(s);
   const size_t stride = std::max<size_t>(1, tracked.size() / kMost);
   std::vector<double> shares;
   for (size_t k = 0; k < tracked.size(); k += stride) {
@@ -110,7 +111,8 @@ std::optional<double> disorder(const Eigen::Matrix2Xd& marker_m, const RecordedM
     if (near.empty()) continue;
     const auto expected = place_among(marker_m, place, near, marker_m.col(m));
     const double spacing_m = (marker_m.col(near.front()) - marker_m.col(m)).norm();
-    if (expected && spacing_m > 0)
+    // Markers nearer to each other than their noise lie in no order.
+    if (expected && spacing_m > kClear * noise_m)
       shares.push_back(
           distance_less_noise(place.col(m) - *expected, kOfNoise * motion.set(s).noise) /
           (motion.units_per_m(s) * spacing_m));
@@ -181,10 +183,16 @@ bool check_side(const RecordedMotion& motion, int s, const Rigid3& world_from_sh
   return false;
 }
 
-/// Distances of the first frame's markers from the flat sheet, m, over all sets.
-std::vector<double> off_sheet_m(const RecordedMotion& motion, const Rigid3& world_from_sheet,
+/// How far a marker lies beside the flat sheet in the first frame.
+struct OffSheet {
+  double distance_m = 0;
+  int marker = 0;
+};
+
+/// Returns that of all markers, over all sets.
+std::vector<OffSheet> off_sheet(const RecordedMotion& motion, const Rigid3& world_from_sheet,
                                 double& noise_m) {
-  std::vector<double> off_m;
+  std::vector<OffSheet> off;
   noise_m = 0;
   for (int s = 0; s < motion.sets(); ++s) {
     const ObservationSet& set = motion.set(s);
@@ -195,10 +203,36 @@ std::vector<double> off_sheet_m(const RecordedMotion& motion, const Rigid3& worl
       if (row.frame > 0) break;
       const Eigen::Vector2d flat = motion.marker_m().col(row.marker);
       const auto expected = set.predict(world_from_sheet * Eigen::Vector3d(flat.x(), flat.y(), 0));
-      if (expected) off_m.push_back((row.observed - *expected).norm() / units_per_m);
+      if (expected)
+        off.push_back(
+            {.distance_m = (row.observed - *expected).norm() / units_per_m, .marker = row.marker});
     }
   }
-  return off_m;
+  return off;
+}
+
+/// Names a few markers that lie far beside the sheet where all others lie in it: s and t are wrong,
+/// or the row is.
+void check_strays(const RecordedMotion& motion, const std::vector<OffSheet>& off, double usual_m,
+                  CheckList& list) {
+  std::vector<std::string> strays;
+  for (const OffSheet& one : off) {
+    if (motion.neighbours(one.marker).empty()) continue;
+    const int nearest = motion.neighbours(one.marker).front();
+    const double spacing_m =
+        (motion.marker_m().col(nearest) - motion.marker_m().col(one.marker)).norm();
+    if (one.distance_m > std::max(kPreflight.stray * usual_m, kPreflight.out_of_place * spacing_m))
+      strays.push_back(
+          fmt::format("{} by {:.3g} mm",
+                      motion.recording().markers.markers[static_cast<size_t>(one.marker)].name,
+                      1e3 * one.distance_m));
+  }
+  constexpr size_t kMost = 6;
+  if (strays.empty() || strays.size() > kMost || 10 * strays.size() > off.size()) return;
+  list.add("markers", FindingState::warning, motion.recording().markers_file.string(),
+           fmt::format("in frame 0 markers lie beside their place in the sheet: {}",
+                       fmt::join(strays, ", ")),
+           "markers where s and t say", "correct s and t, or leave out the row");
 }
 
 /// Returns how far a camera is from the middle of the sheet that it sees.
@@ -220,16 +254,17 @@ double farthest_camera_m(const RecordedMotion& motion) {
 
 void check_flat(const RecordedMotion& motion, const Rigid3& world_from_sheet, CheckList& list) {
   double noise_m = 0;
-  std::vector<double> off_m = off_sheet_m(motion, world_from_sheet, noise_m);
-  if (off_m.empty()) return;
-  std::ranges::sort(off_m);
-  const double most_m = off_m[off_m.size() * 9 / 10];
+  std::vector<OffSheet> off = off_sheet(motion, world_from_sheet, noise_m);
+  if (off.empty()) return;
+  std::ranges::sort(off, {}, &OffSheet::distance_m);
+  const double most_m = off[(9 * off.size() + 9) / 10 - 1].distance_m;
+  check_strays(motion, off, most_m, list);
   constexpr double kNineOfTen = 2.5;  // sigmas, of distances in space
   const double noise = kNineOfTen * noise_m + kPreflight.pose_off * farthest_camera_m(motion);
   const double size_m = motion.size_m();
   const std::string found =
       fmt::format("nine of ten of {} markers in frame 0 lie within {:.2g} mm of a flat sheet",
-                  off_m.size(), 1e3 * most_m);
+                  off.size(), 1e3 * most_m);
   const std::string expected =
       fmt::format("start: released_flat says that it is flat (noise {:.2g} mm)", 1e3 * noise_m);
   const char* remedy =

@@ -15,6 +15,7 @@ namespace clothfit {
 namespace {
 
 constexpr int kMostHangingFrames = 60;
+constexpr double kAtHeld = 0.1;  // of the cloth's size: markers beside what is held
 
 /// Where cloth hangs, seen from what holds it: means over frames, in units of the first set.
 struct Hanging {
@@ -24,7 +25,6 @@ struct Hanging {
 
 /// Returns nothing where no marker is near a held point.
 std::optional<Hanging> hanging(const RecordedMotion& motion, int most_frames) {
-  constexpr double kAtHeld = 0.1;  // of the cloth's size
   const auto dimension = motion.set(0).dimension;
   Eigen::VectorXd middle = Eigen::VectorXd::Zero(dimension), held = middle;
   int seen = 0, holding = 0;
@@ -84,6 +84,23 @@ std::optional<Eigen::VectorXd> seen_down(const RecordedMotion& motion) {
   return seen.normalized();
 }
 
+/// Says whether all that holds the cloth lies to one side of its middle.
+bool is_held_at_one_side(const RecordedMotion& motion) {
+  constexpr double kAside = 0.25;  // of the cloth's size
+  const ClothDescription& cloth = motion.recording().cloth;
+  Eigen::Vector2d mean_m = Eigen::Vector2d::Zero();
+  int near = 0;
+  for (const int m : motion.tracked()) {
+    const Eigen::Vector2d at_m = motion.marker_m().col(m);
+    if (distance_to_held_m(motion.recording(), at_m) > kAtHeld * motion.size_m()) continue;
+    mean_m += at_m;
+    ++near;
+  }
+  if (near == 0) return false;
+  const Eigen::Vector2d middle_m(0.5 * cloth.width_m, 0.5 * cloth.height_m);
+  return (mean_m / near - middle_m).norm() > kAside * motion.size_m();
+}
+
 }  // namespace
 
 std::optional<GravityCandidate> hangs_along(const RecordedMotion& motion) {
@@ -118,13 +135,10 @@ void check_hanging(const RecordedMotion& motion, CheckList& list) {
   const std::string remedy =
       other ? gravity_text(*other) + " would explain it; a wind or a stiff cloth would too"
             : "look at gravity's sign and axis, and at the held points";
-  // Stiff cloth may stick out at a side while it rests, but it does not stand on what holds it.
-  // Cloth that is thrown up comes down soon.
+  // Stiff cloth may stick out at a side while it rests, or be an arch between two; it does not
+  // stand on one.
   const bool stands = share < -kPreflight.above_held;
-  const double falls_s = std::sqrt(2 * motion.size_m() / gravity.norm());
-  const bool is_long =
-      motion.time_s().back() - motion.time_s().front() > kPreflight.falls * falls_s;
-  if (stands && (at_rest || is_long) && recording.declared.empty())
+  if (stands && at_rest && is_held_at_one_side(motion) && !moves_by_effects(recording))
     list.refuse("gravity", found, expected, remedy);
   else if (stands || other)
     list.warn("gravity", found, expected, remedy);

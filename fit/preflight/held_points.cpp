@@ -209,7 +209,8 @@ void check_fixed(const RecordedMotion& motion, int s, const std::vector<Eigen::M
     if (is_free && !resting.empty())
       remedy +=
           " At rest are " + names_of(motion, resting) + resting_layout(motion, fixed, resting);
-    if (is_free)
+    // A track that is another marker's may be to blame.
+    if (is_free && !list.warns_of("markers"))
       list.refuse("held points", found, "a point that stays where it is", remedy);
     else
       list.warn("held points", found, "a point that stays where it is", remedy);

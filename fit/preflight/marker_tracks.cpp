@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numeric>
-#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -180,10 +178,15 @@ bool check_twice(const RecordedMotion& motion, int s, CheckList& list) {
         order.push_back(m);
         ++seen[static_cast<size_t>(m)];
       }
-    std::ranges::sort(order, {}, [&](int m) { return place(0, m); });
+    if (order.empty()) continue;
+    // Along the coordinate in which they lie farthest apart few are near.
+    Eigen::Index axis = 0;
+    const Eigen::MatrixXd seen_place = place(Eigen::all, order);
+    (seen_place.rowwise().maxCoeff() - seen_place.rowwise().minCoeff()).maxCoeff(&axis);
+    std::ranges::sort(order, {}, [&](int m) { return place(axis, m); });
     for (size_t a = 0; a < order.size(); ++a)
-      for (size_t b = a + 1; b < order.size() && place(0, order[b]) - place(0, order[a]) < near;
-           ++b)
+      for (size_t b = a + 1;
+           b < order.size() && place(axis, order[b]) - place(axis, order[a]) < near; ++b)
         if ((place.col(order[a]) - place.col(order[b])).norm() < near)
           ++together[std::minmax(order[a], order[b])];
   }

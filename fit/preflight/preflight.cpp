@@ -22,11 +22,11 @@ Findings check_recording(const FitInput& input, ObservationKind kind) {
   check_first_sheet(motion, list);
   if (list.refused()) return list.findings();
   check_timing(motion, list);
+  check_marker_tracks(motion, list);
   check_held_points(motion, list);
   if (list.refused()) return list.findings();
   check_hanging(motion, list);
   check_release(motion, list);
-  check_marker_tracks(motion, list);
   check_obstacle(motion, list);
   return list.findings();
 }

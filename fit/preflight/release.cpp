@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "calib/camera/rigid3.h"
+#include "data/median.h"
 #include "fit/preflight/checks.h"
 #include "fit/preflight/criteria.h"
 #include "fit/preflight/gravity_candidates.h"
@@ -15,6 +16,34 @@
 
 namespace clothfit {
 namespace {
+
+/// Returns which markers are far from what is held, and lie in frame 0 where the flat sheet has
+/// them as most do: a row that is wrong there would be taken for a motion ever after.
+std::vector<char> free_markers(const RecordedMotion& motion, const Rigid3& world_from_sheet) {
+  constexpr double kFarOff = 5;  // times what half of them are off
+  std::vector<char> is_free;
+  for (int m = 0; m < motion.markers(); ++m)
+    is_free.push_back(distance_to_held_m(motion.recording(), motion.marker_m().col(m)) >
+                      kPreflight.free_of_held * motion.size_m());
+  for (int s = 0; s < motion.sets(); ++s) {
+    std::vector<std::pair<double, int>> off;
+    std::vector<double> usual;
+    for (const Observation& row : motion.set(s).rows) {
+      if (row.frame > 0) break;
+      const Eigen::Vector2d flat = motion.marker_m().col(row.marker);
+      const auto start =
+          motion.set(s).predict(world_from_sheet * Eigen::Vector3d(flat.x(), flat.y(), 0));
+      if (!start) continue;
+      off.emplace_back((row.observed - *start).norm() / row.sigma, row.marker);
+      usual.push_back(off.back().first);
+    }
+    if (usual.empty()) continue;
+    const double limit = kFarOff * std::max(1.0, median(std::move(usual)));
+    for (const auto& [sigmas, marker] : off)
+      if (sigmas > limit) is_free[static_cast<size_t>(marker)] = 0;
+  }
+  return is_free;
+}
 
 /// The mean motion of the free part of a sheet along a direction since frame 0, by frame.
 struct MotionAlong {
@@ -26,10 +55,7 @@ MotionAlong motion_along(const RecordedMotion& motion, const Rigid3& world_from_
                          const Eigen::Vector3d& direction) {
   const auto frames = static_cast<size_t>(motion.frames());
   std::vector<double> information(frames), pull(frames), all(frames);
-  std::vector<char> is_free;
-  for (int m = 0; m < motion.markers(); ++m)
-    is_free.push_back(distance_to_held_m(motion.recording(), motion.marker_m().col(m)) >
-                      kPreflight.free_of_held * motion.size_m());
+  const std::vector<char> is_free = free_markers(motion, world_from_sheet);
   for (int s = 0; s < motion.sets(); ++s)
     for (const Observation& row : motion.set(s).rows) {
       if (is_free[static_cast<size_t>(row.marker)] == 0) continue;
@@ -90,10 +116,13 @@ Parabola fit_parabola(const std::vector<double>& t_s, const MotionAlong& motion,
     sum += std::pow((motion.moved_m[static_cast<size_t>(f)] - found.dot(basis(f))) /
                         motion.sigma_m[static_cast<size_t>(f)],
                     2);
-  const int spare = std::max(1, last - (with_speed ? 2 : 1));
+  int seen = 0;
+  for (int f = 1; f <= last; ++f)
+    if (std::isfinite(motion.sigma_m[static_cast<size_t>(f)])) ++seen;
+  const int spare = std::max(1, seen - (with_speed ? 2 : 1));
   return {.acceleration = found[0],
           .speed = found[1],
-          .sigma = std::sqrt(sum / spare * normal.inverse()(0, 0)),
+          .sigma = std::sqrt(std::max(1.0, sum / spare) * normal.inverse()(0, 0)),
           .left = all > 0 ? sum / all : 1};
 }
 
@@ -127,6 +156,13 @@ int last_of_release(const ReleaseSight& at) {
   };
   int last = last_within(kPreflight.nearly_flat);
   if (last < kFewestFrames) last = std::min(kFewestFrames, last_within(2 * kPreflight.nearly_flat));
+  // Damped sheets do not turn round: their way grows more slowly than with the time.
+  constexpr double kSlowed = 1.9;  // ratio of the ways in twice the time, 4 of a free fall
+  for (int f = 2; f <= last; f += 2) {
+    const auto whole = static_cast<size_t>(f), half = static_cast<size_t>(f / 2);
+    if (moved_m[whole] > at.moved.seen_m[whole] && moved_m[whole] < kSlowed * moved_m[half])
+      last = f / 2;
+  }
   constexpr double kTurned = 0.95;  // of the way that it had gone
   for (int f = 1; f < std::min(2 * last, at.motion.frames() - 1); ++f) {
     const auto frame = static_cast<size_t>(f);
@@ -136,23 +172,43 @@ int last_of_release(const ReleaseSight& at) {
   return last;
 }
 
-/// Returns the time at which a sheet is let go that stands still before: the way grows with the
-/// square of the time since, so its root does with the time. `moves` is the first frame in which it
-/// has moved. 0 where that cannot be told.
-double release_s(const ReleaseSight& at, size_t moves) {
-  constexpr size_t kLookedAt = 3;
+/// When a sheet is let go that stands still before: d = (rate (t - time))^2.
+struct LetGo {
+  double time_s = 0, rate = 0;  ///< rate: roots of metres a second; both 0 where it cannot be told
+};
+
+/// The way grows with the square of the time since, so its root does with the time. `moves` is the
+/// first frame in which it has moved.
+LetGo let_go(const ReleaseSight& at, size_t moves) {
+  constexpr size_t kFewest = 3, kMost = 60;
+  constexpr double kFar = 6;  // times the first way: noise of a short stretch tells no time
   const std::vector<double>& moved_m = at.moved.distance_m;
   Eigen::Matrix2d normal = Eigen::Matrix2d::Zero();
   Eigen::Vector2d right = Eigen::Vector2d::Zero();
-  for (size_t f = moves; f < std::min(moves + kLookedAt, moved_m.size()); ++f) {
+  for (size_t f = moves; f < std::min(moves + kMost, moved_m.size()); ++f) {
     if (!std::isfinite(moved_m[f])) continue;
+    if (f >= moves + kFewest && moved_m[f] > kFar * moved_m[moves]) break;
     const Eigen::Vector2d by(1, at.time_s(static_cast<int>(f)));
     normal += by * by.transpose();
     right += std::sqrt(moved_m[f]) * by;
   }
-  if (!(std::abs(normal.determinant()) > 0)) return 0;
+  if (!(std::abs(normal.determinant()) > 0)) return {};
   const Eigen::Vector2d line = normal.inverse() * right;
-  return line[1] > 0 ? -line[0] / line[1] : 0;
+  if (!(line[1] > 0)) return {};
+  return {.time_s = -line[0] / line[1], .rate = line[1]};
+}
+
+/// Says whether frame 0 shows markers that are free to move.
+bool shows_free_part(const ReleaseSight& at) {
+  constexpr int kFewest = 4;
+  const std::vector<char> is_free = free_markers(at.motion, at.world_from_sheet);
+  int seen = 0;
+  for (int s = 0; s < at.motion.sets(); ++s) {
+    const Eigen::MatrixXd first = at.motion.places(s, 0);
+    for (Eigen::Index m = 0; m < first.cols(); ++m)
+      if (is_free[static_cast<size_t>(m)] != 0 && first.col(m).allFinite()) ++seen;
+  }
+  return seen >= kFewest;
 }
 
 /// Finds the frame in which a sheet is let go that stands still before. Returns whether that is
@@ -168,6 +224,7 @@ bool check_moment(const ReleaseSight& at, CheckList& list) {
       largest_m = std::max(largest_m, moved_m[f]);
     }
   if (!is_seen) {
+    if (!shows_free_part(at)) return false;
     list.refuse("release",
                 fmt::format("in all {} frames markers move by no more than their noise",
                             at.motion.frames()),
@@ -183,8 +240,9 @@ bool check_moment(const ReleaseSight& at, CheckList& list) {
   const double frame_s = at.time_s(static_cast<int>(moves)) / static_cast<double>(moves);
   // A sheet that nothing but its weight moves does not start earlier than this.
   const double falls_s = std::sqrt(2 * moved_m[moves] / at.weight);
+  const LetGo moment = let_go(at, moves);
   const double still =
-      std::min(release_s(at, moves), at.time_s(static_cast<int>(moves)) - 0.5 * falls_s) / frame_s;
+      std::min(moment.time_s, at.time_s(static_cast<int>(moves)) - 0.5 * falls_s) / frame_s;
   if (still < kPreflight.still_frames) return true;
   // The last frame that shows no motion, near there.
   const auto near = static_cast<size_t>(still);
@@ -248,7 +306,7 @@ void judge_ratio(const Recording& recording, const Ratio& ratio, const std::stri
         "it too, and is to be declared";
   const bool clearly = explanation.twice || !ratio.within(kPreflight.gravity_refused);
   // A declared force may push as hard as the weight.
-  if (clearly && is_explained && recording.declared.empty())
+  if (clearly && is_explained && !moves_by_effects(recording))
     list.refuse("gravity", found, "a ratio near 1", remedy);
   else
     list.warn("gravity", found, "a ratio near 1", remedy);
@@ -266,7 +324,7 @@ std::optional<GravityCandidate> falls_along(const ReleaseSight& at, double accel
   return std::nullopt;
 }
 
-/// Refuses a sheet that moves in frame 0 already. Returns whether it does.
+/// Says what moves in frame 0 already. Returns whether it does.
 bool moves_already(const ReleaseSight& at, const MotionAlong& across, int last, CheckList& list) {
   constexpr double kExplains = 0.02, kOfFall = 0.3;
   const Parabola still = fit_parabola(at.motion.time_s(), across, last, false),
@@ -276,11 +334,19 @@ bool moves_already(const ReleaseSight& at, const MotionAlong& across, int last, 
   if (std::abs(moving.speed) < std::max(kPreflight.moving_speed, kOfFall * gathered) ||
       moving.left > std::min(kExplains, 0.5 * still.left))
     return false;
-  list.refuse(
-      "release",
-      fmt::format("in frame 0 the sheet already moves at {:.2g} m/s", std::abs(moving.speed)),
-      "start: released_flat says that it is let go there, at rest",
-      "give start: unknown, or begin with the frame of the release");
+  // From rest it cannot have moved so far in the first frame, by its weight and by what it hangs
+  // on.
+  constexpr double kFaster = 2;
+  const double first_m = std::abs(across.moved_m[1]);
+  const bool is_certain = first_m > kFaster * 0.5 * at.weight * at.time_s(1) * at.time_s(1) +
+                                        kPreflight.release_sigmas * across.sigma_m[1];
+  list.add("release",
+           is_certain && !moves_by_effects(at.motion.recording()) ? FindingState::refused
+                                                                  : FindingState::warning,
+           list.file(),
+           fmt::format("in frame 0 the sheet already moves at {:.2g} m/s", std::abs(moving.speed)),
+           "start: released_flat says that it is let go there, at rest",
+           "give start: unknown, or begin with the frame of the release");
   return true;
 }
 
@@ -289,9 +355,19 @@ bool moves_already(const ReleaseSight& at, const MotionAlong& across, int last, 
 /// near, whatever the fabric is.
 void check_across(const ReleaseSight& at, CheckList& list) {
   const MotionAlong across = motion_along(at.motion, at.world_from_sheet, at.normal);
-  const int last = last_of_release(at);
+  int last = last_of_release(at);
   const bool is_soon_over = last < kFewestFrames;
-  const Parabola fall = fit_parabola(at.motion.time_s(), across, std::max(1, last), false);
+  Parabola fall = fit_parabola(at.motion.time_s(), across, std::max(1, last), false);
+  // What damps a sheet slows it more and more: the first frames tell what moves it.
+  constexpr double kSlower = 1.15;
+  bool slows = false;
+  while (last / 2 >= kFewestFrames) {
+    const Parabola half = fit_parabola(at.motion.time_s(), across, last / 2, false);
+    slows = std::abs(half.acceleration) > kSlower * std::abs(fall.acceleration);
+    if (!slows) break;
+    last /= 2;
+    fall = half;
+  }
   if (!std::isfinite(fall.sigma)) return;
   const bool is_in_view = at.weight >= kPreflight.in_view;
   Ratio ratio;
@@ -299,6 +375,8 @@ void check_across(const ReleaseSight& at, CheckList& list) {
   // Of few frames it is certain only that nothing falls faster than freely.
   if (is_soon_over && ratio.value < kPreflight.gravity_refused) return;
   if (!is_soon_over && is_in_view && moves_already(at, across, last, list)) return;
+  // What does not grow with the square of the time is no free fall.
+  if (!is_soon_over && (slows || fall.left > kPreflight.no_parabola)) return;
   if (!is_soon_over &&
       fall.sigma > kPreflight.release_uncertain * std::max(at.weight, std::abs(fall.acceleration)))
     return;
@@ -321,8 +399,11 @@ void check_across(const ReleaseSight& at, CheckList& list) {
   const double differs = std::abs(fall.acceleration - at.weight);
   if (!explanation.text.empty() &&
       differs > kFalls * size + kPreflight.release_sigmas * fall.sigma &&
-      at.motion.recording().declared.empty())
-    list.refuse("gravity", found, "the declared one", explanation.text + " would explain it");
+      !moves_by_effects(at.motion.recording())) {
+    const std::string remedy = explanation.text + " would explain it; a wind would too";
+    list.add("gravity", explanation.twice ? FindingState::refused : FindingState::warning,
+             list.file(), found, "the declared one", remedy);
+  }
 }
 
 /// How a sheet in pictures falls along a direction.
@@ -383,7 +464,7 @@ void check_rest(const RecordedMotion& motion, CheckList& list) {
   const bool all_fixed = std::ranges::all_of(
       recording.held, [](const HeldPoint& point) { return point.motion == HeldMotion::fixed; });
   if (recording.start != StartKind::at_rest || !all_fixed || recording.held.empty() ||
-      !recording.declared.empty())
+      moves_by_effects(recording))
     return;
   const MovedMarkers moved = moved_markers(motion);
   for (int f = 1; f < motion.frames(); ++f) {
@@ -420,7 +501,8 @@ void check_release(const RecordedMotion& motion, CheckList& list) {
   // One that hangs already need not move.
   const bool is_in_view = at.weight >= kPreflight.in_view;
   if (is_in_view && !check_moment(at, list)) return;
-  if (!motion.set(0).camera)
+  // Several cameras see the motion across the sheet, one hardly.
+  if (!motion.set(0).camera || motion.sets() > 1)
     check_across(at, list);
   else if (is_in_view)
     check_fall(at, list);

@@ -14,10 +14,10 @@ namespace {
 constexpr double kUnstatedTilt = 0.01;
 
 /// Adds two level directions and, where a camera saw the cloth, gravity's direction as an unknown.
-/// Its prior follows from the pose's covariance, or from kUnstatedTilt. Only gravity's direction in the camera's axes
-/// matters to a cloth that is placed by what the camera sees. All else of the pose moves the scene
-/// as a whole. With true camera_from_world = exp(w) * estimate, gravity seen through the estimate
-/// is turned by R' w in the world (R the estimated rotation).
+/// Its prior follows from the pose's covariance, or from kUnstatedTilt. Only gravity's direction in
+/// the camera's axes matters to a cloth that is placed by what the camera sees. All else of the
+/// pose moves the scene as a whole. With true camera_from_world = exp(w) * estimate, gravity seen
+/// through the estimate is turned by R' w in the world (R the estimated rotation).
 void add_gravity_direction(FitProblem& problem) {
   const Eigen::Vector3d down = problem.gravity_m_per_s2.stableNormalized();
   const Eigen::Vector3d away =
@@ -26,7 +26,7 @@ void add_gravity_direction(FitProblem& problem) {
   problem.level_axes.col(1) = problem.level_axes.col(0).cross(down);
 
   const ObservationSet& first = problem.observations.front();
-  if (!first.camera) return;
+  if (!first.camera || down.isZero()) return;
   const CameraPose& pose = *first.camera->camera_from_world;
   const Eigen::Matrix<double, 2, 3> level =
       problem.level_axes.transpose() * pose.rotation.toRotationMatrix().transpose();

@@ -129,11 +129,9 @@ void explain_by_bound(const ParameterSpace& space, const Uncertainty& uncertaint
   if (!(shift > own)) return;
   parameter.state = ParameterState::undetermined;
   parameter.reason = fmt::format(
-      "it trades with {}, which ended at an end of its range, and would move by {:.2g} times its "
-      "own "
+      "it trades with {}, which ended at an end of its range, and would move by more than its "
       "standard deviation beyond that",
-      space.parameters[static_cast<size_t>(uncertainty.bound_by)].name,
-      shift / std::max(own, 1e-4 * shift));
+      space.parameters[static_cast<size_t>(uncertainty.bound_by)].name);
 }
 
 /// Adds the intervals of the p-th parameter.

@@ -21,13 +21,13 @@ constexpr double kBeyondOthers = 8;
 constexpr int kStretch = 5;
 /// Sigmas that half of the markers may be off in the mean: a model that leaves more does not tell.
 constexpr double kExplained = 5;
-/// Share of the markers up to which they are to blame, and not the model; of few markers it is two.
+/// Share of the markers up to which they are to blame, and not the model. Of few it is one, of ten
+/// on two.
 constexpr double kFew = 0.1;
-constexpr size_t kFewAtLeast = 2;
 
 bool are_few(size_t found, size_t all) {
-  return static_cast<double>(found) <=
-             std::max(static_cast<double>(kFewAtLeast), kFew * static_cast<double>(all)) &&
+  const double at_least = all < 10 ? 1 : 2;
+  return static_cast<double>(found) <= std::max(at_least, kFew * static_cast<double>(all)) &&
          2 * found < all;
 }
 

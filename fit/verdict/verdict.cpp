@@ -87,8 +87,9 @@ ErrorsOverFloor errors_over_floor(const FitResult& result) {
 
 void judge(FitResult& result) {
   const ErrorsOverFloor over = errors_over_floor(result);
-  const bool held_out = std::ranges::any_of(
-      result.errors, [](const ObservationErrors& one) { return one.held_out.count > 0; });
+  const bool held_out = std::ranges::any_of(result.errors, [](const ObservationErrors& one) {
+    return one.held_out_without.value_or(one.held_out).count > 0;
+  });
   const bool lacks = over.worst() > kVerdict.usable || states_no_sigma(result);
   const auto say = [&](FitVerdict verdict, const std::string& reason) {
     result.verdict = verdict;

@@ -96,6 +96,7 @@ ordered_json adequacy_json(const Adequacy& of) {
           {"time_correlation", of.time_correlation},
           {"neighbour_correlation", of.neighbour_correlation},
           {"discretisation_square", of.discretisation_square},
+          {"discretisation_found", of.discretisation_found},
           {"smooth_share", of.smooth_share},
           {"smooth_score", of.smooth_score}};
 }

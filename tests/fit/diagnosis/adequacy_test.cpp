@@ -359,6 +359,20 @@ TEST(Adequacy, LeavesOutWhatTheDiscretisationMayErrBy) {
   EXPECT_NEAR(chi_square.mean(), 1, 4 * std::sqrt(2.0 / kWatchedFrames / kNumbersOfFrame / kDraws));
 }
 
+TEST(Adequacy, TellsTheErrorThatTheDiscretisationWasFoundToMake) {
+  constexpr unsigned kSeed = 23;
+  constexpr double kAmplitude = 0.4, kSquare = 2;
+  SCOPED_TRACE("seed " + std::to_string(kSeed));
+  std::mt19937_64 rng(kSeed);
+  FittedModel model = that_errs_along(drift_of(kSquare), model_that_leaves({white(rng)}, rng));
+  EXPECT_EQ(discretisation_found(model), 0);
+  model.parts.front().amplitudes[0] = kAmplitude;
+  const double found = kAmplitude * kAmplitude * kSquare;
+  EXPECT_NEAR(judge_adequacy(model, Loss::squared).discretisation_found, found, 1e-12);
+  model.parts.front().correction = model.parts.front().directions.col(0);
+  EXPECT_NEAR(discretisation_found(model), std::pow(1 + kAmplitude, 2) * kSquare, 1e-12);
+}
+
 // Beside such a direction a smooth function counts from a hundredth of the direction's mean square
 // on. An excess counts from a tenth of it on.
 TEST(Adequacy, HoldsForLittleBesideWhatTheDiscretisationErrsBy) {
