@@ -74,17 +74,16 @@ std::vector<Recording> read_recordings(const DiagnoseFlags& flags) {
   return recordings;
 }
 
-/// Judges the models found as fits are. Their floor has what the test of adequacy found of the
-/// error that mesh and time step make.
+/// Judges the models found as fits are.
 void judge_found(Diagnosis& diagnosis) {
-  const double discretisation = std::sqrt(diagnosis.after.discretisation_found);
+  const double discretisation = std::sqrt(diagnosis.after.discretisation_square);
   for (DiagnosedRecording& recording : diagnosis.recordings)
     for (FitReport* report : {&recording.after, &recording.with_law}) {
       if (!report->usable()) continue;
       for (ObservationErrors& errors : report->result.errors)
         errors.discretisation = errors.noise * discretisation;
       report->result.converged = report->stop == FitStop::converged;
-      judge(report->result);
+      judge(report->result, std::sqrt(diagnosis.after.discretisation_found));
     }
 }
 

@@ -136,7 +136,8 @@ constexpr double kWorkOfOtherMasses = 0.1;
 /// Tries the other way to spread the cloth's mass over its vertices, from where the fit stands.
 /// Returns a warning where that way explains the recording and the declared one does not.
 std::optional<Finding> try_other_masses(const FitInput& input, FitOptions options,
-                                        const FitReport& report, const ProgressCallback& progress) {
+                                        const FitReport& report, double found,
+                                        const ProgressCallback& progress) {
   FitInput other = input;
   MassDistribution& masses = other.recording.cloth.masses;
   const bool by_area = masses == MassDistribution::by_area;
@@ -151,8 +152,8 @@ std::optional<Finding> try_other_masses(const FitInput& input, FitOptions option
   if (!fitted.usable()) return std::nullopt;
   for (size_t k = 0; k < fitted.result.errors.size(); ++k)
     fitted.result.errors[k].discretisation = report.result.errors[k].discretisation;
-  const double own = errors_over_floor(report.result).worst(),
-               others = errors_over_floor(fitted.result).worst();
+  const double own = errors_over_floor(report.result, found).worst(),
+               others = errors_over_floor(fitted.result, found).worst();
   constexpr double kClearly = 0.6;
   if (others > kVerdict.usable || others > kClearly * own) return std::nullopt;
   return Finding{.check = "masses",
@@ -184,20 +185,25 @@ FitReport fit_and_judge(const FitInput& input, FitOptions options,
   FitResult& result = report.result;
   result.converged = report.stop == FitStop::converged;
   const double over = errors_over_floor(result).worst();
+  std::optional<DiscretisationOfFit> discretisation = DiscretisationOfFit{};
   constexpr double kBeyondAnyMesh = 8;  // times the noise
   if (!options.forecast && over > kVerdict.good && over < kBeyondAnyMesh) {
-    const auto square = discretisation_of_fit(input, options, report, progress);
-    if (!square) {
+    discretisation = discretisation_of_fit(input, options, report, progress);
+    if (!discretisation) {
       report.stop = FitStop::cancelled;
       return report;
     }
     for (ObservationErrors& errors : result.errors)
-      errors.discretisation = errors.noise * std::sqrt(*square);
+      errors.discretisation = errors.noise * discretisation->expected;
   }
-  if (!options.forecast && errors_over_floor(result).worst() > kVerdict.good)
-    if (const auto masses = try_other_masses(input, options, report, progress))
+  const double found = discretisation->found;
+  // An edge that weighs twice as much leaves some floors, not tens, and the trial takes a fit.
+  constexpr double kBeyondMasses = 10;
+  const double worst = errors_over_floor(result, found).worst();
+  if (!options.forecast && worst > kVerdict.good && worst < kBeyondMasses)
+    if (const auto masses = try_other_masses(input, options, report, found, progress))
       result.warnings.push_back(*masses);
-  judge(result);
+  judge(result, found);
   return report;
 }
 

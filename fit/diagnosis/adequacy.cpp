@@ -189,6 +189,12 @@ bool looks_like_noise(const Adequacy& of) {
 
 }  // namespace
 
+double discretisation_expected(const FittedModel& model) {
+  double square = 0;
+  for (const PooledPart& part : model.parts) square += part.directions.squaredNorm();
+  return square / static_cast<double>(model.residual_count());
+}
+
 double discretisation_found(const FittedModel& model) {
   double square = 0;
   for (const PooledPart& part : model.parts)
@@ -221,9 +227,7 @@ Adequacy judge_adequacy(const FittedModel& model, Loss loss) {
   result.neighbour_score = along.score;
 
   add_smooth(model, projection, result);
-  double square = 0;
-  for (const PooledPart& part : model.parts) square += part.directions.squaredNorm();
-  result.discretisation_square = square / static_cast<double>(model.residual_count());
+  result.discretisation_square = discretisation_expected(model);
   result.discretisation_found = discretisation_found(model);
   result.adequate = looks_like_noise(result);
   return result;

@@ -29,7 +29,9 @@ struct Adequacy {
 /// Judges a linearised model. `loss` says whether large residuals count less (Huber).
 Adequacy judge_adequacy(const FittedModel& model, Loss loss);
 
-/// Returns Adequacy::discretisation_found of a model that was refined with its discretisation.
+/// Return Adequacy::discretisation_square and discretisation_found of a model that was refined with
+/// its discretisation.
+double discretisation_expected(const FittedModel& model);
 double discretisation_found(const FittedModel& model);
 
 }  // namespace clothfit

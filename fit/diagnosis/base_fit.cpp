@@ -71,18 +71,20 @@ double coarse_will_do_beyond(const DiagnosisSetup& setup) {
   return grossly_misfitting(setup.inputs.front().recording.start == StartKind::unknown);
 }
 
-std::optional<double> discretisation_of_fit(const FitInput& input, const FitOptions& options,
-                                            const FitReport& report,
-                                            const ProgressCallback& progress) try {
+std::optional<DiscretisationOfFit> discretisation_of_fit(const FitInput& input,
+                                                         const FitOptions& options,
+                                                         const FitReport& report,
+                                                         const ProgressCallback& progress) try {
   const DiagnosisSetup setup{.inputs = {&input, 1},
                              .options = options,
                              .columns = report.result.mesh_columns,
                              .rows = report.result.mesh_rows};
   FittedModel model = fitted_to_all(setup, report, progress);
-  if (!model.usable() || model.misfits_grossly()) return 0;
+  if (!model.usable() || model.misfits_grossly()) return DiscretisationOfFit{};
   refine_with_discretisation(model, setup, progress);
-  if (!model.usable()) return 0;
-  return discretisation_found(model);
+  if (!model.usable()) return DiscretisationOfFit{};
+  return DiscretisationOfFit{.expected = std::sqrt(discretisation_expected(model)),
+                             .found = std::sqrt(discretisation_found(model))};
 } catch (const StopRequested&) {
   return std::nullopt;
 }

@@ -11,13 +11,19 @@ namespace clothfit {
 /// coarser one, or a finer one may be analysed.
 double coarse_will_do_beyond(const DiagnosisSetup& setup);
 
-/// Returns the mean square, over the noise's, of the error that mesh and time step were found to
-/// make of a fit (Adequacy::discretisation_found). 0 where the model misfits grossly: it is not
-/// looked for then. Nothing where `progress` says to stop. Takes a fit on another mesh from where
-/// this one stands.
-std::optional<double> discretisation_of_fit(const FitInput& input, const FitOptions& options,
-                                            const FitReport& report,
-                                            const ProgressCallback& progress);
+/// Root mean squares, over the noise's, of the error that mesh and time step make of a fit: as it
+/// is expected (Adequacy::discretisation_square) and as it was found in the fitted frames
+/// (Adequacy::discretisation_found). Both are 0 where the model misfits grossly.
+struct DiscretisationOfFit {
+  double expected = 0, found = 0;
+};
+
+/// Looks for that error by a fit on another mesh from where this one stands. Returns nothing where
+/// `progress` says to stop.
+std::optional<DiscretisationOfFit> discretisation_of_fit(const FitInput& input,
+                                                         const FitOptions& options,
+                                                         const FitReport& report,
+                                                         const ProgressCallback& progress);
 
 /// Fits the declared model to all recordings, on the mesh that is to be analysed. That mesh has
 /// twice the cells a side where the fit leaves clearly less with them. A model that misfits grossly

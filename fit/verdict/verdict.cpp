@@ -72,21 +72,22 @@ std::string times(double ratio) {
 
 }  // namespace
 
-ErrorsOverFloor errors_over_floor(const FitResult& result) {
+ErrorsOverFloor errors_over_floor(const FitResult& result, std::optional<double> found) {
   ErrorsOverFloor worst;
   for (const ObservationErrors& errors : result.errors) {
     if (!(errors.floor() > 0)) continue;
     const ErrorSummary& fitted = errors.fitted_without.value_or(errors.fitted);
     const ErrorSummary& held_out = errors.held_out_without.value_or(errors.held_out);
-    worst.fitted = std::max(worst.fitted, fitted.rms / errors.floor());
+    const double fitted_floor = found ? errors.noise * std::hypot(1.0, *found) : errors.floor();
+    worst.fitted = std::max(worst.fitted, fitted.rms / fitted_floor);
     if (held_out.count > 0)
       worst.held_out = std::max(worst.held_out, held_out.rms / errors.floor());
   }
   return worst;
 }
 
-void judge(FitResult& result) {
-  const ErrorsOverFloor over = errors_over_floor(result);
+void judge(FitResult& result, std::optional<double> found) {
+  const ErrorsOverFloor over = errors_over_floor(result, found);
   const bool held_out = std::ranges::any_of(result.errors, [](const ObservationErrors& one) {
     return one.held_out_without.value_or(one.held_out).count > 0;
   });

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <optional>
+
 #include "data/fit_result.h"
 
 namespace clothfit {
@@ -18,13 +20,18 @@ inline constexpr VerdictCriteria kVerdict{};
 /// error on held-out frames and on fitted ones, over the floor. Sets the verdict and its reason,
 /// and withdraws what a model that lacks something cannot say: the states of its parameters become
 /// `misfit`, without intervals. `converged` must be set. Call it once.
-void judge(FitResult& result);
+///
+/// On held-out frames the floor takes the discretisation's error as it is expected
+/// (ObservationErrors::discretisation): what parameters took up returns there. On fitted ones it
+/// takes what was `found` of it, a root mean square over the noise; without that, what is expected.
+void judge(FitResult& result, std::optional<double> found = std::nullopt);
 
-/// Returns the worst error over its floor: fitted and held out.
+/// The worst error over its floor: fitted and held out.
 struct ErrorsOverFloor {
   double fitted = 0, held_out = 0;
   double worst() const { return fitted > held_out ? fitted : held_out; }
 };
-ErrorsOverFloor errors_over_floor(const FitResult& result);
+ErrorsOverFloor errors_over_floor(const FitResult& result,
+                                  std::optional<double> found = std::nullopt);
 
 }  // namespace clothfit

@@ -45,6 +45,15 @@ TEST(Verdict, CountsMeshAndTimeStepAsFloor) {
   EXPECT_EQ(verdict_of(result_with(1.5, 2.2, 1.2)), FitVerdict::good);
 }
 
+TEST(Verdict, CountsOnFittedFramesWhatWasFoundOfMeshAndTimeStep) {
+  FitResult result = result_with(2, 4, 3);
+  EXPECT_EQ(verdict_of(result), FitVerdict::good);
+  judge(result, 0.5);
+  // The root of 1 + 0.5^2 is 1.12: 2 is 1.79 times as much.
+  EXPECT_EQ(result.verdict, FitVerdict::usable_with_care);
+  EXPECT_NEAR(errors_over_floor(result, 0.5).held_out, 4 / std::hypot(1, 3), 1e-12);
+}
+
 TEST(Verdict, IsNoBetterThanAGuess) {
   EXPECT_EQ(verdict_of(result_with(1, 61)), FitVerdict::do_not_use);
 }
