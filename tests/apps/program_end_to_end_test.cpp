@@ -295,7 +295,8 @@ TEST(ProgramTrack, LeavesTheTracksOfARecordingWhoseTimesCannotBeRead) {
   EXPECT_EQ(run.exit_code, 3);
   EXPECT_THAT(run.error, HasSubstr((recording / "times.csv").string()));
   EXPECT_TRUE(fs::exists(here.path() / "tags_onecam.tracks" / "tracks2d" / "front.csv"));
-  EXPECT_THAT(read_text(here.path() / "tags_onecam.tracks" / "tracks.json"), HasSubstr("times.csv"));
+  EXPECT_THAT(read_text(here.path() / "tags_onecam.tracks" / "tracks.json"),
+              HasSubstr("times.csv"));
 }
 
 TEST(ProgramCalibrate, CompletesARecordingThatTrackingCanUse) {
