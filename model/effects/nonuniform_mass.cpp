@@ -296,8 +296,8 @@ EffectDescription describe() {
                                 over_cloth("patch_t", {0.2, 0.5, 0.8}),
                                 over_cloth("patch_radius", {0.05, 0.12})}}},
           .remedy =
-              "weigh the hem, or declare it: `declared` of the recording takes what model.yaml "
-              "has under `effects`",
+              "weigh the hem, or declare it: copy nonuniform_mass from `effects` of model.yaml "
+              "to `declared` of recording.yaml",
           .in_words = in_words};
 }
 

@@ -55,8 +55,8 @@ std::string verdict_text(const Diagnosis& diagnosis) {
     case DiagnosisVerdict::partly_explained:
       return "The model lacked " + effects_text(diagnosis) +
              (diagnosis.complete
-                  ? ". With that, structure still remains that no tested effect explains."
-                  : ". With that, structure still remains, and not all effects were tried.");
+                  ? ". The residual still has a pattern that no effect which was tried explains."
+                  : ". The residual still has a pattern, and not all effects were tried.");
     case DiagnosisVerdict::unexplained:
       return diagnosis.complete ? "Something is missing, and no tested effect explains it."
                                 : "Something is missing, and not all effects were tried.";
@@ -147,9 +147,10 @@ std::string alike_text(const Diagnosis& diagnosis) {
       if (other.effect != accepted.trial.hypothesis.effect) alike.insert(plain(other.title()));
   const size_t asked = effects_asked(diagnosis);
   if (asked == 0) return "";
+  const char* tried = diagnosis.complete ? "tried" : "compared, not all of them fitted,";
   if (alike.empty())
-    return fmt::format("None of the others of {} effects that were tried comes near.", asked);
-  return fmt::format("Of {} effects that were tried only {} {} near.", asked,
+    return fmt::format("None of the others of {} effects that were {} comes near.", asked, tried);
+  return fmt::format("Of {} effects that were {} only {} {} near.", asked, tried,
                      fmt::join(alike, ", "), alike.size() == 1 ? "comes" : "come");
 }
 
@@ -228,7 +229,7 @@ std::string answer_html(const Diagnosis& diagnosis) {
     cause += fmt::format("<p class=\"found\">{}: <strong>{}</strong>{}</p>\n",
                          escape_xml(plain(term.title())),
                          escape_xml(words.empty() ? found_text(term, result) : words),
-                         escape_xml(words.empty() ? "" : " " + certainty_text(term, result)));
+                         escape_xml(words.empty() ? "" : certainty_text(term, result)));
   }
   if (diagnosis.seen_elsewhere)
     cause += fmt::format("<p class=\"found\">markers seen elsewhere: <strong>{}</strong></p>\n",
@@ -432,9 +433,11 @@ std::string incomplete_text(const Diagnosis& diagnosis) {
   if (diagnosis.scores.empty())
     return "Incomplete: the search ended before its first scores were complete.";
   return fmt::format(
-      "Incomplete: the search ended after {} s. {} of {} modes were scored and not judged; neither "
-      "limits nor separations nor a law were looked for.",
-      significant(diagnosis.seconds, 3), not_tried(diagnosis).size(), diagnosis.scores.size());
+      "Incomplete: the search ended after {} s. Of {} ways in which effects act, {} were compared "
+      "by "
+      "their derivatives alone and not fitted. How small an effect would be seen, what would tell "
+      "effects apart and which formula the force follows was not asked.",
+      significant(diagnosis.seconds, 3), diagnosis.scores.size(), not_tried(diagnosis).size());
 }
 
 std::string diagnosis_page_html(const Diagnosis& diagnosis, std::span<const Recording> recordings,

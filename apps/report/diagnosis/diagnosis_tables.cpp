@@ -263,6 +263,8 @@ std::string seen_elsewhere_text(const SeenElsewhere& seen) {
 }
 
 std::string certainty_text(const Hypothesis& term, const FitResult& result) {
+  // Amplitude and shape trade: what they make together is known otherwise than either.
+  if (term.fits_shape) return "";
   double values = 0, variances = 0;
   for (const ParameterEstimate& parameter : estimates_of(term, result)) {
     if (std::ranges::find(term.amplitudes, amplitude_name(term, parameter)) ==
@@ -272,7 +274,8 @@ std::string certainty_text(const Hypothesis& term, const FitResult& result) {
     variances += parameter.sigma * parameter.sigma;
   }
   if (!(values > 0 && variances > 0)) return "";
-  return fmt::format("± {} %", significant(100 * std::sqrt(variances / values), 2));
+  return fmt::format(" ± {} % (one standard deviation)",
+                     significant(100 * std::sqrt(variances / values), 2));
 }
 
 std::string remedy_text(const Hypothesis& term) {

@@ -62,8 +62,8 @@ std::string found_text(const Hypothesis& term, const FitResult& result);
 /// with its values below, or these alone where its effect has no words for them.
 std::string accepted_text(const Hypothesis& term, const FitReport& found);
 
-/// Writes "± 0.7 %": one standard deviation of a term's amplitudes, of their root sum of squares.
-/// Empty where none was estimated.
+/// Writes " ± 0.7 % (one standard deviation)" of a term's amplitudes, of their root sum of squares.
+/// Empty where none was estimated, and where a shape was fitted along.
 std::string certainty_text(const Hypothesis& term, const FitResult& result);
 
 /// Writes "Remedy: level the camera." for a term whose effect has one; nothing for others.

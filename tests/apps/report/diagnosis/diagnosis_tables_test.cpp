@@ -67,7 +67,10 @@ TEST(CertaintyText, IsOfAllAmplitudesTogether) {
   FitResult found;
   found.effects = {
       {"wind", {{"q_x", "Pa", 0.3, 0.03}, {"q_y", "Pa", 0.4, 0.04}, {"q_z", "Pa", 9, 1}}}};
-  EXPECT_EQ(certainty_text({.effect = "wind", .amplitudes = {"q_x", "q_y"}}, found), "± 10 %");
+  EXPECT_EQ(certainty_text({.effect = "wind", .amplitudes = {"q_x", "q_y"}}, found),
+            " ± 10 % (one standard deviation)");
+  EXPECT_EQ(certainty_text({.effect = "wind", .amplitudes = {"q_x"}, .fits_shape = true}, found),
+            "");
   EXPECT_EQ(certainty_text({.effect = "gust", .amplitudes = {"q_x"}}, found), "");
 }
 
@@ -84,8 +87,8 @@ TEST(ShortCandidateTable, ListsFourAmplitudesOfMany) {
 TEST(RemedyText, IsThatOfTheEffectWhereItHasOne) {
   EXPECT_EQ(
       remedy_text({.effect = "nonuniform_mass", .mode = "hem"}),
-      "Remedy: weigh the hem, or declare it: `declared` of the recording takes what model.yaml "
-      "has under `effects`.");
+      "Remedy: weigh the hem, or declare it: copy nonuniform_mass from `effects` of model.yaml "
+      "to `declared` of recording.yaml.");
   EXPECT_EQ(remedy_text({.effect = "wind", .mode = "pressure"}), "");
 }
 
