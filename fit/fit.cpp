@@ -300,7 +300,7 @@ void identify_all(const FitInput& input, const FitProblem& problem, const FitOpt
   // What a model says of its sigmas that leaves so much is worth no time.
   if (2 * refined.cost > options.coarse_beyond) {
     const Eigen::VectorXd residual = objective.residuals({values}).front();
-    if (residual.size() == 0 || misfit_of_most_markers(problem, residual) > options.coarse_beyond)
+    if (residual.size() == 0 || misfit_of_most_markers(objective, residual) > options.coarse_beyond)
       return run_on(input, problem, options, values, stated(problem, values, {}), {}, {}, report);
   }
   const Uncertainty uncertainty = estimate_uncertainty(

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "data/progress.h"
+#include "fit/cost/objective.h"
 #include "fit/interface/fit_input.h"
 #include "fit/interface/fit_options.h"
 #include "fit/interface/fit_report.h"
@@ -20,10 +21,9 @@ RefineResult identify(const FitInput& input, const FitProblem& problem, const Fi
                       const ProgressCallback& progress, FitReport& report,
                       std::vector<Candidate>& candidates);
 
-/// Returns the mean square of whitened residuals over all fitted frames, without the tenth of the
-/// markers that leave most, at least one of five: a few whose tracks are wrong say nothing of the
-/// model.
-double misfit_of_most_markers(const FitProblem& problem, const Eigen::VectorXd& residual);
+/// Returns the mean square of whitened residuals without the tenth of the markers that leave most,
+/// at least one of five: a few whose tracks are wrong say nothing of the model.
+double misfit_of_most_markers(const Objective& objective, const Eigen::VectorXd& residual);
 
 /// Returns the settings of its last stage.
 RefineOptions final_refinement(const FitProblem& problem, const FitOptions& options);

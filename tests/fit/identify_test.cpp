@@ -314,9 +314,11 @@ TEST(Identify, AllowsTheLastStageMoreWorkForMoreCoordinates) {
   problem.space.parameters.resize(20);
   EXPECT_DOUBLE_EQ(final_refinement(problem, options).most_spring_steps, usual);
   problem.space.parameters.resize(200);
-  EXPECT_DOUBLE_EQ(final_refinement(problem, options).most_spring_steps, 10 * usual);
-  options.work = 0.1;
-  EXPECT_DOUBLE_EQ(final_refinement(problem, options).most_spring_steps, usual);
+  EXPECT_DOUBLE_EQ(final_refinement(problem, options).most_spring_steps, 6 * usual);
+  options.work = 0.5;
+  EXPECT_DOUBLE_EQ(final_refinement(problem, options).most_spring_steps, 3 * usual);
+  problem.space.parameters.resize(80);
+  EXPECT_DOUBLE_EQ(final_refinement(problem, options).most_spring_steps, 2 * usual);
 
   options.loss = Loss::huber;
   options.substep_scale = 3;
