@@ -65,10 +65,12 @@ Json to_json(const ObservationErrors& errors) {
                {"held_out", to_json(errors.held_out)},
                {"noise", finite(errors.noise)},
                {"discretisation", finite(errors.discretisation)},
+               {"discretisation_found", finite(errors.discretisation_found)},
                {"trivial",
                 {{"first_frame", or_null(errors.trivial.first_frame)},
                  {"last_velocity", or_null(errors.trivial.last_velocity)},
                  {"rigid", or_null(errors.trivial.rigid)}}}};
+  if (errors.outliers > 0) json["outliers"] = errors.outliers;
   if (errors.fitted_without) json["fitted_without"] = to_json(*errors.fitted_without);
   if (errors.held_out_without) json["held_out_without"] = to_json(*errors.held_out_without);
   return json;
@@ -213,6 +215,9 @@ ObservationErrors read_errors(const JsonValue& json) {
   errors.held_out = read_error(json.at("held_out"));
   errors.noise = json.at("noise").number();
   if (json.has("discretisation")) errors.discretisation = json.at("discretisation").number();
+  if (json.has("discretisation_found"))
+    errors.discretisation_found = json.at("discretisation_found").number();
+  if (json.has("outliers")) errors.outliers = json.at("outliers").count();
   if (json.has("fitted_without")) errors.fitted_without = read_error(json.at("fitted_without"));
   if (json.has("held_out_without"))
     errors.held_out_without = read_error(json.at("held_out_without"));
@@ -385,6 +390,7 @@ void write_fit_result(const FitResult& result, const std::filesystem::path& file
                {"next_command", result.next_command},
                {"usable", result.usable()},
                {"converged", result.converged},
+               {"contradicts_pose", result.contradicts_pose},
                {"warnings", warnings},
                {"contradicting_markers", contradicting},
                {"recording", result.recording},
@@ -456,6 +462,7 @@ FitResult read_fit_result(const std::filesystem::path& file) {
   result.verdict_reason = json.text_or_empty("verdict_reason");
   result.next_command = json.text_or_empty("next_command");
   if (json.has("converged")) result.converged = json.at("converged").truth();
+  if (json.has("contradicts_pose")) result.contradicts_pose = json.at("contradicts_pose").truth();
   if (json.has("contradicting_markers"))
     for (const JsonValue& marker : json.at("contradicting_markers").items())
       result.contradicting.push_back(read_contradicting(marker));

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <map>
@@ -101,13 +102,22 @@ struct ObservationErrors {
   ErrorSummary held_out;  ///< count 0 when nothing was held out
   double noise = 0;       ///< standard deviation per coordinate
   TrivialErrors trivial;
-  /// Root mean square that mesh and time step are thought to make; 0 where that was not estimated.
-  double discretisation = 0;
-  /// Errors without the markers that contradict all others, where there are any.
+  /// Root mean squares of what mesh and time step make, as expected of them and as found in the
+  /// fitted frames; 0 where they were not estimated.
+  double discretisation = 0, discretisation_found = 0;
+  /// Errors without the markers that contradict all others and without outliers.
   std::optional<ErrorSummary> fitted_without = std::nullopt, held_out_without = std::nullopt;
+  /// Single observations that contradict those before and after them; left out of the same.
+  int outliers = 0;
 
-  /// Returns what no model on this mesh can do better than.
-  double floor() const { return std::hypot(noise, discretisation); }
+  /// Return what no model on this mesh can do better than. On fitted frames that counts the
+  /// discretisation's error as found, up to what is expected: an effect that the model lacks may
+  /// look like a larger one. On held-out frames it counts what is expected: what parameters took
+  /// up returns there.
+  double fitted_floor() const {
+    return std::hypot(noise, std::min(discretisation_found, discretisation));
+  }
+  double held_out_floor() const { return std::hypot(noise, discretisation); }
 };
 
 /// A marker that lies far off the model over a stretch of frames in which the others do not.
@@ -160,8 +170,10 @@ struct FitResult {
   std::string verdict_reason;  ///< one sentence
   std::string next_command;    ///< that asks what is missing, ready to copy; empty of a usable fit
   bool converged = true;
+  bool contradicts_pose = false;  ///< gravity ended far from where the camera's pose has it
   std::vector<ContradictingMarker> contradicting;
-  Findings warnings;  ///< of the checks before the fit (fit/preflight/preflight.h)
+  Findings
+      warnings;  ///< of the checks before the fit (fit/preflight/preflight.h) and of its outcome
   int observations_used = 0;
   std::map<std::string, int> observations_rejected;  ///< reason -> count
 

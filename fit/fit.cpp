@@ -13,6 +13,7 @@
 #include "fit/jobs/thread_limit.h"
 #include "fit/observe/cloud_errors.h"
 #include "fit/observe/marker_offsets.h"
+#include "fit/problem/fitted_tilt.h"
 #include "fit/problem/mesh_ladder.h"
 #include "fit/problem/parameterised_model.h"
 #include "fit/problem/predictor.h"
@@ -21,6 +22,7 @@
 #include "fit/problem/springs_on_limit.h"
 #include "fit/uncertainty/parameter_estimates.h"
 #include "fit/uncertainty/uncertainty.h"
+#include "fit/verdict/contradicted_pose.h"
 #include "fit/verdict/contradicting.h"
 #include "model/cloth/stability.h"
 
@@ -242,6 +244,10 @@ void run_on(const FitInput& input, const FitProblem& problem, const FitOptions& 
       marker_offsets(problem, input.recording.markers, known_offsets, predictor, markers, report));
   fill_residuals(problem, predictor, markers, report);
   name_contradicting(input.recording.markers, report);
+  const FittedTilt tilt = fitted_tilt(problem, values);
+  warn_of_contradicted_pose(
+      {.tilt_rad = tilt.angle_rad, .sigmas = tilt.sigmas, .is_stated = tilt.is_stated},
+      (input.recording.folder / "recording.yaml").string(), report);
   if (!input.clouds.empty())
     result.clouds =
         cloud_errors(input.clouds, problem.cloth.mesh, run.position_m, problem.first_held_out);

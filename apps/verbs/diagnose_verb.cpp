@@ -1,6 +1,8 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -76,14 +78,17 @@ std::vector<Recording> read_recordings(const DiagnoseFlags& flags) {
 
 /// Judges the models found as fits are.
 void judge_found(Diagnosis& diagnosis) {
-  const double discretisation = std::sqrt(diagnosis.after.discretisation_square);
+  const double expected = std::sqrt(diagnosis.after.discretisation_square),
+               found = std::sqrt(diagnosis.after.discretisation_found);
   for (DiagnosedRecording& recording : diagnosis.recordings)
     for (FitReport* report : {&recording.after, &recording.with_law}) {
       if (!report->usable()) continue;
-      for (ObservationErrors& errors : report->result.errors)
-        errors.discretisation = errors.noise * discretisation;
+      for (ObservationErrors& errors : report->result.errors) {
+        errors.discretisation = errors.noise * expected;
+        errors.discretisation_found = errors.noise * found;
+      }
       report->result.converged = report->stop == FitStop::converged;
-      judge(report->result, std::sqrt(diagnosis.after.discretisation_found));
+      judge(report->result);
     }
 }
 
@@ -185,7 +190,7 @@ int run_diagnose(DiagnoseFlags flags, const std::string& command) {
   for (size_t n = 0; n < diagnosis.recordings.size(); ++n)
     for (FitReport* report : {&diagnosis.recordings[n].before, &diagnosis.recordings[n].after,
                               &diagnosis.recordings[n].with_law}) {
-      report->result.warnings = warnings[n];
+      std::ranges::copy(warnings[n], std::back_inserter(report->result.warnings));
       report->result.version = program_version();
       report->result.command = command;
     }

@@ -136,8 +136,7 @@ constexpr double kWorkOfOtherMasses = 0.1;
 /// Tries the other way to spread the cloth's mass over its vertices, from where the fit stands.
 /// Returns a warning where that way explains the recording and the declared one does not.
 std::optional<Finding> try_other_masses(const FitInput& input, FitOptions options,
-                                        const FitReport& report, double found,
-                                        const ProgressCallback& progress) {
+                                        const FitReport& report, const ProgressCallback& progress) {
   FitInput other = input;
   MassDistribution& masses = other.recording.cloth.masses;
   const bool by_area = masses == MassDistribution::by_area;
@@ -150,10 +149,14 @@ std::optional<Finding> try_other_masses(const FitInput& input, FitOptions option
   options.resume = false;
   FitReport fitted = fit(other, options, progress);
   if (!fitted.usable()) return std::nullopt;
-  for (size_t k = 0; k < fitted.result.errors.size(); ++k)
-    fitted.result.errors[k].discretisation = report.result.errors[k].discretisation;
-  const double own = errors_over_floor(report.result, found).worst(),
-               others = errors_over_floor(fitted.result, found).worst();
+  for (size_t k = 0; k < fitted.result.errors.size(); ++k) {
+    ObservationErrors& errors = fitted.result.errors[k];
+    const ObservationErrors& own = report.result.errors[k];
+    errors.discretisation = own.discretisation;
+    errors.discretisation_found = own.discretisation_found;
+  }
+  const double own = errors_over_floor(report.result).worst(),
+               others = errors_over_floor(fitted.result).worst();
   constexpr double kClearly = 0.6;
   if (others > kVerdict.usable || others > kClearly * own) return std::nullopt;
   return Finding{.check = "masses",
@@ -171,39 +174,35 @@ std::optional<Finding> try_other_masses(const FitInput& input, FitOptions option
 /// Fits, and judges the outcome. What mesh and time step make is looked for where that decides.
 FitReport fit_and_judge(const FitInput& input, FitOptions options,
                         const ProgressCallback& progress) {
-  const ClothDescription& cloth = input.recording.cloth;
   options.to_nothing = true;
   if (!options.forecast && options.cost == LeadingCost::trajectory && !options.two_meshes &&
       !options.profile && options.bootstrap == 0)
-    options.coarse_beyond = coarse_will_do_beyond(
-        {.inputs = {&input, 1},
-         .options = options,
-         .columns = options.mesh_columns > 0 ? options.mesh_columns : cloth.mesh_columns,
-         .rows = options.mesh_rows > 0 ? options.mesh_rows : cloth.mesh_rows});
+    options.coarse_beyond = gross_on_any_mesh(input, options);
   FitReport report = fit(input, options, progress);
   if (!report.usable()) return report;
   FitResult& result = report.result;
   result.converged = report.stop == FitStop::converged;
   const double over = errors_over_floor(result).worst();
-  std::optional<DiscretisationOfFit> discretisation = DiscretisationOfFit{};
   constexpr double kBeyondAnyMesh = 8;  // times the noise
   if (!options.forecast && over > kVerdict.good && over < kBeyondAnyMesh) {
-    discretisation = discretisation_of_fit(input, options, report, progress);
+    const std::optional<DiscretisationOfFit> discretisation =
+        discretisation_of_fit(input, options, report, progress);
     if (!discretisation) {
       report.stop = FitStop::cancelled;
       return report;
     }
-    for (ObservationErrors& errors : result.errors)
+    for (ObservationErrors& errors : result.errors) {
       errors.discretisation = errors.noise * discretisation->expected;
+      errors.discretisation_found = errors.noise * discretisation->found;
+    }
   }
-  const double found = discretisation->found;
   // An edge that weighs twice as much leaves some floors, not tens, and the trial takes a fit.
   constexpr double kBeyondMasses = 10;
-  const double worst = errors_over_floor(result, found).worst();
+  const double worst = errors_over_floor(result).worst();
   if (!options.forecast && worst > kVerdict.good && worst < kBeyondMasses)
-    if (const auto masses = try_other_masses(input, options, report, found, progress))
+    if (const auto masses = try_other_masses(input, options, report, progress))
       result.warnings.push_back(*masses);
-  judge(result, found);
+  judge(result);
   return report;
 }
 

@@ -62,13 +62,27 @@ FittedModel on_mesh_to_analyse(FittedModel own, DiagnosisSetup& setup,
   return finer;
 }
 
-}  // namespace
-
+/// Returns chi-square per residual beyond which a fit need only follow a coarser mesh
+/// (FitOptions::coarse_beyond), for what is missing shows on any. Infinite where there is no
+/// coarser one, or a finer one may be analysed.
 double coarse_will_do_beyond(const DiagnosisSetup& setup) {
   const bool will_do =
       is_coarser(with_coarse_mesh(setup), setup) && is_coarser(with_other_mesh(setup), setup);
   if (!will_do) return std::numeric_limits<double>::infinity();
   return grossly_misfitting(setup.inputs.front().recording.start == StartKind::unknown);
+}
+
+}  // namespace
+
+double gross_on_any_mesh(const FitInput& input, const FitOptions& options) {
+  const ClothDescription& cloth = input.recording.cloth;
+  const DiagnosisSetup setup{
+      .inputs = {&input, 1},
+      .options = options,
+      .columns = options.mesh_columns > 0 ? options.mesh_columns : cloth.mesh_columns,
+      .rows = options.mesh_rows > 0 ? options.mesh_rows : cloth.mesh_rows};
+  if (!is_coarser(with_coarse_mesh(setup), setup)) return std::numeric_limits<double>::infinity();
+  return grossly_misfitting(input.recording.start == StartKind::unknown);
 }
 
 std::optional<DiscretisationOfFit> discretisation_of_fit(const FitInput& input,

@@ -6,10 +6,9 @@
 
 namespace clothfit {
 
-/// Returns chi-square per residual beyond which a fit need only follow a coarser mesh
-/// (FitOptions::coarse_beyond), for what is missing shows on any. Infinite where there is no
-/// coarser one, or a finer one may be analysed.
-double coarse_will_do_beyond(const DiagnosisSetup& setup);
+/// Returns chi-square per residual beyond which a model misfits on a coarser mesh as on its own,
+/// for FitOptions::coarse_beyond. Infinite where there is no coarser mesh to compare with.
+double gross_on_any_mesh(const FitInput& input, const FitOptions& options);
 
 /// Root mean squares, over the noise's, of the error that mesh and time step make of a fit: as it
 /// is expected (Adequacy::discretisation_square) and as it was found in the fitted frames

@@ -1,7 +1,10 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
+#include <algorithm>
+#include <cassert>
 #include <cmath>
 
+#include "fit/problem/fitted_tilt.h"
 #include "fit/problem/turned.h"
 #include "fit/problem/unknown_group.h"
 
@@ -88,6 +91,18 @@ class GravityUnknowns final : public UnknownGroup {
 const UnknownGroup& gravity_unknowns() {
   static const GravityUnknowns group;
   return group;
+}
+
+FittedTilt fitted_tilt(const FitProblem& problem, const Eigen::VectorXd& values) {
+  if (problem.tilt.empty()) return {};
+  const auto prior = std::ranges::find_if(problem.priors, [&](const GaussianPrior& one) {
+    return one.indices.front() == problem.tilt.front().parameter;
+  });
+  assert(prior != problem.priors.end());
+  return {
+      .angle_rad = gravity_turn(problem, values).norm(),
+      .sigmas = prior->residual(values).norm(),
+      .is_stated = problem.observations.front().camera->camera_from_world->covariance.has_value()};
 }
 
 }  // namespace clothfit

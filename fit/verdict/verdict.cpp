@@ -72,22 +72,21 @@ std::string times(double ratio) {
 
 }  // namespace
 
-ErrorsOverFloor errors_over_floor(const FitResult& result, std::optional<double> found) {
+ErrorsOverFloor errors_over_floor(const FitResult& result) {
   ErrorsOverFloor worst;
   for (const ObservationErrors& errors : result.errors) {
-    if (!(errors.floor() > 0)) continue;
+    if (!(errors.noise > 0)) continue;
     const ErrorSummary& fitted = errors.fitted_without.value_or(errors.fitted);
     const ErrorSummary& held_out = errors.held_out_without.value_or(errors.held_out);
-    const double fitted_floor = found ? errors.noise * std::hypot(1.0, *found) : errors.floor();
-    worst.fitted = std::max(worst.fitted, fitted.rms / fitted_floor);
+    worst.fitted = std::max(worst.fitted, fitted.rms / errors.fitted_floor());
     if (held_out.count > 0)
-      worst.held_out = std::max(worst.held_out, held_out.rms / errors.floor());
+      worst.held_out = std::max(worst.held_out, held_out.rms / errors.held_out_floor());
   }
   return worst;
 }
 
-void judge(FitResult& result, std::optional<double> found) {
-  const ErrorsOverFloor over = errors_over_floor(result, found);
+void judge(FitResult& result) {
+  const ErrorsOverFloor over = errors_over_floor(result);
   const bool held_out = std::ranges::any_of(result.errors, [](const ObservationErrors& one) {
     return one.held_out_without.value_or(one.held_out).count > 0;
   });
@@ -111,6 +110,9 @@ void judge(FitResult& result, std::optional<double> found) {
     say(FitVerdict::usable_with_care, "nothing was held out to judge it by; " + misfit);
   else if (over.worst() > kVerdict.good)
     say(FitVerdict::usable_with_care, misfit);
+  else if (result.contradicts_pose)
+    say(FitVerdict::usable_with_care,
+        "gravity ended far from where the camera's pose has it; " + misfit);
   else if (!result.converged)
     say(FitVerdict::usable_with_care,
         "the fit reached its limit of work before it converged; " + misfit);

@@ -165,6 +165,9 @@ TEST(FitJson, KeepsVerdictWarningsAndWhatContradicts) {
   written.contradicting = {{"m1", "tracks3d", 20, 71, 0.14}};
   written.warnings = {{"time", FindingState::warning, "found", "x.yaml:3", "expected", "remedy"}};
   written.errors.front().discretisation = 0.25;
+  written.errors.front().discretisation_found = 0.125;
+  written.errors.front().outliers = 3;
+  written.contradicts_pose = true;
   written.errors.front().fitted_without = ErrorSummary{.rms = 0.2, .rms_distance = 0.3, .count = 9};
   written.parameters.front().state = ParameterState::misfit;
   written.parameters.back().state = ParameterState::ratio;
@@ -182,6 +185,9 @@ TEST(FitJson, KeepsVerdictWarningsAndWhatContradicts) {
   ASSERT_EQ(read.warnings.size(), 1u);
   EXPECT_EQ(sentence(read.warnings.front()), "x.yaml:3: found; expected; remedy");
   EXPECT_EQ(read.errors.front().discretisation, 0.25);
+  EXPECT_EQ(read.errors.front().discretisation_found, 0.125);
+  EXPECT_EQ(read.errors.front().outliers, 3);
+  EXPECT_TRUE(read.contradicts_pose);
   EXPECT_EQ(read.errors.front().fitted_without->count, 9);
   EXPECT_EQ(read.parameters.front().state, ParameterState::misfit);
   EXPECT_EQ(read.parameters.back().state, ParameterState::ratio);
@@ -236,11 +242,12 @@ TEST(FitJson, HasTheKeysOfTheFormat) {
 
   std::vector<std::string> keys;
   for (const auto& [key, value] : json.items()) keys.push_back(key);
-  EXPECT_THAT(keys, testing::ElementsAre("format", "verdict", "verdict_reason", "next_command",
-                                         "usable", "converged", "warnings", "contradicting_markers",
-                                         "recording", "version", "command", "seed", "seconds",
-                                         "model", "parameters", "effects", "nuisance", "basins",
-                                         "errors", "observations", "marker_offsets", "clouds"));
+  EXPECT_THAT(keys,
+              testing::ElementsAre("format", "verdict", "verdict_reason", "next_command", "usable",
+                                   "converged", "warnings", "contradicting_markers", "recording",
+                                   "version", "command", "seed", "seconds", "model", "parameters",
+                                   "effects", "nuisance", "basins", "errors", "observations",
+                                   "marker_offsets", "clouds", "contradicts_pose"));
   EXPECT_EQ(json["format"], "clothfit-fit/1");
   EXPECT_EQ(json["model"]["mesh"]["rows"], 9);
   EXPECT_EQ(json["model"]["time_step_s"], 1.0 / 480);

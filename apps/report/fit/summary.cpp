@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "apps/report/fit/fit_tables.h"
@@ -105,10 +106,13 @@ std::string verdict_sentence(const FitResult& result) {
                                        : fmt::format("{}: {}", grade, result.verdict_reason);
 }
 
-/// Names the markers that contradict all others; empty where none does.
+/// Names the markers that contradict all others and counts single outliers; empty where there is
+/// neither.
 std::string contradicting_sentence(const FitResult& result) {
-  if (result.contradicting.empty()) return "";
-  std::string names;
+  int outliers = 0;
+  for (const ObservationErrors& errors : result.errors) outliers += errors.outliers;
+  if (result.contradicting.empty() && outliers == 0) return "";
+  std::string text, names;
   constexpr size_t kShown = 6;
   for (size_t k = 0; k < std::min(kShown, result.contradicting.size()); ++k) {
     const ContradictingMarker& marker = result.contradicting[k];
@@ -118,9 +122,15 @@ std::string contradicting_sentence(const FitResult& result) {
                          marker.last_frame);
   }
   if (result.contradicting.size() > kShown) names += ", ...";
-  std::string text = "Markers that contradict all others: " + names + ". Without them";
+  if (!names.empty()) text = "Markers that contradict all others: " + names + ". ";
+  if (outliers > 0)
+    text += fmt::format("{} single observation{} away from a track and back. ", outliers,
+                        outliers > 1 ? "s jump" : " jumps");
+  text += outliers == 1 && names.empty() ? "Without it" : "Without them";
+  bool first = true;
   for (const ObservationErrors& errors : result.errors) {
     if (!errors.fitted_without) continue;
+    text += std::exchange(first, false) ? "" : ";";
     const ShownUnit unit = shown_unit(errors.unit);
     text += fmt::format(" it is {} {} off in the fitted frames of {}",
                         significant(errors.fitted_without->rms * unit.factor, 3), unit.name,

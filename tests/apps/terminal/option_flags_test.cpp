@@ -67,7 +67,7 @@ TEST(OptionFlags, ExistForEveryMemberThatTheLibraryNames) {
   const std::set<std::string> bounded = captures("fit", "require\\([^;]*, \"([a-z_]+)\",\\s+\"");
   ASSERT_GE(bounded.size(), 20u);
   for (const std::string& member : bounded) {
-    if (member == "coarse_beyond") continue;  // the diagnosis alone sets it
+    if (member == "coarse_beyond") continue;  // the verbs set it
     EXPECT_THAT(flags, ::testing::Contains(with_flags("FitOptions::" + member)));
   }
 }

@@ -7,7 +7,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <set>
 
+#include "fit/verdict/contradicted_pose.h"
 #include "fit/verdict/contradicting.h"
 
 namespace clothfit {
@@ -22,7 +24,8 @@ FitResult result_with(double fitted, double held_out, double discretisation = 0)
                     .held_out = {.rms = held_out, .count = held_out > 0 ? 50 : 0},
                     .noise = 1,
                     .trivial = {.first_frame = 60, .last_velocity = 80, .rigid = 60},
-                    .discretisation = discretisation}};
+                    .discretisation = discretisation,
+                    .discretisation_found = discretisation}};
   return result;
 }
 
@@ -48,10 +51,17 @@ TEST(Verdict, CountsMeshAndTimeStepAsFloor) {
 TEST(Verdict, CountsOnFittedFramesWhatWasFoundOfMeshAndTimeStep) {
   FitResult result = result_with(2, 4, 3);
   EXPECT_EQ(verdict_of(result), FitVerdict::good);
-  judge(result, 0.5);
+  result.errors.front().discretisation_found = 0.5;
+  judge(result);
   // The root of 1 + 0.5^2 is 1.12: 2 is 1.79 times as much.
   EXPECT_EQ(result.verdict, FitVerdict::usable_with_care);
-  EXPECT_NEAR(errors_over_floor(result, 0.5).held_out, 4 / std::hypot(1, 3), 1e-12);
+  EXPECT_NEAR(errors_over_floor(result).held_out, 4 / std::hypot(1, 3), 1e-12);
+}
+
+TEST(Verdict, CountsNoMoreOfMeshAndTimeStepThanExpected) {
+  FitResult result = result_with(3, 1.2, 1);
+  result.errors.front().discretisation_found = 4;
+  EXPECT_NEAR(errors_over_floor(result).fitted, 3 / std::hypot(1, 1), 1e-12);
 }
 
 TEST(Verdict, IsNoBetterThanAGuess) {
@@ -132,7 +142,9 @@ FitReport report_with(int wrong, int markers = 40) {
 MarkerSet forty_markers() {
   MarkerSet markers;
   for (int m = 0; m < 40; ++m)
-    markers.markers.push_back({.name = std::string("m") + std::to_string(m)});
+    markers.markers.push_back({.name = std::string("m") + std::to_string(m),
+                               .s_m = 0.01 * (m % 8),
+                               .t_m = 0.01 * (m / 8)});
   return markers;
 }
 
@@ -150,6 +162,38 @@ TEST(ContradictingMarkers, AreNamedAndLeftOutOfErrorsBeside) {
   EXPECT_EQ(errors.fitted_without->count, 15 * 38);
   EXPECT_NEAR(errors.fitted_without->rms_distance, 1, 1e-12);
   EXPECT_NEAR(errors.held_out_without->rms, 1 / std::sqrt(3), 1e-12);
+}
+
+/// One marker of the grid 60 off from frame 8, and the four around it by so much.
+FitReport report_of_cross(double around) {
+  FitReport report = report_with(0);
+  for (FitReport::Residuals::Row& row : report.residuals.front().rows) {
+    if (row.frame < 8) continue;
+    if (row.marker == 10) row.observed = Eigen::Vector3d(60, 0, 0);
+    if (std::set<int>{2, 9, 11, 18}.contains(row.marker)) row.observed.x() = around;
+  }
+  return report;
+}
+
+TEST(ContradictingMarkers, AreNotNamedWhereTheirNeighboursLieOffWithThem) {
+  FitReport alone = report_of_cross(1), cloth = report_of_cross(24), apart = report_of_cross(-24);
+  for (FitReport* report : {&alone, &cloth, &apart}) name_contradicting(forty_markers(), *report);
+
+  EXPECT_EQ(alone.result.contradicting.size(), 1u);
+  EXPECT_TRUE(cloth.result.contradicting.empty());
+  EXPECT_EQ(apart.result.contradicting.size(), 1u);
+}
+
+TEST(ContradictingMarkers, MayBeAllCornersOfATag) {
+  MarkerSet markers = forty_markers();
+  FitReport report = report_with(0);
+  for (const size_t corner : {9u, 10u, 17u, 18u}) markers.markers[corner].tag = 7;
+  for (FitReport::Residuals::Row& row : report.residuals.front().rows)
+    if (row.frame >= 8 && markers.markers[static_cast<size_t>(row.marker)].tag)
+      row.observed = Eigen::Vector3d(60, 0, 0);
+  name_contradicting(markers, report);
+
+  EXPECT_EQ(report.result.contradicting.size(), 4u);
 }
 
 TEST(ContradictingMarkers, MayBeOneOfAFew) {
@@ -175,6 +219,83 @@ TEST(ContradictingMarkers, AreNotNamedByAModelThatDoesNotFit) {
   name_contradicting(forty_markers(), report);
 
   EXPECT_TRUE(report.result.contradicting.empty());
+}
+
+TEST(Outliers, AreLeftOutWhereTheTrackComesBack) {
+  FitReport report = report_with(0);
+  std::vector<FitReport::Residuals::Row>& rows = report.residuals.front().rows;
+  const auto row = [&](int frame, int marker) -> FitReport::Residuals::Row& {
+    return rows[static_cast<size_t>(frame * 40 + marker)];
+  };
+  row(4, 3).observed = row(16, 5).observed = Eigen::Vector3d(0, 30, 0);
+  row(0, 7).observed = Eigen::Vector3d(0, 30, 0);  // nothing before it tells
+  row(9, 9).observed = row(10, 9).observed = Eigen::Vector3d(0, 30, 0);
+  name_contradicting(forty_markers(), report);
+
+  const ObservationErrors& errors = report.result.errors.front();
+  EXPECT_EQ(errors.outliers, 2);
+  EXPECT_TRUE(report.result.contradicting.empty());
+  ASSERT_TRUE(errors.fitted_without && errors.held_out_without);
+  EXPECT_EQ(errors.fitted_without->count, 15 * 40 - 1);
+  EXPECT_NEAR(errors.held_out_without->rms_distance, 1, 1e-12);
+}
+
+/// Every so many markers jump off in every fourth frame, and are back in the next.
+int outliers_of_every(int markers) {
+  FitReport report = report_with(0);
+  for (FitReport::Residuals::Row& row : report.residuals.front().rows)
+    if (row.frame % 4 == 2 && row.marker % markers == 0) row.observed = Eigen::Vector3d(0, 30, 0);
+  name_contradicting(forty_markers(), report);
+  EXPECT_EQ(report.result.errors.front().fitted_without.has_value(),
+            report.result.errors.front().outliers > 0);
+  return report.result.errors.front().outliers;
+}
+
+TEST(Outliers, AreTheModelsWhereThereAreMany) {
+  EXPECT_EQ(outliers_of_every(14), 15);  // of 800: 1.9 %
+  EXPECT_EQ(outliers_of_every(8), 0);    // 25 are 3.1 %
+}
+
+TEST(Outliers, AreNoneWhereTheModelJumps) {
+  FitReport report = report_with(0);
+  report.residuals.front().rows[4 * 40 + 3].predicted = Eigen::Vector3d(0, 30, 0);
+  name_contradicting(forty_markers(), report);
+
+  EXPECT_EQ(report.result.errors.front().outliers, 0);
+}
+
+TEST(Outliers, AreNoneWhereFramesAreMissingAround) {
+  FitReport report = report_with(0);
+  std::vector<FitReport::Residuals::Row>& rows = report.residuals.front().rows;
+  rows[10 * 40 + 3].observed = Eigen::Vector3d(0, 30, 0);
+  std::erase_if(rows, [](const FitReport::Residuals::Row& row) {
+    return row.marker == 3 && row.frame > 5 && row.frame < 15 && row.frame != 10;
+  });
+  name_contradicting(forty_markers(), report);
+
+  EXPECT_EQ(report.result.errors.front().outliers, 0);
+}
+
+bool contradicts_pose(double tilt_rad, double sigmas) {
+  FitReport report;
+  warn_of_contradicted_pose({.tilt_rad = tilt_rad, .sigmas = sigmas, .is_stated = true}, "",
+                            report);
+  EXPECT_EQ(report.result.warnings.size(), report.result.contradicts_pose ? 1u : 0u);
+  return report.result.contradicts_pose;
+}
+
+TEST(ContradictedPose, NeedsATiltBeyondThePoseAndBeyondWhatModelsMake) {
+  EXPECT_TRUE(contradicts_pose(0.05, 50));
+  EXPECT_FALSE(contradicts_pose(0.05, 4.9));
+  EXPECT_FALSE(contradicts_pose(0.005, 50));
+  EXPECT_FALSE(contradicts_pose(0, 0));
+  EXPECT_FALSE(contradicts_pose(NAN, NAN));
+}
+
+TEST(Verdict, IsNotGoodWhereGravityContradictsThePose) {
+  FitResult result = result_with(1, 1);
+  result.contradicts_pose = true;
+  EXPECT_EQ(verdict_of(result), FitVerdict::usable_with_care);
 }
 
 TEST(ContradictingMarkers, JudgeTheFitNoMore) {
