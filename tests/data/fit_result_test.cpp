@@ -242,12 +242,12 @@ TEST(FitJson, HasTheKeysOfTheFormat) {
 
   std::vector<std::string> keys;
   for (const auto& [key, value] : json.items()) keys.push_back(key);
-  EXPECT_THAT(keys,
-              testing::ElementsAre("format", "verdict", "verdict_reason", "next_command", "usable",
-                                   "converged", "warnings", "contradicting_markers", "recording",
-                                   "version", "command", "seed", "seconds", "model", "parameters",
-                                   "effects", "nuisance", "basins", "errors", "observations",
-                                   "marker_offsets", "clouds", "contradicts_pose"));
+  EXPECT_THAT(
+      keys, testing::ElementsAre("format", "verdict", "verdict_reason", "next_command", "usable",
+                                 "converged", "contradicts_pose", "warnings",
+                                 "contradicting_markers", "recording", "version", "command", "seed",
+                                 "seconds", "model", "parameters", "effects", "nuisance", "basins",
+                                 "errors", "observations", "marker_offsets", "clouds"));
   EXPECT_EQ(json["format"], "clothfit-fit/1");
   EXPECT_EQ(json["model"]["mesh"]["rows"], 9);
   EXPECT_EQ(json["model"]["time_step_s"], 1.0 / 480);
