@@ -172,8 +172,8 @@ struct FitResult {
   bool converged = true;
   bool contradicts_pose = false;  ///< gravity ended far from where the camera's pose has it
   std::vector<ContradictingMarker> contradicting;
-  Findings
-      warnings;  ///< of the checks before the fit (fit/preflight/preflight.h) and of its outcome
+  /// What the checks before the fit (fit/preflight/preflight.h) and its outcome warn of.
+  Findings warnings;
   int observations_used = 0;
   std::map<std::string, int> observations_rejected;  ///< reason -> count
 
