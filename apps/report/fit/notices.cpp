@@ -40,9 +40,9 @@ std::string warnings_box(const Findings& warnings) {
   if (warnings.empty()) return "";
   std::string list = "<ul>\n";
   for (const Finding& warning : warnings)
-    list += fmt::format("<li>{}. Expected: {}.{}</li>\n", escape_xml(warning.found),
-                        escape_xml(warning.expected),
-                        warning.remedy.empty() ? "" : " " + escape_xml(warning.remedy) + ".");
+    list += fmt::format(
+        "<li>{}. Expected: {}.{}</li>\n", escape_xml(warning.found), escape_xml(warning.expected),
+        warning.remedy.empty() ? "" : " Remedy: " + escape_xml(warning.remedy) + ".");
   return notice_box(Notice::care, "The recording may not be what it says it is", list + "</ul>\n");
 }
 
