@@ -62,13 +62,6 @@ void write_start(YamlWriter& out, const ModelDescription& model,
   out.end_map();
 }
 
-void write_times(const std::vector<double>& time_s, const std::filesystem::path& file) {
-  std::string text = "frame,time\n";
-  for (size_t frame = 0; frame < time_s.size(); ++frame)
-    text += fmt::format("{},{}\n", frame, number_text(time_s[frame]));
-  write_text(text, file);
-}
-
 /// Says whether a rate and a duration give the same frames, bit for bit.
 bool are_even(const ModelDescription& model) {
   return model.frame_rate_hz &&

@@ -12,6 +12,10 @@ namespace clothfit {
 double Recording::frame_time_s(int frame) const {
   if (frame_rate_hz) return frame / *frame_rate_hz;
   assert(frame >= 0);
+  if (!times_file && times_s.empty())
+    throw InputError((folder / "recording.yaml").string(),
+                     "no `time` is given, and the videos were not looked at", "times of the frames",
+                     "track the recording first, or give `time: {frame_rate: ...}`");
   if (frame >= static_cast<int>(times_s.size()))
     throw InputError(times_file ? times_file->string() : name,
                      fmt::format("there is no time for frame {}", frame),

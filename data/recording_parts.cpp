@@ -7,8 +7,10 @@
 
 #include "data/csv_table.h"
 #include "data/file_name.h"
+#include "data/number_text.h"
 #include "data/recording_words.h"
 #include "data/shown_text.h"
+#include "data/text_file.h"
 
 namespace clothfit {
 namespace {
@@ -123,6 +125,13 @@ std::vector<double> read_times(const std::filesystem::path& file) {
                    "correct the time (seconds), or make two recordings of it");
   }
   return times_s;
+}
+
+void write_times(const std::vector<double>& times_s, const std::filesystem::path& file) {
+  std::string text = "frame,time\n";
+  for (size_t frame = 0; frame < times_s.size(); ++frame)
+    text += fmt::format("{},{}\n", frame, number_text(times_s[frame]));
+  write_text(text, file);
 }
 
 Eigen::Vector2d read_place(const YamlValue& value, const ClothDescription& cloth) {

@@ -58,6 +58,8 @@ double read_frame_rate(const YamlValue& value);
 std::pair<int, int> read_mesh(const YamlValue& value);
 /// Reads a table of frame times.
 std::vector<double> read_times(const std::filesystem::path& file);
+/// Writes such a table, a row for each frame.
+void write_times(const std::vector<double>& times_s, const std::filesystem::path& file);
 /// Reads a place (s, t) on the cloth.
 Eigen::Vector2d read_place(const YamlValue& value, const ClothDescription& cloth);
 /// Reads held points and edges; `motions` are the allowed words.

@@ -33,13 +33,14 @@ void read_marker_set(const YamlValue& value, const RecordingFiles& files, Record
     set.index.emplace(set.markers[i].name, static_cast<int>(i));
 }
 
+constexpr const char* kTimeWords = "{frame_rate: FRAMES_PER_SECOND} or {file: times.csv}";
+
 void read_time(const YamlValue& value, const RecordingFiles& files, Recording& recording) {
   const YamlMap map = value.map({"frame_rate", "file"});
   const YamlValue* rate = map.find("frame_rate");
   const YamlValue* file = map.find("file");
   if ((rate == nullptr) == (file == nullptr))
-    value.refuse(rate ? "time has both a frame_rate and a file" : "time is not given",
-                 "{frame_rate: FRAMES_PER_SECOND} or {file: times.csv}");
+    value.refuse(rate ? "time has both a frame_rate and a file" : "time is not given", kTimeWords);
   if (rate != nullptr) {
     recording.frame_rate_hz = read_frame_rate(*rate);
   } else {
@@ -78,6 +79,18 @@ std::vector<CameraEntry> read_cameras(const YamlValue& value, const RecordingFil
     cameras.push_back(std::move(camera));
   }
   return cameras;
+}
+
+/// Refuses a recording whose frames nothing gives a time: videos alone state them.
+void require_time(const Recording& recording, const std::filesystem::path& file) {
+  const auto has_video = [](const CameraEntry& camera) {
+    return camera.images && std::filesystem::is_regular_file(*camera.images);
+  };
+  if (recording.frame_rate_hz || recording.times_file ||
+      std::ranges::any_of(recording.cameras, has_video))
+    return;
+  throw InputError(file.string(), "no `time` is given, and no video states it", kTimeWords,
+                   "give the rate at which the frames were taken");
 }
 
 void require_camera(const Recording& recording, const YamlValue& where, const std::string& name) {
@@ -157,11 +170,12 @@ Recording read_recording(const std::filesystem::path& folder) {
   if (const YamlValue* origin = map.find("origin")) recording.origin = origin->text();
   recording.cloth = read_cloth(map.at("cloth"));
   read_marker_set(map.at("markers"), files, recording);
-  read_time(map.at("time"), files, recording);
+  if (const YamlValue* time = map.find("time")) read_time(*time, files, recording);
   if (const YamlValue* gravity = map.find("gravity"))
     recording.gravity_m_per_s2 = read_gravity(*gravity);
   if (const YamlValue* cameras = map.find("cameras"))
     recording.cameras = read_cameras(*cameras, files);
+  require_time(recording, file);
   if (const YamlValue* observations = map.find("observations"))
     read_observations(*observations, files, recording);
   if (const YamlValue* reference = map.find("reference")) {

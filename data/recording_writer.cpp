@@ -91,13 +91,10 @@ void write_recording(const Recording& recording, const std::filesystem::path& fo
   if (!recording.markers_file.empty()) out.key("file").value(relative(recording.markers_file));
   out.end_map();
 
-  assert(recording.frame_rate_hz.has_value() != recording.times_file.has_value());
-  out.key("time").begin_flow_map();
   if (recording.frame_rate_hz)
-    out.key("frame_rate").value(*recording.frame_rate_hz);
-  else
-    out.key("file").value(relative(*recording.times_file));
-  out.end_map();
+    out.key("time").begin_flow_map().key("frame_rate").value(*recording.frame_rate_hz).end_map();
+  else if (recording.times_file)
+    out.key("time").begin_flow_map().key("file").value(relative(*recording.times_file)).end_map();
 
   const Eigen::Vector3d& gravity = recording.gravity_m_per_s2;
   out.key("gravity").value(std::array{gravity.x(), gravity.y(), gravity.z()});

@@ -14,7 +14,7 @@
 #include "apps/terminal/json_file.h"
 #include "data/input_error.h"
 #include "vision/detect/chessboard.h"
-#include "vision/ingest/image_source.h"
+#include "vision/ingest/open_images.h"
 
 namespace clothfit {
 namespace {
@@ -62,8 +62,12 @@ StillsCalibration calibrate_from_stills(const std::string& camera, const Calibra
   cv::Mat grey;
   cv::Size size;
   while (source->next(grey)) {
-    size = grey.size();
     ++calibration.stills;
+    if (!source->damage().empty()) {
+      calibration.board_not_found.push_back(source->current_name() + " (damaged)");
+      continue;
+    }
+    size = grey.size();
     if (auto corners = find_chessboard(grey, stills.board))
       views.push_back({source->current_name(), std::move(*corners)});
     else

@@ -5,16 +5,17 @@
 #include <opencv2/core.hpp>
 
 #include "data/input_error.h"
-#include "vision/ingest/image_source.h"
+#include "vision/ingest/open_images.h"
 
 namespace clothfit {
 
 PictureSize picture_size(const std::filesystem::path& images) {
   const std::unique_ptr<ImageSource> source = open_images(images);
   cv::Mat grey;
-  if (!source->next(grey))
-    throw InputError(images.string(), "holds no picture", "a folder of pictures or a video");
-  return {grey.cols, grey.rows};
+  while (source->next(grey))
+    if (source->damage().empty()) return {grey.cols, grey.rows};
+  throw InputError(images.string(), "holds no whole picture", "a folder of pictures or a video",
+                   "copy it again");
 }
 
 std::string to_string(const PictureSize& size) {

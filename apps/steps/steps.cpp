@@ -45,12 +45,14 @@ ObservationKind resolve_observations(const Recording& recording, ObservationKind
   return recording.tracks3d ? ObservationKind::tracks3d : ObservationKind::tracks2d;
 }
 
-Recording complete_recording(const Recording& recording, ObservationKind kind,
-                             const StepOptions& options, const std::filesystem::path& steps,
-                             const ProgressCallback& progress) {
-  Recording complete = recording;
+CompletedRecording complete_recording(const Recording& recording, ObservationKind kind,
+                                      const StepOptions& options,
+                                      const std::filesystem::path& steps,
+                                      const ProgressCallback& progress) {
+  CompletedRecording result{.recording = recording, .footage = {}};
+  Recording& complete = result.recording;
   // Measured 3D positions need no camera.
-  if (resolve_observations(recording, kind) == ObservationKind::tracks3d) return complete;
+  if (resolve_observations(recording, kind) == ObservationKind::tracks3d) return result;
   check_cameras_can_be_placed(recording);
 
   const std::vector<std::string> uncalibrated = cameras_to_calibrate(complete, false);
@@ -66,8 +68,9 @@ Recording complete_recording(const Recording& recording, ObservationKind kind,
     fs::create_directories(folder);
     TrackStepResult step = track_step(complete, untracked, options.track, folder, progress);
     complete = std::move(step.recording);
+    result.footage = std::move(step.footage);
   }
-  return complete;
+  return result;
 }
 
 namespace {

@@ -13,6 +13,8 @@
 #include "apps/terminal/json_file.h"
 #include "data/camera_parameters.h"
 #include "data/input_error.h"
+#include "data/recording_parts.h"
+#include "vision/ingest/footage.h"
 
 namespace clothfit {
 namespace {
@@ -92,6 +94,13 @@ void place_camera(const Recording& recording, const CameraEntry& camera, CameraT
   tracks.placement = placement;
 }
 
+/// Writes the times that the videos state, and makes them the recording's.
+void take_times(const std::vector<double>& times_s, Recording& recording) {
+  recording.times_s = times_s;
+  recording.times_file = recording.folder / "times.csv";
+  write_times(times_s, *recording.times_file);
+}
+
 nlohmann::ordered_json to_json(const CameraTracks& tracks) {
   const TrackResult& result = tracks.result;
   const auto good = std::count_if(result.tracks.begin(), result.tracks.end(),
@@ -118,12 +127,13 @@ nlohmann::ordered_json to_json(const CameraTracks& tracks) {
 }  // namespace
 
 std::vector<std::string> cameras_to_track(const Recording& recording, bool again) {
+  const bool untimed = !recording.frame_rate_hz && !recording.times_file;
   std::vector<std::string> names;
   for (const CameraEntry& camera : recording.cameras) {
     if (!camera.images) continue;
     const bool tracked = recording.tracks2d.contains(camera.name);
     const bool waits_for_pose = !recording.reference.empty() && !has_pose(camera);
-    if (again || !tracked || waits_for_pose) names.push_back(camera.name);
+    if (again || untimed || !tracked || waits_for_pose) names.push_back(camera.name);
   }
   return names;
 }
@@ -131,8 +141,10 @@ std::vector<std::string> cameras_to_track(const Recording& recording, bool again
 TrackStepResult track_step(const Recording& recording, const std::vector<std::string>& cameras,
                            const TrackOptions& options, const std::filesystem::path& folder,
                            const ProgressCallback& progress) {
-  TrackStepResult step;
-  step.recording = copy_recording(recording, folder);
+  const Footage footage = open_footage(recording, cameras);
+  TrackStepResult step{
+      .recording = copy_recording(recording, folder), .cameras = {}, .footage = footage.findings};
+  if (!footage.times_s.empty()) take_times(footage.times_s, step.recording);
   fs::create_directories(folder / "tracks2d");
   nlohmann::ordered_json json;
   json["format"] = "clothfit-tracks/1";
@@ -146,7 +158,10 @@ TrackStepResult track_step(const Recording& recording, const std::vector<std::st
 
     CameraTracks tracks;
     tracks.camera = camera.name;
-    tracks.result = track(recording, given, options, progress);
+    tracks.result = track(recording, *footage.cameras.at(camera.name), given.images->string(),
+                          options, progress);
+    step.footage.insert(step.footage.end(), tracks.result.footage.begin(),
+                        tracks.result.footage.end());
     if (tracks.result.cancelled) throw Cancelled();
     if (!tracks.result.usable)
       throw NoResult(

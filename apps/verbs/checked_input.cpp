@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <utility>
+
 #include "apps/steps/steps.h"
 #include "apps/terminal/option_flags.h"
 #include "fit/preflight/preflight.h"
@@ -49,8 +51,11 @@ CheckedInput check_input(const Recording& given, ObservationKind kind, const fs:
                          const ProgressCallback& progress) {
   CheckedInput checked{.input = {}, .findings = check_declarations(given)};
   if (!with_state(checked.findings, FindingState::refused).empty()) return checked;
-  checked.input = read_fit_input(complete_recording(given, kind, {}, steps, progress), kind);
-  checked.findings = findings_of(checked.input, given, kind);
+  CompletedRecording complete = complete_recording(given, kind, {}, steps, progress);
+  checked.input = read_fit_input(complete.recording, kind);
+  checked.findings = std::move(complete.footage);
+  const Findings of_tracks = findings_of(checked.input, given, kind);
+  checked.findings.insert(checked.findings.end(), of_tracks.begin(), of_tracks.end());
   return checked;
 }
 

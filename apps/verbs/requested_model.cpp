@@ -220,7 +220,7 @@ ModelDescription model_of_recording(const ModelRequest& request, const fs::path&
                      "tracks3d or tracks2d whose first frame shows the sheet",
                      "write a model file, which says where the sheet lies: docs/formats.md");
   const Recording recording =
-      complete_recording(given, ObservationKind::automatic, {}, steps, progress);
+      complete_recording(given, ObservationKind::automatic, {}, steps, progress).recording;
   const FitInput input = read_fit_input(recording, ObservationKind::automatic);
   GridSize mesh{recording.cloth.mesh_columns, recording.cloth.mesh_rows};
   if (!request.fit.empty()) {  // a fit's stiffness belongs to the mesh that it was found on

@@ -99,7 +99,9 @@ int run_track(const TrackVerbOptions& options) {
     }
     step = track_step(recording, cameras, options.track, out.path(), watch(line));
   }
-  const Findings findings = check_tracks(step, given);
+  Findings findings = step.footage;
+  const Findings of_tracks = check_tracks(step, given);
+  findings.insert(findings.end(), of_tracks.begin(), of_tracks.end());
   add_findings(findings, out.path() / "tracks.json");
   out.publish();
 
@@ -109,6 +111,8 @@ int run_track(const TrackVerbOptions& options) {
       spdlog::warn("camera '{}' has no place in the world, which a fit needs: {}", tracks.camera,
                    tracks.not_placed);
   }
+  for (const Finding& note : with_state(step.footage, FindingState::passed))
+    fmt::print("\n{}\n", note.found);
   fmt::print("\nRecording with tracks: {}\n", shown_path(out.final_path()));
   for (const Finding& warning : with_state(findings, FindingState::warning))
     spdlog::warn("{}", with_flags(sentence(warning)));

@@ -420,5 +420,25 @@ TEST(Recording, IsRefusedWhereThereIsNone) {
                  [&] { read_recording(folder / "empty/recording.yaml"); });
 }
 
+TEST(Recording, MayLeaveItsTimesToItsVideos) {
+  const TemporaryFolder folder;
+  write_full_recording(folder);
+  folder.write("recording.yaml", replaced(kFullRecording, "time: {file: times.csv}\n", ""));
+  const Recording recording = read_recording(folder.path());
+  EXPECT_FALSE(recording.frame_rate_hz);
+  EXPECT_FALSE(recording.times_file);
+  expect_refused(folder, "recording.yaml: no `time` is given, and the videos were not looked at",
+                 [&] { recording.frame_time_s(0); });
+  write_recording(recording, folder.path());
+  expect_same(read_recording(folder.path()), recording);
+}
+
+TEST(Recording, NeedsTimesWhereNoVideoStatesThem) {
+  const TemporaryFolder folder;
+  folder.write("recording.yaml", replaced(kLeastRecording, "time: {frame_rate: 60}\n", ""));
+  expect_refused(folder, "recording.yaml: no `time` is given, and no video states it",
+                 [&] { read_recording(folder.path()); });
+}
+
 }  // namespace
 }  // namespace clothfit

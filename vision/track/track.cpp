@@ -1,7 +1,6 @@
 #include "vision/track/track.h"
 
 #include <fmt/core.h>
-#include <fmt/ranges.h>
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/info.h>
 #include <tbb/parallel_pipeline.h>
@@ -9,16 +8,16 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <bit>
 #include <set>
 
 #include "data/input_error.h"
 #include "vision/detect/fixed_corner.h"
 #include "vision/detect/tag_detector.h"
-#include "vision/detect/tag_family.h"
-#include "vision/ingest/image_source.h"
+#include "vision/ingest/footage.h"
+#include "vision/ingest/frame_list.h"
 #include "vision/track/overlay.h"
 #include "vision/track/tag_history.h"
+#include "vision/track/what_appears.h"
 
 namespace clothfit {
 namespace {
@@ -53,6 +52,7 @@ struct Readings {
   std::map<int, TagHistory> by_tag;
   std::set<int> unlisted;  ///< tags that no marker and no reference point names
   int frames = 0;
+  int whole = 0;  ///< pictures that are not damaged
   bool cancelled = false;
   cv::Size size;
   cv::Mat first_picture;
@@ -61,42 +61,70 @@ struct Readings {
 };
 
 struct Picture {
+  int number = 0;  ///< in order
   int frame = 0;
+  bool whole = true;  ///< else it is not looked at
   cv::Mat grey;
   std::vector<TagDetection> tags;
 };
 
-/// Says whether a frame is drawn on: the middle one is. If a video does not say how long it is, one
-/// between its half and its end serves or, at worst, its quarter.
-bool is_overlay_frame(int frame, int count) {
-  if (count > 0) return frame == count / 2;
-  return frame == 0 || std::has_single_bit(static_cast<unsigned>(frame));
+/// Keeps what is needed of a whole picture. The middle one is drawn on, or the last before it.
+void keep_pictures(const Picture& picture, int count, Readings& readings) {
+  if (readings.first_picture.empty()) {
+    readings.first_picture = picture.grey;
+    readings.size = picture.grey.size();
+  }
+  if (picture.number > count / 2) return;
+  readings.overlay_picture = picture.grey;
+  readings.overlay_frame = picture.frame;
 }
 
-Readings read_all(ImageSource& images, const std::string& family, const PointsByTag& markers,
-                  const PointsByTag& reference, const ProgressCallback& progress) {
+std::string list_of(const std::set<int>& ids) {
+  return list_numbers({ids.begin(), ids.end()});
+}
+
+/// Returns the tags of the cloth and of reference points.
+std::set<int> listed_tags(const PointsByTag& markers, const PointsByTag& reference) {
+  std::set<int> ids;
+  for (const PointsByTag* points : {&markers, &reference})
+    for (const auto& [id, corners] : *points) ids.insert(id);
+  return ids;
+}
+
+/// Throws InputError where a picture shows the listed tags once it is turned, and not as it is.
+void refuse_turned(const cv::Mat& grey, const std::string& where, const std::string& family,
+                   const std::set<int>& listed) {
+  const std::string shows = turned_picture_shows(grey, family, listed);
+  if (shows.empty()) return;
+  throw InputError(where, "no tag of the cloth appears in the first picture",
+                   fmt::format("tags {} of {}", list_of(listed), family), shows);
+}
+
+Readings read_all(ImageSource& images, const std::string& where, const std::string& family,
+                  const PointsByTag& markers, const PointsByTag& reference,
+                  const ProgressCallback& progress) {
   Readings readings;
   std::atomic<bool> cancelled = false;
   tbb::enumerable_thread_specific<TagDetector> detectors([&] { return TagDetector(family); });
 
-  int next_frame = 0;
+  int next = 0;
   const auto load = [&](tbb::flow_control& control) {
-    Picture picture{.frame = next_frame++, .grey = {}, .tags = {}};
-    if (cancelled || !images.next(picture.grey)) control.stop();
+    Picture picture{.number = next++, .grey = {}, .tags = {}};
+    if (cancelled || !images.next(picture.grey)) {
+      control.stop();
+      return picture;
+    }
+    picture.frame = images.frame();
+    picture.whole = images.damage().empty();
     return picture;
   };
   const auto detect = [&](Picture picture) {
-    picture.tags = detectors.local().detect(picture.grey);
+    if (picture.whole) picture.tags = detectors.local().detect(picture.grey);
     return picture;
   };
   const auto collect = [&](const Picture& picture) {
     if (cancelled) return;
-    if (picture.frame == 0) readings.first_picture = picture.grey;
-    readings.size = picture.grey.size();
-    if (is_overlay_frame(picture.frame, images.count())) {
-      readings.overlay_picture = picture.grey;
-      readings.overlay_frame = picture.frame;
-    }
+    if (picture.whole) keep_pictures(picture, images.count(), readings);
     for (const TagDetection& tag : picture.tags) {
       if (markers.contains(tag.id) || reference.contains(tag.id)) {
         readings.by_tag[tag.id].push_back({.frame = picture.frame, .tag = tag, .rejected = {}});
@@ -104,9 +132,12 @@ Readings read_all(ImageSource& images, const std::string& family, const PointsBy
         readings.unlisted.insert(tag.id);
       }
     }
+    const bool first = picture.whole && readings.whole++ == 0;
+    if (first && readings.by_tag.empty())
+      refuse_turned(picture.grey, where, family, listed_tags(markers, reference));
     readings.frames = picture.frame + 1;
     const Progress report{.stage = "track",
-                          .done = static_cast<double>(readings.frames),
+                          .done = static_cast<double>(picture.number + 1),
                           .total = static_cast<double>(images.count()),
                           .unit = "frames",
                           .note = fmt::format("{} tags", picture.tags.size())};
@@ -120,38 +151,6 @@ Readings read_all(ImageSource& images, const std::string& family, const PointsBy
                      tbb::make_filter<Picture, void>(tbb::filter_mode::serial_in_order, collect));
   readings.cancelled = cancelled;
   return readings;
-}
-
-/// Lists numbers as a person would: "0 to 63" or "0, 4, 7".
-std::string list_ids(const std::set<int>& ids) {
-  std::vector<std::string> parts;
-  for (auto it = ids.begin(); it != ids.end();) {
-    const int first = *it;
-    int last = first;
-    for (++it; it != ids.end() && *it == last + 1; ++it) last = *it;
-    parts.push_back(first == last ? fmt::format("{}", first)
-                                  : fmt::format("{} to {}", first, last));
-  }
-  return fmt::format("{}", fmt::join(parts, ", "));
-}
-
-/// Says, as a remedy, which tags the first picture shows instead of those that were looked for.
-std::string what_appears_instead(const Readings& readings, const std::string& family) {
-  if (!readings.unlisted.empty())
-    return fmt::format("tags {} of that family do appear: check markers.csv",
-                       list_ids(readings.unlisted));
-  constexpr size_t kEnough = 3;        // fewer may be chance readings of a small code
-  constexpr double kClearMargin = 30;  // grey levels
-  for (const std::string& other : tag_families()) {
-    if (other == family) continue;
-    std::set<int> ids;
-    for (const TagDetection& tag : TagDetector(other, 0).detect(readings.first_picture))
-      if (tag.decision_margin > kClearMargin) ids.insert(tag.id);
-    if (ids.size() >= kEnough)
-      return fmt::format("the first picture shows tags {} of {}: set that family in recording.yaml",
-                         list_ids(ids), other);
-  }
-  return "check the camera's `images`, the light, and that a tag is 30 pixels wide or more";
 }
 
 std::vector<ReferencePixel> average_reference(const Readings& readings,
@@ -241,8 +240,11 @@ TrackResult track(const Recording& recording, const CameraEntry& camera,
   if (!camera.images)
     throw InputError(yaml, fmt::format("camera '{}' has no images", camera.name),
                      "`images` with a folder or a video to track in");
-  const std::unique_ptr<ImageSource> images = open_images(*camera.images);
-  return track(recording, *images, camera.images->string(), options, progress);
+  const Footage footage = open_footage(recording, {camera.name});
+  TrackResult result = track(recording, *footage.cameras.at(camera.name), camera.images->string(),
+                             options, progress);
+  result.footage.insert(result.footage.begin(), footage.findings.begin(), footage.findings.end());
+  return result;
 }
 
 TrackResult track(const Recording& recording, ImageSource& pictures, const std::string& where,
@@ -256,9 +258,11 @@ TrackResult track(const Recording& recording, ImageSource& pictures, const std::
   const PointsByTag reference =
       points_by_tag(recording.reference, recording.reference_file.value_or("reference").string());
 
-  Readings readings = read_all(pictures, recording.markers.family, markers, reference, progress);
+  Readings readings =
+      read_all(pictures, where, recording.markers.family, markers, reference, progress);
 
   TrackResult result;
+  result.footage = pictures.findings();
   result.frames = readings.frames;
   result.image_width = readings.size.width;
   result.image_height = readings.size.height;
@@ -270,14 +274,15 @@ TrackResult track(const Recording& recording, ImageSource& pictures, const std::
 
   for (auto& [id, history] : readings.by_tag) judge(history, options, readings.size);
   result.tracks = collect_tracks(readings, markers);
-  if (result.tracks.empty()) {
-    std::set<int> ids;
-    for (const auto& [id, points] : markers) ids.insert(id);
-    throw InputError(where,
-                     fmt::format("no tag of the cloth appears in {} pictures", readings.frames),
-                     fmt::format("tags {} of {}", list_ids(ids), recording.markers.family),
-                     what_appears_instead(readings, recording.markers.family));
-  }
+  if (readings.whole == 0)
+    throw InputError(where, fmt::format("none of its {} pictures is whole", pictures.count()),
+                     "pictures that can be decoded", "copy it again");
+  if (result.tracks.empty())
+    throw InputError(
+        where, fmt::format("no tag of the cloth appears in {} pictures", readings.whole),
+        fmt::format("tags {} of {}", list_of(listed_tags(markers, {})), recording.markers.family),
+        what_appears_instead(readings.first_picture, recording.markers.family,
+                             listed_tags(markers, reference), readings.unlisted));
   result.reference = average_reference(readings, reference);
 
   int good = 0;

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "data/finding.h"
 #include "data/progress.h"
 #include "data/recording.h"
 #include "data/tracks.h"
@@ -28,7 +29,8 @@ struct TrackResult {
   std::string message;
   Tracks2d tracks;  ///< good and rejected rows of the cloth's markers
   std::vector<ReferencePixel> reference;
-  int frames = 0;
+  Findings footage;  ///< what the pictures' files and the pictures themselves show to be wrong
+  int frames = 0;    ///< up to the last one that has a picture
   int image_width = 0;
   int image_height = 0;
   std::map<std::string, int> rejected;  ///< reason (vision/track/rejection.h) -> rows of `tracks`

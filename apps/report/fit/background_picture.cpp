@@ -6,18 +6,21 @@
 #include <optional>
 
 #include "data/input_error.h"
-#include "vision/ingest/image_source.h"
+#include "vision/ingest/footage.h"
 
 namespace clothfit {
 namespace {
 
-std::optional<BackgroundPicture> read_picture(const std::string& kind,
-                                              const std::filesystem::path& images, int frame) {
+std::optional<BackgroundPicture> read_picture(const std::string& kind, const Recording& recording,
+                                              int frame) {
   try {
-    const std::unique_ptr<ImageSource> source = open_images(images);
+    const Footage footage = open_footage(recording, {kind});
+    ImageSource& source = *footage.cameras.at(kind);
     cv::Mat grey;
-    for (int i = 0; i <= frame; ++i)
-      if (!source->next(grey)) return std::nullopt;
+    do {
+      if (!source.next(grey)) return std::nullopt;
+    } while (source.frame() < frame);
+    if (source.frame() > frame || !source.damage().empty()) return std::nullopt;
     std::vector<unsigned char> bytes;
     if (!cv::imencode(".jpg", grey, bytes, {cv::IMWRITE_JPEG_QUALITY, 80})) return std::nullopt;
     return BackgroundPicture{.kind = kind,
@@ -49,7 +52,7 @@ std::vector<BackgroundPicture> background_pictures(const FitReport& report,
     const CameraEntry* camera = recording.find_camera(residuals.kind);
     const int frame = overlay_frame(residuals);
     if (camera == nullptr || !camera->images || frame < 0) continue;
-    if (auto picture = read_picture(residuals.kind, *camera->images, frame))
+    if (auto picture = read_picture(residuals.kind, recording, frame))
       pictures.push_back(std::move(*picture));
   }
   return pictures;

@@ -59,7 +59,7 @@ ForeignDiagnosis diagnose_one(const fs::path& folder, const ForeignStudyOptions&
   try {
     const ObservationKind observations = diagnosis_options.fit.observations;
     const Recording recording =
-        complete_recording(read_recording(folder), observations, {}, steps, progress);
+        complete_recording(read_recording(folder), observations, {}, steps, progress).recording;
     const Diagnosis diagnosis =
         diagnose(read_fit_input(recording, observations), diagnosis_options, progress);
     if (diagnosis.stop == FitStop::cancelled || interrupted()) throw Cancelled();

@@ -205,15 +205,19 @@ class StagedPictures : public ImageSource {
   StagedPictures(const Stage& stage, int camera)
       : stage_(stage), camera_(camera), rays_(stage.rays(camera)) {}
 
-  bool next(cv::Mat& grey) override {
-    if (next_ == stage_.frames()) return false;
-    grey = stage_.picture(rays_, camera_, next_++);
-    return true;
-  }
   std::string current_name() const override {
     return next_ == 0 ? std::string() : fmt::format("picture {}", next_ - 1);
   }
   int count() const override { return stage_.frames(); }
+
+ protected:
+  bool read_next(cv::Mat& grey) override {
+    if (next_ == stage_.frames()) return false;
+    grey = stage_.picture(rays_, camera_, next_++);
+    return true;
+  }
+  int own_number() const override { return next_ - 1; }
+  std::string where() const override { return "rendered pictures"; }
 
  private:
   const Stage& stage_;

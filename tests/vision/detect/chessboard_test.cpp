@@ -15,7 +15,7 @@
 #include "calib/camera/projection.h"
 #include "data/camera_parameters.h"
 #include "data/input_error.h"
-#include "vision/ingest/image_source.h"
+#include "vision/ingest/open_images.h"
 
 namespace clothfit {
 namespace {

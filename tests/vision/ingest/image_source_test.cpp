@@ -2,14 +2,16 @@
 
 #include "vision/ingest/image_source.h"
 
+#include <fmt/core.h>
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <opencv2/imgcodecs.hpp>
-#include <opencv2/videoio.hpp>
 
 #include "data/input_error.h"
 #include "tests/data/expect_refused.h"
 #include "tests/data/temporary_folder.h"
+#include "vision/ingest/open_images.h"
 
 namespace clothfit {
 namespace {
@@ -50,25 +52,6 @@ TEST(ImageSource, GivesPicturesOfAFolderByName) {
   EXPECT_NEAR(rest[1], 30, 1);
 }
 
-TEST(ImageSource, GivesTheSamePicturesFromAVideo) {
-  const TemporaryFolder folder;
-  const std::string file = (folder / "film.avi").string();
-  cv::VideoWriter writer(file, cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 30, {64, 48}, false);
-  if (!writer.isOpened()) {
-    GTEST_SKIP() << "OpenCV writes no Motion JPEG here";
-  }
-  for (int i = 0; i < 5; ++i) writer.write(plain_picture(40 * (i + 1)));
-  writer.release();
-
-  const auto images = open_images(file);
-  const std::vector<double> found = levels(*images);
-
-  EXPECT_EQ(images->count(), 5);
-  EXPECT_EQ(images->current_name(), "frame 4");
-  ASSERT_EQ(found.size(), 5U);
-  for (size_t i = 0; i < 5; ++i) EXPECT_NEAR(found[i], 40 * (static_cast<double>(i) + 1), 2);
-}
-
 TEST(ImageSource, RefusesWhatIsNotThere) {
   const TemporaryFolder folder;
   std::filesystem::create_directory(folder / "empty");
@@ -85,19 +68,77 @@ TEST(ImageSource, RefusesWhatIsNotThere) {
                  [&] { open_images(folder / "text.mp4"); });
 }
 
-TEST(ImageSource, RefusesBrokenPicturesAndAChangeOfSize) {
+TEST(ImageSource, GivesDamagedPicturesAsSuchAndNamesThem) {
   const TemporaryFolder folder;
-  cv::imwrite((folder / "0.png").string(), plain_picture(10));
+  cv::imwrite((folder / "0.png").string(), plain_picture(60));
   folder.write("1.png", "no picture at all");
-  cv::Mat grey;
-  const auto broken = open_images(folder.path());
-  ASSERT_TRUE(broken->next(grey));
-  expect_refused(folder, "1.png: the picture cannot be decoded", [&] { broken->next(grey); });
+  cv::imwrite((folder / "2.png").string(), plain_picture(90));
 
-  cv::imwrite((folder / "1.png").string(), plain_picture(10, {64, 50}));
-  const auto changed = open_images(folder.path());
-  ASSERT_TRUE(changed->next(grey));
-  expect_refused(folder, "1.png: the picture is 64 x 50", [&] { changed->next(grey); });
+  const auto images = open_images(folder.path());
+  cv::Mat grey;
+  ASSERT_TRUE(images->next(grey));
+  EXPECT_EQ(images->damage(), "");
+  ASSERT_TRUE(images->next(grey));
+  EXPECT_NE(images->damage(), "");
+  ASSERT_TRUE(images->next(grey));
+  EXPECT_EQ(images->damage(), "");
+  EXPECT_EQ(images->frame(), 2);
+  ASSERT_EQ(images->findings().size(), 1U);
+  EXPECT_THAT(images->findings()[0].found,
+              testing::HasSubstr("1 of 3 pictures are damaged and left out: frames 1 (1.png"));
+}
+
+TEST(ImageSource, RefusesAFolderOfWhichMostIsDamaged) {
+  const TemporaryFolder folder;
+  for (const char* name : {"0.png", "1.png"}) folder.write(name, "no picture at all");
+  cv::imwrite((folder / "2.png").string(), plain_picture(90));
+  const auto images = open_images(folder.path());
+  cv::Mat grey;
+  expect_refused(folder, "1.png: the picture cannot be decoded", [&] { levels(*images); });
+}
+
+TEST(ImageSource, RefusesAChangeOfSize) {
+  const TemporaryFolder folder;
+  cv::imwrite((folder / "0.png").string(), plain_picture(60));
+  cv::imwrite((folder / "1.png").string(), plain_picture(60, {64, 50}));
+  const auto images = open_images(folder.path());
+  try {
+    levels(*images);
+    ADD_FAILURE() << "was accepted";
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), testing::HasSubstr("1.png: the picture is 64 x 50; 64 x 48"));
+  }
+}
+
+TEST(ImageSource, PassesOverCompanionsOfOtherSystems) {
+  const TemporaryFolder folder;
+  cv::imwrite((folder / "0.png").string(), plain_picture(60));
+  folder.write("._0.png", std::string(4096, '\0'));
+  EXPECT_EQ(open_images(folder.path())->count(), 1);
+}
+
+TEST(ImageSource, StretchesLevelsOfTwelveBitsToTheFullRange) {
+  const TemporaryFolder folder;
+  for (const int n : {0, 1, 2})
+    cv::imwrite((folder / fmt::format("{}.png", n)).string(),
+                cv::Mat(48, 64, CV_16UC1, cv::Scalar(1000 * (n + 1))));
+  const auto images = open_images(folder.path());
+  EXPECT_THAT(levels(*images), testing::Pointwise(testing::DoubleNear(0.51),
+                                                  {1000 / 16.06, 2000 / 16.06, 3000 / 16.06}));
+  ASSERT_EQ(images->findings().size(), 1U);
+  EXPECT_EQ(images->findings()[0].found, "levels of 12 bits, stored in 16, are read as such");
+}
+
+TEST(ImageSource, GivesPicturesTheFramesThatTheyAreTold) {
+  const TemporaryFolder folder;
+  for (const char* name : {"0.png", "1.png", "2.png"})
+    cv::imwrite((folder / name).string(), plain_picture(60));
+  const auto images = open_images(folder.path());
+  images->number_frames({0, 2, 5});
+  cv::Mat grey;
+  std::vector<int> frames;
+  while (images->next(grey)) frames.push_back(images->frame());
+  EXPECT_THAT(frames, testing::ElementsAre(0, 2, 5));
 }
 
 }  // namespace

@@ -77,6 +77,7 @@ class DrawnRecording {
     recording_.markers_file = folder_ / "markers.csv";
     recording_.markers.kind = MarkerKind::apriltag;
     recording_.markers.family = "tag36h11";
+    recording_.frame_rate_hz = 60;
     for (int corner = 0; corner < 4; ++corner)
       recording_.markers.markers.push_back(
           {.name = "t7_" + std::to_string(corner), .s_m = 0, .t_m = 0, .tag = 7, .corner = corner});
@@ -329,6 +330,38 @@ TEST(Track, SaysWhatItLookedForAndWhatIsThereInstead) {
   DrawnRecording nothing;
   nothing.add(cv::Mat(120, 320, CV_8UC1, cv::Scalar(200)));
   expect_error("no tag of the cloth appears in 1 pictures", [&] { nothing.track_it(); });
+}
+
+TEST(Track, SaysThatThePicturesAreMirroredOrInverted) {
+  DrawnRecording mirrored;
+  cv::Mat picture;
+  cv::flip(mirrored.draw(0, 0), picture, 1);
+  mirrored.add(picture);
+  expect_error("the mirrored picture shows tags 7: switch mirroring off",
+               [&] { mirrored.track_it(); });
+  DrawnRecording inverted;
+  inverted.add(255 - inverted.draw(0, 0));
+  expect_error("with black and white exchanged the picture shows tags 7",
+               [&] { inverted.track_it(); });
+}
+
+TEST(Track, LeavesOutDamagedPicturesAndKeepsTheTimesOfTheOthers) {
+  DrawnRecording drawn;
+  for (int n = 0; n < 5; ++n) drawn.add(drawn.draw(3 * n, 0));
+  const std::filesystem::path frames = *drawn.recording().cameras[0].images;
+  std::filesystem::resize_file(frames / "102.png", 200);
+  std::filesystem::remove(frames / "103.png");
+
+  const TrackResult result = drawn.track_it();
+
+  std::set<int> seen;
+  for (const Position2d& row : result.tracks) seen.insert(row.frame);
+  EXPECT_EQ(seen, (std::set<int>{0, 1, 4}));
+  EXPECT_EQ(result.frames, 5);
+  std::string said;
+  for (const Finding& finding : result.footage) said += finding.found + "\n";
+  EXPECT_THAT(said, testing::HasSubstr("1 of 4 pictures are damaged and left out: frames 2"));
+  EXPECT_THAT(said, testing::HasSubstr("1 of 5 frames have no picture: 3"));
 }
 
 TEST(Track, RefusesWhatItCannotTrack) {

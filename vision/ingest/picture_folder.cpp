@@ -1,0 +1,157 @@
+#include "vision/ingest/picture_folder.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+
+#include "data/input_error.h"
+#include "vision/ingest/decode_picture.h"
+#include "vision/ingest/frame_list.h"
+#include "vision/ingest/picture_names.h"
+
+namespace clothfit {
+namespace {
+
+namespace fs = std::filesystem;
+
+NumberedPictures pictures_in(const fs::path& folder) {
+  std::vector<fs::path> files;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
+    // Names that begin with a dot are companions that systems lay beside files.
+    const bool hidden = entry.path().filename().string().starts_with(".");
+    if (!hidden && entry.is_regular_file() && is_picture(entry.path()))
+      files.push_back(entry.path());
+  }
+  if (files.empty())
+    throw InputError(folder.string(), "the folder holds no picture",
+                     ".jpg, .png, .tif, .bmp, .pgm or .webp files",
+                     "name the folder that holds the frames themselves");
+  return number_pictures(std::move(files));
+}
+
+/// Returns the brightest level of a picture.
+int brightest(const cv::Mat& levels) {
+  double level = 0;
+  cv::minMaxLoc(levels, nullptr, &level);
+  return static_cast<int>(level);
+}
+
+/// Returns how many bits hold levels up to this one, of those that cameras have.
+int bits_for(int level) {
+  for (const int bits : {8, 10, 12, 14})
+    if (level < 1 << bits) return bits;
+  return 16;
+}
+
+class PictureFolder : public ImageSource {
+ public:
+  explicit PictureFolder(const fs::path& folder)
+      : folder_(folder), pictures_(pictures_in(folder)) {}
+
+  std::string current_name() const override {
+    return next_ == 0 ? std::string() : current().filename().string();
+  }
+  std::string damage() const override { return damage_; }
+  int count() const override { return static_cast<int>(pictures_.files.size()); }
+
+ protected:
+  bool read_next(cv::Mat& grey) override {
+    if (next_ == pictures_.files.size()) return false;
+    DecodedPicture picture = decode_picture(pictures_.files[next_++]);
+    damage_ = picture.damage;
+    if (!damage_.empty()) {
+      damaged_.push_back(frame());
+      last_damaged_ = fmt::format("{}: {}", current_name(), damage_);
+      if (2 * damaged_.size() > pictures_.files.size())
+        throw InputError(current().string(),
+                         fmt::format("the picture cannot be decoded ({}), nor can {} others",
+                                     damage_, damaged_.size() - 1),
+                         "whole pictures", "copy them again or remove them");
+      return true;
+    }
+    note_turn(picture);
+    if (picture.grey.depth() == CV_8U)
+      grey = std::move(picture.grey);
+    else
+      to_8_bits(picture, grey);
+    return true;
+  }
+
+  int own_number() const override { return next_ == 0 ? -1 : pictures_.frames[next_ - 1]; }
+  std::string where() const override { return folder_.string(); }
+
+  Findings own_findings() const override {
+    Findings findings = pictures_.findings;
+    if (!damaged_.empty())
+      findings.push_back(
+          {.check = "pictures",
+           .state = FindingState::warning,
+           .found = fmt::format("{} of {} pictures are damaged and left out: frames {} ({})",
+                                damaged_.size(), count(), list_numbers(damaged_), last_damaged_),
+           .where = where(),
+           .expected = "whole files",
+           .remedy = "copy them again"});
+    if (!turn_.empty())
+      findings.push_back({.check = "pictures", .found = turn_, .where = "", .expected = ""});
+    if (bits_ > 0)
+      findings.push_back(
+          {.check = "pictures",
+           .found = fmt::format("levels of {} bits, stored in 16, are read as such", bits_)});
+    return findings;
+  }
+
+ private:
+  const fs::path& current() const { return pictures_.files[next_ - 1]; }
+
+  /// Says once that a turn is not applied.
+  void note_turn(const DecodedPicture& picture) {
+    if (!turn_.empty() || (picture.turn_deg == 0 && !picture.flipped)) return;
+    turn_ = fmt::format(
+        "{} asks viewers to turn it by {} degrees clockwise{}; pixels are used as the sensor read "
+        "them",
+        current_name(), picture.turn_deg, picture.flipped ? " and to mirror it" : "");
+  }
+
+  /// Brings levels of more bits to 8, by the bits that the folder's pictures use: sensors of 10 to
+  /// 14 bits write files of 16.
+  void to_8_bits(const DecodedPicture& picture, cv::Mat& grey) {
+    if (bits_ == 0) bits_ = picture.bits < 16 ? picture.bits : bits_used();
+    const int level = brightest(picture.grey);
+    if (level >= 1 << bits_)
+      throw InputError(
+          current().string(),
+          fmt::format("its levels reach {}, those of others only {} bits", level, bits_),
+          "pictures of one range", "give all of them the same number of bits");
+    picture.grey.convertTo(grey, CV_8U, 255.0 / ((1 << bits_) - 1));
+  }
+
+  /// Returns the bits that some pictures, spread over the folder, use.
+  int bits_used() const {
+    constexpr size_t kLooks = 12;
+    const size_t count = pictures_.files.size();
+    int level = 0;
+    for (size_t i = 0; i < std::min(kLooks, count); ++i) {
+      const DecodedPicture one =
+          decode_picture(pictures_.files[i * count / std::min(kLooks, count)]);
+      if (one.damage.empty() && one.bits == 16) level = std::max(level, brightest(one.grey));
+    }
+    return bits_for(level);
+  }
+
+  fs::path folder_;
+  NumberedPictures pictures_;
+  size_t next_ = 0;
+  int bits_ = 0;  ///< used of 16; 0 before the first such picture
+  std::string damage_;
+  std::vector<int> damaged_;
+  std::string last_damaged_;  ///< name and reason
+  std::string turn_;
+};
+
+}  // namespace
+
+std::unique_ptr<ImageSource> open_picture_folder(const fs::path& folder) {
+  return std::make_unique<PictureFolder>(folder);
+}
+
+}  // namespace clothfit

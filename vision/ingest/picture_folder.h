@@ -1,0 +1,13 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+
+#include "vision/ingest/image_source.h"
+
+namespace clothfit {
+
+/// Opens a folder of pictures. Throws InputError where it holds none.
+std::unique_ptr<ImageSource> open_picture_folder(const std::filesystem::path& folder);
+
+}  // namespace clothfit
