@@ -20,6 +20,7 @@ void add_diagnose_verb(Verb program);
 void add_simulate_verb(Verb program);
 void add_recover_verb(Verb program);
 void add_demo_verb(Verb program);
+void add_detect_verb(Verb program);
 void add_experiment_verb(Verb program);
 void add_study_verb(Verb program);
 

@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "data/input_error.h"
 #include "vision/ingest/decode_picture.h"
@@ -45,8 +46,8 @@ int bits_for(int level) {
 
 class PictureFolder : public ImageSource {
  public:
-  explicit PictureFolder(const fs::path& folder)
-      : folder_(folder), pictures_(pictures_in(folder)) {}
+  PictureFolder(const fs::path& folder, NumberedPictures pictures)
+      : folder_(folder), pictures_(std::move(pictures)) {}
 
   std::string current_name() const override {
     return next_ == 0 ? std::string() : current().filename().string();
@@ -151,7 +152,11 @@ class PictureFolder : public ImageSource {
 }  // namespace
 
 std::unique_ptr<ImageSource> open_picture_folder(const fs::path& folder) {
-  return std::make_unique<PictureFolder>(folder);
+  return std::make_unique<PictureFolder>(folder, pictures_in(folder));
+}
+
+std::unique_ptr<ImageSource> open_picture(const fs::path& file) {
+  return std::make_unique<PictureFolder>(file.parent_path(), number_pictures({file}));
 }
 
 }  // namespace clothfit

@@ -28,25 +28,6 @@ bool nearly_degenerate(const std::array<Eigen::Vector2d, 4>& corner_px) {
   return false;
 }
 
-/// Rejects for the reasons that show in one picture alone.
-void judge_alone(TagReading& reading, const TrackOptions& options, const cv::Size& size) {
-  const TagDetection& tag = reading.tag;
-  if (tag.decision_margin < options.min_decision_margin) reading.reject(rejection::kLowMargin);
-  if (tag.corrected_bits > options.max_corrected_bits) reading.reject(rejection::kCorrectedBits);
-  if (nearly_degenerate(tag.corner_px)) reading.reject(rejection::kTooOblique);
-  if (!tag.refined || tag.explained < options.min_explained)
-    reading.reject(rejection::kPatternMismatch);
-  constexpr double kBorder = 2;  // px; reach of an edge's blur
-  for (size_t c = 0; c < 4; ++c) {
-    const Eigen::Vector2d& corner = tag.corner_px[c];
-    const bool inside = corner.x() >= kBorder && corner.x() <= size.width - 1 - kBorder &&
-                        corner.y() >= kBorder && corner.y() <= size.height - 1 - kBorder;
-    if (!inside && reading.rejected[c].empty()) reading.rejected[c] = rejection::kTouchingBorder;
-    if (tag.sigma_px[c] > options.max_sigma_px && reading.rejected[c].empty())
-      reading.rejected[c] = rejection::kUncertain;
-  }
-}
-
 /// Rejects a tag read twice in a picture, as nothing tells which reading is it. One row per frame
 /// stays, that of the clearest reading, rejected.
 void judge_duplicates(TagHistory& history) {
@@ -97,6 +78,24 @@ void TagReading::reject(const char* reason) {
 
 Eigen::Vector2d TagReading::centre_px() const {
   return (tag.corner_px[0] + tag.corner_px[1] + tag.corner_px[2] + tag.corner_px[3]) / 4;
+}
+
+void judge_alone(TagReading& reading, const TrackOptions& options, const cv::Size& size) {
+  const TagDetection& tag = reading.tag;
+  if (tag.decision_margin < options.min_decision_margin) reading.reject(rejection::kLowMargin);
+  if (tag.corrected_bits > options.max_corrected_bits) reading.reject(rejection::kCorrectedBits);
+  if (nearly_degenerate(tag.corner_px)) reading.reject(rejection::kTooOblique);
+  if (!tag.refined || tag.explained < options.min_explained)
+    reading.reject(rejection::kPatternMismatch);
+  constexpr double kBorder = 2;  // px; reach of an edge's blur
+  for (size_t c = 0; c < 4; ++c) {
+    const Eigen::Vector2d& corner = tag.corner_px[c];
+    const bool inside = corner.x() >= kBorder && corner.x() <= size.width - 1 - kBorder &&
+                        corner.y() >= kBorder && corner.y() <= size.height - 1 - kBorder;
+    if (!inside && reading.rejected[c].empty()) reading.rejected[c] = rejection::kTouchingBorder;
+    if (tag.sigma_px[c] > options.max_sigma_px && reading.rejected[c].empty())
+      reading.rejected[c] = rejection::kUncertain;
+  }
 }
 
 void judge(TagHistory& history, const TrackOptions& options, const cv::Size& size) {

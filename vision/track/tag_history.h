@@ -27,6 +27,10 @@ struct TagReading {
 /// The readings of one tag, sorted by frame.
 using TagHistory = std::vector<TagReading>;
 
+/// Rejects a reading, or corners of it, for the reasons that show in one picture alone. `size` is
+/// that of the picture.
+void judge_alone(TagReading& reading, const TrackOptions& options, const cv::Size& size);
+
 /// Rejects readings and corners that one picture shows to be doubtful, tags read twice in a
 /// picture, and tags that jump. One reading per frame stays. `size` is that of the pictures.
 void judge(TagHistory& history, const TrackOptions& options, const cv::Size& size);

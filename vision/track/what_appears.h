@@ -7,7 +7,7 @@
 namespace clothfit {
 
 /// Says, as a remedy, how a picture would show the listed tags: mirrored, or with black and white
-/// exchanged. Empty where it would not.
+/// exchanged. Empty where it would not. An empty list stands for all tags of the family.
 std::string turned_picture_shows(const cv::Mat& grey, const std::string& family,
                                  const std::set<int>& listed);
 

@@ -1,0 +1,123 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <set>
+
+#include "apps/terminal/csv_table.h"
+#include "apps/terminal/exit_code.h"
+#include "apps/terminal/json_file.h"
+#include "apps/terminal/number_text.h"
+#include "apps/terminal/option_flags.h"
+#include "apps/terminal/progress_line.h"
+#include "apps/terminal/text_table.h"
+#include "apps/verbs/seen_summary.h"
+#include "apps/verbs/verb.h"
+#include "data/finding_json.h"
+#include "data/input_error.h"
+#include "data/output_folder.h"
+
+namespace clothfit {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct DetectVerbOptions {
+  fs::path images;
+  LookOptions look;
+  fs::path out;
+};
+
+std::string pixel_text(double value) {
+  return fmt::format("{:.3f}", value);
+}
+
+/// Returns a row for each corner of each thing that is seen.
+Table detections(const LookResult& result) {
+  Table table{
+      .header = {"picture", "frame", "kind", "family", "id", "corner", "u", "v", "sigma", "status"},
+      .rows = {}};
+  for (const SeenPicture& picture : result.pictures) {
+    const std::string frame = fmt::format("{}", picture.frame);
+    for (const SeenTag& seen : picture.tags) {
+      const TagReading& reading = seen.reading;
+      for (size_t c = 0; c < 4; ++c) {
+        const std::string& reason = reading.rejected[c];
+        table.rows.push_back({picture.name, frame, "tag", seen.family,
+                              fmt::format("{}", reading.tag.id), fmt::format("{}", c),
+                              pixel_text(reading.tag.corner_px[c].x()),
+                              pixel_text(reading.tag.corner_px[c].y()),
+                              reading.tag.refined ? pixel_text(reading.tag.sigma_px[c]) : "",
+                              reason.empty() ? "ok" : "rejected:" + reason});
+      }
+    }
+    if (!picture.board) continue;
+    const std::string size = fmt::format("{}x{}", picture.board->columns, picture.board->rows);
+    for (size_t c = 0; c < picture.board->corner_px.size(); ++c)
+      table.rows.push_back({picture.name, frame, "board", size, "", fmt::format("{}", c),
+                            pixel_text(picture.board->corner_px[c].x()),
+                            pixel_text(picture.board->corner_px[c].y()), "", "ok"});
+  }
+  return table;
+}
+
+void write_results(const LookResult& result, const SeenSummary& summary, const fs::path& folder) {
+  write_csv_table(detections(result), folder / "detections.csv");
+  write_json(to_json(result, summary), folder / "detect.json");
+  for (const Overlay& overlay : result.overlays) {
+    const fs::path file = folder / fmt::format("overlay_{:06}.png", overlay.frame);
+    if (!cv::imwrite(file.string(), overlay.picture))
+      throw InputError(file.string(), "cannot be written",
+                       "a writable place with room on its disk");
+  }
+}
+
+int run_detect(const DetectVerbOptions& options) {
+  options.look.validate();
+  OutputFolder out(out_folder(options.out, options.images.filename().string() + ".detections"));
+  LookResult result;
+  {
+    ProgressLine line;
+    result = look(options.images, options.look, watch(line));
+  }
+  if (result.cancelled) throw Cancelled();
+  const SeenSummary summary = summarise(result);
+  for (const Finding& warning : with_state(result.footage, FindingState::warning))
+    spdlog::warn("{}", sentence(warning));
+  if (summary.families.empty() && summary.boards.empty())
+    throw NoResult(fmt::format("no tag and no chessboard appears in {} pictures of {}{}",
+                               result.pictures.size(), options.images.string(),
+                               result.turned.empty() ? "" : "; " + result.turned));
+  write_results(result, summary, out.path());
+  out.publish();
+
+  fmt::print("\n{}\n\n{}", footage_text(result), text_table(summary_table(summary)));
+  for (const Finding& note : with_state(result.footage, FindingState::passed))
+    fmt::print("\n{}\n", note.found);
+  fmt::print("\nDetections: {}\n", shown_path(out.final_path() / "detections.csv"));
+  return kExitGood;
+}
+
+}  // namespace
+
+void add_detect_verb(Verb program) {
+  const auto options = std::make_shared<DetectVerbOptions>();
+  Verb verb = program.add_verb("detect", "List the tags and boards that pictures or a video show");
+  verb.add_option("pictures", &options->images, "Folder of pictures, or a video")
+      .required()
+      .type_name("PICTURES");
+  verb.add_option("--family", &options->look.families,
+                  "Families of tags to look for; those that appear, unless told")
+      .type_name("FAMILY");
+  verb.add_option("--every", &options->look.every, "Look at every N-th picture").shows_default();
+  add_out_option(verb, options->out, "PICTURES.detections");
+  verb.footer("Example:\n  clothfit detect data/recordings/tags_onecam/frames/front");
+  verb.runs([options] { return run_detect(*options); });
+}
+
+}  // namespace clothfit

@@ -1,0 +1,148 @@
+#include "vision/look/look.h"
+
+#include <fmt/core.h>
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/info.h>
+#include <tbb/parallel_pipeline.h>
+
+#include <algorithm>
+#include <atomic>
+
+#include "data/input_error.h"
+#include "vision/detect/tag_detector.h"
+#include "vision/ingest/open_images.h"
+#include "vision/look/families_shown.h"
+#include "vision/track/overlay.h"
+#include "vision/track/track_options.h"
+#include "vision/track/what_appears.h"
+
+namespace clothfit {
+namespace {
+
+struct LookedAt {
+  int number = 0;
+  bool wanted = true;
+  cv::Mat grey;
+  SeenPicture seen;
+};
+
+using Detectors = std::vector<TagDetector>;
+
+/// Finds what one picture shows.
+void look_at(LookedAt& picture, Detectors& detectors, const LookOptions& options,
+             const std::vector<std::string>& families) {
+  for (size_t f = 0; f < families.size(); ++f)
+    for (const TagDetection& tag : detectors[f].detect(picture.grey)) {
+      TagReading reading{.frame = picture.seen.frame, .tag = tag, .rejected = {}};
+      judge_alone(reading, TrackOptions(), picture.grey.size());
+      picture.seen.tags.push_back({families[f], std::move(reading)});
+    }
+  constexpr size_t kFewTags = 3;  // where there are more, a grid of corners is a tag's
+  if (options.boards && picture.seen.tags.size() < kFewTags)
+    picture.seen.board = search_board(picture.grey);
+}
+
+/// Says how the first whole picture would show tags, mirrored or inverted, where it shows none of
+/// the family that most people print.
+std::string turned(const std::filesystem::path& images, const std::vector<std::string>& families) {
+  constexpr const char* kUsual = "tag36h11";
+  if (std::ranges::find(families, kUsual) != families.end()) return "";
+  const auto source = open_images(images);
+  cv::Mat grey;
+  while (source->next(grey))
+    if (source->damage().empty()) return turned_picture_shows(grey, kUsual, {});
+  return "";
+}
+
+cv::Mat draw_seen(const cv::Mat& grey, const SeenPicture& seen) {
+  std::vector<OverlayPoint> points;
+  for (const SeenTag& tag : seen.tags)
+    for (size_t c = 0; c < 4; ++c) {
+      const std::string& reason = tag.reading.rejected[c];
+      constexpr size_t kTopLeft = 3;
+      points.push_back(
+          {.kind = reason.empty() ? OverlayPoint::Kind::good : OverlayPoint::Kind::rejected,
+           .pixel_px = tag.reading.tag.corner_px[c],
+           .label = c == kTopLeft ? fmt::format("{}", tag.reading.tag.id) : ""});
+    }
+  if (seen.board)
+    for (const Eigen::Vector2d& corner : seen.board->corner_px)
+      points.push_back({.kind = OverlayPoint::Kind::reference, .pixel_px = corner, .label = ""});
+  return draw_overlay(grey, points);
+}
+
+/// Says whether the picture of that number is drawn: the first, the middle, or the last looked at.
+bool is_drawn(int number, int count, int every) {
+  const int last = (count - 1) / every;
+  return number % every == 0 &&
+         (number == 0 || number / every == last / 2 || number / every == last);
+}
+
+}  // namespace
+
+void LookOptions::validate() const {
+  if (every < 1) throw InputError("every", fmt::format("{}", every), "a whole number, 1 or more");
+}
+
+LookResult look(const std::filesystem::path& images, const LookOptions& options,
+                const ProgressCallback& progress) {
+  options.validate();
+  LookResult result;
+  result.families = options.families.empty() ? families_shown(images) : options.families;
+  result.turned = turned(images, result.families);
+  // What else seems to appear in mirrored tags is chance.
+  if (!result.turned.empty() && options.families.empty()) result.families.clear();
+  const auto source = open_images(images);
+  result.count = source->count();
+  result.times_s = source->times_s();
+
+  std::atomic<bool> cancelled = false;
+  cv::Mat first;
+  tbb::enumerable_thread_specific<Detectors> detectors([&] {
+    Detectors all;
+    for (const std::string& family : result.families) all.emplace_back(family);
+    return all;
+  });
+  int next = 0;
+  const auto load = [&](tbb::flow_control& control) {
+    LookedAt picture{.number = next++, .grey = {}, .seen = {}};
+    if (cancelled || !source->next(picture.grey)) {
+      control.stop();
+      return picture;
+    }
+    picture.wanted = picture.number % options.every == 0 && source->damage().empty();
+    picture.seen.name = source->current_name();
+    picture.seen.frame = source->frame();
+    return picture;
+  };
+  const auto detect = [&](LookedAt picture) {
+    if (picture.wanted) look_at(picture, detectors.local(), options, result.families);
+    return picture;
+  };
+  const auto collect = [&](const LookedAt& picture) {
+    if (!picture.wanted || cancelled) return;
+    if (first.empty()) first = picture.grey;
+    if (is_drawn(picture.number, result.count, options.every))
+      result.overlays.push_back({picture.seen.frame, draw_seen(picture.grey, picture.seen)});
+    result.pictures.push_back(picture.seen);
+    const Progress report{.stage = "look",
+                          .done = static_cast<double>(picture.number + 1),
+                          .total = static_cast<double>(result.count),
+                          .unit = "pictures",
+                          .note = fmt::format("{} tags", picture.seen.tags.size())};
+    if (progress && !progress(report)) cancelled = true;
+  };
+  const size_t in_flight = 2 * static_cast<size_t>(tbb::info::default_concurrency());
+  tbb::parallel_pipeline(
+      in_flight, tbb::make_filter<void, LookedAt>(tbb::filter_mode::serial_in_order, load) &
+                     tbb::make_filter<LookedAt, LookedAt>(tbb::filter_mode::parallel, detect) &
+                     tbb::make_filter<LookedAt, void>(tbb::filter_mode::serial_in_order, collect));
+
+  result.cancelled = cancelled;
+  result.width = first.cols;
+  result.height = first.rows;
+  result.footage = source->findings();
+  return result;
+}
+
+}  // namespace clothfit
