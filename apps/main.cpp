@@ -23,6 +23,7 @@ int run(int argc, char** argv) {
   program.requires_verb();
   program.footer("Each verb explains itself: clothfit fit --help");
   clothfit::add_demo_verb(program);
+  clothfit::add_sheet_verb(program);
   clothfit::add_detect_verb(program);
   clothfit::add_calibrate_verb(program);
   clothfit::add_track_verb(program);

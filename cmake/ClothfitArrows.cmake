@@ -22,6 +22,7 @@ set(CLOTHFIT_ARROWS
   "vision/detect        -> data"
   "vision/track         -> data vision/ingest vision/detect"
   "vision/look          -> data vision/ingest vision/detect vision/track"
+  "vision/print         -> data vision/detect"
   "vision/render        -> data calib/camera vision/detect"
   "model/topology       ->"
   "model/kernels        -> model/topology"
@@ -80,8 +81,9 @@ set(CLOTHFIT_ARROWS
   "apps/report/study    -> data vision/track apps/terminal apps/report/page apps/report/fit
                            apps/study/trials apps/study/louchet1995 apps/study/recordings
                            apps/study/foreign"
-  "apps/verbs           -> data vision/detect vision/track vision/look model/topology model/fabric model/cloth model/effects
-                           model/integrate fit/interface fit/jobs fit/measurement_effects
+  "apps/verbs           -> data vision/detect vision/track vision/look vision/print
+                           model/topology model/fabric model/cloth model/effects model/integrate
+                           fit/interface fit/jobs fit/measurement_effects
                            fit/problem fit/preflight fit/verdict fit fit/diagnosis apps/terminal
                            apps/steps apps/report/page apps/report/fit apps/report/diagnosis
                            apps/study/trials apps/study/louchet1995 apps/study/recordings

@@ -37,6 +37,7 @@ TEST(RenderedTrack, FindsTheMarkersOfASwingingSheetWithinTheStatedSigma) {
   Recording recording;
   recording.folder = folder.path();
   recording.markers = tag_markers(4, kWidth_m);
+  recording.frame_rate_hz = 60;
   recording.cameras.push_back(
       {.name = "front", .file = {}, .images = folder / "frames", .calibration = {}});
   std::filesystem::create_directory(folder / "frames");

@@ -1,0 +1,152 @@
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <memory>
+#include <tuple>
+
+#include "apps/terminal/exit_code.h"
+#include "apps/terminal/grid_size.h"
+#include "apps/terminal/number_text.h"
+#include "apps/verbs/verb.h"
+#include "data/input_error.h"
+#include "data/output_folder.h"
+#include "data/text_file.h"
+#include "vision/print/draw_sheet.h"
+
+namespace clothfit {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct SheetVerbOptions {
+  std::string kind = "tags";
+  std::string size = "0.4x0.4";
+  std::string grid;
+  double square_m = 0.02;
+  TagSheetOptions tags;
+  DrawOptions draw;
+  fs::path out;
+};
+
+/// Reads metres from "0.4" or "0.4x0.3".
+std::pair<double, double> parse_size(const std::string& text) {
+  const auto refuse = [&]() -> InputError {
+    return {"--size", fmt::format("'{}'", text), "metres, WIDTHxHEIGHT or one number",
+            "such as 0.4x0.3"};
+  };
+  const auto number = [&](const std::string& part) {
+    size_t used = 0;
+    double value = 0;
+    try {
+      value = std::stod(part, &used);
+    } catch (const std::exception&) {
+      throw refuse();
+    }
+    if (used != part.size()) throw refuse();
+    return value;
+  };
+  const size_t cross = text.find('x');
+  const double width_m = number(text.substr(0, cross));
+  return {width_m, cross == std::string::npos ? width_m : number(text.substr(cross + 1))};
+}
+
+GridSize grid_of(const SheetVerbOptions& options, const GridSize& usual) {
+  if (options.grid.empty()) return usual;
+  const std::optional<GridSize> grid = parse_grid_size(options.grid);
+  if (!grid)
+    throw InputError("--grid", fmt::format("'{}'", options.grid), "COLUMNSxROWS, such as 8x8");
+  return *grid;
+}
+
+PrintedSheet make_sheet(const SheetVerbOptions& options) {
+  if (options.kind == "board") {
+    const GridSize corners = grid_of(options, {9, 6});
+    return make_board_sheet(
+        {.columns = corners.columns, .rows = corners.rows, .square_m = options.square_m});
+  }
+  TagSheetOptions tags = options.tags;
+  std::tie(tags.width_m, tags.height_m) = parse_size(options.size);
+  const GridSize grid = grid_of(options, {8, 8});
+  tags.columns = grid.columns;
+  tags.rows = grid.rows;
+  return make_tag_sheet(tags);
+}
+
+/// Writes the start of a recording of a cloth that carries the sheet.
+void write_recording_start(const PrintedSheet& sheet, const fs::path& folder) {
+  write_markers(sheet.markers.markers, folder / "markers.csv");
+  write_text(
+      fmt::format("format: clothfit-recording/1\n"
+                  "name: {}\n"
+                  "cloth:\n"
+                  "  size: [{}, {}]  # m; measure the ruler of the print: 100 mm, or scale this\n"
+                  "  mass: null      # kg; weigh the cloth with its print\n"
+                  "markers: {{kind: apriltag, family: {}, file: markers.csv}}\n"
+                  "time: {{frame_rate: 30}}  # per second; leave it out where a video has its own "
+                  "times\n"
+                  "cameras: []      # {{name: front, images: VIDEO, file: cameras/front.yaml}}\n"
+                  "held: []         # {{at: [0, 0], motion: fixed}}, s to the right and t down\n"
+                  "start: released_flat  # or at_rest, unknown\n",
+                  sheet.name, sheet.width_m, sheet.height_m, sheet.markers.family),
+      folder / "recording.yaml");
+}
+
+int run_sheet(const SheetVerbOptions& options) {
+  options.draw.validate();
+  const PrintedSheet sheet = make_sheet(options);
+  OutputFolder out(out_folder(options.out, sheet.name + ".sheet"));
+  write_sheet_pdf(sheet, options.draw, out.path() / "sheet.pdf");
+  write_sheet_svg(sheet, options.draw, out.path() / "sheet.svg");
+  write_sheet_png(sheet, options.draw, out.path() / "sheet.png");
+  if (!sheet.markers.markers.empty()) write_recording_start(sheet, out.path());
+  out.publish();
+  fmt::print(
+      "\n{}: {} x {} mm\n\nPrint {} at 100 % (no \"fit to page\"), and measure the ruler: it is "
+      "100 "
+      "mm long.\n",
+      sheet.name, significant(1e3 * sheet.width_m, 6), significant(1e3 * sheet.height_m, 6),
+      shown_path(out.final_path() / "sheet.pdf"));
+  const int pages = page_count(sheet, options.draw.paper);
+  if (options.kind == "board" && pages > 1)
+    spdlog::warn(
+        "the board is spread over {} pages, which seldom join flat; use smaller fields or "
+        "larger paper, or have it printed on one plate",
+        pages);
+  if (!sheet.markers.markers.empty())
+    fmt::print("Markers and the start of a recording: {}\n",
+               shown_path(out.final_path() / "recording.yaml"));
+  return kExitGood;
+}
+
+}  // namespace
+
+void add_sheet_verb(Verb program) {
+  const auto options = std::make_shared<SheetVerbOptions>();
+  Verb verb = program.add_verb("sheet", "Print markers for a cloth, or a calibration board");
+  verb.add_option("kind", &options->kind, "What to print")
+      .one_of({"tags", "board"})
+      .shows_default();
+  verb.add_option("--size", &options->size, "Cloth, WIDTHxHEIGHT in metres").shows_default();
+  verb.add_option("--grid", &options->grid,
+                  "COLUMNSxROWS: tags (8x8), or inner corners of a board (9x6)")
+      .type_name("GRID");
+  verb.add_option("--tag", &options->tags.tag_m,
+                  "Side of a tag's black border; as large as fits, unless told")
+      .is_length();
+  verb.add_option("--family", &options->tags.family, "Family of tags").shows_default();
+  verb.add_option("--first-id", &options->tags.first_id, "Id of the first tag").shows_default();
+  verb.add_option("--square", &options->square_m, "Field of a board (m)")
+      .is_length()
+      .shows_default();
+  verb.add_option("--paper", &options->draw.paper, "Paper of the PDF")
+      .one_of(paper_names())
+      .shows_default();
+  verb.add_flag("--mirror", options->draw.mirrored, "Mirror it, for transfer paper");
+  verb.add_option("--dpi", &options->draw.dots_per_inch, "Dots per inch of the PNG")
+      .shows_default();
+  add_out_option(verb, options->out, "NAME.sheet");
+  verb.footer("Example:\n  clothfit sheet tags --size 0.4x0.4 --grid 8x8");
+  verb.runs([options] { return run_sheet(*options); });
+}
+
+}  // namespace clothfit
