@@ -25,6 +25,7 @@ int run(int argc, char** argv) {
   clothfit::add_demo_verb(program);
   clothfit::add_sheet_verb(program);
   clothfit::add_detect_verb(program);
+  clothfit::add_init_verb(program);
   clothfit::add_calibrate_verb(program);
   clothfit::add_track_verb(program);
   clothfit::add_check_verb(program);

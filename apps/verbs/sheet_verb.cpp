@@ -24,7 +24,7 @@ struct SheetVerbOptions {
   std::string grid;
   double square_m = 0.02;
   TagSheetOptions tags;
-  DrawOptions draw;
+  PageOptions draw;
   fs::path out;
 };
 

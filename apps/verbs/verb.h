@@ -17,6 +17,7 @@ void add_track_verb(Verb program);
 void add_check_verb(Verb program);
 void add_fit_verb(Verb program);
 void add_diagnose_verb(Verb program);
+void add_init_verb(Verb program);
 void add_sheet_verb(Verb program);
 void add_simulate_verb(Verb program);
 void add_recover_verb(Verb program);

@@ -95,6 +95,7 @@ LookResult look(const std::filesystem::path& images, const LookOptions& options,
   const auto source = open_images(images);
   result.count = source->count();
   result.times_s = source->times_s();
+  const int every = options.looks > 0 ? std::max(1, result.count / options.looks) : options.every;
 
   std::atomic<bool> cancelled = false;
   cv::Mat first;
@@ -110,7 +111,8 @@ LookResult look(const std::filesystem::path& images, const LookOptions& options,
       control.stop();
       return picture;
     }
-    picture.wanted = picture.number % options.every == 0 && source->damage().empty();
+    const bool due = picture.number % every == 0 || picture.number < options.head;
+    picture.wanted = due && source->damage().empty();
     picture.seen.name = source->current_name();
     picture.seen.frame = source->frame();
     return picture;
@@ -122,7 +124,7 @@ LookResult look(const std::filesystem::path& images, const LookOptions& options,
   const auto collect = [&](const LookedAt& picture) {
     if (!picture.wanted || cancelled) return;
     if (first.empty()) first = picture.grey;
-    if (is_drawn(picture.number, result.count, options.every))
+    if (is_drawn(picture.number, result.count, every))
       result.overlays.push_back({picture.seen.frame, draw_seen(picture.grey, picture.seen)});
     result.pictures.push_back(picture.seen);
     const Progress report{.stage = "look",

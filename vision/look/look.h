@@ -29,8 +29,10 @@ struct SeenPicture {
 struct LookOptions {
   /// Families of tags to look for; empty: those that some of the pictures clearly show.
   std::vector<std::string> families;
-  int every = 1;          ///< > 0: looks at every n-th picture
-  bool boards = true;     ///< looks for chessboards
+  int every = 1;       ///< > 0: looks at every n-th picture
+  int looks = 0;       ///< > 0: looks at about so many pictures, spread over all, whatever `every`
+  int head = 0;        ///< looks at each of the first so many besides
+  bool boards = true;  ///< looks for chessboards
   void validate() const;  ///< throws InputError
 };
 

@@ -208,7 +208,7 @@ std::vector<std::string> paper_names() {
   return names;
 }
 
-void DrawOptions::validate() const {
+void PageOptions::validate() const {
   const std::vector<std::string> names = paper_names();
   if (std::ranges::find(names, paper) == names.end())
     throw InputError("paper", fmt::format("unknown paper '{}'", paper), "a4, a3, letter or whole");
@@ -238,7 +238,7 @@ int page_count(const PrintedSheet& sheet, const std::string& paper) {
   return static_cast<int>(plan_pages(sheet, paper).pages());
 }
 
-void write_sheet_pdf(const PrintedSheet& sheet, const DrawOptions& options, const fs::path& file) {
+void write_sheet_pdf(const PrintedSheet& sheet, const PageOptions& options, const fs::path& file) {
   options.validate();
   const PagePlan plan = plan_pages(sheet, options.paper);
   const Surface surface(cairo_pdf_surface_create(file.c_str(), plan.width_mm * kPointsPerMm,
@@ -255,7 +255,7 @@ void write_sheet_pdf(const PrintedSheet& sheet, const DrawOptions& options, cons
   require(cairo_surface_status(surface.get()), file);
 }
 
-void write_sheet_svg(const PrintedSheet& sheet, const DrawOptions& options, const fs::path& file) {
+void write_sheet_svg(const PrintedSheet& sheet, const PageOptions& options, const fs::path& file) {
   options.validate();
   const Surface surface(
       cairo_svg_surface_create(file.c_str(), width_mm(sheet), height_mm(sheet) + kStrip_mm),
@@ -270,7 +270,7 @@ void write_sheet_svg(const PrintedSheet& sheet, const DrawOptions& options, cons
   require(cairo_surface_status(surface.get()), file);
 }
 
-void write_sheet_png(const PrintedSheet& sheet, const DrawOptions& options, const fs::path& file) {
+void write_sheet_png(const PrintedSheet& sheet, const PageOptions& options, const fs::path& file) {
   options.validate();
   const double pixels_per_mm = options.dots_per_inch / 25.4;
   const auto width = static_cast<int>(std::lround(1e3 * sheet.width_m * pixels_per_mm)),

@@ -8,7 +8,7 @@
 
 namespace clothfit {
 
-struct DrawOptions {
+struct PageOptions {
   std::string paper = "a4";    ///< a4, a3, letter, or whole: one page as large as it takes
   bool mirrored = false;       ///< for transfer paper, which is laid face down on the cloth
   double dots_per_inch = 300;  ///< of the PNG, 50 to 1200
@@ -36,12 +36,12 @@ int page_count(const PrintedSheet& sheet, const std::string& paper);
 /// Each writes the sheet at true scale, with crop marks at its corners and a ruler of 100 mm: of a
 /// PDF on each page. Pages stand upright or lie, whichever takes fewer. Throws InputError where the
 /// file cannot be written.
-void write_sheet_pdf(const PrintedSheet& sheet, const DrawOptions& options,
+void write_sheet_pdf(const PrintedSheet& sheet, const PageOptions& options,
                      const std::filesystem::path& file);
-void write_sheet_svg(const PrintedSheet& sheet, const DrawOptions& options,
+void write_sheet_svg(const PrintedSheet& sheet, const PageOptions& options,
                      const std::filesystem::path& file);
 /// The picture ends at the crop marks: sheet alone, its top left corner at that of the picture.
-void write_sheet_png(const PrintedSheet& sheet, const DrawOptions& options,
+void write_sheet_png(const PrintedSheet& sheet, const PageOptions& options,
                      const std::filesystem::path& file);
 
 }  // namespace clothfit

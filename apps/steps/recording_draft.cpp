@@ -1,0 +1,316 @@
+#include "apps/steps/recording_draft.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <set>
+
+#include "data/input_error.h"
+#include "data/number_text.h"
+#include "vision/look/seen_motion.h"
+
+namespace clothfit {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A corner of the cloth, and its words.
+struct ClothCorner {
+  const char* name;
+  double s, t;  ///< shares of width and height
+};
+constexpr std::array kCorners = {ClothCorner{"top left", 0, 0}, ClothCorner{"top right", 1, 0},
+                                 ClothCorner{"bottom left", 0, 1},
+                                 ClothCorner{"bottom right", 1, 1}};
+
+struct ClothSide {
+  const char* name;
+  double s, t;   ///< one of its ends
+  bool along_s;  ///< it runs along s
+};
+constexpr std::array kSides = {ClothSide{"top", 0, 0, true}, ClothSide{"bottom", 0, 1, true},
+                               ClothSide{"left", 0, 0, false}, ClothSide{"right", 1, 0, false}};
+
+/// The tags of a sheet, and how they move.
+class MovingTags {
+ public:
+  MovingTags(const Recording& sheet, SeenMotion motion)
+      : sheet_(sheet), motion_(std::move(motion)) {
+    std::map<int, int> corners;
+    for (const Marker& marker : sheet.markers.markers)
+      if (marker.tag) {
+        middle_m_.try_emplace(*marker.tag, Eigen::Vector2d::Zero()).first->second +=
+            Eigen::Vector2d(marker.s_m, marker.t_m);
+        ++corners[*marker.tag];
+      }
+    for (auto& [id, middle_m] : middle_m_) middle_m /= corners.at(id);
+  }
+
+  const SeenMotion& motion() const { return motion_; }
+  bool moves() const { return motion_.typical_px > kMoves_px; }
+
+  /// Says whether the cloth hardly moves at a place (shares of width and height) of its border.
+  bool rests_at(double s, double t) const {
+    const double way_px = way_at({s * sheet_.cloth.width_m, t * sheet_.cloth.height_m});
+    return way_px < kRests * motion_.typical_px;
+  }
+
+  /// Says whether it hardly moves all along a side.
+  bool rests_along(const ClothSide& side) const {
+    constexpr int kPlaces = 8;
+    for (int i = 0; i <= kPlaces; ++i) {
+      const double along = static_cast<double>(i) / kPlaces;
+      if (!rests_at(side.along_s ? along : side.s, side.along_s ? side.t : along)) return false;
+    }
+    return true;
+  }
+
+ private:
+  static constexpr double kMoves_px = 3;  // beyond noise and a camera that shakes
+  /// Share of the way of most tags. Raised: cloth near a held point is taken for held itself.
+  static constexpr double kRests = 0.12;
+
+  /// Returns the way at a place, continued linearly from the four nearest tags: tags do not reach
+  /// the border.
+  double way_at(const Eigen::Vector2d& place_m) const {
+    std::vector<std::pair<double, int>> nearest;
+    for (const auto& [id, way_px] : motion_.way_px)
+      nearest.emplace_back((middle_m_.at(id) - place_m).norm(), id);
+    std::ranges::sort(nearest);
+    constexpr size_t kTags = 4;
+    if (nearest.size() < kTags) return INFINITY;
+    Eigen::Matrix<double, kTags, 3> plane;
+    Eigen::Matrix<double, kTags, 1> ways_px;
+    for (size_t i = 0; i < kTags; ++i) {
+      const auto row = static_cast<Eigen::Index>(i);
+      const Eigen::Vector2d apart_m = middle_m_.at(nearest[i].second) - place_m;
+      plane.row(row) << 1, apart_m.x(), apart_m.y();
+      ways_px[row] = motion_.way_px.at(nearest[i].second);
+    }
+    // Four tags in a line leave the slope across it open; the smallest one is taken then.
+    return plane.completeOrthogonalDecomposition().solve(ways_px)[0];
+  }
+
+  const Recording& sheet_;
+  SeenMotion motion_;
+  std::map<int, Eigen::Vector2d> middle_m_;
+};
+
+/// Writes the draft part by part.
+class Draft {
+ public:
+  Draft(const DraftInput& input, const std::string& name, const fs::path& folder)
+      : input_(input),
+        folder_(folder),
+        tags_(input.sheet, measure_motion(input.footage.front().seen, input.sheet.markers)) {
+    yaml_ = fmt::format("format: clothfit-recording/1\nname: {}\n", name);
+  }
+
+  RecordingDraft write() {
+    require_tags();
+    cloth();
+    time();
+    cameras();
+    reference();
+    held();
+    start();
+    held_out();
+    return {.yaml = yaml_, .assumed = std::move(assumed_), .needed = std::move(needed_)};
+  }
+
+ private:
+  template <class... Values>
+  void line(fmt::format_string<Values...> text, Values&&... values) {
+    yaml_ += fmt::format(text, std::forward<Values>(values)...) + "\n";
+  }
+  std::string relative(const fs::path& path) const {
+    return fs::proximate(fs::absolute(path), fs::absolute(folder_)).string();
+  }
+
+  void require_tags() const {
+    const MarkerSet& markers = input_.sheet.markers;
+    for (const LookedFootage& footage : input_.footage) {
+      if (measure_motion(footage.seen, markers).way_px.empty())
+        throw InputError(footage.images.string(), "shows no tag of the sheet",
+                         fmt::format("tags of {}", markers.family),
+                         footage.seen.turned.empty() ? "give the sheet that is on the cloth"
+                                                     : footage.seen.turned);
+    }
+  }
+
+  void cloth() {
+    const ClothDescription& cloth = input_.sheet.cloth;
+    line("cloth:");
+    line("  size: [{}, {}]  # m, of the sheet", number_text(cloth.width_m),
+         number_text(cloth.height_m));
+    if (input_.mass_kg) {
+      line("  mass: {}  # kg", number_text(*input_.mass_kg));
+    } else {
+      line("  mass: null  # NEEDED, kg: weigh the dry cloth with its print");
+      needed_.push_back(
+          "the mass of the cloth: weigh it (without it only ratios to the mass are found)");
+    }
+    line("markers: {{kind: apriltag, family: {}, file: markers.csv}}", input_.sheet.markers.family);
+  }
+
+  void time() {
+    const bool states_times = std::ranges::all_of(
+        input_.footage, [](const LookedFootage& one) { return !one.seen.times_s.empty(); });
+    if (input_.frame_rate_hz) {
+      line("time: {{frame_rate: {}}}", number_text(*input_.frame_rate_hz));
+    } else if (states_times) {
+      line(
+          "# time: left out, the videos state it. A video that plays slower than it was filmed "
+          "needs its true rate: time: {{frame_rate: ...}} and times.csv");
+      assumed_.push_back(
+          "times: those in the videos, which are true unless a video plays slower "
+          "than it was filmed");
+    } else {
+      line("time: {{frame_rate: 30}}  # NEEDED, per second: pictures do not say it");
+      needed_.push_back("the frame rate: pictures do not say it; 30 stands there");
+    }
+  }
+
+  void cameras() {
+    line("cameras:");
+    std::set<std::string> names;
+    for (const LookedFootage& footage : input_.footage) {
+      std::string name = footage.images.stem().string();
+      while (!names.insert(name).second) name += "_";
+      line("  - name: {}", name);
+      line("    images: {}", relative(footage.images));
+      board(name);
+    }
+  }
+
+  void board(const std::string& camera) {
+    const SeenBoard* board = usual_board();
+    if (board == nullptr) {
+      line("    # NEEDED: file: cameras/{}.yaml, or stills of a chessboard:", camera);
+      line(
+          "    # calibration: {{images: STILLS, board: {{kind: chessboard, columns: 9, rows: 6, "
+          "square: 0.02}}}}");
+      needed_.push_back(
+          fmt::format("the lens of camera '{}': film or photograph a chessboard with "
+                      "it (clothfit sheet board)",
+                      camera));
+      return;
+    }
+    const double square_m = input_.square_m.value_or(0.02);
+    line("    calibration:");
+    line("      images: {}", relative(*input_.board));
+    line("      board: {{kind: chessboard, columns: {}, rows: {}, square: {}}}  # m",
+         board->columns, board->rows, number_text(square_m));
+    assumed_.push_back(fmt::format("the board: {} x {} inner corners, seen in the stills",
+                                   board->columns, board->rows));
+    if (!input_.square_m)
+      needed_.push_back("the side of the board's fields: measure it; 0.02 m stands there");
+  }
+
+  /// Returns the board that most stills show; nothing where none shows any.
+  const SeenBoard* usual_board() const {
+    if (!input_.board_seen) return nullptr;
+    std::map<std::pair<int, int>, int> count;
+    for (const SeenPicture& still : input_.board_seen->pictures)
+      if (still.board) ++count[{still.board->columns, still.board->rows}];
+    const SeenBoard* best = nullptr;
+    int most = 0;
+    for (const SeenPicture& still : input_.board_seen->pictures) {
+      if (!still.board) continue;
+      const int n = count.at({still.board->columns, still.board->rows});
+      if (n > most) best = &*still.board;
+      most = std::max(most, n);
+    }
+    return best;
+  }
+
+  void reference() {
+    std::set<int> on_cloth, others;
+    for (const Marker& marker : input_.sheet.markers.markers)
+      if (marker.tag) on_cloth.insert(*marker.tag);
+    for (const LookedFootage& footage : input_.footage)
+      for (const SeenPicture& picture : footage.seen.pictures)
+        for (const SeenTag& tag : picture.tags)
+          if (tag.family == input_.sheet.markers.family && tag.reading.good() &&
+              !on_cloth.contains(tag.reading.tag.id))
+            others.insert(tag.reading.tag.id);
+    line(
+        "# NEEDED: reference: reference.csv, fixed points that say where the vertical is "
+        "(point,x,y,z,tag,corner)");
+    needed_.push_back(
+        others.empty()
+            ? "fixed reference points: without them nothing says where the vertical is"
+            : fmt::format("where the tags {} stand: they are not on the cloth. Measure their "
+                          "corners, and write them to reference.csv",
+                          fmt::join(others, ", ")));
+  }
+
+  void held() {
+    std::vector<std::string> entries, words;
+    if (tags_.moves()) {
+      for (const ClothSide& side : kSides)
+        if (tags_.rests_along(side)) {
+          entries.push_back(fmt::format("{{edge: {}, motion: fixed}}", side.name));
+          words.push_back(fmt::format("the {} edge", side.name));
+        }
+      const bool edges = !entries.empty();
+      for (const ClothCorner& corner : kCorners)
+        if (!edges && tags_.rests_at(corner.s, corner.t)) {
+          entries.push_back(fmt::format("{{at: [{}, {}], motion: fixed}}",
+                                        number_text(corner.s * input_.sheet.cloth.width_m),
+                                        number_text(corner.t * input_.sheet.cloth.height_m)));
+          words.push_back(fmt::format("the {} corner", corner.name));
+        }
+    }
+    if (entries.empty()) {
+      line("held: []  # NEEDED: {{at: [s, t], motion: fixed}}, or {{edge: top, motion: fixed}}");
+      needed_.push_back("which points are held: none was seen to rest while the cloth moves");
+      return;
+    }
+    line("held:  # s to the right and t down from the top left of the print; correct the places");
+    for (const std::string& entry : entries) line("  - {}", entry);
+    assumed_.push_back(fmt::format("held: {}, where the tags hardly move while most move {:.0f} px",
+                                   fmt::join(words, " and "), tags_.motion().typical_px));
+  }
+
+  void start() {
+    constexpr double kInMotion = 0.6;  // 1/3 is a release, 1 is motion
+    constexpr double kFlat = 0.01;     // of the sheet's size; a strong lens bends by as much
+    const SeenMotion& motion = tags_.motion();
+    const bool rests = !tags_.moves() || motion.first_step.value_or(1) < kInMotion;
+    const bool flat = motion.not_flat.value_or(1) < kFlat;
+    const char* start = !rests ? "unknown" : flat && tags_.moves() ? "released_flat" : "at_rest";
+    line("start: {}  # released_flat, at_rest or unknown (in motion)", start);
+    assumed_.push_back(fmt::format("start: {}, since the cloth {} in the first frame and is {}",
+                                   start, rests ? "rests" : "moves already",
+                                   flat ? "flat there" : "not flat there"));
+  }
+
+  void held_out() {
+    const int count = input_.footage.front().seen.count;
+    constexpr double kFitted = 0.7;
+    const int from = static_cast<int>(std::lround(kFitted * count));
+    if (from < 1 || from >= count) return;
+    line("held_out: {{from_frame: {}}}  # frames for judging only", from);
+    assumed_.push_back(fmt::format("frames from {} on are held out, to judge by", from));
+  }
+
+  const DraftInput& input_;
+  fs::path folder_;
+  MovingTags tags_;
+  std::string yaml_;
+  std::vector<std::string> assumed_, needed_;
+};
+
+}  // namespace
+
+RecordingDraft draft_recording(const DraftInput& input, const std::string& name,
+                               const fs::path& folder) {
+  return Draft(input, name, folder).write();
+}
+
+}  // namespace clothfit
