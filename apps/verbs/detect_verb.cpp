@@ -21,6 +21,7 @@
 #include "data/finding_json.h"
 #include "data/input_error.h"
 #include "data/output_folder.h"
+#include "fit/jobs/thread_limit.h"
 
 namespace clothfit {
 namespace {
@@ -30,6 +31,7 @@ namespace fs = std::filesystem;
 struct DetectVerbOptions {
   fs::path images;
   LookOptions look;
+  int threads = 0;
   fs::path out;
 };
 
@@ -79,6 +81,8 @@ void write_results(const LookResult& result, const SeenSummary& summary, const f
 
 int run_detect(const DetectVerbOptions& options) {
   options.look.validate();
+  require_threads(options.threads);
+  const ThreadLimit limit(options.threads);
   OutputFolder out(out_folder(options.out, options.images.filename().string() + ".detections"));
   LookResult result;
   {
@@ -115,6 +119,9 @@ void add_detect_verb(Verb program) {
                   "Families of tags to look for; those that appear, unless told")
       .type_name("FAMILY");
   verb.add_option("--every", &options->look.every, "Look at every N-th picture").shows_default();
+  verb.add_option("--threads", &options->threads, "Threads; 0 for as many as the machine has")
+      .shows_default()
+      .shapes_no_result();
   add_out_option(verb, options->out, "PICTURES.detections");
   verb.footer("Example:\n  clothfit detect data/recordings/tags_onecam/frames/front");
   verb.runs([options] { return run_detect(*options); });

@@ -21,6 +21,7 @@
 #include "data/input_error.h"
 #include "data/output_folder.h"
 #include "data/text_file.h"
+#include "fit/jobs/thread_limit.h"
 #include "fit/preflight/preflight.h"
 
 namespace clothfit {
@@ -31,6 +32,7 @@ namespace fs = std::filesystem;
 struct TrackVerbOptions {
   fs::path recording;
   TrackOptions track;
+  int threads = 0;
   fs::path out;
 };
 
@@ -79,6 +81,8 @@ void add_findings(const Findings& findings, const fs::path& file) {
 
 int run_track(const TrackVerbOptions& options) {
   options.track.validate();
+  require_threads(options.threads);
+  const ThreadLimit limit(options.threads);
   const Recording given = read_recording(recording_folder(options.recording));
   refuse_wrong(check_declarations(given));
   Recording recording = given;
@@ -137,6 +141,9 @@ void add_track_verb(Verb program) {
   verb.add_option("--min-margin", &options->track.min_decision_margin,
                   "Tag readings weaker than this are rejected")
       .shows_default();
+  verb.add_option("--threads", &options->threads, "Threads; 0 for as many as the machine has")
+      .shows_default()
+      .shapes_no_result();
   add_out_option(verb, options->out, "NAME.tracks");
   verb.footer("Example:\n  clothfit track data/recordings/tags_onecam");
   verb.runs([options] { return run_track(*options); });
