@@ -111,6 +111,7 @@ nlohmann::ordered_json to_json(const CameraTracks& tracks) {
   json["frames"] = result.frames;
   json["image_size"] = {result.image_width, result.image_height};
   json["observations"] = {{"good", good}, {"rejected", result.rejected}};
+  json["missing"] = result.missing;
   json["reference_points"] = result.reference.size();
   if (tracks.placement) {
     const WorldPlacementResult& placement = *tracks.placement;

@@ -36,6 +36,13 @@ struct TrackVerbOptions {
   fs::path out;
 };
 
+void print_counts(const char* title, const std::map<std::string, int>& counts) {
+  if (counts.empty()) return;
+  std::vector<std::vector<std::string>> rows;
+  for (const auto& [reason, count] : counts) rows.push_back({reason, std::to_string(count)});
+  fmt::print("\n{}", text_table({{title, "count"}, rows}));
+}
+
 void print_tracks(const CameraTracks& tracks, const Recording& recording) {
   const TrackResult& result = tracks.result;
   const auto good = std::count_if(result.tracks.begin(), result.tracks.end(),
@@ -45,12 +52,8 @@ void print_tracks(const CameraTracks& tracks, const Recording& recording) {
   fmt::print("\nCamera {}: {} of {:.0f} marker places in {} frames ({}%)\n{}\n", tracks.camera,
              good, possible, result.frames,
              significant(100 * static_cast<double>(good) / possible, 3), result.message);
-  if (!result.rejected.empty()) {
-    std::vector<std::vector<std::string>> rows;
-    for (const auto& [reason, count] : result.rejected)
-      rows.push_back({reason, std::to_string(count)});
-    fmt::print("\n{}", text_table({{"rejected because", "count"}, rows}));
-  }
+  print_counts("rejected because", result.rejected);
+  print_counts("not found because", result.missing);
   if (tracks.placement) fmt::print("\n{}\n", tracks.placement->message);
 }
 

@@ -63,7 +63,9 @@ void FootageWatch::see(const cv::Mat& grey, int frame) {
   if (pictures_ < kCombed && grey.size() == last_.size()) count_combs(grey);
   compare(grey, frame);
   constexpr int kNearlyBlack = 16;  // grey level; a tag printed in black and white spans no less
-  if (const int bright = bright_level(grey); bright < kNearlyBlack) {
+  const int bright = bright_level(grey);
+  last_dark_ = bright < kNearlyBlack;
+  if (last_dark_) {
     dark_.push_back(frame);
     brightest_ = std::max(brightest_, bright);
   }

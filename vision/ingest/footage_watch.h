@@ -19,6 +19,9 @@ class FootageWatch {
   /// Takes the next whole picture, CV_8UC1.
   void see(const cv::Mat& grey, int frame);
 
+  /// Says whether the picture last taken is nearly black.
+  bool dark() const { return last_dark_; }
+
   /// Says whether even and odd lines show different instants. Where they do, moving edges turn into
   /// combs: lines stick out in turn from those above and below.
   bool interlaced() const;
@@ -47,6 +50,7 @@ class FootageWatch {
   std::vector<int> equal_;  ///< frames equal to the one before, not yet followed by another
   std::vector<int> repeated_;
   std::vector<int> dark_;
+  bool last_dark_ = false;
   int brightest_ = 0;  ///< grey level, over the dark pictures
   int pictures_ = 0;
   Combs combs_[2];   ///< of lines, of columns

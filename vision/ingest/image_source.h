@@ -30,6 +30,8 @@ class ImageSource {
   virtual std::string current_name() const = 0;
   /// Says what is wrong with the file of the picture last returned; empty where it is whole.
   virtual std::string damage() const { return ""; }
+  /// Says whether the picture last returned is nearly black.
+  bool dark() const { return watch_.dark(); }
   /// Returns the number of pictures.
   virtual int count() const = 0;
   /// Returns the time of each picture (s) as the container states it; empty where there is none.

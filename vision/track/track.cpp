@@ -15,6 +15,7 @@
 #include "vision/detect/tag_detector.h"
 #include "vision/ingest/footage.h"
 #include "vision/ingest/frame_list.h"
+#include "vision/track/missing_markers.h"
 #include "vision/track/overlay.h"
 #include "vision/track/tag_history.h"
 #include "vision/track/what_appears.h"
@@ -50,9 +51,9 @@ PointsByTag points_by_tag(const std::vector<Point>& points, const std::string& f
 /// Readings of all listed tags in all pictures.
 struct Readings {
   std::map<int, TagHistory> by_tag;
-  std::set<int> unlisted;  ///< tags that no marker and no reference point names
-  int frames = 0;
-  int whole = 0;  ///< pictures that are not damaged
+  std::set<int> unlisted;            ///< tags that no marker and no reference point names
+  std::vector<FramePicture> frames;  ///< up to the last that has a picture
+  int whole = 0;                     ///< pictures that are not damaged
   bool cancelled = false;
   cv::Size size;
   cv::Mat first_picture;
@@ -63,9 +64,11 @@ struct Readings {
 struct Picture {
   int number = 0;  ///< in order
   int frame = 0;
-  bool whole = true;  ///< else it is not looked at
+  FramePicture state = FramePicture::whole;
   cv::Mat grey;
   std::vector<TagDetection> tags;
+
+  bool readable() const { return state != FramePicture::damaged; }
 };
 
 /// Keeps what is needed of a whole picture. The middle one is drawn on, or the last before it.
@@ -115,16 +118,18 @@ Readings read_all(ImageSource& images, const std::string& where, const std::stri
       return picture;
     }
     picture.frame = images.frame();
-    picture.whole = images.damage().empty();
+    picture.state = !images.damage().empty() ? FramePicture::damaged
+                    : images.dark()          ? FramePicture::dark
+                                             : FramePicture::whole;
     return picture;
   };
   const auto detect = [&](Picture picture) {
-    if (picture.whole) picture.tags = detectors.local().detect(picture.grey);
+    if (picture.readable()) picture.tags = detectors.local().detect(picture.grey);
     return picture;
   };
   const auto collect = [&](const Picture& picture) {
     if (cancelled) return;
-    if (picture.whole) keep_pictures(picture, images.count(), readings);
+    if (picture.readable()) keep_pictures(picture, images.count(), readings);
     for (const TagDetection& tag : picture.tags) {
       if (markers.contains(tag.id) || reference.contains(tag.id)) {
         readings.by_tag[tag.id].push_back({.frame = picture.frame, .tag = tag, .rejected = {}});
@@ -132,10 +137,11 @@ Readings read_all(ImageSource& images, const std::string& where, const std::stri
         readings.unlisted.insert(tag.id);
       }
     }
-    const bool first = picture.whole && readings.whole++ == 0;
+    const bool first = picture.readable() && readings.whole++ == 0;
     if (first && readings.by_tag.empty())
       refuse_turned(picture.grey, where, family, listed_tags(markers, reference));
-    readings.frames = picture.frame + 1;
+    readings.frames.resize(static_cast<size_t>(picture.frame) + 1, FramePicture::none);
+    readings.frames.back() = picture.state;
     const Progress report{.stage = "track",
                           .done = static_cast<double>(picture.number + 1),
                           .total = static_cast<double>(images.count()),
@@ -202,6 +208,20 @@ Tracks2d collect_tracks(const Readings& readings, const PointsByTag& markers) {
   return tracks;
 }
 
+/// Counts markers that no row of a frame shows, by reason.
+std::map<std::string, int> count_missing(const Readings& readings, const PointsByTag& markers) {
+  std::map<std::string, int> missing;
+  for (const auto& [id, points] : markers) {
+    const auto found = readings.by_tag.find(id);
+    static const TagHistory kNever;
+    const TagHistory& history = found != readings.by_tag.end() ? found->second : kNever;
+    const auto corners = static_cast<int>(4 - std::ranges::count(points, kNone));
+    for (const auto& [reason, frames] : missing_frames_of(history, readings.frames, readings.size))
+      missing[reason] += frames * corners;
+  }
+  return missing;
+}
+
 cv::Mat draw(const Readings& readings, const TrackResult& result) {
   std::vector<OverlayPoint> points;
   for (const ReferencePixel& pixel : result.reference)
@@ -263,12 +283,12 @@ TrackResult track(const Recording& recording, ImageSource& pictures, const std::
 
   TrackResult result;
   result.footage = pictures.findings();
-  result.frames = readings.frames;
+  result.frames = static_cast<int>(readings.frames.size());
   result.image_width = readings.size.width;
   result.image_height = readings.size.height;
   if (readings.cancelled) {
     result.cancelled = true;
-    result.message = fmt::format("cancelled after {} frames", readings.frames);
+    result.message = fmt::format("cancelled after {} frames", result.frames);
     return result;
   }
 
@@ -283,6 +303,7 @@ TrackResult track(const Recording& recording, ImageSource& pictures, const std::
         fmt::format("tags {} of {}", list_of(listed_tags(markers, {})), recording.markers.family),
         what_appears_instead(readings.first_picture, recording.markers.family,
                              listed_tags(markers, reference), readings.unlisted));
+  result.missing = count_missing(readings, markers);
   result.reference = average_reference(readings, reference);
 
   int good = 0;

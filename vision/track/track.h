@@ -34,7 +34,9 @@ struct TrackResult {
   int image_width = 0;
   int image_height = 0;
   std::map<std::string, int> rejected;  ///< reason (vision/track/rejection.h) -> rows of `tracks`
-  cv::Mat overlay;                      ///< one frame with its markers drawn, for the report
+  /// Expected and in no row: reason (vision/track/missing_markers.h) -> markers times frames.
+  std::map<std::string, int> missing;
+  cv::Mat overlay;  ///< one frame with its markers drawn, for the report
   int overlay_frame = 0;
 };
 

@@ -364,6 +364,36 @@ TEST(Track, LeavesOutDamagedPicturesAndKeepsTheTimesOfTheOthers) {
   EXPECT_THAT(said, testing::HasSubstr("1 of 5 frames have no picture: 3"));
 }
 
+TEST(Track, CountsMarkersThatItDidNotFindByReason) {
+  DrawnRecording drawn;
+  // Frame 3 hides the tag, 4 is nearly black, 5 has no picture, 6 is damaged. From 10 on the tag, 40
+  // px wide, is out of the picture of 320.
+  for (int n = 0; n < 12; ++n) {
+    cv::Mat picture = drawn.draw(20 * n - 60, 0);
+    if (n == 3) picture.setTo(200);
+    if (n == 4) picture *= 0.01;
+    drawn.add(picture);
+  }
+  const std::filesystem::path frames = *drawn.recording().cameras[0].images;
+  std::filesystem::remove(frames / "105.png");
+  std::filesystem::resize_file(frames / "106.png", 200);
+
+  const TrackResult result = drawn.track_it({.max_speed_px = 1000});
+
+  const auto count = [&](const char* reason) {
+    const auto found = result.missing.find(reason);
+    return found == result.missing.end() ? 0 : found->second;
+  };
+  EXPECT_EQ(count("unread"), 4);
+  EXPECT_EQ(count("dark"), 4);
+  EXPECT_EQ(count("no_picture"), 4);
+  EXPECT_EQ(count("damaged_picture"), 4);
+  EXPECT_EQ(count("outside"), 8);
+  int missing = 0;
+  for (const auto& [reason, markers] : result.missing) missing += markers;
+  EXPECT_EQ(missing + static_cast<int>(result.tracks.size()), 4 * result.frames);
+}
+
 TEST(Track, RefusesWhatItCannotTrack) {
   DrawnRecording drawn;
   expect_error("holds no picture", [&] { drawn.track_it(); });
