@@ -1,0 +1,214 @@
+#include "vision/track/dot_identity.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "data/median.h"
+
+namespace clothfit {
+namespace {
+
+// What a dot may deviate from its neighbours' prediction. The map's sigma is what smooth cloth
+// does; a sharper fold deviates more, and a wrong neighbour by a whole spacing.
+constexpr double kGateSigmas = 4;
+constexpr double kLeastGate = 0.08;  // spacings as they appear where nothing is foreshortened
+constexpr double kMostGate = 0.35;   // of the spacing as it appears in that direction
+
+constexpr double kNoRatio = 1e9;  // of an outline without area
+
+/// Returns how far a place is from the expected one: 1 is as far as is let through.
+double gate_distance(const LocalMap& map, const Eigen::Vector2d& place_px) {
+  const Eigen::Vector2d off_px = place_px - map.place_px;
+  const double own = std::max(kGateSigmas * map.sigma, kLeastGate) * map.scale_px;
+  const Eigen::Matrix2d& j = map.jacobian_px;
+  const double determinant = j(0, 0) * j(1, 1) - j(0, 1) * j(1, 0);
+  Eigen::Matrix2d inverse;
+  inverse << j(1, 1), -j(0, 1), -j(1, 0), j(0, 0);
+  const double in_spacings = (inverse * off_px).norm() / std::max(std::abs(determinant), 1e-9);
+  return std::max(off_px.norm() / own, in_spacings / kMostGate);
+}
+
+/// A site that may be placed next.
+struct Frontier {
+  double sigma = 0;
+  int site = 0;
+  bool operator<(const Frontier& other) const {
+    return sigma != other.sigma ? sigma < other.sigma : site < other.site;
+  }
+};
+
+/// Grows the placed set over found dots.
+class Growth {
+ public:
+  Growth(const DotLayout& layout, const std::vector<Dot>& found, PlacedDots& placed)
+      : layout_(layout), found_(found), placed_(placed), taken_(found.size(), false) {}
+
+  void run();
+
+ private:
+  /// Puts an unplaced dot into the queue with its present prediction.
+  void consider(int site);
+  /// Index of the only found dot that agrees with the site's neighbours; -1 without one.
+  int only_match(int site, const LocalMap& map) const;
+
+  static constexpr double kSureEnough = 0.45;  // spacings; two rows in line, and no more, give 0.4
+  const DotLayout& layout_;
+  const std::vector<Dot>& found_;
+  PlacedDots& placed_;
+  std::vector<bool> taken_;
+  std::set<Frontier> queue_;
+  DotScale scale_;
+};
+
+void Growth::consider(int site) {
+  const DotSite& here = layout_.sites[static_cast<size_t>(site)];
+  if (!here.is_dot || placed_.places[static_cast<size_t>(site)]) return;
+  const LocalMap map = fit_local_map(layout_, site, placed_.places, false);
+  if (map.neighbours >= 3 && map.sigma < kSureEnough)
+    queue_.insert({.sigma = map.sigma, .site = site});
+}
+
+int Growth::only_match(int site, const LocalMap& map) const {
+  const double size = layout_.sites[static_cast<size_t>(site)].size;
+  int match = -1;
+  for (size_t i = 0; i < found_.size(); ++i) {
+    const Dot& dot = found_[i];
+    if (taken_[i] || !agrees(map, dot, scale_, size)) continue;
+    if (match >= 0) return -1;
+    match = static_cast<int>(i);
+  }
+  return match;
+}
+
+void Growth::run() {
+  for (size_t site = 0; site < layout_.sites.size(); ++site) consider(static_cast<int>(site));
+  int placed = 0;
+  while (!queue_.empty()) {
+    const int site = queue_.begin()->site;
+    queue_.erase(queue_.begin());
+    if (placed_.places[static_cast<size_t>(site)]) continue;
+    const LocalMap map = fit_local_map(layout_, site, placed_.places, false);
+    const int match = only_match(site, map);
+    if (match < 0) continue;
+    taken_[static_cast<size_t>(match)] = true;
+    placed_.place(site, found_[static_cast<size_t>(match)]);
+    constexpr int kSettled = 30;  // dots after which the scale no longer changes much
+    if (++placed <= kSettled && placed % 5 == 0) scale_ = measure_dot_scale(layout_, placed_);
+    for (const int other : layout_.sites[static_cast<size_t>(site)].neighbours) consider(other);
+  }
+}
+
+/// Removes both of two sites whose dots lie within each other.
+void remove_shared_dots(const DotLayout& layout, PlacedDots& placed, std::vector<int>& left_out) {
+  std::vector<int> shared;
+  for (size_t i = 0; i < layout.sites.size(); ++i) {
+    if (!placed.dots[i]) continue;
+    for (size_t j = i + 1; j < layout.sites.size(); ++j) {
+      if (!placed.dots[j]) continue;
+      const double apart = (*placed.places[i] - *placed.places[j]).norm();
+      if (apart > placed.dots[i]->outline.radii_px()[0]) continue;
+      shared.push_back(static_cast<int>(i));
+      shared.push_back(static_cast<int>(j));
+    }
+  }
+  for (const int site : shared) {
+    if (!placed.dots[static_cast<size_t>(site)]) continue;
+    placed.remove(site);
+    left_out.push_back(site);
+  }
+}
+
+}  // namespace
+
+void PlacedDots::place(int site, const Dot& dot) {
+  dots[static_cast<size_t>(site)] = dot;
+  places[static_cast<size_t>(site)] = dot.outline.centre_px;
+}
+
+void PlacedDots::remove(int site) {
+  dots[static_cast<size_t>(site)].reset();
+  places[static_cast<size_t>(site)].reset();
+}
+
+int PlacedDots::count() const {
+  return static_cast<int>(
+      std::ranges::count_if(dots, [](const std::optional<Dot>& dot) { return dot.has_value(); }));
+}
+
+DotScale measure_dot_scale(const DotLayout& layout, const PlacedDots& placed) {
+  std::vector<double> radii;
+  for (size_t site = 0; site < layout.sites.size(); ++site) {
+    if (!placed.dots[site]) continue;
+    const LocalMap map = fit_local_map(layout, static_cast<int>(site), placed.places, true);
+    constexpr double kSure = 0.1;
+    if (map.neighbours < 4 || map.sigma > kSure) continue;
+    const Eigen::Matrix2d& j = map.jacobian_px;
+    const double area = std::abs(j(0, 0) * j(1, 1) - j(0, 1) * j(1, 0));
+    radii.push_back(std::sqrt(placed.dots[site]->outline.area_px2() / (M_PI * area)) /
+                    layout.sites[site].size);
+  }
+  constexpr size_t kFewest = 5;
+  if (radii.size() < kFewest) return {};
+  return {.radius = median(std::move(radii))};
+}
+
+Eigen::Matrix2d expected_shape_px2(const LocalMap& map, double radius) {
+  return radius * radius * map.jacobian_px * map.jacobian_px.transpose();
+}
+
+double shape_ratio(const Eigen::Matrix2d& a_px2, const Eigen::Matrix2d& b_px2) {
+  const double determinant = b_px2.determinant();
+  if (!(determinant > 0)) return kNoRatio;
+  // Eigenvalues of b^-1 a: squared ratios along the axes that both have in common.
+  const double mean = 0.5 * (b_px2(1, 1) * a_px2(0, 0) + b_px2(0, 0) * a_px2(1, 1) -
+                             2 * b_px2(0, 1) * a_px2(0, 1)) /
+                      determinant;
+  const double product = a_px2.determinant() / determinant;
+  const double half = std::sqrt(std::max(mean * mean - product, 0.0));
+  if (!(mean - half > 0)) return kNoRatio;
+  return std::sqrt(std::max(mean + half, 1 / (mean - half)));
+}
+
+bool agrees(const LocalMap& map, const Dot& dot, const DotScale& scale, double size) {
+  if (gate_distance(map, dot.outline.centre_px) > 1) return false;
+  if (!scale.radius) return true;
+  // Folds bend the map within a spacing, so that outlines differ from those of its slope.
+  constexpr double kLargestRatio = 1.6;
+  const double thick_px = 0.5 + dot.blur_px;  // what a thin outline may err by
+  Eigen::Matrix2d expected = expected_shape_px2(map, *scale.radius * size);
+  expected.diagonal().array() += 0.25 * thick_px * thick_px;
+  Eigen::Matrix2d shape = dot.outline.shape_px2;
+  shape.diagonal().array() += 0.25 * thick_px * thick_px;
+  return shape_ratio(shape, expected) < kLargestRatio;
+}
+
+void grow_identities(const DotLayout& layout, const std::vector<Dot>& found, PlacedDots& placed) {
+  Growth(layout, found, placed).run();
+}
+
+std::vector<int> leave_out_conflicts(const DotLayout& layout, PlacedDots& placed) {
+  std::vector<int> left_out;
+  remove_shared_dots(layout, placed, left_out);
+  std::vector<double> conflict(layout.sites.size(), 0);
+  const auto judge = [&](size_t site) {
+    if (!placed.dots[site]) return 0.0;
+    const LocalMap map = fit_local_map(layout, static_cast<int>(site), placed.places, false);
+    if (map.neighbours < 3) return 1e6;
+    return gate_distance(map, *placed.places[site]);
+  };
+  for (size_t site = 0; site < layout.sites.size(); ++site) conflict[site] = judge(site);
+  while (true) {
+    const auto worst = std::max_element(conflict.begin(), conflict.end());
+    if (*worst <= 1) return left_out;
+    const int site = static_cast<int>(worst - conflict.begin());
+    placed.remove(site);
+    left_out.push_back(site);
+    *worst = 0;
+    for (const int other : layout.sites[static_cast<size_t>(site)].neighbours)
+      conflict[static_cast<size_t>(other)] = judge(static_cast<size_t>(other));
+  }
+}
+
+}  // namespace clothfit

@@ -1,0 +1,419 @@
+#include "vision/track/dot_tracks.h"
+
+#include <fmt/core.h>
+#include <tbb/parallel_for.h>
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <optional>
+
+#include "data/input_error.h"
+#include "data/median.h"
+#include "vision/track/dot_bend.h"
+#include "vision/track/dot_identity.h"
+#include "vision/track/dot_lattice.h"
+#include "vision/track/dot_layout.h"
+
+namespace clothfit {
+namespace {
+
+/// Where a site was seen last.
+struct SiteHistory {
+  std::optional<Dot> last;                   ///< in the picture before
+  std::optional<Eigen::Vector2d> before_px;  ///< its centre one picture earlier
+};
+
+/// Moves an outline to the middle of what is darker (brighter) than half way around it.
+void centre_on_dark(const cv::Mat& grey, double half_level, bool bright, DotOutline& outline) {
+  const Eigen::Vector2d reach =
+      1.5 * outline.shape_px2.diagonal().cwiseSqrt() + Eigen::Vector2d::Ones();
+  constexpr int kMostMoves = 5;
+  for (int move = 0; move < kMostMoves; ++move) {
+    const Eigen::Vector2d low = outline.centre_px - reach, high = outline.centre_px + reach;
+    double weight = 0, su = 0, sv = 0;
+    for (int v = std::max(0, static_cast<int>(std::ceil(low.y())));
+         v <= std::min(grey.rows - 1, static_cast<int>(std::floor(high.y()))); ++v) {
+      const std::uint8_t* row = grey.ptr<std::uint8_t>(v);
+      for (int u = std::max(0, static_cast<int>(std::ceil(low.x())));
+           u <= std::min(grey.cols - 1, static_cast<int>(std::floor(high.x()))); ++u) {
+        const double dark = bright ? row[u] - half_level : half_level - row[u];
+        if (dark <= 0) continue;
+        weight += dark;
+        su += dark * u;
+        sv += dark * v;
+      }
+    }
+    if (weight <= 0) return;
+    const Eigen::Vector2d centre(su / weight, sv / weight);
+    const double moved = (centre - outline.centre_px).norm();
+    outline.centre_px = centre;
+    if (moved < 0.3) return;
+  }
+}
+
+double half_level(const Dot& dot) {
+  return dot.paper_levels * (1 - 0.5 * dot.contrast);
+}
+
+double excess_misfit(const Dot& dot) {
+  const double noise = dot.noise_levels / std::abs(dot.contrast * dot.paper_levels);
+  return std::sqrt(std::max(dot.misfit * dot.misfit - noise * noise, 0.0));
+}
+
+}  // namespace
+
+/// The state between pictures.
+class DotTracker::Follower {
+ public:
+  Follower(const MarkerSet& markers, const std::string& file, const DotTrackOptions& options);
+  DotFrame next(const cv::Mat& grey);
+
+ private:
+  /// The picture's own working set.
+  struct Working {
+    explicit Working(size_t sites) : placed(sites), reason(sites, nullptr) {}
+    PlacedDots placed;
+    DotScale scale;
+    std::vector<TagDetection> tags;
+    std::vector<const char*> reason;  ///< by site; null: not known
+  };
+
+  Working search_whole(const cv::Mat& grey);
+  Working follow(const cv::Mat& grey);
+  void find_tags_nearby(const cv::Mat& grey, Working& working);
+  void place_tag_corners(Working& working) const;
+  bool tags_agree(const Working& working) const;
+  bool pattern_agrees(const Working& working) const;
+  void complete(const cv::Mat& grey, Working& working) const;
+  int complete_once(const cv::Mat& grey, Working& working, double blur_px) const;
+  void leave_out_cut(Working& working) const;
+  void say_why_missing(const cv::Mat& grey, Working& working) const;
+  DotFrame report(const Working& working) const;
+  void remember(const Working& working);
+
+  size_t size() const { return layout_.sites.size(); }
+
+  DotTrackOptions options_;
+  DotLayout layout_;
+  std::optional<TagDetector> tag_detector_;
+  std::optional<DotPattern> pattern_;
+  std::optional<DotPatternIndex> index_;
+  std::vector<SiteHistory> history_;
+  int seen_before_ = 0;  ///< dots in the picture before
+};
+
+DotTracker::Follower::Follower(const MarkerSet& markers, const std::string& file,
+                               const DotTrackOptions& options)
+    : options_(options), layout_(make_dot_layout(markers.markers, file)), history_(size()) {
+  options.validate();
+  if (!layout_.corner_sites_by_tag.empty()) {
+    tag_detector_.emplace(markers.family);
+    return;
+  }
+  if (layout_.columns < 3 || layout_.rows < 3)
+    throw InputError(file, "nothing names the dots",
+                     "anchor tags among them, or a full grid printed with a pattern of sizes");
+  pattern_ = make_dot_pattern(layout_.columns, layout_.rows);
+  index_.emplace(*pattern_);
+  Eigen::Vector2d low = layout_.sites[0].place_m;
+  for (const DotSite& site : layout_.sites) low = low.cwiseMin(site.place_m);
+  for (DotSite& site : layout_.sites) {
+    const Eigen::Vector2d at = (site.place_m - low) / layout_.spacing_m;
+    site.size = dot_radius_over_spacing(pattern_->symbol(static_cast<int>(std::lround(at.y())),
+                                                         static_cast<int>(std::lround(at.x())))) /
+                dot_radius_over_spacing(0);
+  }
+}
+
+void DotTracker::Follower::place_tag_corners(Working& working) const {
+  std::map<int, int> times;
+  for (const TagDetection& tag : working.tags) ++times[tag.id];
+  for (const TagDetection& tag : working.tags) {
+    const auto corners = layout_.corner_sites_by_tag.find(tag.id);
+    if (corners == layout_.corner_sites_by_tag.end() || times[tag.id] > 1) continue;
+    for (size_t c = 0; c < 4; ++c)
+      working.placed.places[static_cast<size_t>(corners->second[c])] = tag.corner_px[c];
+  }
+}
+
+DotTracker::Follower::Working DotTracker::Follower::search_whole(const cv::Mat& grey) {
+  Working working(size());
+  std::vector<Dot> good;
+  for (const Dot& dot : find_dots(grey, options_.detector))
+    if (dot.good()) good.push_back(dot);
+  if (tag_detector_) {
+    working.tags = tag_detector_->detect(grey);
+    place_tag_corners(working);
+  } else {
+    name_by_pattern(layout_, *pattern_, *index_, good, working.placed);
+  }
+  grow_identities(layout_, good, working.placed);
+  leave_out_conflicts(layout_, working.placed);
+  return working;
+}
+
+DotTracker::Follower::Working DotTracker::Follower::follow(const cv::Mat& grey) {
+  Working working(size());
+  tbb::parallel_for(size_t{0}, size(), [&](size_t site) {
+    const SiteHistory& history = history_[site];
+    if (!history.last) return;
+    DotStart start{.outline = history.last->outline, .blur_px = history.last->blur_px};
+    if (history.before_px)
+      start.outline.centre_px += history.last->outline.centre_px - *history.before_px;
+    centre_on_dark(grey, half_level(*history.last), options_.detector.bright, start.outline);
+    const Dot dot = fit_dot(grey, start, options_.detector);
+    constexpr double kLargestChange = 1.5;  // of the outline between pictures
+    if (dot.good() &&
+        shape_ratio(dot.outline.shape_px2, history.last->outline.shape_px2) < kLargestChange)
+      working.placed.place(static_cast<int>(site), dot);
+  });
+  leave_out_conflicts(layout_, working.placed);
+  if (tag_detector_) {
+    find_tags_nearby(grey, working);
+    place_tag_corners(working);
+  }
+  return working;
+}
+
+/// Reads each anchor in a window around the place where the dots expect it.
+void DotTracker::Follower::find_tags_nearby(const cv::Mat& grey, Working& working) {
+  for (const auto& [tag, corners] : layout_.corner_sites_by_tag) {
+    cv::Point2d low(1e9, 1e9), high(-1e9, -1e9);
+    bool known = true;
+    for (const int corner : corners) {
+      const LocalMap map = fit_local_map(layout_, corner, working.placed.places, false);
+      constexpr double kSure = 0.5;
+      known = known && map.neighbours >= 3 && map.sigma < kSure;
+      low = {std::min(low.x, map.place_px.x()), std::min(low.y, map.place_px.y())};
+      high = {std::max(high.x, map.place_px.x()), std::max(high.y, map.place_px.y())};
+    }
+    if (!known) continue;
+    const double margin = 0.4 * std::max(high.x - low.x, high.y - low.y) + 3;
+    const cv::Rect window =
+        cv::Rect(cv::Point(static_cast<int>(low.x - margin), static_cast<int>(low.y - margin)),
+                 cv::Point(static_cast<int>(high.x + margin) + 1,
+                           static_cast<int>(high.y + margin) + 1)) &
+        cv::Rect(0, 0, grey.cols, grey.rows);
+    constexpr int kFewest = 12;  // px; no tag is read in less
+    if (window.width < kFewest || window.height < kFewest) continue;
+    for (TagDetection found : tag_detector_->detect(grey(window))) {
+      for (Eigen::Vector2d& corner : found.corner_px)
+        corner += Eigen::Vector2d(window.x, window.y);
+      if (found.id == tag) working.tags.push_back(found);
+    }
+  }
+}
+
+/// Says whether every tag that was read lies where the dots around it expect it.
+bool DotTracker::Follower::tags_agree(const Working& working) const {
+  PlacedDots without_tags = working.placed;
+  for (const auto& [tag, corners] : layout_.corner_sites_by_tag)
+    for (const int corner : corners) without_tags.places[static_cast<size_t>(corner)].reset();
+  for (const TagDetection& tag : working.tags) {
+    const auto corners = layout_.corner_sites_by_tag.find(tag.id);
+    if (corners == layout_.corner_sites_by_tag.end()) continue;
+    for (size_t c = 0; c < 4; ++c) {
+      const LocalMap map = fit_local_map(layout_, corners->second[c], without_tags.places, false);
+      constexpr double kSure = 0.15, kAside = 0.4;  // spacings
+      if (map.neighbours < 3 || map.sigma > kSure) continue;
+      if ((map.place_px - tag.corner_px[c]).norm() > kAside * map.scale_px) return false;
+    }
+  }
+  return true;
+}
+
+/// Says whether the dots have the sizes that the pattern gives them.
+bool DotTracker::Follower::pattern_agrees(const Working& working) const {
+  const DotScale scale = measure_dot_scale(layout_, working.placed);
+  if (!scale.radius) return false;
+  int right = 0, wrong = 0;
+  for (size_t site = 0; site < size(); ++site) {
+    if (!working.placed.dots[site]) continue;
+    const LocalMap map =
+        fit_local_map(layout_, static_cast<int>(site), working.placed.places, true);
+    const double area = std::abs(map.jacobian_px.determinant());
+    const double size =
+        std::sqrt(working.placed.dots[site]->outline.area_px2() / (M_PI * area)) / *scale.radius;
+    const double off = std::abs(std::log(size / layout_.sites[site].size));
+    ++(off < 0.5 * std::log(dot_radius_over_spacing(1) / dot_radius_over_spacing(0)) ? right
+                                                                                     : wrong);
+  }
+  return right > 4 * wrong;
+}
+
+/// Seeks unplaced dots where their neighbours expect them, from the placed ones outwards.
+void DotTracker::Follower::complete(const cv::Mat& grey, Working& working) const {
+  working.scale = measure_dot_scale(layout_, working.placed);
+  if (!working.scale.radius) return;
+  std::vector<double> blurs;
+  for (const std::optional<Dot>& dot : working.placed.dots)
+    if (dot) blurs.push_back(dot->blur_px);
+  const double blur_px = median(std::move(blurs));
+  constexpr int kMostRounds = 40;
+  for (int round = 0; round < kMostRounds; ++round)
+    if (complete_once(grey, working, blur_px) == 0) return;
+}
+
+int DotTracker::Follower::complete_once(const cv::Mat& grey, Working& working,
+                                        double blur_px) const {
+  std::vector<std::optional<Dot>> found(size());
+  tbb::parallel_for(size_t{0}, size(), [&](size_t site) {
+    const DotSite& here = layout_.sites[site];
+    if (!here.is_dot || working.placed.places[site] || working.reason[site]) return;
+    const LocalMap map =
+        fit_local_map(layout_, static_cast<int>(site), working.placed.places, false);
+    constexpr double kSure = 0.45;
+    if (map.neighbours < 3 || map.sigma > kSure) return;
+    DotStart start{.outline = {.centre_px = map.place_px,
+                               .shape_px2 = expected_shape_px2(
+                                   map, *working.scale.radius * here.size)},
+                   .blur_px = blur_px};
+    start.outline.shape_px2.diagonal().array() += 0.25;
+    for (const int other : here.neighbours)
+      if (working.placed.dots[static_cast<size_t>(other)]) {
+        centre_on_dark(grey, half_level(*working.placed.dots[static_cast<size_t>(other)]),
+                       options_.detector.bright, start.outline);
+        break;
+      }
+    const Dot dot = fit_dot(grey, start, options_.detector);
+    if (dot.good() && agrees(map, dot, working.scale, here.size)) found[site] = dot;
+  });
+  int placed = 0;
+  for (size_t site = 0; site < size(); ++site) {
+    if (!found[site]) continue;
+    working.placed.place(static_cast<int>(site), *found[site]);
+    ++placed;
+  }
+  for (const int site : leave_out_conflicts(layout_, working.placed)) {
+    // It is not sought again in this picture.
+    working.reason[static_cast<size_t>(site)] = dot_missing::kCovered;
+    --placed;
+  }
+  return std::max(placed, 0);
+}
+
+/// Leaves out dots that are seen in part: their pixels, or their outline, do not fit.
+void DotTracker::Follower::leave_out_cut(Working& working) const {
+  std::vector<double> misfits;
+  for (const std::optional<Dot>& dot : working.placed.dots)
+    if (dot) misfits.push_back(excess_misfit(*dot));
+  if (misfits.empty()) return;
+  constexpr double kClean = 0.012;  // what sharp pictures have
+  const double usual = std::max(median(std::move(misfits)), kClean);
+  std::vector<size_t> cut;
+  for (size_t site = 0; site < size(); ++site) {
+    const std::optional<Dot>& dot = working.placed.dots[site];
+    if (!dot) continue;
+    const LocalMap map =
+        fit_local_map(layout_, static_cast<int>(site), working.placed.places, true);
+    Eigen::Matrix2d expected =
+        expected_shape_px2(map, working.scale.radius.value_or(0) * layout_.sites[site].size);
+    Eigen::Matrix2d shape = dot->outline.shape_px2;
+    const double thick = 0.25 * dot->blur_px * dot->blur_px;
+    expected.diagonal().array() += thick;
+    shape.diagonal().array() += thick;
+    const bool odd_shape =
+        working.scale.radius && shape_ratio(shape, expected) > options_.cut_shape_ratio;
+    if (odd_shape || excess_misfit(*dot) > options_.cut_misfit_ratio * usual) cut.push_back(site);
+  }
+  for (const size_t site : cut) {
+    working.placed.remove(static_cast<int>(site));
+    working.reason[site] = dot_missing::kCut;
+  }
+}
+
+void DotTracker::Follower::say_why_missing(const cv::Mat& grey, Working& working) const {
+  for (size_t site = 0; site < size(); ++site) {
+    if (!layout_.sites[site].is_dot || working.placed.dots[site] || working.reason[site]) continue;
+    working.reason[site] = dot_missing::kUnplaced;
+  }
+  (void)grey;
+}
+
+DotFrame DotTracker::Follower::report(const Working& working) const {
+  DotFrame frame;
+  frame.tags = working.tags;
+  for (size_t site = 0; site < size(); ++site) {
+    const DotSite& here = layout_.sites[site];
+    if (!here.is_dot) continue;
+    if (!working.placed.dots[site]) {
+      frame.missing.emplace_back(here.marker, working.reason[site]);
+      continue;
+    }
+    const Dot& dot = *working.placed.dots[site];
+    DotRow row{.marker = here.marker, .pixel_px = dot.outline.centre_px, .sigma_px = dot.sigma_px()};
+    const LocalMap map =
+        fit_local_map(layout_, static_cast<int>(site), working.placed.places, true);
+    if (map.neighbours >= 4 && working.scale.radius) {
+      const Eigen::Vector2d shift = dot_bend_shift_px(map, *working.scale.radius * here.size);
+      row.pixel_px -= shift;
+      constexpr double kLeftOut = 0.3;  // of the shift: higher orders
+      row.sigma_px = std::hypot(row.sigma_px, kLeftOut * shift.norm() * M_SQRT1_2);
+    }
+    frame.dots.push_back(row);
+  }
+  return frame;
+}
+
+void DotTracker::Follower::remember(const Working& working) {
+  seen_before_ = working.placed.count();
+  for (size_t site = 0; site < size(); ++site) {
+    SiteHistory& history = history_[site];
+    std::optional<Eigen::Vector2d> before;
+    if (history.last) before = history.last->outline.centre_px;
+    history.before_px = before;
+    history.last = working.placed.dots[site];
+  }
+}
+
+DotFrame DotTracker::Follower::next(const cv::Mat& grey) {
+  assert(grey.type() == CV_8UC1);
+  std::optional<Working> working;
+  bool searched = false;
+  if (seen_before_ > 0) {
+    working = follow(grey);
+    const bool agree = tag_detector_ ? tags_agree(*working) : pattern_agrees(*working);
+    if (agree) complete(grey, *working);
+    if (!agree || 2 * working->placed.count() < seen_before_) working.reset();
+  }
+  if (!working) {
+    working = search_whole(grey);
+    searched = true;
+    complete(grey, *working);
+  }
+  leave_out_cut(*working);
+  say_why_missing(grey, *working);
+  DotFrame frame = report(*working);
+  frame.searched_whole = searched;
+  remember(*working);
+  return frame;
+}
+
+void DotTrackOptions::validate() const {
+  detector.validate();
+  if (!(cut_misfit_ratio > 1))
+    throw InputError("cut_misfit_ratio", fmt::format("{}", cut_misfit_ratio), "a ratio, > 1");
+  if (!(cut_shape_ratio > 1))
+    throw InputError("cut_shape_ratio", fmt::format("{}", cut_shape_ratio), "a ratio, > 1");
+}
+
+std::map<std::string, int> DotFrame::missing_counts() const {
+  std::map<std::string, int> counts;
+  for (const auto& [marker, reason] : missing) ++counts[reason];
+  return counts;
+}
+
+DotTracker::DotTracker(const MarkerSet& markers, const std::string& file,
+                       const DotTrackOptions& options)
+    : follower_(std::make_unique<Follower>(markers, file, options)) {}
+DotTracker::~DotTracker() = default;
+DotTracker::DotTracker(DotTracker&&) noexcept = default;
+DotTracker& DotTracker::operator=(DotTracker&&) noexcept = default;
+
+DotFrame DotTracker::next(const cv::Mat& grey) {
+  return follower_->next(grey);
+}
+
+}  // namespace clothfit
