@@ -13,6 +13,7 @@
 #include <tuple>
 
 #include "data/input_error.h"
+#include "data/median.h"
 
 namespace clothfit {
 namespace {
@@ -245,11 +246,31 @@ Dot fit_dot(const cv::Mat& grey, const DotStart& start, const DotDetectorOptions
   return dot;
 }
 
+double covariance_factor(const std::vector<const Dot*>& dots) {
+  constexpr size_t kFewest = 10;
+  if (dots.size() < kFewest) return 1;
+  // Of chi-square / 2 with 2 degrees of freedom, less the share that light and blur take up.
+  constexpr double kMedian = 0.693 * 0.73;
+  constexpr double kLeast = 0.25;  // noise is never so much less than its estimate
+  double factor = kLeast;
+  for (const size_t waves : {size_t{0}, size_t{1}}) {
+    std::vector<double> chi2;
+    for (const Dot* dot : dots) chi2.push_back(dot->waves_chi2[waves]);
+    factor = std::max(factor, median(std::move(chi2)) / kMedian);
+  }
+  return factor;
+}
+
 std::vector<Dot> find_dots(const cv::Mat& grey, const DotDetectorOptions& options) {
   options.validate();
   std::vector<Dot> dots;
   for (const DotOutline& outline : find_dot_candidates(grey, options))
     dots.push_back(fit_dot(grey, {.outline = outline}, options));
+  std::vector<const Dot*> good;
+  for (const Dot& dot : dots)
+    if (dot.good()) good.push_back(&dot);
+  const double factor = covariance_factor(good);
+  for (Dot& dot : dots) dot.covariance_px2 *= factor;
   std::sort(dots.begin(), dots.end(), [](const Dot& a, const Dot& b) {
     return std::tuple(a.outline.centre_px.y(), a.outline.centre_px.x()) <
            std::tuple(b.outline.centre_px.y(), b.outline.centre_px.x());

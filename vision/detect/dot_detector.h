@@ -36,6 +36,13 @@ std::vector<DotOutline> find_dot_candidates(const cv::Mat& grey, const DotDetect
 /// Fits a dot and says whether it is doubted.
 Dot fit_dot(const cv::Mat& grey, const DotStart& start, const DotDetectorOptions& options);
 
+/// Returns by how much the errors of the dots of one picture have a larger variance than if pixels
+/// erred independently, as they do not where a codec or a lens mixed them, or print is ragged. The
+/// centre is the outline's wave with one period around. Waves with 3 and 4 periods, which the fit
+/// leaves over, err by nearly the same law. The factor is the larger of their median chi-squares
+/// over that of the distribution; 1 with fewer than 10 dots.
+double covariance_factor(const std::vector<const Dot*>& dots);
+
 /// Finds all dots of an 8-bit grey picture, doubted ones included; sorted by row, then column. Two
 /// fits that end in the same place are one dot.
 std::vector<Dot> find_dots(const cv::Mat& grey, const DotDetectorOptions& options = {});

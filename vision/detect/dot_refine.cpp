@@ -84,7 +84,7 @@ Eigen::Matrix2d inverse_root(const Eigen::Matrix2d& shape_px2) {
 /// Gathers the pixels within `beyond_px` of the outline, and no further out than `kReach` times it:
 /// what lies beyond is other print, or the sheet's edge.
 DotWindow gather_pixels(const cv::Mat& grey, const DotOutline& outline, double blur_px) {
-  constexpr double kReach = 2.2;
+  constexpr double kReach = 1.8;
   const double beyond_px = 1.5 + 1.5 * blur_px;
   const Eigen::Matrix2d inverse = inverse_root(outline.shape_px2);
   const Eigen::Vector2d half =
@@ -232,6 +232,31 @@ void weigh(DotModel& model, std::vector<float>& flat, std::vector<float>& rough)
   model.explained = robust.mean();
 }
 
+/// Independent normal priors. They are wide, and keep the fit near its start where the picture says
+/// nothing; the centre of a clean dot is shifted by some 1e-5 px.
+struct DotPrior {
+  DotUnknowns mean;
+  DotUnknowns precision;  ///< 1 / sd^2
+};
+
+DotPrior prior_about(const DotUnknowns& start) {
+  const double inverse = inverse_map(start).norm() * M_SQRT1_2;  // of the radius
+  const double paper = start[kDotLight];
+  DotUnknowns sd;
+  sd.segment<2>(kDotCentre).setConstant(1 / inverse);
+  sd.segment<3>(kDotInverse).setConstant(0.5 * inverse);
+  sd[kDotBlur] = 3;                            // px^2
+  sd.segment<2>(kDotBlur + 1).setConstant(1.5);  // px^2
+  sd[kDotContrast] = 0.3 * (1 + std::abs(start[kDotContrast]));
+  sd.segment<3>(kDotLight).setConstant(0.5 * paper);
+  DotPrior prior{.mean = start, .precision = sd.cwiseAbs2().cwiseInverse()};
+  constexpr double kUsualBlur = 0.6;  // px^2
+  prior.mean[kDotBlur] = kUsualBlur;
+  prior.mean.segment<2>(kDotBlur + 1).setZero();
+  prior.mean.segment<2>(kDotLight + 1).setZero();
+  return prior;
+}
+
 /// How far a step went.
 struct DotStep {
   double centre_px = std::numeric_limits<double>::infinity();
@@ -244,16 +269,15 @@ struct DotStep {
 };
 
 /// Adds one step to the unknowns, shortened where it goes beyond what is nearly linear.
-DotStep step(const DotUnknowns& prior_mean, const DotUnknowns& prior, DotModel& model,
-             DotNormal& covariance) {
+DotStep step(const DotPrior& prior, DotModel& model, DotNormal& covariance) {
   const PixelValues root = model.weight.sqrt();
   const PixelRows whitened = model.jacobian.colwise() * root;
   const auto rows = whitened.matrix();
   DotNormal information =
-      rows.transpose().lazyProduct(rows).eval().cast<double>() + DotNormal(prior.asDiagonal());
+      rows.transpose().lazyProduct(rows).eval().cast<double>() + DotNormal(prior.precision.asDiagonal());
   const DotUnknowns gradient =
       (rows.transpose() * (root * model.residual).matrix()).cast<double>() -
-      prior.cwiseProduct(model.unknowns - prior_mean);
+      prior.precision.cwiseProduct(model.unknowns - prior.mean);
   const Eigen::LDLT<DotNormal> solver(information);
   DotUnknowns change = solver.solve(gradient);
   covariance = solver.solve(DotNormal::Identity());
@@ -272,6 +296,38 @@ DotStep step(const DotUnknowns& prior_mean, const DotUnknowns& prior, DotModel& 
   return {.centre_px = change.segment<2>(kDotCentre).norm(),
           .centre_sigma_px = std::sqrt(covariance.topLeftCorner<2, 2>().trace() / 2),
           .shape = std::max(shape, 0.5 * blur)};
+}
+
+/// Measures the outline's deviation from an ellipse by its waves with 3, 4 and 5 periods around.
+void measure_waves(const DotWindow& window, const DotModel& model, Dot& dot) {
+  const Eigen::Matrix2f b = inverse_map(model.unknowns).cast<float>();
+  const PixelValues dx = window.x - static_cast<float>(model.unknowns[kDotCentre]);
+  const PixelValues dy = window.y - static_cast<float>(model.unknowns[kDotCentre + 1]);
+  const PixelValues qx = b(0, 0) * dx + b(0, 1) * dy, qy = b(0, 1) * dx + b(1, 1) * dy;
+  const PixelValues inverse_length = (qx.square() + qy.square()).max(1e-8F).rsqrt();
+  const PixelValues cosine = qx * inverse_length, sine = qy * inverse_length;
+  const PixelValues score = model.weight * model.residual * model.slope;
+  const PixelValues information = model.weight * model.slope.square();
+  const PixelValues plain_score = model.residual * model.slope;
+  const PixelValues plain_information = model.slope.square();
+  PixelValues c = cosine, s = sine;  // of k times the angle
+  float squares = 0;
+  dot.waves_chi2.fill(0);
+  constexpr int kFewestWaves = 3, kMostWaves = 5;
+  for (int k = 2; k <= kMostWaves; ++k) {
+    const PixelValues next = c * cosine - s * sine;
+    s = s * cosine + c * sine;
+    c = next;
+    if (k < kFewestWaves) continue;
+    for (const PixelValues* wave : {&c, &s}) {
+      const PixelValues square = wave->square();
+      // Weights would spare the very pixels that tell a cut dot.
+      squares += square_of((plain_score * *wave).sum() / (plain_information * square).sum());
+      dot.waves_chi2[static_cast<size_t>(k - kFewestWaves)] += static_cast<double>(
+          0.5F * square_of((score * *wave).sum()) / (information * square).sum());
+    }
+  }
+  dot.waves_px = std::sqrt(static_cast<double>(squares));
 }
 
 }  // namespace
@@ -321,12 +377,7 @@ Dot refine_dot(const cv::Mat& grey, const DotStart& start) {
   model.unknowns[kDotLight] = paper;
   model.unknowns[kDotContrast] = 1 - (bright ? brightest : darkest) / paper;
 
-  DotUnknowns prior_mean = DotUnknowns::Zero();
-  DotUnknowns prior = DotUnknowns::Zero();
-  constexpr double kUsualBlur = 0.6, kBlurSpread = 3, kBlurAnisotropy = 1.5;  // px^2
-  prior_mean[kDotBlur] = kUsualBlur;
-  prior[kDotBlur] = 1 / (kBlurSpread * kBlurSpread);
-  prior.segment<2>(kDotBlur + 1).setConstant(1 / (kBlurAnisotropy * kBlurAnisotropy));
+  DotPrior prior = prior_about(model.unknowns);
 
   constexpr int kMaxSteps = 14;
   DotNormal covariance;
@@ -347,12 +398,13 @@ Dot refine_dot(const cv::Mat& grey, const DotStart& start) {
       if (window.size() < kFewest) return dot;
       const Eigen::Vector2d shift = window.origin_px - origin;
       model.unknowns.segment<2>(kDotCentre) -= shift;
+      prior.mean.segment<2>(kDotCentre) -= shift;
       model.unknowns[kDotLight] += shift.dot(model.unknowns.segment<2>(kDotLight + 1)) / scale_px;
       regathered = true;
     }
     evaluate(window, scale_px, model);
     weigh(model, flat, rough);
-    moved = step(prior_mean, prior, model, covariance);
+    moved = step(prior, model, covariance);
     constexpr double kNoDot = 100;  // px^2
     if (!model.unknowns.allFinite() || model.unknowns[kDotBlur] > kNoDot ||
         inverse_map(model.unknowns).determinant() <= 0)
@@ -376,6 +428,7 @@ Dot refine_dot(const cv::Mat& grey, const DotStart& start) {
   dot.covariance_px2 = covariance.topLeftCorner<2, 2>();
   const double step_levels = std::abs(dot.contrast * dot.paper_levels);
   dot.misfit = std::sqrt(static_cast<double>(model.residual.square().mean())) / step_levels;
+  measure_waves(window, model, dot);
   dot.steps = steps;
   if (moved.settled()) dot.doubt = DotDoubt::none;
   return dot;

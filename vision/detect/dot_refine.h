@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <opencv2/core.hpp>
 #include <string>
 
@@ -32,7 +33,8 @@ enum class DotDoubt {
 struct Dot {
   DotOutline outline;
   DotDoubt doubt = DotDoubt::unsettled;
-  /// Of the centre, px^2: the posterior's, with the noise's correlation between pixels.
+  /// Of the centre, px^2: the posterior's. It takes pixels' errors for independent
+  /// (`scale_covariances` in vision/detect/dot_detector.h).
   Eigen::Matrix2d covariance_px2 = Eigen::Matrix2d::Zero();
   Eigen::Matrix2d blur_px2 = Eigen::Matrix2d::Zero();  ///< covariance of the blur
   double blur_px = 0;       ///< root of its mean variance per direction
@@ -42,6 +44,10 @@ struct Dot {
   double noise_levels = 0;  ///< standard deviation of a pixel where the picture is flat
   double misfit = 0;        ///< rms residual of its pixels over the step from paper to dot
 
+  double waves_px = 0;      ///< size of the outline's waves with 3 to 5 periods; 0: an ellipse
+  /// Half the square of the waves with 3, 4 and 5 periods over their variance if pixels err
+  /// independently.
+  std::array<double, 3> waves_chi2{};
   int steps = 0;            ///< of the fit
 
   bool good() const { return doubt == DotDoubt::none; }

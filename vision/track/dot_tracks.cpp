@@ -8,6 +8,8 @@
 #include <cassert>
 #include <cmath>
 #include <optional>
+#include <cstdio>
+#include <cstdlib>
 
 #include "data/input_error.h"
 #include "data/median.h"
@@ -25,10 +27,18 @@ struct SiteHistory {
   std::optional<Eigen::Vector2d> before_px;  ///< its centre one picture earlier
 };
 
+/// A dot sought where its neighbours expect it, and not taken.
+struct Attempt {
+  LocalMap map;
+  Dot dot;
+};
+
 /// Moves an outline to the middle of what is darker (brighter) than half way around it.
 void centre_on_dark(const cv::Mat& grey, double half_level, bool bright, DotOutline& outline) {
   const Eigen::Vector2d reach =
       1.5 * outline.shape_px2.diagonal().cwiseSqrt() + Eigen::Vector2d::Ones();
+  const Eigen::Matrix2d metric = outline.shape_px2.inverse() / (1.5 * 1.5);
+  const Eigen::Vector2d start = outline.centre_px;
   constexpr int kMostMoves = 5;
   for (int move = 0; move < kMostMoves; ++move) {
     const Eigen::Vector2d low = outline.centre_px - reach, high = outline.centre_px + reach;
@@ -39,7 +49,8 @@ void centre_on_dark(const cv::Mat& grey, double half_level, bool bright, DotOutl
       for (int u = std::max(0, static_cast<int>(std::ceil(low.x())));
            u <= std::min(grey.cols - 1, static_cast<int>(std::floor(high.x()))); ++u) {
         const double dark = bright ? row[u] - half_level : half_level - row[u];
-        if (dark <= 0) continue;
+        const Eigen::Vector2d from = Eigen::Vector2d(u, v) - outline.centre_px;
+        if (dark <= 0 || from.dot(metric * from) > 1) continue;
         weight += dark;
         su += dark * u;
         sv += dark * v;
@@ -49,6 +60,11 @@ void centre_on_dark(const cv::Mat& grey, double half_level, bool bright, DotOutl
     const Eigen::Vector2d centre(su / weight, sv / weight);
     const double moved = (centre - outline.centre_px).norm();
     outline.centre_px = centre;
+    const Eigen::Vector2d off = centre - start;
+    if (off.dot(metric * off) > 1) {  // 1.5 radii away is something else
+      outline.centre_px = start;
+      return;
+    }
     if (moved < 0.3) return;
   }
 }
@@ -57,9 +73,19 @@ double half_level(const Dot& dot) {
   return dot.paper_levels * (1 - 0.5 * dot.contrast);
 }
 
+/// Returns the misfit that noise does not explain; it is itself known to a tenth.
 double excess_misfit(const Dot& dot) {
   const double noise = dot.noise_levels / std::abs(dot.contrast * dot.paper_levels);
-  return std::sqrt(std::max(dot.misfit * dot.misfit - noise * noise, 0.0));
+  return std::sqrt(std::max(dot.misfit * dot.misfit - 1.5 * noise * noise, 0.0));
+}
+
+/// Returns the median of a quantity over the placed dots, and `least` where it is less.
+template <class Quantity>
+double usual(const PlacedDots& placed, double least, Quantity quantity) {
+  std::vector<double> values;
+  for (const std::optional<Dot>& dot : placed.dots)
+    if (dot) values.push_back(quantity(*dot));
+  return values.empty() ? least : std::max(median(std::move(values)), least);
 }
 
 }  // namespace
@@ -73,11 +99,13 @@ class DotTracker::Follower {
  private:
   /// The picture's own working set.
   struct Working {
-    explicit Working(size_t sites) : placed(sites), reason(sites, nullptr) {}
+    explicit Working(size_t sites) : placed(sites), reason(sites, nullptr), attempt(sites) {}
     PlacedDots placed;
     DotScale scale;
+    bool mirrored = false;  ///< the sheet appears as in a mirror
     std::vector<TagDetection> tags;
     std::vector<const char*> reason;  ///< by site; null: not known
+    std::vector<std::optional<Attempt>> attempt;  ///< by site, the last one
   };
 
   Working search_whole(const cv::Mat& grey);
@@ -90,6 +118,7 @@ class DotTracker::Follower {
   int complete_once(const cv::Mat& grey, Working& working, double blur_px) const;
   void leave_out_cut(Working& working) const;
   void say_why_missing(const cv::Mat& grey, Working& working) const;
+  const char* why_missing(const cv::Mat& grey, const Working& working, size_t site) const;
   DotFrame report(const Working& working) const;
   void remember(const Working& working);
 
@@ -278,7 +307,10 @@ int DotTracker::Follower::complete_once(const cv::Mat& grey, Working& working,
         break;
       }
     const Dot dot = fit_dot(grey, start, options_.detector);
-    if (dot.good() && agrees(map, dot, working.scale, here.size)) found[site] = dot;
+    if (dot.good() && agrees(map, dot, working.scale, here.size))
+      found[site] = dot;
+    else
+      working.attempt[site] = Attempt{.map = map, .dot = dot};
   });
   int placed = 0;
   for (size_t site = 0; site < size(); ++site) {
@@ -296,12 +328,10 @@ int DotTracker::Follower::complete_once(const cv::Mat& grey, Working& working,
 
 /// Leaves out dots that are seen in part: their pixels, or their outline, do not fit.
 void DotTracker::Follower::leave_out_cut(Working& working) const {
-  std::vector<double> misfits;
-  for (const std::optional<Dot>& dot : working.placed.dots)
-    if (dot) misfits.push_back(excess_misfit(*dot));
-  if (misfits.empty()) return;
-  constexpr double kClean = 0.012;  // what sharp pictures have
-  const double usual = std::max(median(std::move(misfits)), kClean);
+  constexpr double kCleanMisfit = 0.012, kCleanWaves_px = 0.025;  // what sharp pictures have
+  const double misfit = usual(working.placed, kCleanMisfit, excess_misfit);
+  const double waves_px =
+      usual(working.placed, kCleanWaves_px, [](const Dot& dot) { return dot.waves_px; });
   std::vector<size_t> cut;
   for (size_t site = 0; site < size(); ++site) {
     const std::optional<Dot>& dot = working.placed.dots[site];
@@ -316,7 +346,12 @@ void DotTracker::Follower::leave_out_cut(Working& working) const {
     shape.diagonal().array() += thick;
     const bool odd_shape =
         working.scale.radius && shape_ratio(shape, expected) > options_.cut_shape_ratio;
-    if (odd_shape || excess_misfit(*dot) > options_.cut_misfit_ratio * usual) cut.push_back(site);
+    // A bend makes waves about as large as its shift of the centre.
+    const double bend_px =
+        dot_bend_shift_px(map, working.scale.radius.value_or(0) * layout_.sites[site].size).norm();
+    const bool odd_pixels = excess_misfit(*dot) > 1.5 * options_.cut_ratio * misfit ||
+                            dot->waves_px > options_.cut_ratio * waves_px + 0.7 * bend_px;
+    if (odd_shape || odd_pixels) cut.push_back(site);
   }
   for (const size_t site : cut) {
     working.placed.remove(static_cast<int>(site));
@@ -324,17 +359,85 @@ void DotTracker::Follower::leave_out_cut(Working& working) const {
   }
 }
 
-void DotTracker::Follower::say_why_missing(const cv::Mat& grey, Working& working) const {
-  for (size_t site = 0; site < size(); ++site) {
-    if (!layout_.sites[site].is_dot || working.placed.dots[site] || working.reason[site]) continue;
-    working.reason[site] = dot_missing::kUnplaced;
+const char* DotTracker::Follower::why_missing(const cv::Mat& grey, const Working& working,
+                                              size_t site) const {
+  LocalMap map = fit_local_map(layout_, static_cast<int>(site), working.placed.places, false);
+  constexpr double kSure = 0.45;
+  if (map.neighbours < 3 || map.sigma > kSure) return dot_missing::kUnplaced;
+  const Eigen::Vector2d& at = map.place_px;
+  const DotSite& here = layout_.sites[site];
+  const double radius_px = working.scale.radius.value_or(0) * here.size * map.scale_px;
+  if (at.x() < radius_px || at.y() < radius_px || at.x() > grey.cols - 1 - radius_px ||
+      at.y() > grey.rows - 1 - radius_px)
+    return dot_missing::kOutside;
+  constexpr double kEdgeOn = 0.15;  // of the area seen head on
+  const double area = map.jacobian_px.determinant() / (map.scale_px * map.scale_px);
+  if (std::abs(area) < kEdgeOn || (area < 0) != working.mirrored) return dot_missing::kHidden;
+  for (size_t other = 0; other < size(); ++other) {
+    if (other == site || !working.placed.dots[other]) continue;
+    // Cloth that is known to be elsewhere appears in its place.
+    const double apart = (*working.placed.places[other] - at).norm();
+    const double on_cloth = (layout_.sites[other].place_m - here.place_m).norm();
+    if (apart < 0.7 * std::sqrt(std::abs(area)) * map.scale_px && on_cloth > 1.6 * layout_.spacing_m)
+      return dot_missing::kHidden;
   }
-  (void)grey;
+  if (!working.attempt[site]) return dot_missing::kCovered;
+  const Dot& dot = working.attempt[site]->dot;
+  constexpr double kDarkPaper = 20;  // grey levels
+  switch (dot.doubt) {
+    case DotDoubt::border:
+      return dot_missing::kOutside;
+    case DotDoubt::blurred:
+      return dot_missing::kBlurred;
+    case DotDoubt::faint:
+      return dot.paper_levels < kDarkPaper ? dot_missing::kDark : dot_missing::kCovered;
+    case DotDoubt::not_a_disc:
+    case DotDoubt::none:
+      return dot_missing::kCut;
+    case DotDoubt::unsettled:
+      break;
+  }
+  return dot_missing::kCovered;
+}
+
+void DotTracker::Follower::say_why_missing(const cv::Mat& grey, Working& working) const {
+  double turn = 0;
+  for (size_t site = 0; site < size(); ++site) {
+    if (!working.placed.dots[site]) continue;
+    const LocalMap map =
+        fit_local_map(layout_, static_cast<int>(site), working.placed.places, true);
+    if (map.neighbours >= 3) turn += map.jacobian_px.determinant() > 0 ? 1 : -1;
+  }
+  working.mirrored = turn < 0;
+  for (size_t site = 0; site < size(); ++site)
+    if (layout_.sites[site].is_dot && !working.placed.dots[site] && !working.reason[site])
+      working.reason[site] = why_missing(grey, working, site);
+  if (getenv("DBG2"))
+    for (size_t site = 0; site < size(); ++site)
+      if (layout_.sites[site].is_dot && !working.placed.dots[site]) {
+        const auto& a = working.attempt[site];
+        fprintf(stderr, "MISSING site %zu %s", site, working.reason[site]);
+        if (a)
+          fprintf(stderr,
+                  " map %.1f %.1f sigma %.3f scale %.1f | %.1f %.1f doubt %d steps %d expl %.3f misfit "
+                  "%.3f contrast %.2f paper %.0f blur %.2f noise %.1f radii %.2f %.2f exp %.2f %.2f ratio %.2f",
+                  a->map.place_px.x(), a->map.place_px.y(), a->map.sigma, a->map.scale_px,
+                  a->dot.outline.centre_px.x(), a->dot.outline.centre_px.y(), int(a->dot.doubt),
+                  a->dot.steps, a->dot.explained, a->dot.misfit, a->dot.contrast,
+                  a->dot.paper_levels, a->dot.blur_px, a->dot.noise_levels, a->dot.outline.radii_px()[0],a->dot.outline.radii_px()[1], DotOutline{.centre_px={},.shape_px2=expected_shape_px2(a->map,*working.scale.radius)}.radii_px()[0], DotOutline{.centre_px={},.shape_px2=expected_shape_px2(a->map,*working.scale.radius)}.radii_px()[1],
+                  shape_ratio(a->dot.outline.shape_px2,
+                              expected_shape_px2(a->map, *working.scale.radius)));
+        fprintf(stderr, "\n");
+      }
 }
 
 DotFrame DotTracker::Follower::report(const Working& working) const {
   DotFrame frame;
   frame.tags = working.tags;
+  std::vector<const Dot*> placed;
+  for (const std::optional<Dot>& dot : working.placed.dots)
+    if (dot) placed.push_back(&*dot);
+  const double sigma_factor = std::sqrt(covariance_factor(placed));
   for (size_t site = 0; site < size(); ++site) {
     const DotSite& here = layout_.sites[site];
     if (!here.is_dot) continue;
@@ -343,7 +446,7 @@ DotFrame DotTracker::Follower::report(const Working& working) const {
       continue;
     }
     const Dot& dot = *working.placed.dots[site];
-    DotRow row{.marker = here.marker, .pixel_px = dot.outline.centre_px, .sigma_px = dot.sigma_px()};
+    DotRow row{.marker = here.marker, .pixel_px = dot.outline.centre_px, .sigma_px = sigma_factor * dot.sigma_px()};
     const LocalMap map =
         fit_local_map(layout_, static_cast<int>(site), working.placed.places, true);
     if (map.neighbours >= 4 && working.scale.radius) {
@@ -393,8 +496,8 @@ DotFrame DotTracker::Follower::next(const cv::Mat& grey) {
 
 void DotTrackOptions::validate() const {
   detector.validate();
-  if (!(cut_misfit_ratio > 1))
-    throw InputError("cut_misfit_ratio", fmt::format("{}", cut_misfit_ratio), "a ratio, > 1");
+  if (!(cut_ratio > 1))
+    throw InputError("cut_ratio", fmt::format("{}", cut_ratio), "a ratio, > 1");
   if (!(cut_shape_ratio > 1))
     throw InputError("cut_shape_ratio", fmt::format("{}", cut_shape_ratio), "a ratio, > 1");
 }
