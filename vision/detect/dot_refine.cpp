@@ -1,7 +1,6 @@
 #include "vision/detect/dot_refine.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cassert>
@@ -75,10 +74,12 @@ void keep_blur_positive(DotUnknowns& unknowns) {
   if (apart > most) unknowns.segment<2>(kDotBlur + 1) *= most / apart;
 }
 
-/// Returns the symmetric B with B^-2 = shape.
+/// Returns the symmetric B with B^-2 = shape; the root of a 2 x 2 matrix in closed form.
 Eigen::Matrix2d inverse_root(const Eigen::Matrix2d& shape_px2) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(shape_px2);
-  return axes.operatorInverseSqrt();
+  const double root = std::sqrt(std::max(shape_px2.determinant(), 1e-12));
+  const Eigen::Matrix2d a = (shape_px2 + root * Eigen::Matrix2d::Identity()) /
+                            std::sqrt(shape_px2.trace() + 2 * root);
+  return a.inverse();
 }
 
 /// Gathers the pixels within `beyond_px` of the outline, and no further out than `kReach` times it:
@@ -333,8 +334,9 @@ void measure_waves(const DotWindow& window, const DotModel& model, Dot& dot) {
 }  // namespace
 
 Eigen::Vector2d DotOutline::radii_px() const {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(shape_px2, Eigen::EigenvaluesOnly);
-  return axes.eigenvalues().cwiseMax(0).cwiseSqrt();
+  const double mean = 0.5 * shape_px2.trace();
+  const double half = std::sqrt(std::max(mean * mean - shape_px2.determinant(), 0.0));
+  return {std::sqrt(std::max(mean - half, 0.0)), std::sqrt(mean + half)};
 }
 
 double DotOutline::area_px2() const {

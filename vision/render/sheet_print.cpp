@@ -77,6 +77,9 @@ void PrintOptions::validate() const {
   check("ink", ink);
   if (!(dot_radius_m > 0 && std::isfinite(dot_radius_m)))
     throw InputError("dot_radius_m", fmt::format("{}", dot_radius_m), "metres, > 0");
+  for (const double radius_m : dot_radii_m)
+    if (!(radius_m > 0 && std::isfinite(radius_m)))
+      throw InputError("dot_radii_m", fmt::format("{}", radius_m), "metres, > 0");
 }
 
 SheetPrint::SheetPrint(const MarkerSet& markers, double width_m, double height_m,
@@ -93,6 +96,8 @@ SheetPrint::SheetPrint(const MarkerSet& markers, double width_m, double height_m
       add_tags(markers);
       return;
     case MarkerKind::dots:
+      if (std::ranges::any_of(markers.markers, [](const Marker& marker) { return marker.tag.has_value(); }))
+        add_tags(markers);
       add_dots(markers);
       return;
     case MarkerKind::none:
@@ -134,12 +139,19 @@ void SheetPrint::add_tags(const MarkerSet& markers) {
 }
 
 void SheetPrint::add_dots(const MarkerSet& markers) {
-  for (const Marker& marker : markers.markers) {
+  const std::vector<double>& radii_m = options_.dot_radii_m;
+  if (!radii_m.empty() && radii_m.size() != markers.markers.size())
+    throw InputError("dot_radii_m", fmt::format("{} radii", radii_m.size()),
+                     fmt::format("one for each of {} markers, or none", markers.markers.size()));
+  for (size_t i = 0; i < markers.markers.size(); ++i) {
+    const Marker& marker = markers.markers[i];
+    if (marker.tag) continue;
+    const double radius_m = radii_m.empty() ? options_.dot_radius_m : radii_m[i];
     const Eigen::Vector2d centre_m(marker.s_m, marker.t_m);
-    const Eigen::Vector2d reach_m = Eigen::Vector2d::Constant(options_.dot_radius_m);
+    const Eigen::Vector2d reach_m = Eigen::Vector2d::Constant(radius_m);
     list_in_bins(centre_m - reach_m, centre_m + reach_m, static_cast<int>(dots_.size()),
                  &Bin::dots);
-    dots_.push_back({.centre_m = centre_m, .radius_m = options_.dot_radius_m});
+    dots_.push_back({.centre_m = centre_m, .radius_m = radius_m});
   }
 }
 

@@ -12,6 +12,9 @@ struct PrintOptions {
   double paper = 0.85;         ///< the cloth where nothing is printed, and its back
   double ink = 0.08;           ///< of tags and dots
   double dot_radius_m = 4e-3;  ///< > 0; of the discs around markers of kind `dots`
+  /// > 0; radius of each marker's disc, as a pattern has them (vision/detect/dot_pattern.h). Empty:
+  /// all have `dot_radius_m`. Those of tags' corners are not used.
+  std::vector<double> dot_radii_m;
   void validate() const;       ///< throws InputError
 };
 
@@ -21,7 +24,8 @@ struct PrintOptions {
 /// Markers of kind `apriltag` are corners of tags: the printed tag, whose border ends at the four
 /// corners, is laid out between them, with the cells outside the border that its family has. Ink
 /// wins where white margins overlap a neighbour. Markers of kind `dots` are the centres of filled
-/// circles, those of kind `none` show nothing.
+/// circles, but for corners of anchor tags, which are printed as tags. Those of kind `none` show
+/// nothing.
 class SheetPrint {
  public:
   /// Throws InputError for a cloth without size, an unknown family and markers of kind `texture`.

@@ -43,7 +43,11 @@ struct Frontier {
 class Growth {
  public:
   Growth(const DotLayout& layout, const std::vector<Dot>& found, PlacedDots& placed)
-      : layout_(layout), found_(found), placed_(placed), taken_(found.size(), false) {}
+      : layout_(layout), found_(found), placed_(placed), taken_(found.size(), false) {
+    for (size_t i = 0; i < found.size(); ++i)
+      for (const std::optional<Dot>& dot : placed.dots)
+        if (dot && dot->outline.centre_px == found[i].outline.centre_px) taken_[i] = true;
+  }
 
   void run();
 
@@ -95,7 +99,8 @@ void Growth::run() {
     taken_[static_cast<size_t>(match)] = true;
     placed_.place(site, found_[static_cast<size_t>(match)]);
     constexpr int kSettled = 30;  // dots after which the scale no longer changes much
-    if (++placed <= kSettled && placed % 5 == 0) scale_ = measure_dot_scale(layout_, placed_);
+    if (layout_.sizes_known && ++placed <= kSettled && placed % 5 == 0)
+      scale_ = measure_dot_scale(layout_, placed_);
     for (const int other : layout_.sites[static_cast<size_t>(site)].neighbours) consider(other);
   }
 }
@@ -105,10 +110,10 @@ void remove_shared_dots(const DotLayout& layout, PlacedDots& placed, std::vector
   std::vector<int> shared;
   for (size_t i = 0; i < layout.sites.size(); ++i) {
     if (!placed.dots[i]) continue;
+    const double radius = placed.dots[i]->outline.radii_px()[0];
     for (size_t j = i + 1; j < layout.sites.size(); ++j) {
       if (!placed.dots[j]) continue;
-      const double apart = (*placed.places[i] - *placed.places[j]).norm();
-      if (apart > placed.dots[i]->outline.radii_px()[0]) continue;
+      if ((*placed.places[i] - *placed.places[j]).squaredNorm() > radius * radius) continue;
       shared.push_back(static_cast<int>(i));
       shared.push_back(static_cast<int>(j));
     }

@@ -25,6 +25,7 @@ struct DotLayout {
   std::vector<DotSite> sites;
   double spacing_m = 0;  ///< median distance of a dot from the nearest
   std::map<int, std::array<int, 4>> corner_sites_by_tag;
+  bool sizes_known = true;    ///< `size` of the sites is what is printed
   int columns = 0, rows = 0;  ///< where the dots fill a grid, and there are no tags; else 0
 };
 

@@ -318,6 +318,7 @@ int DotTracker::Follower::complete_once(const cv::Mat& grey, Working& working,
     working.placed.place(static_cast<int>(site), *found[site]);
     ++placed;
   }
+  if (placed == 0) return 0;
   for (const int site : leave_out_conflicts(layout_, working.placed)) {
     // It is not sought again in this picture.
     working.reason[static_cast<size_t>(site)] = dot_missing::kCovered;
