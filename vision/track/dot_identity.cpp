@@ -79,7 +79,9 @@ int Growth::only_match(int site, const LocalMap& map) const {
   int match = -1;
   for (size_t i = 0; i < found_.size(); ++i) {
     const Dot& dot = found_[i];
-    if (taken_[i] || !agrees(map, dot, scale_, size)) continue;
+    if (taken_[i] || !agrees(map, dot, scale_, size) ||
+        !has_links(layout_, placed_, scale_, site, dot))
+      continue;
     if (match >= 0) return -1;
     match = static_cast<int>(i);
   }
@@ -179,14 +181,117 @@ double shape_ratio(const Eigen::Matrix2d& a_px2, const Eigen::Matrix2d& b_px2) {
 bool agrees(const LocalMap& map, const Dot& dot, const DotScale& scale, double size) {
   if (gate_distance(map, dot.outline.centre_px) > 1) return false;
   if (!scale.radius) return true;
-  // Folds bend the map within a spacing, so that outlines differ from those of its slope.
-  constexpr double kLargestRatio = 1.6;
+  // Folds bend the map within a spacing, so that outlines differ from those of its slope. A dot
+  // that placed ones do not surround may be one beyond a fold, which has another outline.
+  constexpr double kSurrounded = 0.1;  // spacings
+  const double largest_ratio = map.sigma < kSurrounded ? 1.6 : 1.45;
   const double thick_px = 0.5 + dot.blur_px;  // what a thin outline may err by
   Eigen::Matrix2d expected = expected_shape_px2(map, *scale.radius * size);
   expected.diagonal().array() += 0.25 * thick_px * thick_px;
   Eigen::Matrix2d shape = dot.outline.shape_px2;
   shape.diagonal().array() += 0.25 * thick_px * thick_px;
-  return shape_ratio(shape, expected) < kLargestRatio;
+  return shape_ratio(shape, expected) < largest_ratio;
+}
+
+bool is_linked(const DotEnd& from, const Eigen::Vector2d& place_px, double apart,
+               const DotEnd& other) {
+  // Where foreshortening changes by a factor r over the way, the outlines at its ends see it
+  // (1 + r) / 2 and (1 + 1 / r) / 2 times as long: 2 and 0.67 for r = 3, 1.15 in the mean.
+  constexpr double kMostOff = 1.25, kMostOffAlone = 1.9;
+  const Eigen::Vector2d way = place_px - from.dot->outline.centre_px;
+  const auto length = [&](const DotEnd& end) {
+    const double thick_px = 0.3 + 0.3 * end.dot->blur_px;  // what a thin outline may err by
+    Eigen::Matrix2d shape = end.dot->outline.shape_px2;
+    shape.diagonal().array() += thick_px * thick_px;
+    const double determinant = shape.determinant();
+    const double square = (shape(1, 1) * way.x() * way.x() - 2 * shape(0, 1) * way.x() * way.y() +
+                           shape(0, 0) * way.y() * way.y()) /
+                          determinant;
+    return end.radius * std::sqrt(square) / apart;
+  };
+  if (!other.dot) {
+    const double off = length(from);
+    return off < kMostOffAlone && off > 1 / kMostOffAlone;
+  }
+  const double one = length(from), two = length(other);
+  const double off = std::sqrt(one * two);
+  return off < kMostOff && off > 1 / kMostOff && std::max(one, two) < kMostOffAlone &&
+         std::min(one, two) > 1 / kMostOffAlone;
+}
+
+namespace {
+
+constexpr double kLinkReach = 1.5;  // spacings: the eight around
+
+/// Calls `each(neighbour, linked)` for the placed dots around a dot put at a site.
+template <class Each>
+void for_each_link(const DotLayout& layout, const PlacedDots& placed, double scale, int site,
+                   const Dot& dot, Each each) {
+  const DotSite& here = layout.sites[static_cast<size_t>(site)];
+  for (const int other : here.neighbours) {
+    const DotSite& there = layout.sites[static_cast<size_t>(other)];
+    const double apart = (there.place_m - here.place_m).norm() / layout.spacing_m;
+    if (apart > kLinkReach) return;
+    const std::optional<Dot>& neighbour = placed.dots[static_cast<size_t>(other)];
+    if (!neighbour) continue;
+    each(other, is_linked({.dot = &dot, .radius = scale * here.size},
+                          neighbour->outline.centre_px, apart,
+                          {.dot = &*neighbour, .radius = scale * there.size}));
+  }
+}
+
+}  // namespace
+
+bool has_links(const DotLayout& layout, const PlacedDots& placed, const DotScale& scale, int site,
+               const Dot& dot) {
+  if (!scale.radius) return true;
+  int good = 0, bad = 0;
+  for_each_link(layout, placed, *scale.radius, site, dot,
+                [&](int, bool linked) { ++(linked ? good : bad); });
+  return good + bad == 0 || (good > 1 && good > 4 * bad);
+}
+
+std::vector<int> linked_groups(const DotLayout& layout, const PlacedDots& placed,
+                               const DotScale& scale) {
+  std::vector<int> group(layout.sites.size(), -1);
+  int count = 0;
+  std::vector<int> stack;
+  for (size_t seed = 0; seed < group.size(); ++seed) {
+    if (!placed.dots[seed] || group[seed] >= 0) continue;
+    group[seed] = count;
+    stack.assign(1, static_cast<int>(seed));
+    while (!stack.empty()) {
+      const int site = stack.back();
+      stack.pop_back();
+      for_each_link(layout, placed, scale.radius.value_or(0), site,
+                    *placed.dots[static_cast<size_t>(site)], [&](int other, bool linked) {
+                      if (!linked || group[static_cast<size_t>(other)] >= 0) return;
+                      group[static_cast<size_t>(other)] = count;
+                      stack.push_back(other);
+                    });
+    }
+    ++count;
+  }
+  return group;
+}
+
+std::vector<bool> linked_with_tags(const DotLayout& layout, const PlacedDots& placed,
+                                   const DotScale& scale) {
+  std::vector<bool> linked(layout.sites.size(), false);
+  for (size_t site = 0; site < linked.size(); ++site) {
+    if (!placed.dots[site]) continue;
+    const DotSite& here = layout.sites[site];
+    for (const int other : here.neighbours) {
+      const DotSite& there = layout.sites[static_cast<size_t>(other)];
+      const double apart = (there.place_m - here.place_m).norm() / layout.spacing_m;
+      if (apart > kLinkReach) break;
+      if (there.is_dot || !placed.places[static_cast<size_t>(other)]) continue;
+      if (is_linked({.dot = &*placed.dots[site], .radius = scale.radius.value_or(0) * here.size},
+                    *placed.places[static_cast<size_t>(other)], apart))
+        linked[site] = true;
+    }
+  }
+  return linked;
 }
 
 void grow_identities(const DotLayout& layout, const std::vector<Dot>& found, PlacedDots& placed) {

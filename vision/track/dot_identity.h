@@ -38,10 +38,34 @@ double shape_ratio(const Eigen::Matrix2d& a_px2, const Eigen::Matrix2d& b_px2);
 /// its outline's size and turn where the scale is known.
 bool agrees(const LocalMap& map, const Dot& dot, const DotScale& scale, double size);
 
+/// Says whether nothing but cloth may lie between a dot and a place `apart` spacings from it: the
+/// way between them, measured by the dot's own outline, is as long as on the sheet. Across a fold
+/// it is not, where the outline is thin or some of the sheet is hidden. `other`, if any, is the dot
+/// at that place; both outlines then count.
+struct DotEnd {
+  const Dot* dot = nullptr;
+  double radius = 0;  ///< in spacings
+};
+bool is_linked(const DotEnd& from, const Eigen::Vector2d& place_px, double apart,
+               const DotEnd& other = {});
+
+/// Says whether most of the placed neighbours within 1.5 spacings are linked with a dot put at a
+/// site. True where the scale is not known.
+bool has_links(const DotLayout& layout, const PlacedDots& placed, const DotScale& scale, int site,
+               const Dot& dot);
+
 /// Names found dots from the sites that are placed already (corners of tags, dots): dot by dot, the
 /// best predicted first, each by the neighbours placed before it. A dot is taken where it alone
-/// lies where its neighbours expect it.
+/// lies where its neighbours expect it, and is linked with them.
 void grow_identities(const DotLayout& layout, const std::vector<Dot>& found, PlacedDots& placed);
+
+/// Groups placed dots that links connect. Returns a group's number per site, -1 where no dot is.
+std::vector<int> linked_groups(const DotLayout& layout, const PlacedDots& placed,
+                               const DotScale& scale);
+
+/// Says for each placed dot whether it is linked with a placed corner of a tag.
+std::vector<bool> linked_with_tags(const DotLayout& layout, const PlacedDots& placed,
+                                   const DotScale& scale);
 
 /// Leaves out dots that their neighbours contradict, the worst first, and dots that two sites
 /// claim. A dot with fewer than 3 placed neighbours is left out, as nothing speaks for it. Returns
