@@ -78,6 +78,7 @@ set(CLOTHFIT_ARROWS
                             apps/report/fit"
   "apps/study/foreign   -> data fit/jobs fit/diagnosis apps/terminal apps/steps
                            apps/study/recordings"
+  "apps/study/vision    -> data"
   "apps/report/study    -> data vision/track apps/terminal apps/report/page apps/report/fit
                            apps/study/trials apps/study/louchet1995 apps/study/recordings
                            apps/study/foreign"
@@ -99,7 +100,7 @@ set(CLOTHFIT_TEST_ARROWS
   "tests/model  -> model data"
   "tests/fit    -> fit model calib data tests/data"
   "tests/apps   -> apps fit model vision calib data tests/data"
-  "tests/bench  -> fit model tests/model"
+  "tests/bench  -> fit model vision calib data tests/model tests/vision"
 )
 
 # What `folder` may include: a list in `result`.

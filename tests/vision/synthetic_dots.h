@@ -28,7 +28,7 @@ struct SyntheticDotPicture {
   int width = 64;
   int height = 64;
   double paper_levels = 200;
-  double ink = 0.1;  ///< share of the paper's light
+  double ink = 0.1;                                       ///< share of the paper's light
   Eigen::Vector2d light_slope = Eigen::Vector2d::Zero();  ///< relative change per px
   double blur_px = 0.6;                                   ///< Gaussian, besides the pixel's area
   Eigen::Vector2d motion_px = Eigen::Vector2d::Zero();    ///< way during the exposure

@@ -64,8 +64,8 @@ void collect_maxima(const cv::Mat& strength, float least, int step, double radiu
 
 /// Finds spots at scales half an octave apart; each octave halves the picture.
 std::vector<Spot> find_spots(const cv::Mat& dark, const DotDetectorOptions& options) {
-  constexpr float kLeast = 4;         // grey levels; noise of 8 levels reaches 3
-  constexpr float kFinest = 1.2F;     // px
+  constexpr float kLeast = 4;          // grey levels; noise of 8 levels reaches 3
+  constexpr float kFinest = 1.2F;      // px
   constexpr double kRadius = M_SQRT2;  // a disc of radius sqrt(2) sigma answers most
   std::vector<Spot> spots;
   cv::Mat base;

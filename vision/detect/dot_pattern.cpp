@@ -183,8 +183,7 @@ DotPatternIndex::DotPatternIndex(const DotPattern& pattern) {
     for (int column = 1; column + 1 < pattern.columns; ++column) {
       DotNeighbourhood symbols{};
       for (int i = 0; i < 9; ++i)
-        symbols[static_cast<std::size_t>(i)] =
-            pattern.symbol(row - 1 + i / 3, column - 1 + i % 3);
+        symbols[static_cast<std::size_t>(i)] = pattern.symbol(row - 1 + i / 3, column - 1 + i % 3);
       place_by_code_.emplace(code_of(symbols), std::pair(row, column));
     }
 }

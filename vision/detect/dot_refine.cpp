@@ -13,8 +13,8 @@
 namespace clothfit {
 namespace {
 
-// Unknowns: centre; the symmetric matrix B with q = B (p - c); the blur's variance as mean, half the
-// difference of x and y, and mixed; contrast; light.
+// Unknowns: centre; the symmetric matrix B with q = B (p - c); the blur's variance as mean, half
+// the difference of x and y, and mixed; contrast; light.
 constexpr int kDotCentre = 0;
 constexpr int kDotInverse = 2;
 constexpr int kDotBlur = 5;
@@ -77,8 +77,8 @@ void keep_blur_positive(DotUnknowns& unknowns) {
 /// Returns the symmetric B with B^-2 = shape; the root of a 2 x 2 matrix in closed form.
 Eigen::Matrix2d inverse_root(const Eigen::Matrix2d& shape_px2) {
   const double root = std::sqrt(std::max(shape_px2.determinant(), 1e-12));
-  const Eigen::Matrix2d a = (shape_px2 + root * Eigen::Matrix2d::Identity()) /
-                            std::sqrt(shape_px2.trace() + 2 * root);
+  const Eigen::Matrix2d a =
+      (shape_px2 + root * Eigen::Matrix2d::Identity()) / std::sqrt(shape_px2.trace() + 2 * root);
   return a.inverse();
 }
 
@@ -130,7 +130,7 @@ DotWindow gather_pixels(const cv::Mat& grey, const DotOutline& outline, double b
 
 /// Sets residuals, slopes and derivatives. The derivative of d by A leaves out how |grad |q||
 /// changes, which vanishes on the outline; c is not affected, as the rest is even about it.
-void evaluate(const DotWindow& window, double light_scale_px, DotModel& model) {
+void evaluate_dot(const DotWindow& window, double light_scale_px, DotModel& model) {
   const DotUnknowns& now = model.unknowns;
   const Eigen::Matrix2f b = inverse_map(now).cast<float>();
   const Eigen::Matrix2f spread = blur_px2(now).cast<float>();
@@ -143,14 +143,16 @@ void evaluate(const DotWindow& window, double light_scale_px, DotModel& model) {
   const PixelValues inverse_length = square.rsqrt();
   const PixelValues ex = qx * inverse_length, ey = qy * inverse_length;
   PixelValues nx = b(0, 0) * ex + b(0, 1) * ey, ny = b(0, 1) * ex + b(1, 1) * ey;
-  const PixelValues inverse_gradient = (nx.square() + ny.square()).rsqrt();
+  // A pixel right on the centre has no direction; whatever it gets is inside.
+  const PixelValues inverse_gradient = (nx.square() + ny.square()).max(1e-10F).rsqrt();
   nx *= inverse_gradient;
   ny *= inverse_gradient;
   // The blur across the normal in units of q; for a circle that of q itself.
   const float across = 0.5F * (b * spread * b).trace();
-  const PixelValues inverse_blur = (spread(0, 0) * nx.square() + 2 * spread(0, 1) * nx * ny +
-                                    spread(1, 1) * ny.square())
-                                       .rsqrt();
+  const PixelValues inverse_blur =
+      (spread(0, 0) * nx.square() + 2 * spread(0, 1) * nx * ny + spread(1, 1) * ny.square())
+          .max(1e-4F)
+          .rsqrt();
   const PixelValues radius = (square + across).sqrt();
   const PixelValues distance = (radius - 1) * inverse_gradient * inverse_blur;  // in blurs
   // Phi and its density by one exponential [abramowitz1964, 7.1.26]; errors below 1e-6.
@@ -204,7 +206,7 @@ float middle_of(std::vector<float>& values) {
 
 /// Weighs the residuals as vision/detect/tag_refine.cpp does: variance = noise^2 + (roughness *
 /// slope)^2, both from medians, and a Cauchy loss on top.
-void weigh(DotModel& model, std::vector<float>& flat, std::vector<float>& rough) {
+void weigh_dot(DotModel& model, std::vector<float>& flat, std::vector<float>& rough) {
   const float steepest = model.slope.maxCoeff();
   flat.clear();
   rough.clear();
@@ -246,7 +248,7 @@ DotPrior prior_about(const DotUnknowns& start) {
   DotUnknowns sd;
   sd.segment<2>(kDotCentre).setConstant(1 / inverse);
   sd.segment<3>(kDotInverse).setConstant(0.5 * inverse);
-  sd[kDotBlur] = 3;                            // px^2
+  sd[kDotBlur] = 3;                              // px^2
   sd.segment<2>(kDotBlur + 1).setConstant(1.5);  // px^2
   sd[kDotContrast] = 0.3 * (1 + std::abs(start[kDotContrast]));
   sd.segment<3>(kDotLight).setConstant(0.5 * paper);
@@ -266,16 +268,18 @@ struct DotStep {
 
   /// Says whether the outline is near enough for its window to be gathered.
   bool near() const { return shape < 0.2; }
-  bool settled() const { return centre_px < std::max(0.15 * centre_sigma_px, 0.001) && shape < 0.03; }
+  bool settled() const {
+    return centre_px < std::max(0.15 * centre_sigma_px, 0.001) && shape < 0.03;
+  }
 };
 
 /// Adds one step to the unknowns, shortened where it goes beyond what is nearly linear.
-DotStep step(const DotPrior& prior, DotModel& model, DotNormal& covariance) {
+DotStep take_step(const DotPrior& prior, DotModel& model, DotNormal& covariance) {
   const PixelValues root = model.weight.sqrt();
   const PixelRows whitened = model.jacobian.colwise() * root;
   const auto rows = whitened.matrix();
-  DotNormal information =
-      rows.transpose().lazyProduct(rows).eval().cast<double>() + DotNormal(prior.precision.asDiagonal());
+  DotNormal information = rows.transpose().lazyProduct(rows).eval().cast<double>() +
+                          DotNormal(prior.precision.asDiagonal());
   const DotUnknowns gradient =
       (rows.transpose() * (root * model.residual).matrix()).cast<double>() -
       prior.precision.cwiseProduct(model.unknowns - prior.mean);
@@ -404,9 +408,9 @@ Dot refine_dot(const cv::Mat& grey, const DotStart& start) {
       model.unknowns[kDotLight] += shift.dot(model.unknowns.segment<2>(kDotLight + 1)) / scale_px;
       regathered = true;
     }
-    evaluate(window, scale_px, model);
-    weigh(model, flat, rough);
-    moved = step(prior, model, covariance);
+    evaluate_dot(window, scale_px, model);
+    weigh_dot(model, flat, rough);
+    moved = take_step(prior, model, covariance);
     constexpr double kNoDot = 100;  // px^2
     if (!model.unknowns.allFinite() || model.unknowns[kDotBlur] > kNoDot ||
         inverse_map(model.unknowns).determinant() <= 0)
@@ -418,8 +422,7 @@ Dot refine_dot(const cv::Mat& grey, const DotStart& start) {
   dot.outline.centre_px = window.origin_px + model.unknowns.segment<2>(kDotCentre);
   // Blurring light that varies times a disc moves the disc by the variance times the light's
   // relative slope.
-  dot.outline.centre_px += blur_px2(model.unknowns) *
-                           model.unknowns.segment<2>(kDotLight + 1) /
+  dot.outline.centre_px += blur_px2(model.unknowns) * model.unknowns.segment<2>(kDotLight + 1) /
                            (scale_px * model.unknowns[kDotLight]);
   dot.blur_px2 = blur_px2(model.unknowns);
   dot.blur_px = std::sqrt(model.unknowns[kDotBlur]);
@@ -432,7 +435,10 @@ Dot refine_dot(const cv::Mat& grey, const DotStart& start) {
   dot.misfit = std::sqrt(static_cast<double>(model.residual.square().mean())) / step_levels;
   measure_waves(window, model, dot);
   dot.steps = steps;
-  if (moved.settled()) dot.doubt = DotDoubt::none;
+  if (moved.settled())
+    dot.doubt = DotDoubt::none;
+  else if (window.cut_by_border)
+    dot.doubt = DotDoubt::border;
   return dot;
 }
 

@@ -10,7 +10,8 @@ namespace clothfit {
 /// A dot's outline: the points c + A u with |u| = 1, whose `shape_px2` is A A^T. For a circle it is
 /// the squared radius times the identity.
 struct DotOutline {
-  Eigen::Vector2d centre_px = Eigen::Vector2d::Zero();  ///< pixel (0, 0): centre of the top left one
+  Eigen::Vector2d centre_px =
+      Eigen::Vector2d::Zero();  ///< pixel (0, 0): centre of the top left one
   Eigen::Matrix2d shape_px2 = Eigen::Matrix2d::Identity();  ///< symmetric, positive definite
 
   /// Semi-axes, the smaller first.
@@ -37,18 +38,18 @@ struct Dot {
   /// (`scale_covariances` in vision/detect/dot_detector.h).
   Eigen::Matrix2d covariance_px2 = Eigen::Matrix2d::Zero();
   Eigen::Matrix2d blur_px2 = Eigen::Matrix2d::Zero();  ///< covariance of the blur
-  double blur_px = 0;       ///< root of its mean variance per direction
-  double paper_levels = 0;  ///< grey level around it
+  double blur_px = 0;                                  ///< root of its mean variance per direction
+  double paper_levels = 0;                             ///< grey level around it
   double contrast = 0;      ///< share of the paper's light that the dot lacks; negative: bright dot
   double explained = 0;     ///< mean robust weight of its pixels; about 0.9 is all
   double noise_levels = 0;  ///< standard deviation of a pixel where the picture is flat
   double misfit = 0;        ///< rms residual of its pixels over the step from paper to dot
 
-  double waves_px = 0;      ///< size of the outline's waves with 3 to 5 periods; 0: an ellipse
+  double waves_px = 0;  ///< size of the outline's waves with 3 to 5 periods; 0: an ellipse
   /// Half the square of the waves with 3, 4 and 5 periods over their variance if pixels err
   /// independently.
   std::array<double, 3> waves_chi2{};
-  int steps = 0;            ///< of the fit
+  int steps = 0;  ///< of the fit
 
   bool good() const { return doubt == DotDoubt::none; }
   /// One standard deviation per coordinate.

@@ -96,7 +96,8 @@ SheetPrint::SheetPrint(const MarkerSet& markers, double width_m, double height_m
       add_tags(markers);
       return;
     case MarkerKind::dots:
-      if (std::ranges::any_of(markers.markers, [](const Marker& marker) { return marker.tag.has_value(); }))
+      if (std::ranges::any_of(markers.markers,
+                              [](const Marker& marker) { return marker.tag.has_value(); }))
         add_tags(markers);
       add_dots(markers);
       return;

@@ -15,7 +15,7 @@ struct PrintOptions {
   /// > 0; radius of each marker's disc, as a pattern has them (vision/detect/dot_pattern.h). Empty:
   /// all have `dot_radius_m`. Those of tags' corners are not used.
   std::vector<double> dot_radii_m;
-  void validate() const;       ///< throws InputError
+  void validate() const;  ///< throws InputError
 };
 
 /// The printed side of a sheet, as reflectance over material coordinates (s to the right, t down,

@@ -169,9 +169,10 @@ double shape_ratio(const Eigen::Matrix2d& a_px2, const Eigen::Matrix2d& b_px2) {
   const double determinant = b_px2.determinant();
   if (!(determinant > 0)) return kNoRatio;
   // Eigenvalues of b^-1 a: squared ratios along the axes that both have in common.
-  const double mean = 0.5 * (b_px2(1, 1) * a_px2(0, 0) + b_px2(0, 0) * a_px2(1, 1) -
-                             2 * b_px2(0, 1) * a_px2(0, 1)) /
-                      determinant;
+  const double mean =
+      0.5 *
+      (b_px2(1, 1) * a_px2(0, 0) + b_px2(0, 0) * a_px2(1, 1) - 2 * b_px2(0, 1) * a_px2(0, 1)) /
+      determinant;
   const double product = a_px2.determinant() / determinant;
   const double half = std::sqrt(std::max(mean * mean - product, 0.0));
   if (!(mean - half > 0)) return kNoRatio;
@@ -234,9 +235,8 @@ void for_each_link(const DotLayout& layout, const PlacedDots& placed, double sca
     if (apart > kLinkReach) return;
     const std::optional<Dot>& neighbour = placed.dots[static_cast<size_t>(other)];
     if (!neighbour) continue;
-    each(other, is_linked({.dot = &dot, .radius = scale * here.size},
-                          neighbour->outline.centre_px, apart,
-                          {.dot = &*neighbour, .radius = scale * there.size}));
+    each(other, is_linked({.dot = &dot, .radius = scale * here.size}, neighbour->outline.centre_px,
+                          apart, {.dot = &*neighbour, .radius = scale * there.size}));
   }
 }
 

@@ -38,7 +38,8 @@ DotLayout blank_lattice(int half) {
 /// The four dots around one, to the right, down, left and up in some turn.
 struct Cross {
   std::array<size_t, 4> arm{};
-  double evenness = 0;  ///< 0: opposite arms are equal and the two pairs upright in the dot's metric
+  double evenness =
+      0;  ///< 0: opposite arms are equal and the two pairs upright in the dot's metric
 };
 
 /// Finds the cross of a dot: of its nearest dots, in the metric of its own outline, four that lie
@@ -55,8 +56,7 @@ std::optional<Cross> cross_around(const std::vector<Dot>& dots, size_t middle) {
   if (near.size() < kArms) return std::nullopt;
   std::partial_sort(near.begin(), near.begin() + kArms, near.end());
   std::array<Eigen::Vector2d, kArms> way;
-  for (size_t k = 0; k < kArms; ++k)
-    way[k] = dots[near[k].second].outline.centre_px - centre;
+  for (size_t k = 0; k < kArms; ++k) way[k] = dots[near[k].second].outline.centre_px - centre;
   const auto turn = [](const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
     return a.x() * b.y() - a.y() * b.x();
   };
@@ -70,13 +70,12 @@ std::optional<Cross> cross_around(const std::vector<Dot>& dots, size_t middle) {
   if (turn(way[0], way[sides[0]]) < 0) std::swap(sides[0], sides[1]);
   const double length = way[0].norm() + way[opposite].norm();
   const double width = way[sides[0]].norm() + way[sides[1]].norm();
-  Cross cross{.arm = {near[0].second, near[sides[0]].second, near[opposite].second,
-                      near[sides[1]].second}};
+  Cross cross{
+      .arm = {near[0].second, near[sides[0]].second, near[opposite].second, near[sides[1]].second}};
   const Eigen::Vector2d x = way[0] - way[opposite], y = way[sides[0]] - way[sides[1]];
   cross.evenness = (way[0] + way[opposite]).norm() / length +
                    (way[sides[0]] + way[sides[1]]).norm() / width +
-                   std::abs(x.dot(metric * y)) /
-                       std::sqrt(x.dot(metric * x) * y.dot(metric * y)) +
+                   std::abs(x.dot(metric * y)) / std::sqrt(x.dot(metric * x) * y.dot(metric * y)) +
                    std::abs(std::log(x.dot(metric * x) / y.dot(metric * y)));
   return cross;
 }
@@ -110,8 +109,7 @@ std::vector<int> read_symbols(const DotLayout& lattice, const PlacedDots& placed
     constexpr double kSure = 0.1;
     if (map.neighbours < 4 || map.sigma > kSure) continue;
     const double cell = std::abs(map.jacobian_px.determinant());
-    symbols[i] =
-        nearest_dot_symbol(std::sqrt(placed.dots[i]->outline.area_px2() / (M_PI * cell)));
+    symbols[i] = nearest_dot_symbol(std::sqrt(placed.dots[i]->outline.area_px2() / (M_PI * cell)));
   }
   return symbols;
 }

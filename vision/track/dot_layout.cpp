@@ -87,8 +87,7 @@ struct MapEquations {
     constexpr double kNear = 0.02;   // spacings; what a dot's place errs
     constexpr double kThird = 0.01;  // spacings at a distance of one, by third derivatives
     const double distance = from_site.norm();
-    const double variance =
-        kNear * kNear + length_squared(kThird * distance * distance * distance);
+    const double variance = kNear * kNear + length_squared(kThird * distance * distance * distance);
     const Quadratic terms = quadratic(from_site);
     information += terms * terms.transpose() / variance;
     sums += terms * place_px.transpose() / variance;

@@ -55,7 +55,8 @@ struct LocalMap {
 
 /// Fits the map to the neighbours that are placed, and to the site itself where `with_site`. The
 /// prior says that second derivatives are some 0.4 spacings per spacing^2; each neighbour's error
-/// grows with the cube of its distance, which is what third derivatives do. sigma accounts for both.
+/// grows with the cube of its distance, which is what third derivatives do. sigma accounts for
+/// both.
 LocalMap fit_local_map(const DotLayout& layout, int site, const SitePlaces& places, bool with_site);
 
 }  // namespace clothfit

@@ -19,18 +19,6 @@
 namespace clothfit {
 namespace {
 
-/// Where a site was seen last.
-struct SiteHistory {
-  std::optional<Dot> last;                   ///< in the picture before
-  std::optional<Eigen::Vector2d> before_px;  ///< its centre one picture earlier
-};
-
-/// A dot sought where its neighbours expect it, and not taken.
-struct Attempt {
-  LocalMap map;
-  Dot dot;
-};
-
 /// Moves an outline to the middle of what is darker (brighter) than half way around it.
 void centre_on_dark(const cv::Mat& grey, double half_level, bool bright, DotOutline& outline) {
   const Eigen::Vector2d reach =
@@ -95,14 +83,25 @@ class DotTracker::Follower {
   DotFrame next(const cv::Mat& grey);
 
  private:
+  /// Where a site was seen last.
+  struct SiteHistory {
+    std::optional<Dot> last;                   ///< in the picture before
+    std::optional<Eigen::Vector2d> before_px;  ///< its centre one picture earlier
+  };
+  /// A dot sought where its neighbours expect it, and not taken.
+  struct Attempt {
+    LocalMap map;
+    Dot dot;
+  };
   /// The picture's own working set.
   struct Working {
-    explicit Working(size_t sites) : placed(sites), reason(sites, nullptr), attempt(sites), followed(sites) {}
+    explicit Working(size_t sites)
+        : placed(sites), reason(sites, nullptr), attempt(sites), followed(sites) {}
     PlacedDots placed;
     DotScale scale;
     bool mirrored = false;  ///< the sheet appears as in a mirror
     std::vector<TagDetection> tags;
-    std::vector<const char*> reason;  ///< by site; null: not known
+    std::vector<const char*> reason;              ///< by site; null: not known
     std::vector<std::optional<Attempt>> attempt;  ///< by site, the last one
     std::vector<bool> followed;                   ///< by site: from the picture before
   };
@@ -234,8 +233,7 @@ void DotTracker::Follower::find_tags_nearby(const cv::Mat& grey, Working& workin
     constexpr int kFewest = 12;  // px; no tag is read in less
     if (window.width < kFewest || window.height < kFewest) continue;
     for (TagDetection found : tag_detector_->detect(grey(window))) {
-      for (Eigen::Vector2d& corner : found.corner_px)
-        corner += Eigen::Vector2d(window.x, window.y);
+      for (Eigen::Vector2d& corner : found.corner_px) corner += Eigen::Vector2d(window.x, window.y);
       if (found.id == tag) working.tags.push_back(found);
     }
   }
@@ -305,10 +303,10 @@ int DotTracker::Follower::complete_once(const cv::Mat& grey, Working& working,
         fit_local_map(layout_, static_cast<int>(site), working.placed.places, false);
     constexpr double kSure = 0.45;
     if (map.neighbours < 3 || map.sigma > kSure) return;
-    DotStart start{.outline = {.centre_px = map.place_px,
-                               .shape_px2 = expected_shape_px2(
-                                   map, *working.scale.radius * here.size)},
-                   .blur_px = blur_px};
+    DotStart start{
+        .outline = {.centre_px = map.place_px,
+                    .shape_px2 = expected_shape_px2(map, *working.scale.radius * here.size)},
+        .blur_px = blur_px};
     start.outline.shape_px2.diagonal().array() += 0.25;
     for (const int other : here.neighbours)
       if (working.placed.dots[static_cast<size_t>(other)]) {
@@ -356,12 +354,12 @@ void DotTracker::Follower::leave_out_unanchored(Working& working) const {
   working.scale = measure_dot_scale(layout_, working.placed);
   if (!working.scale.radius) return;
   std::vector<int> doubtful;
-  const std::vector<bool> right = pattern_ ? sites_of_their_size(working)
-                                           : std::vector<bool>(size(), true);
+  const std::vector<bool> right =
+      pattern_ ? sites_of_their_size(working) : std::vector<bool>(size(), true);
   for (size_t site = 0; site < size(); ++site)
     if (working.placed.dots[site] &&
-        (!right[site] || !has_links(layout_, working.placed, working.scale,
-                                    static_cast<int>(site), *working.placed.dots[site])))
+        (!right[site] || !has_links(layout_, working.placed, working.scale, static_cast<int>(site),
+                                    *working.placed.dots[site])))
       doubtful.push_back(static_cast<int>(site));
   for (const int site : doubtful) {
     working.placed.remove(site);
@@ -438,7 +436,8 @@ const char* DotTracker::Follower::why_missing(const cv::Mat& grey, const Working
     // Cloth that is known to be elsewhere appears in its place.
     const double apart = (*working.placed.places[other] - at).norm();
     const double on_cloth = (layout_.sites[other].place_m - here.place_m).norm();
-    if (apart < 0.7 * std::sqrt(std::abs(area)) * map.scale_px && on_cloth > 1.6 * layout_.spacing_m)
+    if (apart < 0.7 * std::sqrt(std::abs(area)) * map.scale_px &&
+        on_cloth > 1.6 * layout_.spacing_m)
       return dot_missing::kHidden;
   }
   if (!working.attempt[site]) return dot_missing::kCovered;
@@ -489,7 +488,9 @@ DotFrame DotTracker::Follower::report(const Working& working) const {
       continue;
     }
     const Dot& dot = *working.placed.dots[site];
-    DotRow row{.marker = here.marker, .pixel_px = dot.outline.centre_px, .sigma_px = sigma_factor * dot.sigma_px()};
+    DotRow row{.marker = here.marker,
+               .pixel_px = dot.outline.centre_px,
+               .sigma_px = sigma_factor * dot.sigma_px()};
     const LocalMap map =
         fit_local_map(layout_, static_cast<int>(site), working.placed.places, true);
     if (map.neighbours >= 4 && working.scale.radius) {
@@ -548,8 +549,7 @@ DotFrame DotTracker::Follower::next(const cv::Mat& grey) {
 
 void DotTrackOptions::validate() const {
   detector.validate();
-  if (!(cut_ratio > 1))
-    throw InputError("cut_ratio", fmt::format("{}", cut_ratio), "a ratio, > 1");
+  if (!(cut_ratio > 1)) throw InputError("cut_ratio", fmt::format("{}", cut_ratio), "a ratio, > 1");
   if (!(cut_shape_ratio > 1))
     throw InputError("cut_shape_ratio", fmt::format("{}", cut_shape_ratio), "a ratio, > 1");
 }

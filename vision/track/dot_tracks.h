@@ -37,17 +37,17 @@ struct DotTrackOptions {
 
 /// A dot of the sheet in one picture.
 struct DotRow {
-  int marker = 0;  ///< index into the markers
+  int marker = 0;                                      ///< index into the markers
   Eigen::Vector2d pixel_px = Eigen::Vector2d::Zero();  ///< of the printed centre
   double sigma_px = 0;                                 ///< one standard deviation per coordinate
 };
 
 /// What one picture shows of a sheet of dots.
 struct DotFrame {
-  std::vector<DotRow> dots;                            ///< sorted by marker
-  std::vector<TagDetection> tags;                      ///< of the sheet's anchors, and others seen
-  std::vector<std::pair<int, const char*>> missing;    ///< marker and reason, sorted by marker
-  bool searched_whole = false;                         ///< the whole picture was searched
+  std::vector<DotRow> dots;                          ///< sorted by marker
+  std::vector<TagDetection> tags;                    ///< of the sheet's anchors, and others seen
+  std::vector<std::pair<int, const char*>> missing;  ///< marker and reason, sorted by marker
+  bool searched_whole = false;                       ///< the whole picture was searched
 
   std::map<std::string, int> missing_counts() const;
 };

@@ -19,6 +19,7 @@
 #include "vision/track/overlay.h"
 #include "vision/track/tag_history.h"
 #include "vision/track/what_appears.h"
+#include "vision/track/track_dots.h"
 
 namespace clothfit {
 namespace {
@@ -270,6 +271,8 @@ TrackResult track(const Recording& recording, const CameraEntry& camera,
 TrackResult track(const Recording& recording, ImageSource& pictures, const std::string& where,
                   const TrackOptions& options, const ProgressCallback& progress) {
   options.validate();
+  if (recording.markers.kind == MarkerKind::dots)
+    return track_dots(recording, pictures, where, options, progress);
   const PointsByTag markers =
       points_by_tag(recording.markers.markers, recording.markers_file.string());
   if (markers.empty())

@@ -1,46 +1,17 @@
 #pragma once
 
-#include <filesystem>
-#include <map>
-#include <opencv2/core.hpp>
 #include <string>
-#include <vector>
 
-#include "data/finding.h"
 #include "data/progress.h"
 #include "data/recording.h"
-#include "data/tracks.h"
 #include "vision/ingest/image_source.h"
 #include "vision/track/track_options.h"
+#include "vision/track/track_result.h"
 
 namespace clothfit {
 
-/// The mean place of a fixed reference point over all frames that show it.
-struct ReferencePixel {
-  int point = 0;  ///< index into Recording::reference
-  Eigen::Vector2d pixel_px = Eigen::Vector2d::Zero();
-  double sigma_px = 0;  ///< of the mean, systematic part of one detection included
-  int frames = 0;
-};
-
-struct TrackResult {
-  bool usable = false;
-  bool cancelled = false;
-  std::string message;
-  Tracks2d tracks;  ///< good and rejected rows of the cloth's markers
-  std::vector<ReferencePixel> reference;
-  Findings footage;  ///< what the pictures' files and the pictures themselves show to be wrong
-  int frames = 0;    ///< up to the last one that has a picture
-  int image_width = 0;
-  int image_height = 0;
-  std::map<std::string, int> rejected;  ///< reason (vision/track/rejection.h) -> rows of `tracks`
-  /// Expected and in no row: reason (vision/track/missing_markers.h) -> markers times frames.
-  std::map<std::string, int> missing;
-  cv::Mat overlay;  ///< one frame with its markers drawn, for the report
-  int overlay_frame = 0;
-};
-
-/// Finds the cloth's tags in every picture of one camera. They are the markers and reference points
+/// Finds the cloth's tags in every picture of one camera, or its dots and their anchor tags
+/// (track_dots.h) where the markers are of that kind. Tags are the markers and reference points
 /// that carry a tag and a corner. Pictures are worked on in parallel; the result does not depend on
 /// the number of threads. `progress` (may be empty) is called once per picture, in order, by one
 /// thread at a time but not always the same. Throws InputError for pictures that cannot be read,

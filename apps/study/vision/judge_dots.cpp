@@ -17,11 +17,9 @@ constexpr double kFalse_px = 3;  // a row further away is another dot's
 
 std::vector<TrueSighting> read_true_sightings(const std::filesystem::path& file,
                                               const MarkerSet& markers) {
-  const CsvTable table(file, {{.name = "frame"},
-                              {.name = "marker"},
-                              {.name = "u"},
-                              {.name = "v"},
-                              {.name = "visible"}});
+  const CsvTable table(
+      file,
+      {{.name = "frame"}, {.name = "marker"}, {.name = "u"}, {.name = "v"}, {.name = "visible"}});
   std::vector<TrueSighting> truth;
   for (int row = 0; row < table.rows(); ++row) {
     const std::string name = table.name(row, 1);

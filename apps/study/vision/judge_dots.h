@@ -30,7 +30,7 @@ struct DotJudgement {
   int invisible_reported = 0;  ///< rows of markers that the camera does not see
   double median_px = 0;        ///< of the distances of the found ones
   double percentile95_px = 0;
-  double rms_px = 0;           ///< per coordinate
+  double rms_px = 0;                    ///< per coordinate
   double mean_u_px = 0, mean_v_px = 0;  ///< mean offset
   double error_over_sigma = 0;  ///< root of the mean squared coordinate error over sigma squared
   double robust_error_over_sigma = 0;  ///< by the median, 1 for normal errors

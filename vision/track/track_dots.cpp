@@ -1,0 +1,159 @@
+#include "vision/track/track_dots.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+
+#include "data/input_error.h"
+#include "vision/detect/fixed_corner.h"
+#include "vision/track/dot_tracks.h"
+#include "vision/track/overlay.h"
+#include "vision/track/tag_history.h"
+
+namespace clothfit {
+namespace {
+
+/// What the pictures of one camera show, by kind.
+struct DotReadings {
+  Tracks2d dots;
+  std::map<int, TagHistory> tags;
+  std::map<std::string, int> missing;
+  cv::Mat overlay_picture;
+  int overlay_frame = 0;
+  cv::Size size;
+  int frames = 0;
+  bool cancelled = false;
+};
+
+void add_frame(const DotFrame& frame, int number, DotReadings& readings) {
+  for (const DotRow& row : frame.dots)
+    readings.dots.push_back({.frame = number,
+                             .marker = row.marker,
+                             .position_px = row.pixel_px,
+                             .sigma_px = row.sigma_px,
+                             .rejected = ""});
+  for (const TagDetection& tag : frame.tags)
+    readings.tags[tag.id].push_back({.frame = number, .tag = tag, .rejected = {}});
+  for (const auto& [reason, count] : frame.missing_counts()) readings.missing[reason] += count;
+}
+
+DotReadings read_dots(DotTracker& tracker, ImageSource& pictures,
+                      const ProgressCallback& progress) {
+  DotReadings readings;
+  cv::Mat grey;
+  while (!readings.cancelled && pictures.next(grey)) {
+    const int number = readings.frames++;
+    readings.size = grey.size();
+    const DotFrame frame = tracker.next(grey);
+    add_frame(frame, number, readings);
+    if (number == 0 || number == pictures.count() / 2) {
+      readings.overlay_picture = grey.clone();
+      readings.overlay_frame = number;
+    }
+    const Progress report{.stage = "track",
+                          .done = static_cast<double>(readings.frames),
+                          .total = static_cast<double>(pictures.count()),
+                          .unit = "frames",
+                          .note = fmt::format("{} dots", frame.dots.size())};
+    if (progress && !progress(report)) readings.cancelled = true;
+  }
+  return readings;
+}
+
+/// Adds the corners of anchor tags to the rows.
+void add_tag_rows(const DotReadings& readings, const std::vector<Marker>& markers,
+                  Tracks2d& tracks) {
+  for (size_t i = 0; i < markers.size(); ++i) {
+    if (!markers[i].tag || !markers[i].corner) continue;
+    const auto history = readings.tags.find(*markers[i].tag);
+    if (history == readings.tags.end()) continue;
+    const auto corner = static_cast<size_t>(*markers[i].corner);
+    for (const TagReading& reading : history->second)
+      tracks.push_back({.frame = reading.frame,
+                        .marker = static_cast<int>(i),
+                        .position_px = reading.tag.corner_px[corner],
+                        .sigma_px = reading.tag.sigma_px[corner],
+                        .rejected = reading.rejected[corner]});
+  }
+  std::sort(tracks.begin(), tracks.end(), [](const Position2d& a, const Position2d& b) {
+    return a.frame != b.frame ? a.frame < b.frame : a.marker < b.marker;
+  });
+}
+
+std::vector<ReferencePixel> average_references(const DotReadings& readings,
+                                               const std::vector<ReferencePoint>& points) {
+  std::vector<ReferencePixel> result;
+  for (size_t i = 0; i < points.size(); ++i) {
+    if (!points[i].tag || !points[i].corner) continue;
+    const auto history = readings.tags.find(*points[i].tag);
+    if (history == readings.tags.end()) continue;
+    const auto corner = static_cast<size_t>(*points[i].corner);
+    std::vector<Eigen::Vector2d> pixels;
+    std::vector<double> sigmas;
+    for (const TagReading& reading : history->second) {
+      if (!reading.rejected[corner].empty()) continue;
+      pixels.push_back(reading.tag.corner_px[corner]);
+      sigmas.push_back(reading.tag.sigma_px[corner]);
+    }
+    if (pixels.empty()) continue;
+    const FixedCorner mean = average_fixed_corner(pixels, sigmas);
+    result.push_back({.point = static_cast<int>(i),
+                      .pixel_px = mean.pixel_px,
+                      .sigma_px = mean.sigma_px,
+                      .frames = mean.frames});
+  }
+  return result;
+}
+
+cv::Mat draw_rows(const DotReadings& readings, const TrackResult& result) {
+  std::vector<OverlayPoint> points;
+  for (const ReferencePixel& pixel : result.reference)
+    points.push_back(
+        {.kind = OverlayPoint::Kind::reference, .pixel_px = pixel.pixel_px, .label = ""});
+  for (const Position2d& row : result.tracks)
+    if (row.frame == readings.overlay_frame)
+      points.push_back(
+          {.kind = row.rejected.empty() ? OverlayPoint::Kind::good : OverlayPoint::Kind::rejected,
+           .pixel_px = row.position_px,
+           .label = row.rejected});
+  return draw_overlay(readings.overlay_picture, points);
+}
+
+}  // namespace
+
+TrackResult track_dots(const Recording& recording, ImageSource& pictures, const std::string& where,
+                       const TrackOptions& options, const ProgressCallback& progress) {
+  DotTracker tracker(recording.markers, recording.markers_file.string());
+  DotReadings readings = read_dots(tracker, pictures, progress);
+  TrackResult result;
+  result.frames = readings.frames;
+  result.image_width = readings.size.width;
+  result.image_height = readings.size.height;
+  if (readings.cancelled) {
+    result.cancelled = true;
+    result.message = fmt::format("cancelled after {} frames", readings.frames);
+    return result;
+  }
+  if (readings.dots.empty())
+    throw InputError(where,
+                     fmt::format("no dot of the cloth is named in {} pictures", readings.frames),
+                     "dots 4 px wide or more, and an anchor tag or the printed pattern among them");
+  for (auto& [id, history] : readings.tags) judge(history, options, readings.size);
+  result.tracks = std::move(readings.dots);
+  const size_t dots = result.tracks.size();
+  add_tag_rows(readings, recording.markers.markers, result.tracks);
+  result.reference = average_references(readings, recording.reference);
+  for (const Position2d& row : result.tracks)
+    if (!row.rejected.empty()) ++result.rejected[row.rejected];
+  int missing = 0;
+  for (const auto& [reason, count] : readings.missing) missing += count;
+  result.missing = std::move(readings.missing);
+  result.overlay = draw_rows(readings, result);
+  result.overlay_frame = readings.overlay_frame;
+  result.usable = true;
+  result.message = fmt::format("{} dots and {} corners in {} frames, {} dots not found", dots,
+                               result.tracks.size() - dots, result.frames, missing);
+  return result;
+}
+
+}  // namespace clothfit
