@@ -18,8 +18,8 @@
 #include "vision/track/missing_markers.h"
 #include "vision/track/overlay.h"
 #include "vision/track/tag_history.h"
-#include "vision/track/what_appears.h"
 #include "vision/track/track_dots.h"
+#include "vision/track/what_appears.h"
 
 namespace clothfit {
 namespace {

@@ -7,6 +7,7 @@
 #include "data/input_error.h"
 #include "vision/detect/fixed_corner.h"
 #include "vision/track/dot_tracks.h"
+#include "vision/track/missing_markers.h"
 #include "vision/track/overlay.h"
 #include "vision/track/tag_history.h"
 
@@ -21,7 +22,8 @@ struct DotReadings {
   cv::Mat overlay_picture;
   int overlay_frame = 0;
   cv::Size size;
-  int frames = 0;
+  int frames = 0;  ///< up to the last that has a picture
+  int pictures = 0;
   bool cancelled = false;
 };
 
@@ -37,24 +39,38 @@ void add_frame(const DotFrame& frame, int number, DotReadings& readings) {
   for (const auto& [reason, count] : frame.missing_counts()) readings.missing[reason] += count;
 }
 
-DotReadings read_dots(DotTracker& tracker, ImageSource& pictures,
+/// Counts all dots as missing in the frames that lie between two pictures.
+void add_gap(int from, int to, int dots, DotReadings& readings) {
+  if (to > from) readings.missing[missing::kNoPicture] += dots * (to - from);
+}
+
+DotReadings read_dots(DotTracker& tracker, int dots, ImageSource& pictures,
                       const ProgressCallback& progress) {
   DotReadings readings;
   cv::Mat grey;
   while (!readings.cancelled && pictures.next(grey)) {
-    const int number = readings.frames++;
-    readings.size = grey.size();
-    const DotFrame frame = tracker.next(grey);
-    add_frame(frame, number, readings);
-    if (number == 0 || number == pictures.count() / 2) {
-      readings.overlay_picture = grey.clone();
-      readings.overlay_frame = number;
+    const int number = pictures.frame();
+    add_gap(readings.frames, number, dots, readings);
+    readings.frames = number + 1;
+    ++readings.pictures;
+    size_t found = 0;
+    if (pictures.damage().empty()) {
+      readings.size = grey.size();
+      const DotFrame frame = tracker.next(grey);
+      add_frame(frame, number, readings);
+      found = frame.dots.size();
+      if (readings.pictures <= pictures.count() / 2 + 1) {
+        readings.overlay_picture = grey.clone();
+        readings.overlay_frame = number;
+      }
+    } else {
+      readings.missing[missing::kDamaged] += dots;
     }
     const Progress report{.stage = "track",
-                          .done = static_cast<double>(readings.frames),
+                          .done = static_cast<double>(readings.pictures),
                           .total = static_cast<double>(pictures.count()),
                           .unit = "frames",
-                          .note = fmt::format("{} dots", frame.dots.size())};
+                          .note = fmt::format("{} dots", found)};
     if (progress && !progress(report)) readings.cancelled = true;
   }
   return readings;
@@ -124,8 +140,11 @@ cv::Mat draw_rows(const DotReadings& readings, const TrackResult& result) {
 TrackResult track_dots(const Recording& recording, ImageSource& pictures, const std::string& where,
                        const TrackOptions& options, const ProgressCallback& progress) {
   DotTracker tracker(recording.markers, recording.markers_file.string());
-  DotReadings readings = read_dots(tracker, pictures, progress);
+  const auto sheet_dots = static_cast<int>(std::ranges::count_if(
+      recording.markers.markers, [](const Marker& marker) { return !marker.tag; }));
+  DotReadings readings = read_dots(tracker, sheet_dots, pictures, progress);
   TrackResult result;
+  result.footage = pictures.findings();
   result.frames = readings.frames;
   result.image_width = readings.size.width;
   result.image_height = readings.size.height;
@@ -136,7 +155,7 @@ TrackResult track_dots(const Recording& recording, ImageSource& pictures, const 
   }
   if (readings.dots.empty())
     throw InputError(where,
-                     fmt::format("no dot of the cloth is named in {} pictures", readings.frames),
+                     fmt::format("no dot of the cloth is named in {} pictures", readings.pictures),
                      "dots 4 px wide or more, and an anchor tag or the printed pattern among them");
   for (auto& [id, history] : readings.tags) judge(history, options, readings.size);
   result.tracks = std::move(readings.dots);
