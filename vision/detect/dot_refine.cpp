@@ -45,7 +45,8 @@ struct DotModel {
   PixelValues residual;  ///< grey levels
   PixelValues slope;     ///< of the model, grey levels per px
   PixelValues weight;    ///< inverse variance times robust weight
-  double noise_levels = 0;
+  float noise_levels = 0;
+  float square_roughness = 0;  ///< px^2
   double explained = 0;
 };
 
@@ -204,35 +205,42 @@ float middle_of(std::vector<float>& values) {
   return *middle;
 }
 
-/// Weighs the residuals as vision/detect/tag_refine.cpp does: variance = noise^2 + (roughness *
-/// slope)^2, both from medians, and a Cauchy loss on top.
-void weigh_dot(DotModel& model, std::vector<float>& flat, std::vector<float>& rough) {
+/// Estimates the noise from medians over the dot's pixels: of flat ones, and of steep ones by
+/// slope.
+void estimate_noise(DotModel& model) {
   const float steepest = model.slope.maxCoeff();
-  flat.clear();
-  rough.clear();
+  std::vector<float> flat, rough;
+  flat.reserve(static_cast<size_t>(model.residual.size()));
+  rough.reserve(flat.capacity());
   float square_slopes = 0;
   for (Eigen::Index i = 0; i < model.residual.size(); ++i) {
-    if (model.slope[i] < 0.1F * steepest) flat.push_back(std::abs(model.residual[i]));
-    if (model.slope[i] > 0.4F * steepest) {
-      rough.push_back(std::abs(model.residual[i]) / model.slope[i]);
-      square_slopes += 1 / square_of(model.slope[i]);
+    const float slope = model.slope[i];
+    if (slope < 0.1F * steepest) flat.push_back(std::abs(model.residual[i]));
+    if (slope > 0.4F * steepest) {
+      rough.push_back(std::abs(model.residual[i]) / slope);
+      square_slopes += 1 / square_of(slope);
     }
   }
   constexpr float kRounding = 0.3F;  // grey levels; what 8 bits leave
   constexpr auto kSigma = static_cast<float>(kMadToSigma);
-  const float noise = std::max(flat.empty() ? 0 : kSigma * middle_of(flat), kRounding);
-  float square_roughness = 0;
+  model.noise_levels = std::max(flat.empty() ? 0 : kSigma * middle_of(flat), kRounding);
+  model.square_roughness = 0;
   if (!rough.empty())
-    square_roughness =
-        std::max(0.0F, square_of(kSigma * middle_of(rough)) -
-                           square_of(noise) * square_slopes / static_cast<float>(rough.size()));
+    model.square_roughness = std::max(
+        0.0F, square_of(kSigma * middle_of(rough)) -
+                  square_of(model.noise_levels) * square_slopes / static_cast<float>(rough.size()));
+}
+
+/// Weighs the residuals as vision/detect/tag_refine.cpp does: variance = noise^2 + (roughness *
+/// slope)^2, and a Cauchy loss on top.
+void weigh_dot(DotModel& model) {
   constexpr float kCauchy = 3;
-  const PixelValues variance = square_of(noise) + square_roughness * model.slope.square();
+  const PixelValues variance =
+      square_of(model.noise_levels) + model.square_roughness * model.slope.square();
   const PixelValues robust =
       (1 + model.residual.square() / (square_of(kCauchy) * variance)).inverse();
   model.weight = robust / variance;
-  model.noise_levels = noise;
-  model.explained = robust.mean();
+  model.explained = static_cast<double>(robust.mean());
 }
 
 /// Independent normal priors. They are wide, and keep the fit near its start where the picture says
@@ -268,24 +276,38 @@ struct DotStep {
 
   /// Says whether the outline is near enough for its window to be gathered.
   bool near() const { return shape < 0.2; }
+  /// Says whether what is left of the way does not change the noise.
+  bool near_end() const { return centre_px < centre_sigma_px && shape < 0.02; }
   bool settled() const {
     return centre_px < std::max(0.15 * centre_sigma_px, 0.001) && shape < 0.03;
   }
 };
 
-/// Adds one step to the unknowns, shortened where it goes beyond what is nearly linear.
-DotStep take_step(const DotPrior& prior, DotModel& model, DotNormal& covariance) {
+/// Returns J^T W J and the prior's precision.
+DotNormal information_of(const PixelRows& whitened, const DotPrior& prior) {
+  DotNormal information = prior.precision.asDiagonal();
+  for (int i = 0; i < kDotUnknowns; ++i)
+    for (int j = 0; j <= i; ++j)
+      information(i, j) += static_cast<double>((whitened.col(i) * whitened.col(j)).sum());
+  return information;
+}
+
+/// Adds one step to the unknowns, shortened where it goes beyond what is nearly linear. Sets the
+/// covariance of the centre.
+DotStep take_step(const DotPrior& prior, DotModel& model, Eigen::Matrix2d& covariance) {
   const PixelValues root = model.weight.sqrt();
   const PixelRows whitened = model.jacobian.colwise() * root;
-  const auto rows = whitened.matrix();
-  DotNormal information = rows.transpose().lazyProduct(rows).eval().cast<double>() +
-                          DotNormal(prior.precision.asDiagonal());
-  const DotUnknowns gradient =
-      (rows.transpose() * (root * model.residual).matrix()).cast<double>() -
-      prior.precision.cwiseProduct(model.unknowns - prior.mean);
-  const Eigen::LDLT<DotNormal> solver(information);
+  const PixelValues whitened_residual = root * model.residual;
+  DotUnknowns gradient = -prior.precision.cwiseProduct(model.unknowns - prior.mean);
+  for (int i = 0; i < kDotUnknowns; ++i)
+    gradient[i] += static_cast<double>((whitened.col(i) * whitened_residual).sum());
+  const Eigen::LLT<DotNormal> solver(information_of(whitened, prior));
   DotUnknowns change = solver.solve(gradient);
-  covariance = solver.solve(DotNormal::Identity());
+  // The centre comes first among the unknowns.
+  static_assert(kDotCentre == 0);
+  const Eigen::Matrix<double, kDotUnknowns, 2> ends =
+      solver.matrixL().solve(Eigen::Matrix<double, kDotUnknowns, 2>::Identity());
+  covariance = ends.transpose() * ends;
   const Eigen::Matrix2d b = inverse_map(model.unknowns);
   Eigen::Matrix2d db;
   db << change[kDotInverse], change[kDotInverse + 1], change[kDotInverse + 1],
@@ -299,7 +321,7 @@ DotStep take_step(const DotPrior& prior, DotModel& model, DotNormal& covariance)
   model.unknowns += change;
   keep_blur_positive(model.unknowns);
   return {.centre_px = change.segment<2>(kDotCentre).norm(),
-          .centre_sigma_px = std::sqrt(covariance.topLeftCorner<2, 2>().trace() / 2),
+          .centre_sigma_px = std::sqrt(covariance.trace() / 2),
           .shape = std::max(shape, 0.5 * blur)};
 }
 
@@ -335,6 +357,82 @@ void measure_waves(const DotWindow& window, const DotModel& model, Dot& dot) {
   dot.waves_px = std::sqrt(static_cast<double>(squares));
 }
 
+constexpr Eigen::Index kFewestPixels = 3 * kDotUnknowns;
+
+/// Everything that changes while a dot is fitted.
+struct DotFit {
+  DotWindow window;
+  double light_scale_px = 1;
+  DotModel model;
+  DotPrior prior;
+  DotStep moved;
+  Eigen::Matrix2d covariance_px2 = Eigen::Matrix2d::Zero();
+  int steps = 0;
+};
+
+/// Starts from the outline, a round blur, and light from the extremes.
+DotUnknowns start_unknowns(const DotWindow& window, const DotStart& start) {
+  DotUnknowns unknowns = DotUnknowns::Zero();
+  const Eigen::Vector2d centre = start.outline.centre_px - window.origin_px;
+  unknowns.segment<2>(kDotCentre) = centre;
+  const Eigen::Matrix2d b = inverse_root(start.outline.shape_px2);
+  unknowns.segment<3>(kDotInverse) << b(0, 0), b(0, 1), b(1, 1);
+  unknowns[kDotBlur] = start.blur_px * start.blur_px;
+  const double darkest = static_cast<double>(window.grey.minCoeff());
+  const double brightest = static_cast<double>(window.grey.maxCoeff());
+  Eigen::Index middle = 0;
+  ((window.x - static_cast<float>(centre.x())).square() +
+   (window.y - static_cast<float>(centre.y())).square())
+      .minCoeff(&middle);
+  const bool bright = static_cast<double>(window.grey[middle]) > 0.5 * (darkest + brightest);
+  const double paper = std::max(bright ? darkest : brightest, 1.0);
+  unknowns[kDotLight] = paper;
+  unknowns[kDotContrast] = 1 - (bright ? brightest : darkest) / paper;
+  return unknowns;
+}
+
+DotOutline outline_of(const DotFit& fit) {
+  const Eigen::Matrix2d a = inverse_map(fit.model.unknowns).inverse();
+  const Eigen::Vector2d centre = fit.model.unknowns.segment<2>(kDotCentre);
+  return {.centre_px = fit.window.origin_px + centre, .shape_px2 = a * a.transpose()};
+}
+
+/// Lets the window follow the outline.
+void regather(const cv::Mat& grey, DotFit& fit) {
+  DotUnknowns& unknowns = fit.model.unknowns;
+  const Eigen::Vector2d origin = fit.window.origin_px;
+  fit.window = gather_pixels(grey, outline_of(fit), std::sqrt(unknowns[kDotBlur]));
+  const Eigen::Vector2d shift = fit.window.origin_px - origin;
+  unknowns.segment<2>(kDotCentre) -= shift;
+  fit.prior.mean.segment<2>(kDotCentre) -= shift;
+  unknowns[kDotLight] += shift.dot(unknowns.segment<2>(kDotLight + 1)) / fit.light_scale_px;
+}
+
+/// Puts the fit's result into words of the picture.
+void describe(const DotFit& fit, Dot& dot) {
+  const DotUnknowns& unknowns = fit.model.unknowns;
+  dot.outline = outline_of(fit);
+  dot.blur_px2 = blur_px2(unknowns);
+  // Blurring light that varies times a disc moves the disc by the variance times the light's
+  // relative slope.
+  dot.outline.centre_px += dot.blur_px2 * unknowns.segment<2>(kDotLight + 1) /
+                           (fit.light_scale_px * unknowns[kDotLight]);
+  dot.blur_px = std::sqrt(unknowns[kDotBlur]);
+  dot.paper_levels = unknowns[kDotLight];
+  dot.contrast = unknowns[kDotContrast];
+  dot.explained = fit.model.explained;
+  dot.noise_levels = static_cast<double>(fit.model.noise_levels);
+  dot.covariance_px2 = fit.covariance_px2;
+  const double step_levels = std::abs(dot.contrast * dot.paper_levels);
+  dot.misfit = std::sqrt(static_cast<double>(fit.model.residual.square().mean())) / step_levels;
+  measure_waves(fit.window, fit.model, dot);
+  dot.steps = fit.steps;
+  if (fit.moved.settled())
+    dot.doubt = DotDoubt::none;
+  else if (fit.window.cut_by_border)
+    dot.doubt = DotDoubt::border;
+}
+
 }  // namespace
 
 Eigen::Vector2d DotOutline::radii_px() const {
@@ -356,89 +454,33 @@ Dot refine_dot(const cv::Mat& grey, const DotStart& start) {
   Dot dot;
   dot.outline = start.outline;
   dot.blur_px = start.blur_px;
-  DotWindow window = gather_pixels(grey, start.outline, start.blur_px);
-  constexpr Eigen::Index kFewest = 3 * kDotUnknowns;
-  if (window.size() < kFewest) {
-    dot.doubt = window.cut_by_border ? DotDoubt::border : DotDoubt::unsettled;
+  DotFit fit{.window = gather_pixels(grey, start.outline, start.blur_px),
+             .light_scale_px = std::sqrt(start.outline.shape_px2.trace())};
+  if (fit.window.size() < kFewestPixels) {
+    if (fit.window.cut_by_border) dot.doubt = DotDoubt::border;
     return dot;
   }
-
-  DotModel model;
-  const double scale_px = std::sqrt(start.outline.shape_px2.trace());
-  const auto put_outline = [&](const DotOutline& outline) {
-    model.unknowns.segment<2>(kDotCentre) = outline.centre_px - window.origin_px;
-    const Eigen::Matrix2d b = inverse_root(outline.shape_px2);
-    model.unknowns[kDotInverse] = b(0, 0);
-    model.unknowns[kDotInverse + 1] = b(0, 1);
-    model.unknowns[kDotInverse + 2] = b(1, 1);
-  };
-  put_outline(start.outline);
-  model.unknowns[kDotBlur] = start.blur_px * start.blur_px;
-  const double darkest = window.grey.minCoeff(), brightest = window.grey.maxCoeff();
-  const Eigen::Vector2d middle = start.outline.centre_px;
-  const int mu = std::clamp(static_cast<int>(std::lround(middle.x())), 0, grey.cols - 1);
-  const int mv = std::clamp(static_cast<int>(std::lround(middle.y())), 0, grey.rows - 1);
-  const bool bright = grey.at<std::uint8_t>(mv, mu) > 0.5 * (darkest + brightest);
-  const double paper = std::max(bright ? darkest : brightest, 1.0);
-  model.unknowns[kDotLight] = paper;
-  model.unknowns[kDotContrast] = 1 - (bright ? brightest : darkest) / paper;
-
-  DotPrior prior = prior_about(model.unknowns);
+  fit.model.unknowns = start_unknowns(fit.window, start);
+  fit.prior = prior_about(fit.model.unknowns);
 
   constexpr int kMaxSteps = 14;
-  DotNormal covariance;
-  DotStep moved;
-  std::vector<float> flat, rough;
-  int steps = 0;
   bool regathered = false;
-  for (; steps < kMaxSteps && !(moved.settled() && regathered); ++steps) {
-    if (moved.near() && !regathered) {
-      // The window follows the outline once.
-      DotOutline outline;
-      const Eigen::Matrix2d a = inverse_map(model.unknowns).inverse();
-      outline.shape_px2 = a * a.transpose();
-      const Eigen::Vector2d centre = model.unknowns.segment<2>(kDotCentre);
-      outline.centre_px = window.origin_px + centre;
-      const Eigen::Vector2d origin = window.origin_px;
-      window = gather_pixels(grey, outline, std::sqrt(model.unknowns[kDotBlur]));
-      if (window.size() < kFewest) return dot;
-      const Eigen::Vector2d shift = window.origin_px - origin;
-      model.unknowns.segment<2>(kDotCentre) -= shift;
-      prior.mean.segment<2>(kDotCentre) -= shift;
-      model.unknowns[kDotLight] += shift.dot(model.unknowns.segment<2>(kDotLight + 1)) / scale_px;
+  for (; fit.steps < kMaxSteps && !(fit.moved.settled() && regathered); ++fit.steps) {
+    if (fit.moved.near() && !regathered) {
+      regather(grey, fit);
       regathered = true;
+      if (fit.window.size() < kFewestPixels) return dot;
     }
-    evaluate_dot(window, scale_px, model);
-    weigh_dot(model, flat, rough);
-    moved = take_step(prior, model, covariance);
+    evaluate_dot(fit.window, fit.light_scale_px, fit.model);
+    if (!fit.moved.near_end()) estimate_noise(fit.model);
+    weigh_dot(fit.model);
+    fit.moved = take_step(fit.prior, fit.model, fit.covariance_px2);
     constexpr double kNoDot = 100;  // px^2
-    if (!model.unknowns.allFinite() || model.unknowns[kDotBlur] > kNoDot ||
-        inverse_map(model.unknowns).determinant() <= 0)
+    if (!fit.model.unknowns.allFinite() || fit.model.unknowns[kDotBlur] > kNoDot ||
+        inverse_map(fit.model.unknowns).determinant() <= 0)
       return dot;
   }
-
-  const Eigen::Matrix2d a = inverse_map(model.unknowns).inverse();
-  dot.outline.shape_px2 = a * a.transpose();
-  dot.outline.centre_px = window.origin_px + model.unknowns.segment<2>(kDotCentre);
-  // Blurring light that varies times a disc moves the disc by the variance times the light's
-  // relative slope.
-  dot.outline.centre_px += blur_px2(model.unknowns) * model.unknowns.segment<2>(kDotLight + 1) /
-                           (scale_px * model.unknowns[kDotLight]);
-  dot.blur_px2 = blur_px2(model.unknowns);
-  dot.blur_px = std::sqrt(model.unknowns[kDotBlur]);
-  dot.paper_levels = model.unknowns[kDotLight];
-  dot.contrast = model.unknowns[kDotContrast];
-  dot.explained = model.explained;
-  dot.noise_levels = model.noise_levels;
-  dot.covariance_px2 = covariance.topLeftCorner<2, 2>();
-  const double step_levels = std::abs(dot.contrast * dot.paper_levels);
-  dot.misfit = std::sqrt(static_cast<double>(model.residual.square().mean())) / step_levels;
-  measure_waves(window, model, dot);
-  dot.steps = steps;
-  if (moved.settled())
-    dot.doubt = DotDoubt::none;
-  else if (window.cut_by_border)
-    dot.doubt = DotDoubt::border;
+  describe(fit, dot);
   return dot;
 }
 

@@ -1,5 +1,7 @@
 #include "vision/track/dot_identity.h"
 
+#include <tbb/parallel_for.h>
+
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -102,7 +104,7 @@ void Growth::run() {
     placed_.place(site, found_[static_cast<size_t>(match)]);
     constexpr int kSettled = 30;  // dots after which the scale no longer changes much
     if (layout_.sizes_known && ++placed <= kSettled && placed % 5 == 0)
-      scale_ = measure_dot_scale(layout_, placed_);
+      scale_ = measure_dot_scale(layout_, placed_, survey(layout_, placed_));
     for (const int other : layout_.sites[static_cast<size_t>(site)].neighbours) consider(other);
   }
 }
@@ -144,15 +146,23 @@ int PlacedDots::count() const {
       std::ranges::count_if(dots, [](const std::optional<Dot>& dot) { return dot.has_value(); }));
 }
 
-DotScale measure_dot_scale(const DotLayout& layout, const PlacedDots& placed) {
+std::vector<LocalMap> survey(const DotLayout& layout, const PlacedDots& placed) {
+  std::vector<LocalMap> maps(layout.sites.size());
+  tbb::parallel_for(size_t{0}, maps.size(), [&](size_t site) {
+    if (placed.dots[site])
+      maps[site] = fit_local_map(layout, static_cast<int>(site), placed.places, true);
+  });
+  return maps;
+}
+
+DotScale measure_dot_scale(const DotLayout& layout, const PlacedDots& placed,
+                           const std::vector<LocalMap>& maps) {
   std::vector<double> radii;
   for (size_t site = 0; site < layout.sites.size(); ++site) {
-    if (!placed.dots[site]) continue;
-    const LocalMap map = fit_local_map(layout, static_cast<int>(site), placed.places, true);
+    const LocalMap& map = maps[site];
     constexpr double kSure = 0.1;
-    if (map.neighbours < 4 || map.sigma > kSure) continue;
-    const Eigen::Matrix2d& j = map.jacobian_px;
-    const double area = std::abs(j(0, 0) * j(1, 1) - j(0, 1) * j(1, 0));
+    if (!placed.dots[site] || map.neighbours < 4 || map.sigma > kSure) continue;
+    const double area = std::abs(map.jacobian_px.determinant());
     radii.push_back(std::sqrt(placed.dots[site]->outline.area_px2() / (M_PI * area)) /
                     layout.sites[site].size);
   }
@@ -308,7 +318,7 @@ std::vector<int> leave_out_conflicts(const DotLayout& layout, PlacedDots& placed
     if (map.neighbours < 3) return 1e6;
     return gate_distance(map, *placed.places[site]);
   };
-  for (size_t site = 0; site < layout.sites.size(); ++site) conflict[site] = judge(site);
+  tbb::parallel_for(size_t{0}, conflict.size(), [&](size_t site) { conflict[site] = judge(site); });
   while (true) {
     const auto worst = std::max_element(conflict.begin(), conflict.end());
     if (*worst <= 1) return left_out;

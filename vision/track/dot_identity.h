@@ -24,9 +24,13 @@ struct DotScale {
   std::optional<double> radius;
 };
 
+/// Returns the map around each placed dot, itself included; unset for other sites.
+std::vector<LocalMap> survey(const DotLayout& layout, const PlacedDots& placed);
+
 /// Returns the radius of the smallest size of dot in spacings by the median of the placed dots;
 /// nothing with fewer than 5 that have a map around them.
-DotScale measure_dot_scale(const DotLayout& layout, const PlacedDots& placed);
+DotScale measure_dot_scale(const DotLayout& layout, const PlacedDots& placed,
+                           const std::vector<LocalMap>& maps);
 
 /// Returns the squared outline that a dot of `radius` spacings has under a map, px^2.
 Eigen::Matrix2d expected_shape_px2(const LocalMap& map, double radius);

@@ -96,7 +96,7 @@ class DotTracker::Follower {
   /// The picture's own working set.
   struct Working {
     explicit Working(size_t sites)
-        : placed(sites), reason(sites, nullptr), attempt(sites), followed(sites) {}
+        : placed(sites), reason(sites, nullptr), attempt(sites), followed(sites), maps(sites) {}
     PlacedDots placed;
     DotScale scale;
     bool mirrored = false;  ///< the sheet appears as in a mirror
@@ -104,6 +104,7 @@ class DotTracker::Follower {
     std::vector<const char*> reason;              ///< by site; null: not known
     std::vector<std::optional<Attempt>> attempt;  ///< by site, the last one
     std::vector<bool> followed;                   ///< by site: from the picture before
+    std::vector<LocalMap> maps;                   ///< by site, itself included, once all is placed
   };
 
   void search_whole(const cv::Mat& grey, Working& working);
@@ -111,9 +112,10 @@ class DotTracker::Follower {
   void find_tags_nearby(const cv::Mat& grey, Working& working);
   void place_tag_corners(Working& working) const;
   bool tags_agree(const Working& working) const;
-  bool pattern_agrees(const Working& working) const;
+  bool pattern_agrees(Working& working) const;
   void complete(const cv::Mat& grey, Working& working) const;
   int complete_once(const cv::Mat& grey, Working& working, double blur_px) const;
+  DotScale measure(Working& working) const;
   void leave_out_unanchored(Working& working) const;
   std::vector<bool> anchored_sites(const Working& working) const;
   std::vector<bool> sites_of_their_size(const Working& working) const;
@@ -132,6 +134,7 @@ class DotTracker::Follower {
   std::optional<DotPattern> pattern_;
   std::optional<DotPatternIndex> index_;
   std::vector<SiteHistory> history_;
+  DotScale scale_;        ///< of the picture before
   int seen_before_ = 0;   ///< dots in the picture before
   int since_search_ = 0;  ///< pictures since the whole one was searched
 };
@@ -260,11 +263,10 @@ bool DotTracker::Follower::tags_agree(const Working& working) const {
 /// Says for each dot whether it has the size that the pattern gives it.
 std::vector<bool> DotTracker::Follower::sites_of_their_size(const Working& working) const {
   std::vector<bool> right(size(), false);
-  const double scale = measure_dot_scale(layout_, working.placed).radius.value_or(0);
+  const double scale = working.scale.radius.value_or(0);
   for (size_t site = 0; site < size(); ++site) {
     if (!working.placed.dots[site]) continue;
-    const LocalMap map =
-        fit_local_map(layout_, static_cast<int>(site), working.placed.places, true);
+    const LocalMap& map = working.maps[site];
     const double area = std::abs(map.jacobian_px.determinant());
     const double size =
         std::sqrt(working.placed.dots[site]->outline.area_px2() / (M_PI * area)) / scale;
@@ -275,14 +277,15 @@ std::vector<bool> DotTracker::Follower::sites_of_their_size(const Working& worki
 }
 
 /// Says whether nearly all dots have the sizes that the pattern gives them.
-bool DotTracker::Follower::pattern_agrees(const Working& working) const {
+bool DotTracker::Follower::pattern_agrees(Working& working) const {
+  working.scale = measure(working);
   const std::vector<bool> right = sites_of_their_size(working);
   return std::ranges::count(right, true) * 5 > working.placed.count() * 4;
 }
 
 /// Seeks unplaced dots where their neighbours expect them, from the placed ones outwards.
 void DotTracker::Follower::complete(const cv::Mat& grey, Working& working) const {
-  working.scale = measure_dot_scale(layout_, working.placed);
+  working.scale = scale_.radius ? scale_ : measure(working);
   if (!working.scale.radius) return;
   std::vector<double> blurs;
   for (const std::optional<Dot>& dot : working.placed.dots)
@@ -336,6 +339,12 @@ int DotTracker::Follower::complete_once(const cv::Mat& grey, Working& working,
   return std::max(placed, 0);
 }
 
+/// Surveys the placed dots and returns the scale of their size.
+DotScale DotTracker::Follower::measure(Working& working) const {
+  working.maps = survey(layout_, working.placed);
+  return measure_dot_scale(layout_, working.placed, working.maps);
+}
+
 /// Says for each dot whether something but its neighbours names it: a tag beside it, its size in
 /// the pattern, or the picture before.
 std::vector<bool> DotTracker::Follower::anchored_sites(const Working& working) const {
@@ -351,7 +360,7 @@ std::vector<bool> DotTracker::Follower::anchored_sites(const Working& working) c
 /// Leaves out groups of dots that are linked with nothing that names them, as those beyond a fold.
 /// What their neighbours across the fold expect of them is a guess.
 void DotTracker::Follower::leave_out_unanchored(Working& working) const {
-  working.scale = measure_dot_scale(layout_, working.placed);
+  working.scale = measure(working);
   if (!working.scale.radius) return;
   std::vector<int> doubtful;
   const std::vector<bool> right =
@@ -379,9 +388,12 @@ void DotTracker::Follower::leave_out_unanchored(Working& working) const {
     // In a pattern three of four dots misplaced have another size; some sizes are misread.
     const bool named = tag_detector_ ? anchors > 0 : dots >= 4 && 4 * anchors >= 3 * dots;
     if (named) continue;
+    doubtful.push_back(static_cast<int>(site));
     working.placed.remove(static_cast<int>(site));
     working.reason[site] = dot_missing::kUnplaced;
   }
+  // What was left out must not bend the maps that the others are corrected by.
+  if (!doubtful.empty()) working.scale = measure(working);
 }
 
 /// Leaves out dots that are seen in part: their pixels, or their outline, do not fit.
@@ -394,8 +406,7 @@ void DotTracker::Follower::leave_out_cut(Working& working) const {
   for (size_t site = 0; site < size(); ++site) {
     const std::optional<Dot>& dot = working.placed.dots[site];
     if (!dot) continue;
-    const LocalMap map =
-        fit_local_map(layout_, static_cast<int>(site), working.placed.places, true);
+    const LocalMap& map = working.maps[site];
     Eigen::Matrix2d expected =
         expected_shape_px2(map, working.scale.radius.value_or(0) * layout_.sites[site].size);
     Eigen::Matrix2d shape = dot->outline.shape_px2;
@@ -463,8 +474,7 @@ void DotTracker::Follower::say_why_missing(const cv::Mat& grey, Working& working
   double turn = 0;
   for (size_t site = 0; site < size(); ++site) {
     if (!working.placed.dots[site]) continue;
-    const LocalMap map =
-        fit_local_map(layout_, static_cast<int>(site), working.placed.places, true);
+    const LocalMap& map = working.maps[site];
     if (map.neighbours >= 3) turn += map.jacobian_px.determinant() > 0 ? 1 : -1;
   }
   working.mirrored = turn < 0;
@@ -491,8 +501,7 @@ DotFrame DotTracker::Follower::report(const Working& working) const {
     DotRow row{.marker = here.marker,
                .pixel_px = dot.outline.centre_px,
                .sigma_px = sigma_factor * dot.sigma_px()};
-    const LocalMap map =
-        fit_local_map(layout_, static_cast<int>(site), working.placed.places, true);
+    const LocalMap& map = working.maps[site];
     if (map.neighbours >= 4 && working.scale.radius) {
       const Eigen::Vector2d shift = dot_bend_shift_px(map, *working.scale.radius * here.size);
       row.pixel_px -= shift;
@@ -506,6 +515,7 @@ DotFrame DotTracker::Follower::report(const Working& working) const {
 
 void DotTracker::Follower::remember(const Working& working) {
   seen_before_ = working.placed.count();
+  scale_ = working.scale;
   for (size_t site = 0; site < size(); ++site) {
     SiteHistory& history = history_[site];
     std::optional<Eigen::Vector2d> before;
@@ -530,10 +540,9 @@ DotFrame DotTracker::Follower::next(const cv::Mat& grey) {
   bool search = seen_before_ == 0;
   if (!search) {
     working = follow(grey);
-    if (tag_detector_ ? tags_agree(working) : pattern_agrees(working))
-      complete(grey, working);
-    else
-      working = Working(size());
+    const bool agrees = !tag_detector_ || tags_agree(working);
+    if (agrees) complete(grey, working);
+    if (!agrees || (pattern_ && !pattern_agrees(working))) working = Working(size());
     search = 2 * working.placed.count() < seen_before_ || is_search_due(working);
   }
   if (search) search_whole(grey, working);
