@@ -276,7 +276,7 @@ struct DotStep {
 
   /// Says whether the outline is near enough for its window to be gathered.
   bool near() const { return shape < 0.2; }
-  /// Says whether what is left of the way does not change the noise.
+  /// Says whether the steps to come do not change the noise.
   bool near_end() const { return centre_px < centre_sigma_px && shape < 0.02; }
   bool settled() const {
     return centre_px < std::max(0.15 * centre_sigma_px, 0.001) && shape < 0.03;
@@ -363,9 +363,9 @@ constexpr Eigen::Index kFewestPixels = 3 * kDotUnknowns;
 struct DotFit {
   DotWindow window;
   double light_scale_px = 1;
-  DotModel model;
-  DotPrior prior;
-  DotStep moved;
+  DotModel model{};
+  DotPrior prior{};
+  DotStep moved{};
   Eigen::Matrix2d covariance_px2 = Eigen::Matrix2d::Zero();
   int steps = 0;
 };
