@@ -290,6 +290,7 @@ void DotTracker::Follower::complete(const cv::Mat& grey, Working& working) const
   std::vector<double> blurs;
   for (const std::optional<Dot>& dot : working.placed.dots)
     if (dot) blurs.push_back(dot->blur_px);
+  if (blurs.empty()) return;  // nothing is placed from which to go on
   const double blur_px = median(std::move(blurs));
   constexpr int kMostRounds = 40;
   for (int round = 0; round < kMostRounds; ++round)
