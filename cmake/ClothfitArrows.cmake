@@ -18,6 +18,7 @@ set(CLOTHFIT_ARROWS
   "calib/bundle         -> data calib/camera"
   "calib/placement      -> data/algebra data calib/camera calib/bundle"
   "calib/boards         -> data calib/camera calib/bundle calib/placement"
+  "vision/degrade       -> data"
   "vision/ingest        -> data"
   "vision/detect        -> data"
   "vision/track         -> data vision/ingest vision/detect"
@@ -76,15 +77,16 @@ set(CLOTHFIT_ARROWS
                             apps/report/fit"
   "apps/study/foreign   -> data fit/jobs fit/diagnosis apps/terminal apps/steps
                            apps/study/recordings"
+  "apps/study/vision    -> data vision/degrade vision/detect vision/track fit/jobs apps/terminal"
   "apps/report/study    -> data vision/track apps/terminal apps/report/page apps/report/fit
                            apps/study/trials apps/study/louchet1995 apps/study/recordings
-                           apps/study/foreign"
+                           apps/study/foreign apps/study/vision"
   "apps/verbs           -> data model/topology model/fabric model/cloth model/effects
                            model/integrate fit/interface fit/jobs fit/measurement_effects
                            fit/problem fit/preflight fit/verdict fit fit/diagnosis apps/terminal
                            apps/steps apps/report/page apps/report/fit apps/report/diagnosis
                            apps/study/trials apps/study/louchet1995 apps/study/recordings
-                           apps/study/foreign apps/report/study"
+                           apps/study/foreign apps/study/vision apps/report/study"
   "apps                 -> data apps/terminal apps/verbs"
 )
 

@@ -17,6 +17,7 @@
 #include "apps/terminal/version.h"
 #include "apps/verbs/resumable_run.h"
 #include "apps/verbs/study_foreign.h"
+#include "apps/verbs/study_vision.h"
 #include "apps/verbs/verb.h"
 #include "data/input_error.h"
 #include "data/text_file.h"
@@ -202,6 +203,7 @@ void add_study_verb(Verb program) {
   recordings.runs(
       [flags, recordings] { return run_recordings_study(*flags, recordings.command_text()); });
   add_foreign_study(verb);
+  add_vision_study(verb);
 }
 
 }  // namespace clothfit

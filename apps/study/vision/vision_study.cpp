@@ -1,0 +1,182 @@
+#include "apps/study/vision/vision_study.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <tbb/enumerable_thread_specific.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <functional>
+#include <map>
+
+#include "apps/study/vision/photo_sets.h"
+#include "apps/study/vision/spoiled_pictures.h"
+#include "apps/terminal/exit_code.h"
+#include "apps/terminal/interrupt.h"
+#include "data/input_error.h"
+#include "data/recording.h"
+#include "fit/jobs/parallel.h"
+
+namespace clothfit {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kNotMeasured = std::numeric_limits<double>::quiet_NaN();
+
+/// A row that spoils recordings.
+struct SpoilRow {
+  VisionRow row;
+  Spoil spoil;
+};
+
+const std::vector<SpoilRow>& spoil_rows() {
+  static const std::vector<SpoilRow> rows = {
+      {{"stills", "pictures as they are"}, as_they_are},
+      {{"blur3", "3 px of blur along the motion"}, blurred_along_motion(3)},
+      {{"blur6", "6 px of blur along the motion"}, blurred_along_motion(6)},
+      {{"hand", "a hand over a quarter of the corners"}, behind_a_hand},
+      {{"dark", "brightness x 0.15, noise of 3 levels"}, darkened(0.15, 3)},
+      {{"small", "tags 11 px wide"}, shrunk_to_tags(11)},
+      {{"crf18", "H.264 at crf 18"}, through_codec(18)},
+      {{"crf23", "H.264 at crf 23"}, through_codec(23)},
+      {{"crf30", "H.264 at crf 30"}, through_codec(30)},
+  };
+  return rows;
+}
+
+/// Rows of photos, each with the folder below vision/ and what judges it.
+struct PhotoRow {
+  VisionRow row;
+  std::vector<const char*> sets;
+  std::function<TagScore(const fs::path& folder)> score;
+};
+
+const std::vector<PhotoRow>& photo_rows() {
+  static const std::vector<PhotoRow> rows = {
+      {{"room", "tags on the walls of a room"}, {"apriltag-room"}, score_room},
+      {{"sheet", "40 tags, shrunk to 29, 14 and 12 px"},
+       {"apriltag-sheet-40"},
+       [](const fs::path& folder) { return score_sheet(folder).score; }},
+      {{"false", "pictures without a tag of the family"},
+       {"aprilgrid-kalibr", "opencv-aruco", "cloth-colour-grid-nc"},
+       score_false_tags},
+  };
+  return rows;
+}
+
+bool asked_for(const VisionStudyOptions& options, const std::string& row) {
+  return options.rows.empty() || std::ranges::find(options.rows, row) != options.rows.end();
+}
+
+/// Finds recordings of tags whose truth is known.
+std::vector<fs::path> judged_recordings(const fs::path& data) {
+  std::vector<fs::path> found;
+  const fs::path folder = data / "recordings";
+  if (!fs::is_directory(folder)) return found;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
+    if (!fs::exists(entry.path() / "recording.yaml")) continue;
+    const Recording recording = read_recording(entry.path());
+    if (recording.markers.kind != MarkerKind::apriltag || recording.cameras.empty()) continue;
+    const std::string truth = "truth_tracks2d_" + recording.cameras.front().name + ".csv.gz";
+    if (recording.cameras.front().images && fs::exists(entry.path() / truth))
+      found.push_back(entry.path());
+  }
+  std::ranges::sort(found);
+  return found;
+}
+
+TagScore score_recording(const JudgedRecording& recording, const Spoil& spoil,
+                         const VisionStudyOptions& options) {
+  std::vector<size_t> frames;
+  for (size_t frame = 0; frame < recording.pictures.size();
+       frame += static_cast<size_t>(options.stride))
+    frames.push_back(frame);
+  const std::vector<SpoiledPicture> pictures = spoil(recording, frames, options.seed);
+  tbb::enumerable_thread_specific<TagDetector> detectors(
+      [&] { return TagDetector(recording.family); });
+  std::vector<TagScore> scores(pictures.size());
+  for_each_index(pictures.size(), [&](size_t i) {
+    const SpoiledPicture& picture = pictures[i];
+    scores[i] = score_tags(detectors.local().detect(picture.grey), picture.truth,
+                           recording.other_tags, picture.grey.size());
+  });
+  TagScore all;
+  for (const TagScore& score : scores) all.add(score);
+  return all;
+}
+
+/// Measures with a clock, and keeps why nothing could be measured.
+VisionResult measured(const std::string& row, const std::string& set,
+                      const std::function<TagScore()>& score) {
+  VisionResult result{.row = row, .set = set, .score = {}, .reason = {}};
+  const auto begin = std::chrono::steady_clock::now();
+  try {
+    result.score = score();
+  } catch (const InputError& error) {
+    result.reason = error.what();
+  }
+  result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  return result;
+}
+
+}  // namespace
+
+const std::vector<VisionRow>& vision_rows() {
+  static const std::vector<VisionRow> rows = [] {
+    std::vector<VisionRow> all;
+    for (const SpoilRow& one : spoil_rows()) all.push_back(one.row);
+    for (const PhotoRow& one : photo_rows()) all.push_back(one.row);
+    return all;
+  }();
+  return rows;
+}
+
+void VisionStudyOptions::validate() const {
+  if (stride < 1) throw InputError("--stride", fmt::format("{}", stride), "1 or more");
+  std::vector<std::string> known;
+  for (const VisionRow& row : vision_rows()) known.push_back(row.name);
+  for (const std::string& row : rows)
+    if (std::ranges::find(known, row) == known.end())
+      throw InputError("--rows", fmt::format("there is no row '{}'", row),
+                       fmt::format("{}", fmt::join(known, ", ")));
+  if (!fs::is_directory(data))
+    throw InputError(data.string(), "is not a folder", "a folder with recordings/ and vision/");
+}
+
+std::vector<VisionResult> study_vision(const VisionStudyOptions& options,
+                                       const ProgressCallback& progress) {
+  options.validate();
+  std::vector<VisionResult> results;
+  const auto report = [&](const std::string& row, const std::string& set) {
+    const Progress now{.stage = "judge",
+                       .done = static_cast<double>(results.size()),
+                       .total = 0,
+                       .unit = "rows",
+                       .note = row + " of " + set};
+    if (interrupted() || (progress && !progress(now))) throw Cancelled();
+  };
+  for (const fs::path& folder : judged_recordings(options.data)) {
+    if (std::ranges::none_of(spoil_rows(),
+                             [&](const SpoilRow& one) { return asked_for(options, one.row.name); }))
+      break;
+    const JudgedRecording recording = read_judged_recording(folder);
+    for (const SpoilRow& one : spoil_rows()) {
+      if (!asked_for(options, one.row.name)) continue;
+      report(one.row.name, recording.name);
+      results.push_back(measured(one.row.name, recording.name,
+                                 [&] { return score_recording(recording, one.spoil, options); }));
+    }
+  }
+  for (const PhotoRow& one : photo_rows())
+    for (const char* set : one.sets) {
+      const fs::path folder = options.data / "vision" / set;
+      if (!asked_for(options, one.row.name) || !fs::is_directory(folder)) continue;
+      report(one.row.name, set);
+      results.push_back(measured(one.row.name, set, [&] { return one.score(folder); }));
+    }
+  return results;
+}
+
+}  // namespace clothfit

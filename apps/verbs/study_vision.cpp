@@ -1,0 +1,100 @@
+#include "apps/verbs/study_vision.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "apps/report/study/vision_tables.h"
+#include "apps/study/vision/vision_study.h"
+#include "apps/terminal/csv_table.h"
+#include "apps/terminal/exit_code.h"
+#include "apps/terminal/json_file.h"
+#include "apps/terminal/progress_line.h"
+#include "apps/terminal/text_table.h"
+#include "apps/verbs/verb.h"
+#include "data/output_folder.h"
+#include "data/text_file.h"
+#include "fit/jobs/thread_limit.h"
+
+namespace clothfit {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kVisionFolder = "vision.study";
+
+struct VisionFlags {
+  VisionStudyOptions options;
+  int threads = 0;
+  fs::path out;
+};
+
+nlohmann::ordered_json targets_json(const std::vector<VisionTarget>& targets,
+                                    const std::string& command) {
+  nlohmann::ordered_json json{{"format", "clothfit-targets/1"}, {"command", command}};
+  json["targets"] = nlohmann::ordered_json::array();
+  for (const VisionTarget& target : targets)
+    json["targets"].push_back({{"name", target.name},
+                               {"target", target.target},
+                               {"value", target.value},
+                               {"unit", target.unit},
+                               {"met", target.met},
+                               {"note", target.note}});
+  return json;
+}
+
+int run_vision_study(const VisionFlags& flags, const std::string& command) {
+  flags.options.validate();
+  OutputFolder out(out_folder(flags.out, kVisionFolder));
+  const ThreadLimit limit(flags.threads);
+  std::vector<VisionResult> results;
+  {
+    ProgressLine line;
+    results = study_vision(flags.options, watch(line));
+  }
+  const std::vector<VisionTarget> targets = vision_targets(results);
+  write_csv_table(vision_table(results), out.path() / "vision.csv");
+  write_json(targets_json(targets, command), out.path() / "targets.json");
+  write_text(vision_page_html(results, targets, command), out.path() / "report.html");
+  out.publish();
+  fmt::print("\n{}\n{}\n", text_table(short_vision_table(results)),
+             text_table(vision_target_table(targets)));
+  fmt::print("Report: {}\n", shown_path(out.final_path() / "report.html"));
+  if (std::ranges::none_of(results, [](const VisionResult& one) { return one.reason.empty(); }))
+    throw NoResult("nothing could be measured: " +
+                   (results.empty() ? "no set is there" : results.front().reason));
+  return kExitGood;
+}
+
+}  // namespace
+
+void add_vision_study(Verb study) {
+  const auto flags = std::make_shared<VisionFlags>();
+  Verb verb = study.add_verb(
+      "vision", "Spoil pictures in known ways, and judge by the truth what is read of them");
+  verb.add_option("data", &flags->options.data,
+                  "Folder with recordings/ and vision/ in it; sets that it lacks are left out")
+      .required()
+      .type_name("FOLDER");
+  verb.add_option("--rows", &flags->options.rows, "Row to measure; may be repeated (default: all)")
+      .one_at_a_time()
+      .type_name("NAME");
+  verb.add_option("--stride", &flags->options.stride,
+                  "Every so many-th picture of a recording is judged")
+      .shows_default();
+  verb.add_option("--seed", &flags->options.seed, "Seed of noise, hands and textures")
+      .check(check_seed)
+      .shows_default();
+  verb.add_option("--threads", &flags->threads, "Threads; 0 for as many as the machine has")
+      .shows_default()
+      .shapes_no_result();
+  add_out_option(verb, flags->out, kVisionFolder);
+  verb.footer(
+      "Example:\n"
+      "  clothfit study vision data --rows stills --rows blur6");
+  verb.runs([flags, verb] { return run_vision_study(*flags, verb.command_text()); });
+}
+
+}  // namespace clothfit
