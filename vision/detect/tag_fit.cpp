@@ -47,7 +47,7 @@ TagUnknowns::Vector TagUnknowns::prior_precision() {
   }
   prior.segment(kBlur, 3).setConstant(precision(1.4));  // of log variances: lens, focus, motion
   prior.segment(kBlurSlope, 6).setConstant(precision(0.4));  // motion that differs over the tag
-  return prior;                                         // light: free
+  return prior;                                              // light: free
 }
 
 TagFit::TagFit(const TagPattern& pattern, const Eigen::Matrix2d& pixel_by_tag,
@@ -85,12 +85,6 @@ bool TagFit::converge(int most_steps) {
   return false;
 }
 
-double TagFit::misfit() const {
-  std::vector<double> sizes(static_cast<size_t>(residual_.size()));
-  Eigen::VectorXd::Map(sizes.data(), residual_.size()) = residual_.cwiseAbs();
-  return median(std::move(sizes)) / std::abs(contrast());
-}
-
 /// Weighs residuals, whose spread grows with the slope of the picture,
 ///
 ///   variance = noise^2 + (roughness * slope)^2,
@@ -115,6 +109,7 @@ void TagFit::weigh() {
     square_roughness = square(kMadToSigma * median(std::move(rough))) -
                        square(noise) * median(std::move(inverse_square_slope));
   square_roughness = std::max(square_roughness, 0.0);
+  roughness_px_ = std::sqrt(square_roughness);
 
   constexpr double kCauchy = 3;
   const Eigen::ArrayXd variance = square(noise) + square_roughness * slope_.array().square();
@@ -127,7 +122,7 @@ void TagFit::evaluate() {
   const auto rows = static_cast<Eigen::Index>(samples_.size());
   jacobian_.resize(rows, Layout::kCount);
   residual_.resize(rows);
-  slope_.resize(rows);
+  gradient_.resize(rows, 2);
   const PictureBlur blur(unknowns_.segment<3>(Layout::kBlur));
   const BlurredPattern blurred(*pattern_, pixel_by_tag_, blur);
   const Eigen::Matrix2d tag_by_pixel = pixel_by_tag_.inverse();
@@ -150,8 +145,8 @@ void TagFit::evaluate() {
     double level = white.value;
     for (int k = 0; k < 3; ++k) {
       const Eigen::Matrix2d& half = half_slopes[static_cast<size_t>(k)];
-      const double by_blur = half(0, 0) * white.by_xx + 2 * half(0, 1) * white.by_xy +
-                             half(1, 1) * white.by_yy;
+      const double by_blur =
+          half(0, 0) * white.by_xx + 2 * half(0, 1) * white.by_xy + half(1, 1) * white.by_yy;
       derivative[Layout::kBlur + k] = contrast * by_blur;
       derivative[Layout::kBlurSlope + 2 * k] = contrast * by_blur * sample.x;
       derivative[Layout::kBlurSlope + 2 * k + 1] = contrast * by_blur * sample.y;
@@ -162,9 +157,9 @@ void TagFit::evaluate() {
     derivative.segment<3>(Layout::kLight + 3) = level * linear;
     jacobian_.row(row) = derivative.cast<float>();
     residual_[row] = sample.grey - (offset + contrast * level);
-    slope_[row] =
-        std::abs(contrast) * (Eigen::RowVector2d(white.by_x, white.by_y) * tag_by_pixel).norm();
+    gradient_.row(row) = contrast * Eigen::RowVector2d(white.by_x, white.by_y) * tag_by_pixel;
   }
+  slope_ = gradient_.rowwise().norm();
   weigh();
 }
 

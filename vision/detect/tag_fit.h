@@ -60,11 +60,14 @@ class TagFit {
   const Eigen::VectorXd& weight() const {
     return weight_;
   }  ///< inverse variance times robust weight
+  /// Returns the derivatives of the model's grey levels by place in the picture, one row per
+  /// sample.
+  const Eigen::MatrixX2d& gradient() const { return gradient_; }
   const Eigen::VectorXd& robust() const { return robust_; }  ///< robust weight, 0 to 1
   /// Returns the brightness of white above black in the middle of the tag; negative where inverted.
   double contrast() const { return unknowns_[TagUnknowns::kLight + 3]; }
-  /// Returns the median size of a residual over the contrast: how badly the pattern fits.
-  double misfit() const;
+  /// Returns by how much edges are off where the pattern puts them, one standard deviation, px.
+  double roughness_px() const { return roughness_px_; }
 
  private:
   void evaluate();
@@ -79,6 +82,8 @@ class TagFit {
   TagUnknowns::Matrix covariance_ = TagUnknowns::Matrix::Zero();
   Rows jacobian_;
   Eigen::VectorXd residual_, slope_, weight_, robust_;
+  Eigen::MatrixX2d gradient_;
+  double roughness_px_ = 0;
 };
 
 }  // namespace clothfit
