@@ -85,18 +85,14 @@ ResidualCovariance::Sums residual_weights(const TagFit& fit, const Effects& effe
          (fit.jacobian() * (effects * fit.covariance()).transpose().cast<float>());
 }
 
-/// Returns the residuals' covariance with what the fit has taken up of it, by iteration. The mean
-/// over the tag is that over the four points of Gauss's quadrature.
+/// Returns the residuals' covariance with what the fit has taken up of it. The mean over the tag is
+/// that over the four points of Gauss's quadrature.
 ResidualCovariance completed_covariance(const TagFit& fit, const Eigen::Matrix3d& pixel_from_tag) {
   const double inner = 1 / std::sqrt(3.0);
   const std::array<Eigen::Vector2d, 4> points = {
       {{-inner, -inner}, {inner, -inner}, {inner, inner}, {-inner, inner}}};
-  const ResidualCovariance::Sums weights =
-      residual_weights(fit, effects_on(fit.unknowns(), points, pixel_from_tag));
   ResidualCovariance covariance(fit);
-  constexpr int kRounds = 3;
-  for (int i = 0; i < kRounds; ++i)
-    covariance.set_taken_up(covariance.shift_variance(weights).mean());
+  covariance.complete(residual_weights(fit, effects_on(fit.unknowns(), points, pixel_from_tag)));
   return covariance;
 }
 

@@ -125,16 +125,14 @@ void ResidualCovariance::estimate(const TagFit& fit) {
 
 double ResidualCovariance::shift_at(double distance_px) const {
   const std::vector<LagClass>& classes = lag_classes();
-  const double reach = 0.5 * size_px_.minCoeff();  // of smooth bending
-  const double smooth = taken_up_ * std::max(0.0, 1 - distance_px / reach);
-  if (distance_px <= classes.front().distance_px) return smooth + shift_class_.front();
+  if (distance_px <= classes.front().distance_px) return shift_class_.front();
   for (size_t k = 1; k < classes.size(); ++k) {
     if (distance_px > classes[k].distance_px) continue;
     const double share = (distance_px - classes[k - 1].distance_px) /
                          (classes[k].distance_px - classes[k - 1].distance_px);
-    return smooth + shift_class_[k - 1] + share * (shift_class_[k] - shift_class_[k - 1]);
+    return shift_class_[k - 1] + share * (shift_class_[k] - shift_class_[k - 1]);
   }
-  return smooth + shift_class_.back() * std::exp(1 - distance_px / classes.back().distance_px);
+  return shift_class_.back() * std::exp(1 - distance_px / classes.back().distance_px);
 }
 
 double ResidualCovariance::noise_variance(const Map& weight) const {
@@ -147,39 +145,73 @@ double ResidualCovariance::noise_variance(const Map& weight) const {
   return std::max(variance, noise_ * static_cast<double>(weight.square().sum()));
 }
 
-/// Adds up the shift over blocks of pixels, since it is alike within a few.
-ResidualCovariance::Variances ResidualCovariance::shift_variance(const Sums& weights) const {
-  constexpr int kLeast = 3, kMostAcross = 14;  // px, blocks
-  const int side = std::max(kLeast, (size_px_.maxCoeff() + kMostAcross - 1) / kMostAcross);
-  const Eigen::Vector2i blocks = (size_px_.array() + side - 1) / side;
-  Sums along_u = Sums::Zero(blocks.prod(), 8), along_v = along_u;
+/// Adds up slopes times weights over blocks of pixels, since the shift is alike within a few.
+ResidualCovariance::BlockSums ResidualCovariance::block_sums(const Sums& weights) const {
+  BlockSums sums;
+  constexpr int kLeast = 3, kMostAcross = 10;  // px, blocks
+  sums.side_px = std::max(kLeast, (size_px_.maxCoeff() + kMostAcross - 1) / kMostAcross);
+  const Eigen::Vector2i blocks = (size_px_.array() + sums.side_px - 1) / sums.side_px;
+  sums.across = blocks.x();
+  sums.along_u = sums.along_v = Sums::Zero(blocks.prod(), 8);
   for (Eigen::Index i = 0; i < weights.rows(); ++i) {
-    const Eigen::Index block = place_px_(i, 1) / side * blocks.x() + place_px_(i, 0) / side;
-    along_u.row(block) += gradient_(i, 0) * weights.row(i);
-    along_v.row(block) += gradient_(i, 1) * weights.row(i);
+    const Eigen::Index block =
+        place_px_(i, 1) / sums.side_px * blocks.x() + place_px_(i, 0) / sums.side_px;
+    sums.along_u.row(block) += gradient_(i, 0) * weights.row(i);
+    sums.along_v.row(block) += gradient_(i, 1) * weights.row(i);
   }
-  const double within = shift_at(0.5 * side);
-  Eigen::MatrixXf between(blocks.prod(), blocks.prod());
-  for (int a = 0; a < blocks.prod(); ++a)
-    for (int b = 0; b <= a; ++b) {
-      const double distance =
-          side * std::hypot(a % blocks.x() - b % blocks.x(), a / blocks.x() - b / blocks.x());
-      between(a, b) = between(b, a) = static_cast<float>(a == b ? within : shift_at(distance));
-    }
-  const auto quadratic = [&](const Sums& sums) {
-    return sums.cwiseProduct(between * sums).colwise().sum().transpose().cast<double>().eval();
+  sums.alone = (gradient_.rowwise().squaredNorm().asDiagonal() * weights.cwiseAbs2())
+                   .colwise()
+                   .sum()
+                   .transpose()
+                   .cast<double>();
+  return sums;
+}
+
+/// Returns the variance of sums under a covariance of the shift that falls with the distance (px),
+/// and is `all` at the same pixel.
+ResidualCovariance::Variances ResidualCovariance::shift_variance(
+    const BlockSums& sums, double all, const std::function<double(double)>& at) {
+  const auto blocks = static_cast<int>(sums.along_u.rows());
+  const int down = blocks / sums.across;
+  Eigen::MatrixXf by_offset(down, sums.across);  // blocks apart, down and across
+  for (int v = 0; v < down; ++v)
+    for (int u = 0; u < sums.across; ++u)
+      by_offset(v, u) = static_cast<float>(at(sums.side_px * std::hypot(u, v)));
+  const double within = at(0.5 * sums.side_px);
+  by_offset(0, 0) = static_cast<float>(within);
+  Eigen::MatrixXf between(blocks, blocks);
+  for (int a = 0; a < blocks; ++a)
+    for (int b = 0; b < blocks; ++b)
+      between(b, a) = by_offset(std::abs(a / sums.across - b / sums.across),
+                                std::abs(a % sums.across - b % sums.across));
+  const auto quadratic = [&](const Sums& one) {
+    return one.cwiseProduct(between * one).colwise().sum().transpose().cast<double>().eval();
   };
-  const Variances alone = (gradient_.rowwise().squaredNorm().asDiagonal() * weights.cwiseAbs2())
-                              .colwise()
-                              .sum()
-                              .transpose()
-                              .cast<double>();
-  const double all = shift_ + taken_up_;
-  return ((all - within) * alone + quadratic(along_u) + quadratic(along_v)).cwiseMax(all * alone);
+  return ((all - within) * sums.alone + quadratic(sums.along_u) + quadratic(sums.along_v))
+      .cwiseMax(all * sums.alone);
+}
+
+void ResidualCovariance::complete(const Sums& places) {
+  if (!(shift_class_.front() > 0)) return;
+  // What is taken up adds to the covariance, and that to what is taken up: t = seen + t smooth.
+  const BlockSums sums = block_sums(places);
+  const double seen =
+      shift_variance(sums, shift_, [this](double distance) { return shift_at(distance); }).mean();
+  const double smooth =
+      shift_variance(sums, 1, [this](double distance) { return smooth_at(distance); }).mean();
+  constexpr double kMost = 0.75;  // the rest would be told by too little
+  taken_up_ = seen / (1 - std::min(smooth, kMost));
+}
+
+double ResidualCovariance::smooth_at(double distance_px) const {
+  const double reach = 0.5 * size_px_.minCoeff();  // of smooth bending
+  return std::max(0.0, 1 - distance_px / reach);
 }
 
 ResidualCovariance::Variances ResidualCovariance::variance(const Sums& weights) const {
-  Variances result = shift_variance(weights);
+  Variances result = shift_variance(
+      block_sums(weights), shift_ + taken_up_,
+      [this](double distance) { return shift_at(distance) + taken_up_ * smooth_at(distance); });
   for (int k = 0; k < 8; ++k) result[k] += noise_variance(to_map(weights.col(k)));
   return result;
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <functional>
 #include <vector>
 
 #include "vision/detect/tag_fit.h"
@@ -24,18 +25,29 @@ class ResidualCovariance {
   using Variances = Eigen::Matrix<double, 8, 1>;
   /// Returns the variance of each of these sums.
   Variances variance(const Sums& weights) const;
-  /// Returns the part of it that shifts of edges bring.
-  Variances shift_variance(const Sums& weights) const;
-  /// Says what variance of shift the fit has taken up (px^2, mean over the tag): residuals show
-  /// what is left of the shift, and the smooth part of it is missing there.
-  void set_taken_up(double shift_px2) { taken_up_ = shift_px2; }
+  /// Adds the part of the shift that the fit has taken up: residuals show what is left of it, and
+  /// its smooth part is missing there. `places` are the weights of residuals in the coordinates of
+  /// four points whose variance is the mean over the tag.
+  void complete(const Sums& places);
 
  private:
   using Map = Eigen::Array<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
+  /// Sums of slopes times weights over square blocks of pixels.
+  struct BlockSums {
+    int side_px = 0;
+    int across = 0;  ///< blocks in a row
+    Sums along_u, along_v;
+    Variances alone;  ///< sums of squares over single pixels
+  };
+
   Map to_map(const Eigen::VectorXf& values) const;
   void estimate(const TagFit& fit);
+  BlockSums block_sums(const Sums& weights) const;
+  static Variances shift_variance(const BlockSums& sums, double all,
+                                  const std::function<double(double)>& at);
   double shift_at(double distance_px) const;
+  double smooth_at(double distance_px) const;
   double noise_variance(const Map& weight) const;
 
   Eigen::Vector2i first_px_;   ///< of the smallest box that holds all samples

@@ -167,9 +167,9 @@ void TagFit::evaluate() {
 /// the length of the step in standard deviations per unknown; not finite when there is no step.
 double TagFit::step() {
   constexpr int kCount = TagUnknowns::kCount;
-  const Rows whitened = weight_.cwiseSqrt().cast<float>().asDiagonal() * jacobian_;
+  whitened_ = weight_.cwiseSqrt().cast<float>().asDiagonal() * jacobian_;
   Eigen::Matrix<float, kCount, kCount> lower = Eigen::Matrix<float, kCount, kCount>::Zero();
-  lower.selfadjointView<Eigen::Lower>().rankUpdate(whitened.transpose());
+  lower.selfadjointView<Eigen::Lower>().rankUpdate(whitened_.transpose());
   Normal information = lower.cast<double>().selfadjointView<Eigen::Lower>();
   information.diagonal() += prior_;
   const Unknowns gradient =

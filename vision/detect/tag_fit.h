@@ -80,7 +80,7 @@ class TagFit {
   TagUnknowns::Vector unknowns_ = TagUnknowns::Vector::Zero();
   TagUnknowns::Vector prior_mean_, prior_;
   TagUnknowns::Matrix covariance_ = TagUnknowns::Matrix::Zero();
-  Rows jacobian_;
+  Rows jacobian_, whitened_;
   Eigen::VectorXd residual_, slope_, weight_, robust_;
   Eigen::MatrixX2d gradient_;
   double roughness_px_ = 0;

@@ -36,7 +36,7 @@ RefinedTag refine_tag(const cv::Mat& grey, const TagPattern& pattern,
   TagFit fit(pattern, pixel_by_tag, samples, PictureBlur::unknowns(kSharp, {0, 0}));
   fit.thin_out();
   if (fit.samples().size() < kFewest) return result;
-  constexpr int kMostSteps = 10;
+  constexpr int kMostSteps = 20;
   const bool converged = fit.converge(kMostSteps);
   result.explained = fit.robust().mean();
   if (std::getenv("DBG")) {
