@@ -131,10 +131,12 @@ struct SplineWeights {
 BlurredPattern::BlurredPattern(const TagPattern& pattern, const Eigen::Matrix2d& pixel_by_tag,
                                const PictureBlur& blur) {
   const double cell_px = pattern.cell() * pixel_by_tag.colwise().norm().minCoeff();
-  constexpr double kStep_px = 0.45;
-  constexpr int kFewestPerCell = 6, kMostPerCell = 64;
-  const int per_cell =
-      std::clamp(static_cast<int>(std::ceil(cell_px / kStep_px)), kFewestPerCell, kMostPerCell);
+  // Steps below the lens's blur leave the spline's own blur well within it.
+  constexpr double kWidest_px = 0.45, kOfLens = 0.75;
+  const double step_px = std::min(kWidest_px, kOfLens * std::sqrt(blur.lens_variance_px2()));
+  constexpr int kFewestPerCell = 2, kMostPerCell = 64;
+  const int per_cell = static_cast<int>(
+      std::clamp(std::ceil(cell_px / step_px), 1.0 * kFewestPerCell, 1.0 * kMostPerCell));
   step_ = pattern.cell() / per_cell;
   const GridKernel kernel = grid_kernel(pixel_by_tag.inverse() / step_, blur);
 

@@ -9,11 +9,11 @@ namespace clothfit {
 
 /// A printed pattern under a blur, as a smooth function of tag coordinates: 0 black, 1 white.
 ///
-/// It is a cubic B-spline on a grid of about half a pixel. Its coefficients are the pattern under
+/// It is a cubic B-spline on a grid of half a pixel or less. Its coefficients are the pattern under
 /// that part of the blur that the spline itself does not add: cells under a Gaussian along the
 /// tag's axes in closed form, then a sum over the shifts that make up the motion and what of the
 /// lens is not along the axes. Second moments of the whole are those of the blur, and the kernel is
-/// symmetric, so that no edge moves. A blur narrower than about 0.3 px is widened to it.
+/// symmetric, so that no edge moves.
 class BlurredPattern {
  public:
   /// `pixel_by_tag` maps small steps from tag coordinates to pixels, at the middle of the tag.

@@ -111,28 +111,39 @@ void ResidualCovariance::estimate(const TagFit& fit) {
   const Eigen::Vector2d variances = sums_at({}).covariances();
   constexpr double kRounding = 0.3;  // grey levels; what 8 bits leave
   noise_ = std::max(variances[0], kRounding * kRounding);
-  shift_ = std::max(variances[1], 0.0);
-  double before = shift_;
+  seen_shift_.push_back(variances[1]);
   for (size_t k = 0; k < lag_classes().size(); ++k) {
     PairSums sums;
     for (const Lag& lag : lag_classes()[k].lags) sums += sums_at(lag);
     const Eigen::Vector2d covariances = sums.covariances();
     if (k < kNoiseClasses) noise_lag_.push_back(std::clamp(covariances[0], 0.0, noise_));
-    before = std::clamp(covariances[1], 0.0, before);  // falls with the distance
-    shift_class_.push_back(before);
+    seen_shift_.push_back(covariances[1]);
+  }
+  set_taken_up(0);
+}
+
+void ResidualCovariance::set_taken_up(double taken_up_px2) {
+  const double reach = 0.5 * size_px_.minCoeff();  // of smooth bending
+  shift_.clear();
+  for (size_t k = 0; k < seen_shift_.size(); ++k) {
+    const double distance = k == 0 ? 0 : lag_classes()[k - 1].distance_px;
+    const double smooth = taken_up_px2 * std::max(0.0, 1 - distance / reach);
+    // It falls with the distance.
+    const double most = k == 0 ? seen_shift_[k] + smooth : shift_.back();
+    shift_.push_back(std::max(0.0, std::min(seen_shift_[k] + smooth, most)));
   }
 }
 
 double ResidualCovariance::shift_at(double distance_px) const {
   const std::vector<LagClass>& classes = lag_classes();
-  if (distance_px <= classes.front().distance_px) return shift_class_.front();
+  if (distance_px <= classes.front().distance_px) return shift_[1];
   for (size_t k = 1; k < classes.size(); ++k) {
     if (distance_px > classes[k].distance_px) continue;
     const double share = (distance_px - classes[k - 1].distance_px) /
                          (classes[k].distance_px - classes[k - 1].distance_px);
-    return shift_class_[k - 1] + share * (shift_class_[k] - shift_class_[k - 1]);
+    return shift_[k] + share * (shift_[k + 1] - shift_[k]);
   }
-  return shift_class_.back() * std::exp(1 - distance_px / classes.back().distance_px);
+  return shift_.back() * std::exp(1 - distance_px / classes.back().distance_px);
 }
 
 double ResidualCovariance::noise_variance(const Map& weight) const {
@@ -167,17 +178,14 @@ ResidualCovariance::BlockSums ResidualCovariance::block_sums(const Sums& weights
   return sums;
 }
 
-/// Returns the variance of sums under a covariance of the shift that falls with the distance (px),
-/// and is `all` at the same pixel.
-ResidualCovariance::Variances ResidualCovariance::shift_variance(
-    const BlockSums& sums, double all, const std::function<double(double)>& at) {
+ResidualCovariance::Variances ResidualCovariance::shift_variance(const BlockSums& sums) const {
   const auto blocks = static_cast<int>(sums.along_u.rows());
   const int down = blocks / sums.across;
   Eigen::MatrixXf by_offset(down, sums.across);  // blocks apart, down and across
   for (int v = 0; v < down; ++v)
     for (int u = 0; u < sums.across; ++u)
-      by_offset(v, u) = static_cast<float>(at(sums.side_px * std::hypot(u, v)));
-  const double within = at(0.5 * sums.side_px);
+      by_offset(v, u) = static_cast<float>(shift_at(sums.side_px * std::hypot(u, v)));
+  const double within = shift_at(0.5 * sums.side_px);
   by_offset(0, 0) = static_cast<float>(within);
   Eigen::MatrixXf between(blocks, blocks);
   for (int a = 0; a < blocks; ++a)
@@ -187,33 +195,25 @@ ResidualCovariance::Variances ResidualCovariance::shift_variance(
   const auto quadratic = [&](const Sums& one) {
     return one.cwiseProduct(between * one).colwise().sum().transpose().cast<double>().eval();
   };
-  return ((all - within) * sums.alone + quadratic(sums.along_u) + quadratic(sums.along_v))
-      .cwiseMax(all * sums.alone);
+  return ((shift_[0] - within) * sums.alone + quadratic(sums.along_u) + quadratic(sums.along_v))
+      .cwiseMax(shift_[0] * sums.alone);
+}
+
+ResidualCovariance::Variances ResidualCovariance::noise_variances(const Sums& weights) const {
+  Variances result;
+  for (int k = 0; k < 8; ++k) result[k] = noise_variance(to_map(weights.col(k)));
+  return result;
 }
 
 void ResidualCovariance::complete(const Sums& places) {
-  if (!(shift_class_.front() > 0)) return;
-  // What is taken up adds to the covariance, and that to what is taken up: t = seen + t smooth.
   const BlockSums sums = block_sums(places);
-  const double seen =
-      shift_variance(sums, shift_, [this](double distance) { return shift_at(distance); }).mean();
-  const double smooth =
-      shift_variance(sums, 1, [this](double distance) { return smooth_at(distance); }).mean();
-  constexpr double kMost = 0.75;  // the rest would be told by too little
-  taken_up_ = seen / (1 - std::min(smooth, kMost));
-}
-
-double ResidualCovariance::smooth_at(double distance_px) const {
-  const double reach = 0.5 * size_px_.minCoeff();  // of smooth bending
-  return std::max(0.0, 1 - distance_px / reach);
+  const double by_noise = noise_variances(places).mean();
+  constexpr int kRounds = 3;
+  for (int i = 0; i < kRounds; ++i) set_taken_up(by_noise + shift_variance(sums).mean());
 }
 
 ResidualCovariance::Variances ResidualCovariance::variance(const Sums& weights) const {
-  Variances result = shift_variance(
-      block_sums(weights), shift_ + taken_up_,
-      [this](double distance) { return shift_at(distance) + taken_up_ * smooth_at(distance); });
-  for (int k = 0; k < 8; ++k) result[k] += noise_variance(to_map(weights.col(k)));
-  return result;
+  return noise_variances(weights) + shift_variance(block_sums(weights));
 }
 
 }  // namespace clothfit

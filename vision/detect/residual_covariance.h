@@ -1,7 +1,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <functional>
 #include <vector>
 
 #include "vision/detect/tag_fit.h"
@@ -25,9 +24,10 @@ class ResidualCovariance {
   using Variances = Eigen::Matrix<double, 8, 1>;
   /// Returns the variance of each of these sums.
   Variances variance(const Sums& weights) const;
-  /// Adds the part of the shift that the fit has taken up: residuals show what is left of it, and
-  /// its smooth part is missing there. `places` are the weights of residuals in the coordinates of
-  /// four points whose variance is the mean over the tag.
+  /// Adds what the fit has taken up of noise and shift, since residuals show what is left of them:
+  /// places that err by some variance take a smooth shift of that variance out of the residuals.
+  /// `places` are the weights of residuals in the coordinates of four points whose variance is the
+  /// mean over the tag.
   void complete(const Sums& places);
 
  private:
@@ -44,20 +44,21 @@ class ResidualCovariance {
   Map to_map(const Eigen::VectorXf& values) const;
   void estimate(const TagFit& fit);
   BlockSums block_sums(const Sums& weights) const;
-  static Variances shift_variance(const BlockSums& sums, double all,
-                                  const std::function<double(double)>& at);
-  double shift_at(double distance_px) const;
-  double smooth_at(double distance_px) const;
+  Variances shift_variance(const BlockSums& sums) const;
+  Variances noise_variances(const Sums& weights) const;
   double noise_variance(const Map& weight) const;
+  void set_taken_up(double taken_up_px2);
+  double shift_at(double distance_px) const;
 
-  Eigen::Vector2i first_px_;   ///< of the smallest box that holds all samples
-  Eigen::Vector2i size_px_;    ///< of the box
-  Eigen::MatrixX2i place_px_;  ///< of each sample, in the box
-  Eigen::MatrixX2f gradient_;  ///< of each sample
-  double taken_up_ = 0;
-  double noise_ = 0, shift_ = 0;     ///< variances, of shift per coordinate
-  std::vector<double> noise_lag_;    ///< covariances, one per class of near lags
-  std::vector<double> shift_class_;  ///< covariances, one per class of lags
+  Eigen::Vector2i first_px_;       ///< of the smallest box that holds all samples
+  Eigen::Vector2i size_px_;        ///< of the box
+  Eigen::MatrixX2i place_px_;      ///< of each sample, in the box
+  Eigen::MatrixX2f gradient_;      ///< of each sample
+  double noise_ = 0;               ///< variance, grey levels^2
+  std::vector<double> noise_lag_;  ///< covariances, one per class of near lags
+  // Covariances of the shift, px^2 per coordinate: at the same pixel, then one per class of lags.
+  std::vector<double> seen_shift_;  ///< of the residuals
+  std::vector<double> shift_;       ///< completed
 };
 
 }  // namespace clothfit
