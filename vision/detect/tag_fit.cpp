@@ -70,6 +70,11 @@ void TagFit::thin_out() {
   clothfit::thin_out(samples_, slope_);
 }
 
+void TagFit::bound_noise(double noise_levels, double roughness_px) {
+  most_noise_levels_ = noise_levels;
+  most_roughness_px_ = roughness_px;
+}
+
 bool TagFit::converge(int most_steps) {
   // A step below a third of a standard deviation leaves an error of about its square.
   constexpr double kStill = 0.3;
@@ -102,13 +107,14 @@ void TagFit::weigh() {
     }
   }
   constexpr double kRounding = 0.3;  // grey levels; what 8 bits leave
-  const double noise =
-      std::max(flat.empty() ? 0 : kMadToSigma * median(std::move(flat)), kRounding);
+  const double by_median = flat.empty() ? 0 : kMadToSigma * median(std::move(flat));
+  const double noise = std::max(std::min(by_median, most_noise_levels_), kRounding);
   double square_roughness = 0;
   if (!rough.empty())
     square_roughness = square(kMadToSigma * median(std::move(rough))) -
                        square(noise) * median(std::move(inverse_square_slope));
-  square_roughness = std::max(square_roughness, 0.0);
+  square_roughness = std::clamp(square_roughness, 0.0, square(most_roughness_px_));
+  noise_levels_ = noise;
   roughness_px_ = std::sqrt(square_roughness);
 
   constexpr double kCauchy = 3;

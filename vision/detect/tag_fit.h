@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <limits>
 #include <vector>
 
 #include "vision/detect/picture_blur.h"
@@ -47,6 +48,9 @@ class TagFit {
 
   /// Leaves samples out that say little (tag_samples.h).
   void thin_out();
+  /// Bounds what noise and roughness are taken for. Their estimates are medians over the tag, which
+  /// are too large once half of it is hidden.
+  void bound_noise(double noise_levels, double roughness_px);
   /// Steps until a step is below 0.3 of a standard deviation; false where that does not happen
   /// within `most_steps`, or the blur runs away.
   bool converge(int most_steps);
@@ -68,6 +72,8 @@ class TagFit {
   double contrast() const { return unknowns_[TagUnknowns::kLight + 3]; }
   /// Returns by how much edges are off where the pattern puts them, one standard deviation, px.
   double roughness_px() const { return roughness_px_; }
+  /// Returns the noise of flat places, one standard deviation, grey levels.
+  double noise_levels() const { return noise_levels_; }
 
  private:
   void evaluate();
@@ -83,7 +89,9 @@ class TagFit {
   Rows jacobian_, whitened_;
   Eigen::VectorXd residual_, slope_, weight_, robust_;
   Eigen::MatrixX2d gradient_;
-  double roughness_px_ = 0;
+  double noise_levels_ = 0, roughness_px_ = 0;
+  double most_noise_levels_ = std::numeric_limits<double>::infinity();
+  double most_roughness_px_ = std::numeric_limits<double>::infinity();
 };
 
 }  // namespace clothfit

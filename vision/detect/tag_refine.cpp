@@ -2,9 +2,11 @@
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
+#include <algorithm>
 #include <cassert>
 #include <cmath>
-#include <optional>
+#include <opencv2/imgproc.hpp>
+#include <vector>
 
 #include "vision/detect/corner_place.h"
 #include "vision/detect/tag_fit.h"
@@ -12,6 +14,15 @@
 
 namespace clothfit {
 namespace {
+
+constexpr double kSharp_px = 0.5;  // blur of a good lens and a pixel
+constexpr size_t kFewestSamples = 2 * TagUnknowns::kCount;
+constexpr int kMostSteps = 20;
+
+const std::array<Eigen::Vector2d, 4>& border_corners() {
+  static const std::array<Eigen::Vector2d, 4> corners = {{{-1, 1}, {1, 1}, {1, -1}, {-1, -1}}};
+  return corners;
+}
 
 /// Returns small steps from tag coordinates to pixels at the middle of the tag.
 Eigen::Matrix2d steps_at_middle(const Eigen::Matrix3d& pixel_from_tag) {
@@ -21,47 +32,104 @@ Eigen::Matrix2d steps_at_middle(const Eigen::Matrix3d& pixel_from_tag) {
   return steps;
 }
 
+/// Lists the blurs to start from: a sharp picture, the motion known, motion in four directions.
+std::vector<PictureBlur::Unknowns> starts(const std::optional<Eigen::Vector2d>& motion_px) {
+  std::vector<PictureBlur::Unknowns> blurs = {PictureBlur::unknowns(kSharp_px, {0, 0})};
+  if (motion_px) blurs.push_back(PictureBlur::unknowns(kSharp_px, *motion_px));
+  constexpr double kLength_px = 6;
+  for (int k = 0; k < 4; ++k) {
+    const double direction = k * M_PI / 4;
+    const Eigen::Vector2d along(std::cos(direction), std::sin(direction));
+    blurs.push_back(PictureBlur::unknowns(kSharp_px, kLength_px * along));
+  }
+  return blurs;
+}
+
 }  // namespace
 
 RefinedTag refine_tag(const cv::Mat& grey, const TagPattern& pattern,
-                      const Eigen::Matrix3d& pixel_from_tag) {
+                      const Eigen::Matrix3d& pixel_from_tag, const RefineHints& hints) {
   assert(grey.type() == CV_8UC1);
   RefinedTag result;
-  std::vector<TagSample> samples = tag_samples(grey, pattern, pixel_from_tag);
-  constexpr size_t kFewest = 2 * TagUnknowns::kCount;
-  if (samples.size() < kFewest) return result;
-
+  const std::vector<TagSample> samples = tag_samples(grey, pattern, pixel_from_tag);
+  if (samples.size() < kFewestSamples) return result;
   const Eigen::Matrix2d pixel_by_tag = steps_at_middle(pixel_from_tag);
-  constexpr double kSharp = 0.5;  // px
-  TagFit fit(pattern, pixel_by_tag, samples, PictureBlur::unknowns(kSharp, {0, 0}));
-  fit.thin_out();
-  if (fit.samples().size() < kFewest) return result;
-  constexpr int kMostSteps = 20;
-  const bool converged = fit.converge(kMostSteps);
-  result.explained = fit.robust().mean();
-  if (std::getenv("DBG")) {
-    PictureBlur b(fit.unknowns().segment<3>(TagUnknowns::kBlur));
-    printf("DBG conv %d rough %.3f expl %.3f contrast %.1f lens %.3f motion %.2f\n", converged,
-           fit.roughness_px(), result.explained, fit.contrast(), std::sqrt(b.lens_variance_px2()),
-           b.motion_px().norm());
-  }
-  result.usable = converged && fit.contrast() > 0;  // white is brighter than black
-  if (!result.usable) return result;
-
-  if (std::getenv("DUMP")) {
-    printf("TAG %zu\n", fit.samples().size());
-    for (size_t i = 0; i < fit.samples().size(); ++i)
-      printf("S %d %d %.3f %.3f %.3f %.4f\n", fit.samples()[i].u, fit.samples()[i].v,
-             fit.residual()[i], fit.gradient()(i, 0), fit.gradient()(i, 1), fit.robust()[i]);
-  }
-  const std::array<CornerPlace, 4> places = corner_places(fit, pixel_from_tag, pixel_by_tag);
-  for (size_t c = 0; c < 4; ++c) {
-    result.corner_px[c] = places[c].pixel_px;
-    result.sigma_px[c] = places[c].sigma_px;
-    result.usable =
-        result.usable && places[c].pixel_px.allFinite() && std::isfinite(places[c].sigma_px);
+  for (const PictureBlur::Unknowns& start : starts(hints.motion_px)) {
+    TagFit fit(pattern, pixel_by_tag, samples, start);
+    fit.thin_out();
+    if (fit.samples().size() < kFewestSamples) return result;
+    result.usable = fit.converge(kMostSteps);
+    if (result.usable && std::isfinite(hints.most_noise_levels)) {
+      fit.bound_noise(hints.most_noise_levels, hints.most_roughness_px);
+      result.usable = fit.converge(kMostSteps);
+    }
+    result.usable = result.usable && fit.contrast() > 0;  // white is brighter than black
+    result.noise_levels = fit.noise_levels();
+    result.roughness_px = fit.roughness_px();
+    result.explained = fit.robust().mean();
+    result.contrast_levels = fit.contrast();
+    result.motion_px = PictureBlur(fit.unknowns().segment<3>(TagUnknowns::kBlur)).motion_px();
+    if (fit.unknowns().allFinite()) result.evidence = tag_evidence(fit, pattern, pixel_by_tag);
+    if (!result.usable) continue;
+    const std::array<CornerPlace, 4> places = corner_places(fit, pixel_from_tag, pixel_by_tag);
+    for (size_t c = 0; c < 4; ++c) {
+      result.corner_px[c] = places[c].pixel_px;
+      result.sigma_px[c] = places[c].sigma_px;
+      result.usable =
+          result.usable && places[c].pixel_px.allFinite() && std::isfinite(places[c].sigma_px);
+    }
+    break;
   }
   return result;
+}
+
+std::optional<Eigen::Matrix3d> align_tag(const cv::Mat& grey, const TagPattern& pattern,
+                                         const Eigen::Matrix3d& pixel_from_tag) {
+  const Eigen::Matrix2d pixel_by_tag = steps_at_middle(pixel_from_tag);
+  Eigen::AlignedBox2d box;
+  for (const Eigen::Vector2d& corner : border_corners())
+    box.extend(mapped(pixel_from_tag, 1.5 * corner));
+  if (!box.sizes().allFinite()) return {};
+  const cv::Rect whole(0, 0, grey.cols, grey.rows);
+  const cv::Rect window = whole & cv::Rect(cv::Point2d(box.min().x(), box.min().y()),
+                                           cv::Point2d(box.max().x() + 1, box.max().y() + 1));
+  if (window.empty()) return {};
+  const double smooth_px = pattern.cell() * pixel_by_tag.colwise().norm().mean() / 3;
+  cv::Mat smooth;
+  cv::GaussianBlur(grey(window), smooth, cv::Size(), smooth_px, smooth_px, cv::BORDER_REPLICATE);
+  Eigen::Matrix3d window_from_tag = pixel_from_tag;
+  window_from_tag.row(0) -= window.x * pixel_from_tag.row(2);
+  window_from_tag.row(1) -= window.y * pixel_from_tag.row(2);
+  const std::vector<TagSample> samples = tag_samples(smooth, pattern, window_from_tag);
+  if (samples.size() < kFewestSamples) return {};
+  TagFit fit(pattern, pixel_by_tag, samples,
+             PictureBlur::unknowns(std::hypot(kSharp_px, smooth_px), {0, 0}));
+  fit.thin_out();
+  if (fit.samples().size() < kFewestSamples || !fit.converge(kMostSteps) || !(fit.contrast() > 0))
+    return {};
+  const std::array<CornerPlace, 4> places = corner_places(fit, pixel_from_tag, pixel_by_tag);
+  std::array<Eigen::Vector2d, 4> corners;
+  for (size_t c = 0; c < 4; ++c) corners[c] = places[c].pixel_px;
+  return homography_to(corners);
+}
+
+Eigen::Matrix3d homography_to(const std::array<Eigen::Vector2d, 4>& corner_px) {
+  Eigen::Matrix<double, 8, 8> equations = Eigen::Matrix<double, 8, 8>::Zero();
+  Eigen::Matrix<double, 8, 1> right;
+  for (size_t c = 0; c < 4; ++c) {
+    const Eigen::Vector3d tag = border_corners()[c].homogeneous();
+    for (int k = 0; k < 2; ++k) {
+      const auto row = 2 * static_cast<Eigen::Index>(c) + k;
+      equations.block<1, 3>(row, 3 * k) = tag.transpose();
+      equations.block<1, 2>(row, 6) = -corner_px[c][k] * tag.head<2>().transpose();
+      right[row] = corner_px[c][k];
+    }
+  }
+  const Eigen::Matrix<double, 8, 1> entries = equations.partialPivLu().solve(right);
+  Eigen::Matrix3d homography;
+  homography << entries.head<3>().transpose(), entries.segment<3>(3).transpose(), entries[6],
+      entries[7], 1;
+  return homography;
 }
 
 }  // namespace clothfit
