@@ -23,8 +23,8 @@ bool ImageSource::next(cv::Mat& grey) {
 }
 
 int ImageSource::frame() const {
-  const int number = own_number();
-  return frame_of_picture_.empty() ? number : frame_of_picture_.at(static_cast<size_t>(number));
+  return frame_of_picture_.empty() ? own_number()
+                                   : frame_of_picture_.at(static_cast<size_t>(picture_index()));
 }
 
 Findings ImageSource::findings() const {

@@ -48,6 +48,8 @@ class ImageSource {
   virtual bool read_next(cv::Mat& grey) = 0;
   /// Returns the number of the picture last returned, counted with those that are missing.
   virtual int own_number() const = 0;
+  /// Returns the place of the picture last returned among those there are.
+  virtual int picture_index() const { return own_number(); }
   /// Returns what the files themselves say.
   virtual Findings own_findings() const { return {}; }
   /// Returns the file or folder, as refusals name it.

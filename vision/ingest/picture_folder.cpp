@@ -79,6 +79,7 @@ class PictureFolder : public ImageSource {
   }
 
   int own_number() const override { return next_ == 0 ? -1 : pictures_.frames[next_ - 1]; }
+  int picture_index() const override { return static_cast<int>(next_) - 1; }
   std::string where() const override { return folder_.string(); }
 
   Findings own_findings() const override {

@@ -101,7 +101,9 @@ libav::Codec open_decoder(const AVStream& stream, const std::string& file) {
   context->err_recognition = AV_EF_CRCCHECK | AV_EF_EXPLODE;
   context->max_pixels = libav::kMostPixels;
   context->pkt_timebase = stream.time_base;
-  context->thread_count = 0;  // as many as there are cores; pictures do not depend on it
+  // Threads over pictures tell of damage late, and differently from run to run.
+  context->thread_count = 0;
+  context->thread_type = FF_THREAD_SLICE;
   if (code >= 0) code = avcodec_open2(context.get(), decoder, nullptr);
   if (code < 0)
     throw InputError(file,
@@ -170,12 +172,8 @@ class VideoFile : public ImageSource {
   bool decode();
   bool send_next_packet();
   int number_of(const AVFrame& frame) const;
-  /// Returns the packet that the decoder's last answer is about: with threads, some before the
-  /// last.
-  std::int64_t packet_in_work() const {
-    const bool frames = (decoder_->active_thread_type & FF_THREAD_FRAME) != 0;
-    return std::max<std::int64_t>(0, sent_ - (frames ? std::max(1, decoder_->thread_count) : 1));
-  }
+  /// Returns the packet that the decoder's last answer is about.
+  std::int64_t packet_in_work() const { return std::max<std::int64_t>(0, sent_ - 1); }
   static std::int64_t packet_of(const AVFrame& frame) { return frame.reordered_opaque; }
 
   /// Says whether a picture rests on damaged data: on those of a packet since the last one that

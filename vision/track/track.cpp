@@ -72,13 +72,14 @@ struct Picture {
   bool readable() const { return state != FramePicture::damaged; }
 };
 
-/// Keeps what is needed of a whole picture. The middle one is drawn on, or the last before it.
+/// Keeps what is needed of a whole picture. The middle one is drawn on, or the
+/// last before it, or the first after.
 void keep_pictures(const Picture& picture, int count, Readings& readings) {
   if (readings.first_picture.empty()) {
     readings.first_picture = picture.grey;
     readings.size = picture.grey.size();
   }
-  if (picture.number > count / 2) return;
+  if (picture.number > count / 2 && !readings.overlay_picture.empty()) return;
   readings.overlay_picture = picture.grey;
   readings.overlay_frame = picture.frame;
 }

@@ -110,6 +110,13 @@ TEST(OpenFootage, AsksForTimesThatNoPictureStates) {
   EXPECT_THAT(footages.refusal(), HasSubstr("the pictures of camera 'side' have none"));
 }
 
+TEST(OpenFootage, GivesAFolderWithGapsATimeForEachPicture) {
+  Footages footages;
+  footages.add_folder("front", {0, 1, 3, 4});
+  footages.set_times({0, 0.02, 0.06, 0.08});
+  EXPECT_THAT(footages.frames("front"), ElementsAre(0, 1, 2, 3));
+}
+
 TEST(OpenFootage, MatchesPicturesWithTimesCsv) {
   Footages footages;
   footages.add_video("front", {0, 0.04, 0.08, 0.1});
