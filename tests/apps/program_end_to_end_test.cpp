@@ -280,7 +280,7 @@ TEST(ProgramTrack, CompletesARecordingThatAFitCanUse) {
   EXPECT_TRUE(fs::exists(here.path() / "tags_onecam.tracks" / "overlay_front.png"));
 }
 
-TEST(ProgramTrack, LeavesTheTracksOfARecordingWhoseTimesCannotBeRead) {
+TEST(ProgramTrack, RefusesTimesThatDoNotReachBeforeItTracks) {
   const test::ScratchFolder here("track_times");
   const fs::path recording = here.path() / "short";
   fs::copy(kBundled / "tags_onecam", recording, fs::copy_options::recursive);
@@ -294,9 +294,9 @@ TEST(ProgramTrack, LeavesTheTracksOfARecordingWhoseTimesCannotBeRead) {
 
   EXPECT_EQ(run.exit_code, 3);
   EXPECT_THAT(run.error, HasSubstr((recording / "times.csv").string()));
-  EXPECT_TRUE(fs::exists(here.path() / "tags_onecam.tracks" / "tracks2d" / "front.csv"));
-  EXPECT_THAT(read_text(here.path() / "tags_onecam.tracks" / "tracks.json"),
-              HasSubstr("times.csv"));
+  EXPECT_THAT(run.error, HasSubstr("lists 2 frames, but"));
+  EXPECT_THAT(run.error, HasSubstr("holds 72 pictures"));
+  EXPECT_FALSE(fs::exists(here.path() / "tags_onecam.tracks"));
 }
 
 TEST(ProgramCalibrate, CompletesARecordingThatTrackingCanUse) {
