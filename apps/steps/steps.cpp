@@ -55,6 +55,7 @@ CompletedRecording complete_recording(const Recording& recording, ObservationKin
   if (resolve_observations(recording, kind) == ObservationKind::tracks3d) return result;
   check_cameras_can_be_placed(recording);
 
+  require_footage(recording, cameras_to_track(recording, false));
   const std::vector<std::string> uncalibrated = cameras_to_calibrate(complete, false);
   if (!uncalibrated.empty()) {
     const fs::path folder = steps / "calibrated";

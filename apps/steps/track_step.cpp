@@ -139,6 +139,10 @@ std::vector<std::string> cameras_to_track(const Recording& recording, bool again
   return names;
 }
 
+void require_footage(const Recording& recording, const std::vector<std::string>& cameras) {
+  open_footage(recording, cameras);
+}
+
 TrackStepResult track_step(const Recording& recording, const std::vector<std::string>& cameras,
                            const TrackOptions& options, const std::filesystem::path& folder,
                            const ProgressCallback& progress) {

@@ -31,6 +31,10 @@ struct TrackStepResult {
 /// the times, or with `again`, it is every camera with pictures.
 std::vector<std::string> cameras_to_track(const Recording& recording, bool again);
 
+/// Throws InputError for pictures that cannot be opened, and times that contradict the recording.
+/// It names the user's files and takes no step, so it comes before all of them.
+void require_footage(const Recording& recording, const std::vector<std::string>& cameras);
+
 /// Tracks the named cameras and writes a complete recording into `folder`, which exists. It holds
 /// tracks2d/CAMERA.csv, cameras/CAMERA.yaml with the pose, overlay_CAMERA.png, tracks.json, and
 /// times.csv where the videos state the times. Throws InputError for a camera file of another size

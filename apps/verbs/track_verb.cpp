@@ -94,6 +94,7 @@ int run_track(const TrackVerbOptions& options) {
     throw InputError((recording.folder / "recording.yaml").string(), "no camera has pictures",
                      "`images: FOLDER or VIDEO` in a camera's entry");
 
+  require_footage(given, cameras);
   OutputFolder out(out_folder(options.out, recording.name + ".tracks"));
   TrackStepResult step;
   {
