@@ -9,7 +9,9 @@ extern "C" {
 #include <fmt/core.h>
 
 #include <array>
+#include <atomic>
 #include <cerrno>
+#include <cstdarg>
 #include <cstdio>
 #include <cstring>
 #include <opencv2/imgproc.hpp>
@@ -19,10 +21,17 @@ extern "C" {
 namespace clothfit::libav {
 namespace {
 
+std::atomic<long> errors = 0;
+
+/// Counts libav's errors instead of printing its messages.
+void count_errors(void* /*context*/, int level, const char* /*format*/, va_list /*values*/) {
+  if (level <= AV_LOG_ERROR) ++errors;
+}
+
 /// Keeps libav's own messages off the terminal, from the first use on.
 void silence() {
   static const bool done = [] {
-    av_log_set_level(AV_LOG_QUIET);
+    av_log_set_callback(count_errors);
     return true;
   }();
   static_cast<void>(done);
@@ -34,10 +43,11 @@ int open_nothing(AVFormatContext* /*format*/, AVIOContext** /*io*/, const char* 
   return AVERROR(EPERM);
 }
 
-/// Containers that cameras and video programs write. Demuxers of playlists are left out.
+/// Containers that cameras and video programs write. Playlists are left out, and raw streams, whose
+/// times libav would invent.
 constexpr const char* kContainers =
-    "mov,mp4,m4a,3gp,3g2,mj2,matroska,webm,avi,mpegts,mpegtsraw,mpeg,mpegvideo,m4v,h264,hevc,"
-    "mjpeg,ogg,flv,asf,ivf,gif,yuv4mpegpipe,mxf,dv,nut";
+    "mov,mp4,m4a,3gp,3g2,mj2,matroska,webm,avi,mpegts,mpeg,ogg,flv,asf,ivf,gif,yuv4mpegpipe,mxf,"
+    "dv,nut";
 
 /// Converts a frame into another pixel format of the same size.
 cv::Mat converted(const AVFrame& frame, AVPixelFormat format, int type) {
@@ -84,7 +94,6 @@ GreyLevels grey_of_luma(const AVFrame& frame, const AVPixFmtDescriptor& format) 
             static_cast<size_t>(frame.linesize[luma.plane]))
         .copyTo(grey.levels);
   } else {
-    std::vector<uint16_t> row(static_cast<size_t>(frame.width));
     const std::array<const uint8_t*, 4> data{frame.data[0], frame.data[1], frame.data[2],
                                              frame.data[3]};
     grey.levels.create(frame.height, frame.width, CV_16UC1);
@@ -109,6 +118,10 @@ void refuse_transparent(const AVFrame& frame, const std::string& where) {
 }
 
 }  // namespace
+
+long errors_logged() {
+  return errors;
+}
 
 std::string error_text(int code) {
   std::array<char, AV_ERROR_MAX_STRING_SIZE> text{};
@@ -218,6 +231,7 @@ GreyLevels decode_still(const std::string& bytes, AVCodecID codec, const std::st
                                 : avcodec_open2(context.get(), decoder, nullptr);
   // The packet's own copy ends in the padding that decoders read ahead into.
   if (code >= 0) code = av_new_packet(packet.get(), static_cast<int>(bytes.size()));
+  const long before = errors_logged();
   if (code >= 0) {
     std::memcpy(packet->data, bytes.data(), bytes.size());
     code = avcodec_send_packet(context.get(), packet.get());
@@ -228,7 +242,8 @@ GreyLevels decode_still(const std::string& bytes, AVCodecID codec, const std::st
     damage = error_text(code);
     return {};
   }
-  if (frame->decode_error_flags != 0 || (frame->flags & AV_FRAME_FLAG_CORRUPT) != 0)
+  if (errors_logged() != before || frame->decode_error_flags != 0 ||
+      (frame->flags & AV_FRAME_FLAG_CORRUPT) != 0)
     damage = "its data are damaged";
   return grey_levels(*frame, where);
 }

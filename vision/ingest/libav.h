@@ -25,6 +25,9 @@ using Codec = std::unique_ptr<AVCodecContext, Release>;
 /// Returns libav's words for one of its error codes.
 std::string error_text(int code);
 
+/// Returns how many errors libav has logged in this process. It logs some that it returns nowhere.
+long errors_logged();
+
 /// The most pixels of a picture; larger ones are taken for damaged headers.
 inline constexpr std::int64_t kMostPixels = std::int64_t{1} << 28;
 

@@ -27,6 +27,10 @@ struct VideoTable {
   int stated = 0;  ///< pictures that the container claims, hidden ones included; 0: it does not say
   int stored = 0;  ///< of those, whole ones
   int turn_deg = 0;  ///< clockwise, asked of players
+  int videos = 0;    ///< in the file; the largest is read
+  int repeated = 0;  ///< pictures that share a time with another
+  bool tells_damage = true;
+  double missing_end_s = 0;  ///< by which the pictures end before the container states
 };
 
 constexpr const char* kVideo = "a folder of pictures or a video";
@@ -48,8 +52,79 @@ int turn_of(AVStream& stream) {
   return std::isfinite(turn) ? (static_cast<int>(std::lround(turn)) % 360 + 360) % 360 : 0;
 }
 
-std::int64_t time_of(const AVPacket& packet) {
-  return packet.pts != AV_NOPTS_VALUE ? packet.pts : packet.dts;
+/// Says whether the codec's decoder reports most damage inside pictures. Others decode on.
+bool tells_damage(AVCodecID codec) {
+  switch (codec) {
+    case AV_CODEC_ID_H264:
+    case AV_CODEC_ID_FFV1:
+    case AV_CODEC_ID_RAWVIDEO:
+      return true;
+    default:
+      return false;
+  }
+}
+
+/// Gathers what the packets of a video say of its pictures.
+class TableReader {
+ public:
+  TableReader(VideoTable& table, std::string file) : table_(table), file_(std::move(file)) {}
+
+  void take(const AVPacket& packet) {
+    ++table_.stored;
+    const bool timed = packet.pts != AV_NOPTS_VALUE;
+    untimed_ += timed ? 0 : 1;
+    const std::int64_t time = timed ? packet.pts : packet.dts;
+    if (time == AV_NOPTS_VALUE) refuse_untimed();
+    const bool hidden = (packet.flags & AV_PKT_FLAG_DISCARD) != 0;
+    packets_.push_back({time, hidden, (packet.flags & AV_PKT_FLAG_CORRUPT) != 0});
+  }
+
+  /// Fills the table. `reordered` says that pictures are not stored in the order shown: then times
+  /// of storage are none of display.
+  void finish(bool reordered) {
+    if (untimed_ > 0 && (reordered || untimed_ < table_.stored)) refuse_untimed();
+    // The last ones of a file that is cut short are no pictures any more.
+    for (; !packets_.empty() && packets_.back().cut; packets_.pop_back()) --table_.stored;
+    for (const StoredPicture& packet : packets_)
+      if (!packet.hidden) table_.times.push_back(packet.time);
+    std::sort(table_.times.begin(), table_.times.end());
+    const auto last = std::unique(table_.times.begin(), table_.times.end());
+    table_.repeated = static_cast<int>(table_.times.end() - last);
+    table_.times.erase(last, table_.times.end());
+    if (table_.times.empty())
+      throw InputError(file_, "no picture can be read from it: it holds no frame", kVideo,
+                       "check that the file is whole and that a video player shows it");
+  }
+
+ private:
+  struct StoredPicture {
+    std::int64_t time = 0;
+    bool hidden = false, cut = false;
+  };
+
+  [[noreturn]] void refuse_untimed() const {
+    throw InputError(
+        file_,
+        fmt::format("{} of its first {} pictures have no time of display", untimed_, table_.stored),
+        "a video whose container holds a time for each picture",
+        "convert it: ffmpeg -i IN -c:v ffv1 OUT.mkv, or extract pictures");
+  }
+
+  VideoTable& table_;
+  std::string file_;
+  std::vector<StoredPicture> packets_;
+  int untimed_ = 0;
+};
+
+/// Says by how much a video ends before its container states, where there is nothing but a video.
+double missing_end_s(const AVFormatContext& format, const VideoTable& table) {
+  if (format.nb_streams != 1 || format.duration <= 0 ||
+      format.duration_estimation_method == AVFMT_DURATION_FROM_BITRATE)
+    return 0;
+  const double begin_s = static_cast<double>(table.times.front()) * table.tick_s,
+               end_s = static_cast<double>(table.times.back()) * table.tick_s;
+  // Some count from 0, others from their first picture.
+  return static_cast<double>(format.duration) / AV_TIME_BASE - std::max(end_s, end_s - begin_s);
 }
 
 VideoTable read_table(const fs::path& file) {
@@ -64,32 +139,20 @@ VideoTable read_table(const fs::path& file) {
   table.tick_s = av_q2d(stream.time_base);
   table.stated = static_cast<int>(std::clamp<std::int64_t>(stream.nb_frames, 0, 1'000'000'000));
   table.turn_deg = turn_of(stream);
+  table.tells_damage = tells_damage(stream.codecpar->codec_id);
+  for (unsigned i = 0; i < container->nb_streams; ++i)  // a cover is no video
+    if (container->streams[i]->codecpar->codec_type == AVMEDIA_TYPE_VIDEO &&
+        (container->streams[i]->disposition & AV_DISPOSITION_ATTACHED_PIC) == 0)
+      ++table.videos;
 
+  TableReader reader(table, file.string());
   const libav::Packet packet(av_packet_alloc());
-  std::vector<bool> cut;  // by time as read: the last ones are no pictures any more
   while (av_read_frame(&*container, packet.get()) >= 0) {
-    if (packet->stream_index == table.stream) {
-      const std::int64_t time = time_of(*packet);
-      if (time == AV_NOPTS_VALUE)
-        throw InputError(file.string(), fmt::format("picture {} has no time", table.stored),
-                         "a video whose container holds times",
-                         "convert it: ffmpeg -i IN -c:v ffv1 OUT.mkv, or extract pictures");
-      ++table.stored;
-      const bool hidden = (packet->flags & AV_PKT_FLAG_DISCARD) != 0;
-      if (!hidden) table.times.push_back(time);
-      cut.push_back((packet->flags & AV_PKT_FLAG_CORRUPT) != 0);
-    }
+    if (packet->stream_index == table.stream) reader.take(*packet);
     av_packet_unref(packet.get());
   }
-  for (; !cut.empty() && cut.back(); cut.pop_back()) {
-    --table.stored;
-    if (!table.times.empty()) table.times.pop_back();
-  }
-  std::sort(table.times.begin(), table.times.end());
-  table.times.erase(std::unique(table.times.begin(), table.times.end()), table.times.end());
-  if (table.times.empty())
-    throw InputError(file.string(), "no picture can be read from it: it holds no frame", kVideo,
-                     "check that the file is whole and that a video player shows it");
+  reader.finish(stream.codecpar->video_delay > 0);
+  table.missing_end_s = missing_end_s(*container, table);
   return table;
 }
 
@@ -149,7 +212,8 @@ class VideoFile : public ImageSource {
     const int number = number_of(*frame_);
     for (int n = number_ + 1; n < number; ++n) damaged_.insert(n);
     number_ = number;
-    damage_ = is_damaged(packet_of(*frame_)) ? "its data are damaged" : "";
+    damage_ =
+        is_damaged(packet_of(*frame_), frame_->best_effort_timestamp) ? "its data are damaged" : "";
     if (!damage_.empty()) {
       damaged_.insert(number_);
       return true;
@@ -177,12 +241,19 @@ class VideoFile : public ImageSource {
   static std::int64_t packet_of(const AVFrame& frame) { return frame.reordered_opaque; }
 
   /// Says whether a picture rests on damaged data: on those of a packet since the last one that
-  /// needs no other.
-  bool is_damaged(std::int64_t packet) const {
-    const auto key = std::upper_bound(keys_.begin(), keys_.end(), packet);
-    const std::int64_t from = key == keys_.begin() ? 0 : *std::prev(key);
+  /// needs no other. One that is shown before that also rests on what was before it.
+  bool is_damaged(std::int64_t packet, std::int64_t time) const {
+    auto key = std::upper_bound(keys_.begin(), keys_.end(), packet,
+                                [](std::int64_t p, const Key& k) { return p < k.packet; });
+    if (key != keys_.begin() && time < std::prev(key)->time) --key;
+    const std::int64_t from = key == keys_.begin() ? 0 : std::prev(key)->packet;
     return std::ranges::any_of(
         errors_, [&](std::int64_t error) { return error >= from && error <= packet; });
+  }
+
+  /// Notes the packet in work as damaged where libav has logged an error since.
+  void note_errors(long before) {
+    if (libav::errors_logged() != before) errors_.push_back(packet_in_work());
   }
 
   std::string file_;
@@ -192,8 +263,11 @@ class VideoFile : public ImageSource {
   libav::Packet packet_;
   libav::Frame frame_;
   bool ended_ = false;
-  std::int64_t sent_ = 0;             ///< packets
-  std::vector<std::int64_t> keys_;    ///< packets that need no other, rising
+  std::int64_t sent_ = 0;  ///< packets
+  struct Key {
+    std::int64_t packet = 0, time = 0;
+  };
+  std::vector<Key> keys_;             ///< packets that need no other, rising
   std::vector<std::int64_t> errors_;  ///< packets that are damaged
   int number_ = -1;
   std::string damage_;
@@ -203,7 +277,9 @@ class VideoFile : public ImageSource {
 /// Decodes the next picture into `frame_`; false at the end.
 bool VideoFile::decode() {
   for (;;) {
+    const long errors = libav::errors_logged();
     const int code = avcodec_receive_frame(decoder_.get(), frame_.get());
+    note_errors(errors);
     if (code == AVERROR_EOF) return false;
     if (code == AVERROR(EAGAIN)) {
       if (!send_next_packet()) return false;
@@ -230,10 +306,12 @@ bool VideoFile::send_next_packet() {
     if (packet_->stream_index == table_.stream) break;
     av_packet_unref(packet_.get());
   }
-  if ((packet_->flags & AV_PKT_FLAG_KEY) != 0) keys_.push_back(sent_);
+  if ((packet_->flags & AV_PKT_FLAG_KEY) != 0) keys_.push_back({sent_, packet_->pts});
   if ((packet_->flags & AV_PKT_FLAG_CORRUPT) != 0) errors_.push_back(sent_);
   decoder_->reordered_opaque = sent_++;
+  const long errors = libav::errors_logged();
   if (avcodec_send_packet(decoder_.get(), packet_.get()) < 0) errors_.push_back(packet_in_work());
+  note_errors(errors);
   av_packet_unref(packet_.get());
   return true;
 }
@@ -257,6 +335,7 @@ Findings VideoFile::own_findings() const {
                         .expected = "a whole file",
                         .remedy = remedy});
   };
+  constexpr double kCutShort_s = 0.5;
   // Containers round their count, so one missing picture is no sign of damage.
   if (table_.stored + 1 < table_.stated)
     warn(fmt::format("the video breaks off after {} of {} pictures", table_.stored, table_.stated),
@@ -265,6 +344,20 @@ Findings VideoFile::own_findings() const {
     warn(fmt::format("{} of {} pictures are damaged and left out: {}", damaged_.size(), count(),
                      list_numbers({damaged_.begin(), damaged_.end()})),
          "copy it again");
+  if (table_.stated == 0 && table_.missing_end_s > kCutShort_s)
+    warn(fmt::format("the video ends {:.2g} s before its container states", table_.missing_end_s),
+         "copy it again");
+  if (table_.repeated > 0)
+    warn(fmt::format("{} pictures share a time with another and are left out", table_.repeated),
+         "use the file as the camera wrote it");
+  if (table_.videos > 1)
+    warn(fmt::format("{} videos are in it, of which one is read", table_.videos),
+         "extract the one that is meant: ffmpeg -i IN -map 0:v:N -c copy OUT.mkv");
+  if (!table_.tells_damage)
+    findings.push_back({.check = "pictures",
+                        .found = fmt::format(
+                            "{} is of a codec whose decoder tells little of damage inside pictures",
+                            fs::path(file_).filename().string())});
   if (table_.turn_deg != 0)
     findings.push_back(
         {.check = "pictures",

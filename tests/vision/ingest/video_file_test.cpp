@@ -10,6 +10,7 @@
 
 #include "data/input_error.h"
 #include "tests/data/expect_refused.h"
+#include "tests/data/file_bytes.h"
 #include "tests/data/temporary_folder.h"
 #include "tests/vision/ingest/written_video.h"
 
@@ -124,14 +125,34 @@ TEST(VideoFile, LeavesDamagedPicturesOutUpToTheNextThatNeedsNoOther) {
   EXPECT_THAT(images->findings()[0].found, HasSubstr("are damaged and left out"));
 }
 
+TEST(VideoFile, TellsOfDamageTheSameWayInEveryRun) {
+  const TemporaryFolder folder;
+  write_video(film(40), folder / "film.mkv");
+  std::string bytes = file_bytes(folder / "film.mkv");
+  bytes.replace(bytes.size() / 3, 60, std::string(60, '\x13'));
+  write_bytes(bytes, folder / "film.mkv");
+  const Seen first = watch(*open_video(folder / "film.mkv"));
+  for (int run = 0; run < 5; ++run)
+    EXPECT_EQ(watch(*open_video(folder / "film.mkv")).frames, first.frames);
+}
+
+TEST(VideoFile, RefusesPicturesThatAreStoredOutOfOrderWithoutATimeEach) {
+  const TemporaryFolder folder;
+  write_video(film(20), folder / "film.avi");  // of B frames, and a container of one time a packet
+  expect_refused(folder, "film.avi: ", [&] { open_video(folder / "film.avi"); });
+}
+
 TEST(VideoFile, SaysWhereAVideoBreaksOff) {
   const TemporaryFolder folder;
   write_video(film(40), folder / "film.mkv");
   std::filesystem::resize_file(folder / "film.mkv",
                                std::filesystem::file_size(folder / "film.mkv") * 6 / 10);
-  const Seen seen = watch(*open_video(folder / "film.mkv"));
+  const auto images = open_video(folder / "film.mkv");
+  const Seen seen = watch(*images);
   EXPECT_EQ(seen.frames, seen.numbers) << "those before the end of the file are whole";
   EXPECT_GT(seen.frames.size(), 15U);
+  ASSERT_FALSE(images->findings().empty());
+  EXPECT_THAT(images->findings().back().found, HasSubstr("s before its container states"));
 }
 
 TEST(VideoFile, OpensNoOtherFile) {
