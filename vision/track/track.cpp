@@ -11,14 +11,13 @@
 #include <set>
 
 #include "data/input_error.h"
-#include "vision/detect/fixed_corner.h"
 #include "vision/detect/tag_detector.h"
 #include "vision/ingest/footage.h"
 #include "vision/ingest/frame_list.h"
 #include "vision/track/missing_markers.h"
-#include "vision/track/overlay.h"
 #include "vision/track/tag_history.h"
 #include "vision/track/track_dots.h"
+#include "vision/track/track_rows.h"
 #include "vision/track/what_appears.h"
 
 namespace clothfit {
@@ -167,21 +166,10 @@ std::vector<ReferencePixel> average_reference(const Readings& readings,
   for (const auto& [id, points] : reference) {
     const auto history = readings.by_tag.find(id);
     if (history == readings.by_tag.end()) continue;
-    for (size_t c = 0; c < 4; ++c) {
-      std::vector<Eigen::Vector2d> pixels;
-      std::vector<double> sigmas;
-      for (const TagReading& reading : history->second) {
-        if (!reading.rejected[c].empty()) continue;
-        pixels.push_back(reading.tag.corner_px[c]);
-        sigmas.push_back(reading.tag.sigma_px[c]);
-      }
-      if (points[c] == kNone || pixels.empty()) continue;
-      const FixedCorner corner = average_fixed_corner(pixels, sigmas);
-      result.push_back({.point = points[c],
-                        .pixel_px = corner.pixel_px,
-                        .sigma_px = corner.sigma_px,
-                        .frames = corner.frames});
-    }
+    for (size_t c = 0; c < 4; ++c)
+      if (points[c] != kNone)
+        if (const auto corner = average_corner(history->second, c, points[c]))
+          result.push_back(*corner);
   }
   std::sort(result.begin(), result.end(),
             [](const ReferencePixel& a, const ReferencePixel& b) { return a.point < b.point; });
@@ -204,9 +192,7 @@ Tracks2d collect_tracks(const Readings& readings, const PointsByTag& markers) {
       }
     }
   }
-  std::sort(tracks.begin(), tracks.end(), [](const Position2d& a, const Position2d& b) {
-    return a.frame != b.frame ? a.frame < b.frame : a.marker < b.marker;
-  });
+  sort_rows(tracks);
   return tracks;
 }
 
@@ -222,21 +208,6 @@ std::map<std::string, int> count_missing(const Readings& readings, const PointsB
       missing[reason] += frames * corners;
   }
   return missing;
-}
-
-cv::Mat draw(const Readings& readings, const TrackResult& result) {
-  std::vector<OverlayPoint> points;
-  for (const ReferencePixel& pixel : result.reference)
-    points.push_back(
-        {.kind = OverlayPoint::Kind::reference, .pixel_px = pixel.pixel_px, .label = ""});
-  for (const Position2d& row : result.tracks) {
-    if (row.frame != readings.overlay_frame) continue;
-    points.push_back(
-        {.kind = row.rejected.empty() ? OverlayPoint::Kind::good : OverlayPoint::Kind::rejected,
-         .pixel_px = row.position_px,
-         .label = row.rejected});
-  }
-  return draw_overlay(readings.overlay_picture, points);
 }
 
 }  // namespace
@@ -316,7 +287,7 @@ TrackResult track(const Recording& recording, ImageSource& pictures, const std::
       ++good;
     else
       ++result.rejected[row.rejected];
-  result.overlay = draw(readings, result);
+  result.overlay = draw_rows(readings.overlay_picture, readings.overlay_frame, result);
   result.overlay_frame = readings.overlay_frame;
   result.usable = good > 0;
   result.message = fmt::format("{} corners in {} frames, {} rejected, {} of {} reference points",

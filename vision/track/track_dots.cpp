@@ -5,11 +5,10 @@
 #include <algorithm>
 
 #include "data/input_error.h"
-#include "vision/detect/fixed_corner.h"
 #include "vision/track/dot_tracks.h"
 #include "vision/track/missing_markers.h"
-#include "vision/track/overlay.h"
 #include "vision/track/tag_history.h"
+#include "vision/track/track_rows.h"
 
 namespace clothfit {
 namespace {
@@ -91,9 +90,7 @@ void add_tag_rows(const DotReadings& readings, const std::vector<Marker>& marker
                         .sigma_px = reading.tag.sigma_px[corner],
                         .rejected = reading.rejected[corner]});
   }
-  std::sort(tracks.begin(), tracks.end(), [](const Position2d& a, const Position2d& b) {
-    return a.frame != b.frame ? a.frame < b.frame : a.marker < b.marker;
-  });
+  sort_rows(tracks);
 }
 
 std::vector<ReferencePixel> average_references(const DotReadings& readings,
@@ -103,36 +100,11 @@ std::vector<ReferencePixel> average_references(const DotReadings& readings,
     if (!points[i].tag || !points[i].corner) continue;
     const auto history = readings.tags.find(*points[i].tag);
     if (history == readings.tags.end()) continue;
-    const auto corner = static_cast<size_t>(*points[i].corner);
-    std::vector<Eigen::Vector2d> pixels;
-    std::vector<double> sigmas;
-    for (const TagReading& reading : history->second) {
-      if (!reading.rejected[corner].empty()) continue;
-      pixels.push_back(reading.tag.corner_px[corner]);
-      sigmas.push_back(reading.tag.sigma_px[corner]);
-    }
-    if (pixels.empty()) continue;
-    const FixedCorner mean = average_fixed_corner(pixels, sigmas);
-    result.push_back({.point = static_cast<int>(i),
-                      .pixel_px = mean.pixel_px,
-                      .sigma_px = mean.sigma_px,
-                      .frames = mean.frames});
+    if (const auto corner = average_corner(history->second, static_cast<size_t>(*points[i].corner),
+                                           static_cast<int>(i)))
+      result.push_back(*corner);
   }
   return result;
-}
-
-cv::Mat draw_rows(const DotReadings& readings, const TrackResult& result) {
-  std::vector<OverlayPoint> points;
-  for (const ReferencePixel& pixel : result.reference)
-    points.push_back(
-        {.kind = OverlayPoint::Kind::reference, .pixel_px = pixel.pixel_px, .label = ""});
-  for (const Position2d& row : result.tracks)
-    if (row.frame == readings.overlay_frame)
-      points.push_back(
-          {.kind = row.rejected.empty() ? OverlayPoint::Kind::good : OverlayPoint::Kind::rejected,
-           .pixel_px = row.position_px,
-           .label = row.rejected});
-  return draw_overlay(readings.overlay_picture, points);
 }
 
 }  // namespace
@@ -167,7 +139,7 @@ TrackResult track_dots(const Recording& recording, ImageSource& pictures, const 
   int missing = 0;
   for (const auto& [reason, count] : readings.missing) missing += count;
   result.missing = std::move(readings.missing);
-  result.overlay = draw_rows(readings, result);
+  result.overlay = draw_rows(readings.overlay_picture, readings.overlay_frame, result);
   result.overlay_frame = readings.overlay_frame;
   result.usable = true;
   result.message = fmt::format("{} dots and {} corners in {} frames, {} dots not found", dots,
