@@ -94,18 +94,28 @@ void write_recording_start(const PrintedSheet& sheet, const fs::path& folder) {
 int run_sheet(const SheetVerbOptions& options) {
   options.draw.validate();
   const PrintedSheet sheet = make_sheet(options);
-  OutputFolder out(out_folder(options.out, sheet.name + ".sheet"));
+  const char* mirrored = options.draw.mirrored ? "_mirrored" : "";
+  const fs::path folder = out_folder(options.out, sheet.name + mirrored + ".sheet");
+  // What stands there may hold what a person has written since.
+  if (fs::exists(folder))
+    throw InputError(folder.string(), "is there already", "a folder that does not exist yet",
+                     "give another one with --out");
+  OutputFolder out(folder);
   write_sheet_pdf(sheet, options.draw, out.path() / "sheet.pdf");
   write_sheet_svg(sheet, options.draw, out.path() / "sheet.svg");
   write_sheet_png(sheet, options.draw, out.path() / "sheet.png");
   if (!sheet.markers.markers.empty()) write_recording_start(sheet, out.path());
   out.publish();
+  fs::remove(folder / ".clothfit");  // what is in it is the user's from now on
   fmt::print(
       "\n{}: {} x {} mm\n\nPrint {} at 100 % (no \"fit to page\"), and measure the ruler: it is "
       "100 "
       "mm long.\n",
       sheet.name, significant(1e3 * sheet.width_m, 6), significant(1e3 * sheet.height_m, 6),
       shown_path(out.final_path() / "sheet.pdf"));
+  if (const double dpi = png_dots_per_inch(sheet, options.draw); dpi < options.draw.dots_per_inch)
+    fmt::print("sheet.png has {} dots per inch, which so large a sheet allows.\n",
+               significant(dpi, 3));
   const int pages = page_count(sheet, options.draw.paper);
   if (options.kind == "board" && pages > 1)
     spdlog::warn(

@@ -78,6 +78,8 @@ TEST(TagSheet, RefusesWhatDoesNotFit) {
   EXPECT_THROW(make_tag_sheet({.columns = 30, .rows = 30}), InputError);
   EXPECT_THROW(make_tag_sheet({.tag_m = 0.045}), InputError);
   EXPECT_THROW(make_tag_sheet({.width_m = -1}), InputError);
+  EXPECT_THROW(make_tag_sheet({.tag_m = -0.03}), InputError);
+  EXPECT_THROW(make_tag_sheet({.width_m = 400, .height_m = 400}), InputError) << "millimetres";
   EXPECT_THROW(make_tag_sheet({.first_id = 580}), InputError);
   EXPECT_THROW(make_tag_sheet({.columns = 0}), InputError);
 }
@@ -92,6 +94,7 @@ TEST(BoardSheet, PrintsABoardOfThatSize) {
   EXPECT_EQ(page_count(sheet, "a4"), 1);
   EXPECT_EQ(page_count(sheet, "letter"), 1);
   EXPECT_THROW(make_board_sheet({.columns = 2, .rows = 6, .square_m = 0.02}), InputError);
+  EXPECT_THROW(make_board_sheet({.columns = 9, .rows = 6, .square_m = 20}), InputError);
 }
 
 TEST(PageSpans, ShowEveryPartAndCutNoShare) {
@@ -130,6 +133,12 @@ TEST(DrawSheet, WritesPagesOfPaperAndAnSvgInMillimetres) {
   EXPECT_THROW(write_sheet_pdf(sheet, {.paper = "b7"}, folder / "b.pdf"), InputError);
   EXPECT_THROW(write_sheet_png(sheet, {.dots_per_inch = 5}, folder / "b.png"), InputError);
   EXPECT_THROW(write_sheet_pdf(sheet, {}, folder / "none" / "b.pdf"), InputError);
+}
+
+TEST(DrawSheet, GivesALargeSheetFewerDotsPerInch) {
+  EXPECT_EQ(png_dots_per_inch(make_tag_sheet({}), {}), 300);
+  EXPECT_NEAR(png_dots_per_inch(make_tag_sheet({.width_m = 3, .height_m = 2}), {}),
+              12'000 / (3 / 0.0254), 1e-9);
 }
 
 }  // namespace

@@ -270,15 +270,17 @@ void write_sheet_svg(const PrintedSheet& sheet, const PageOptions& options, cons
   require(cairo_surface_status(surface.get()), file);
 }
 
+double png_dots_per_inch(const PrintedSheet& sheet, const PageOptions& options) {
+  constexpr double kMostPixels = 12'000;  // a side; 0.6 GB of memory
+  return std::min(options.dots_per_inch,
+                  kMostPixels * 0.0254 / std::max(sheet.width_m, sheet.height_m));
+}
+
 void write_sheet_png(const PrintedSheet& sheet, const PageOptions& options, const fs::path& file) {
   options.validate();
-  const double pixels_per_mm = options.dots_per_inch / 25.4;
+  const double pixels_per_mm = png_dots_per_inch(sheet, options) / 25.4;
   const auto width = static_cast<int>(std::lround(1e3 * sheet.width_m * pixels_per_mm)),
              height = static_cast<int>(std::lround(1e3 * sheet.height_m * pixels_per_mm));
-  constexpr int kMostPixels = 30'000;
-  if (width > kMostPixels || height > kMostPixels)
-    throw InputError("dots_per_inch", fmt::format("a picture of {} x {} pixels", width, height),
-                     fmt::format("{} a side at most", kMostPixels), "fewer dots per inch");
   const Surface surface(cairo_image_surface_create(CAIRO_FORMAT_RGB24, width, height),
                         cairo_surface_destroy);
   require(cairo_surface_status(surface.get()), file);

@@ -33,9 +33,12 @@ inline constexpr double kPageOverlap_mm = 5;
 /// Returns how many pages a PDF of the sheet has.
 int page_count(const PrintedSheet& sheet, const std::string& paper);
 
-/// Each writes the sheet at true scale, with crop marks at its corners and a ruler of 100 mm: of a
-/// PDF on each page. Pages stand upright or lie, whichever takes fewer. Throws InputError where the
-/// file cannot be written.
+/// Returns the dots per inch of a PNG: those that are asked for, or fewer on a large sheet.
+double png_dots_per_inch(const PrintedSheet& sheet, const PageOptions& options);
+
+/// Each writes the sheet at true scale, PDF and SVG with crop marks at its corners and a ruler of
+/// 100 mm, or as long as there is room for: of a PDF on each page. Pages stand upright or lie,
+/// whichever takes fewer. Throws InputError where the file cannot be written.
 void write_sheet_pdf(const PrintedSheet& sheet, const PageOptions& options,
                      const std::filesystem::path& file);
 void write_sheet_svg(const PrintedSheet& sheet, const PageOptions& options,

@@ -12,12 +12,12 @@
 namespace clothfit {
 namespace {
 
-void require_length(const char* option, double value_m) {
-  constexpr double kLeast_m = 1e-3, kMost_m = 100;
-  if (!(value_m >= kLeast_m && value_m <= kMost_m))
+void require_length(const char* option, double value_m, double most_m) {
+  constexpr double kLeast_m = 1e-3;
+  if (!(value_m >= kLeast_m && value_m <= most_m))
     throw InputError(option, fmt::format("{} m", value_m),
-                     fmt::format("a length of {} to {} m", kLeast_m, kMost_m),
-                     "lengths are in metres");
+                     fmt::format("a length of {} to {} m", kLeast_m, most_m),
+                     "lengths are in metres: 20 mm is 0.02, or 20mm where a unit is taken");
 }
 
 /// Adds a tag's black cells; neighbours in a row are one rectangle.
@@ -53,8 +53,9 @@ void add_markers(int id, const Eigen::Vector2d& low_m, const Eigen::Vector2d& hi
 }  // namespace
 
 PrintedSheet make_tag_sheet(const TagSheetOptions& options) {
-  require_length("width", options.width_m);
-  require_length("height", options.height_m);
+  constexpr double kLargest_m = 10;
+  require_length("width", options.width_m, kLargest_m);
+  require_length("height", options.height_m, kLargest_m);
   if (options.columns < 1 || options.rows < 1)
     throw InputError("tags", fmt::format("{} x {}", options.columns, options.rows),
                      "columns and rows of tags, 1 or more each");
@@ -69,6 +70,7 @@ PrintedSheet make_tag_sheet(const TagSheetOptions& options) {
   const int border = family->width_at_border, total = family->total_width;
   const double most_m = share_m.minCoeff() * border / total;
   constexpr double kOfMost = 0.9;
+  if (options.tag_m != 0) require_length("tag", options.tag_m, kLargest_m);
   const double tag_m = options.tag_m > 0 ? options.tag_m : kOfMost * most_m;
   if (tag_m > most_m * (1 + 1e-9))
     throw InputError("tag",
@@ -103,7 +105,8 @@ PrintedSheet make_board_sheet(const BoardDescription& board) {
                                  board.square_m),
                      fmt::format("{} to {} inner corners along each side", kFewestBoardCorners,
                                  kMostBoardCorners));
-  require_length("square", board.square_m);
+  constexpr double kLargest_m = 0.5;
+  require_length("square", board.square_m, kLargest_m);
   constexpr double kMargin = 0.25;  // of a field; the paper around it is white too
   const int across = board.columns + 1, down = board.rows + 1;
   PrintedSheet sheet{.name = fmt::format("board_{}x{}", board.columns, board.rows),
