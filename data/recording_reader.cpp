@@ -52,7 +52,7 @@ void read_time(const YamlValue& value, const RecordingFiles& files, Recording& r
 CalibrationStills read_calibration(const YamlValue& value, const RecordingFiles& files) {
   const YamlMap map = value.map({"images", "board"});
   CalibrationStills stills;
-  stills.images = files.folder(map.at("images"));
+  stills.images = files.file_or_folder(map.at("images"));
   const YamlMap board = map.at("board").map({"kind", "columns", "rows", "square"});
   board.at("kind").one_of<int>({{"chessboard", 0}});
   stills.board.columns = board.at("columns").whole_number(kFewestBoardCorners, kMostBoardCorners);

@@ -18,6 +18,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
+/// Returns text as a YAML string, whatever is in it.
+std::string yaml_text(const std::string& text) {
+  std::string result = "'";
+  for (const char c : text) result += c == '\'' ? "''" : std::string(1, c);
+  return result + "'";
+}
+
 /// A corner of the cloth, and its words.
 struct ClothCorner {
   const char* name;
@@ -107,7 +114,7 @@ class Draft {
       : input_(input),
         folder_(folder),
         tags_(input.sheet, measure_motion(input.footage.front().seen, input.sheet.markers)) {
-    yaml_ = fmt::format("format: clothfit-recording/1\nname: {}\n", name);
+    yaml_ = fmt::format("format: clothfit-recording/1\nname: {}\n", yaml_text(name));
   }
 
   RecordingDraft write() {
@@ -154,7 +161,16 @@ class Draft {
       needed_.push_back(
           "the mass of the cloth: weigh it (without it only ratios to the mass are found)");
     }
+    if (cloth.masses == MassDistribution::equal) line("  masses: equal  # as the sheet has it");
+    line("  mesh: {{columns: {}, rows: {}}}", cloth.mesh_columns, cloth.mesh_rows);
     line("markers: {{kind: apriltag, family: {}, file: markers.csv}}", input_.sheet.markers.family);
+    const Eigen::Vector3d& gravity = input_.sheet.gravity_m_per_s2;
+    line("gravity: [{}, {}, {}]  # m/s2", number_text(gravity.x()), number_text(gravity.y()),
+         number_text(gravity.z()));
+    assumed_.push_back(
+        fmt::format("of the sheet's recording: masses {}, a mesh of {} x {}, gravity",
+                    cloth.masses == MassDistribution::equal ? "equal" : "by area",
+                    cloth.mesh_columns, cloth.mesh_rows));
   }
 
   void time() {
@@ -170,8 +186,9 @@ class Draft {
           "times: those in the videos, which are true unless a video plays slower "
           "than it was filmed");
     } else {
-      line("time: {{frame_rate: 30}}  # NEEDED, per second: pictures do not say it");
-      needed_.push_back("the frame rate: pictures do not say it; 30 stands there");
+      throw InputError(input_.footage.front().images.string(),
+                       "pictures do not say how many were taken in a second",
+                       "the frame rate of the camera", "give --frame-rate");
     }
   }
 
@@ -181,14 +198,15 @@ class Draft {
     for (const LookedFootage& footage : input_.footage) {
       std::string name = footage.images.stem().string();
       while (!names.insert(name).second) name += "_";
-      line("  - name: {}", name);
-      line("    images: {}", relative(footage.images));
+      line("  - name: {}", yaml_text(name));
+      line("    images: {}", yaml_text(relative(footage.images)));
       board(name);
     }
   }
 
   void board(const std::string& camera) {
-    const SeenBoard* board = usual_board();
+    // One set of stills shows the lens of one camera.
+    const SeenBoard* board = boards_given_++ == 0 ? usual_board() : nullptr;
     if (board == nullptr) {
       line("    # NEEDED: file: cameras/{}.yaml, or stills of a chessboard:", camera);
       line(
@@ -202,7 +220,7 @@ class Draft {
     }
     const double square_m = input_.square_m.value_or(0.02);
     line("    calibration:");
-    line("      images: {}", relative(*input_.board));
+    line("      images: {}", yaml_text(relative(*input_.board)));
     line("      board: {{kind: chessboard, columns: {}, rows: {}, square: {}}}  # m",
          board->columns, board->rows, number_text(square_m));
     assumed_.push_back(fmt::format("the board: {} x {} inner corners, seen in the stills",
@@ -291,10 +309,11 @@ class Draft {
   }
 
   void held_out() {
-    const int count = input_.footage.front().seen.count;
+    const std::vector<SeenPicture>& pictures = input_.footage.front().seen.pictures;
+    const int frames = pictures.empty() ? 0 : pictures.back().frame + 1;
     constexpr double kFitted = 0.7;
-    const int from = static_cast<int>(std::lround(kFitted * count));
-    if (from < 1 || from >= count) return;
+    const int from = static_cast<int>(std::lround(kFitted * frames));
+    if (from < 1 || from >= frames) return;
     line("held_out: {{from_frame: {}}}  # frames for judging only", from);
     assumed_.push_back(fmt::format("frames from {} on are held out, to judge by", from));
   }
@@ -302,6 +321,7 @@ class Draft {
   const DraftInput& input_;
   fs::path folder_;
   MovingTags tags_;
+  int boards_given_ = 0;
   std::string yaml_;
   std::vector<std::string> assumed_, needed_;
 };

@@ -83,7 +83,9 @@ int run_detect(const DetectVerbOptions& options) {
   options.look.validate();
   require_threads(options.threads);
   const ThreadLimit limit(options.threads);
-  OutputFolder out(out_folder(options.out, options.images.filename().string() + ".detections"));
+  const fs::path images = fs::absolute(options.images).lexically_normal();
+  const fs::path named = images.has_filename() ? images : images.parent_path();
+  OutputFolder out(out_folder(options.out, named.filename().string() + ".detections"));
   LookResult result;
   {
     ProgressLine line;

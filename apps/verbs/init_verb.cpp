@@ -61,7 +61,7 @@ fs::path new_folder(const InitVerbOptions& options, const std::string& name) {
   // What stands there may hold what a person has written since.
   if (fs::exists(folder))
     throw InputError(folder.string(), "is there already", "a folder that does not exist yet",
-                     "give another one with --out, or remove it");
+                     "give another one with --out");
   return folder;
 }
 
@@ -91,21 +91,38 @@ void print_list(const char* title, const std::vector<std::string>& lines) {
   for (const std::string& text : lines) fmt::print("  - {}\n", text);
 }
 
-int run_init(const InitVerbOptions& options) {
-  const std::string name = options.images.front().stem().string();
-  const fs::path folder = new_folder(options, name);
+/// Returns a path without a separator at its end, which would hide its name.
+fs::path trimmed(const fs::path& path) {
+  const fs::path normal = path.lexically_normal();
+  return normal.has_filename() ? normal : normal.parent_path();
+}
+
+void require_positive(const char* option, const std::optional<double>& value) {
+  if (value && !(*value > 0))
+    throw InputError(option, fmt::format("{}", *value), "a number above 0");
+}
+
+int run_init(InitVerbOptions options) {
+  require_positive("--mass", options.mass_kg);
+  require_positive("--frame-rate", options.frame_rate_hz);
+  require_positive("--square", options.square_m);
+  for (fs::path& images : options.images) images = trimmed(images);
+  const std::string usual = options.images.front().stem().string() + ".recording";
+  const fs::path folder = new_folder(options, usual);
   DraftInput input = look_at_all(options);
   if (!input.mass_kg)
     if (const auto grams = ask("Mass of the cloth with its print, in grams"))
       input.mass_kg = *grams / 1e3;
 
+  const std::string name =
+      options.out.empty() ? options.images.front().stem().string() : folder.filename().string();
   const RecordingDraft draft = draft_recording(input, name, folder);
   OutputFolder out(folder);
   write_markers(input.sheet.markers.markers, out.path() / "markers.csv");
   write_text(draft.yaml, out.path() / "recording.yaml");
+  read_recording(out.path());
   out.publish();
   fs::remove(folder / ".clothfit");  // what is in it is the user's from now on
-  read_recording(folder);
 
   fmt::print("\n{}\n", shown_path(folder / "recording.yaml"));
   print_list("Assumed, to be looked at:", draft.assumed);
@@ -130,7 +147,7 @@ void add_init_verb(Verb program) {
   verb.add_option("--square", &options->square_m, "Side of the board's fields").is_length();
   verb.add_option("--mass", &options->mass_kg, "Mass of the cloth (kg)");
   verb.add_option("--frame-rate", &options->frame_rate_hz, "Frames per second, of pictures");
-  add_out_option(verb, options->out, "the first video's name");
+  add_out_option(verb, options->out, "VIDEO.recording");
   verb.footer("Example:\n  clothfit init front.mp4 --sheet tags_8x8.sheet --mass 0.032");
   verb.runs([options] { return run_init(*options); });
 }

@@ -57,6 +57,7 @@ struct Filmed {
       seen.pictures.push_back(picture);
     }
     input.footage.push_back({"film.mp4", seen});
+    input.frame_rate_hz = 60;
   }
   RecordingDraft draft() const { return draft_recording(input, "film", "."); }
 };
@@ -101,12 +102,30 @@ TEST(RecordingDraft, TellsAReleaseFromMotionAndFromRest) {
 
 TEST(RecordingDraft, TakesTimesOfVideosAndAsksForARateOtherwise) {
   Filmed filmed(falling(from_top_corners));
-  EXPECT_THAT(filmed.draft().yaml, HasSubstr("time: {frame_rate: 30}  # NEEDED"));
-  filmed.input.frame_rate_hz = 60;
   EXPECT_THAT(filmed.draft().yaml, HasSubstr("time: {frame_rate: 60}\n"));
   filmed.input.frame_rate_hz.reset();
+  EXPECT_THROW(filmed.draft(), InputError);
   filmed.input.footage[0].seen.times_s = {0, 0.03};
   EXPECT_THAT(filmed.draft().yaml, HasSubstr("# time: left out"));
+}
+
+TEST(RecordingDraft, KeepsWhatTheSheetsRecordingSaysOfTheCloth) {
+  Filmed filmed(falling(from_top_corners));
+  filmed.input.sheet.cloth.masses = MassDistribution::equal;
+  filmed.input.sheet.cloth.mesh_columns = 21;
+  filmed.input.sheet.gravity_m_per_s2 = {0, 0, -9.78};
+  EXPECT_THAT(filmed.draft().yaml,
+              AllOf(HasSubstr("masses: equal"), HasSubstr("mesh: {columns: 21, rows: 17}"),
+                    HasSubstr("gravity: [0, 0, -9.78]")));
+}
+
+TEST(RecordingDraft, GivesABoardToOneCameraAlone) {
+  Filmed filmed(falling(from_top_corners));
+  filmed.input.footage.push_back({"side.mp4", filmed.input.footage[0].seen});
+  filmed.input.board = "stills";
+  filmed.input.board_seen =
+      LookResult{.pictures = {{.board = SeenBoard{.columns = 9, .rows = 6, .corner_px = {}}}}};
+  EXPECT_THAT(filmed.draft().needed, Contains(HasSubstr("the lens of camera 'side'")));
 }
 
 TEST(RecordingDraft, NamesWhatNoPictureTells) {
@@ -136,14 +155,16 @@ TEST(RecordingDraft, TakesTheBoardThatMostStillsShow) {
 TEST(RecordingDraft, CanBeReadAsARecording) {
   const TemporaryFolder folder;
   Filmed filmed(falling(from_top_corners));
-  std::filesystem::create_directory(folder / "frames");
-  filmed.input.footage[0].images = folder / "frames";
+  const std::string name = "clip #2: it's";  // no text of YAML's own
+  std::filesystem::create_directory(folder / name);
+  filmed.input.footage[0].images = folder / name;
   std::filesystem::create_directory(folder / "film");
   const RecordingDraft draft = draft_recording(filmed.input, "film", folder / "film");
   std::ofstream(folder / "film" / "recording.yaml") << draft.yaml;
   write_markers(filmed.input.sheet.markers.markers, folder / "film" / "markers.csv");
   const Recording recording = read_recording(folder / "film");
-  EXPECT_EQ(recording.cameras.at(0).name, "frames");
+  EXPECT_EQ(recording.cameras.at(0).images, folder / name);
+  EXPECT_EQ(recording.cloth.masses, MassDistribution::by_area);
   EXPECT_EQ(recording.held.size(), 2U);
   EXPECT_EQ(recording.held_out_from_frame, 8);
 }
