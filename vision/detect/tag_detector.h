@@ -2,8 +2,11 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <limits>
 #include <memory>
 #include <opencv2/core.hpp>
+#include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -17,9 +20,30 @@ struct TagDetection {
   int corrected_bits = 0;      ///< bits of the code that were read wrong
   double decision_margin = 0;  ///< mean distance of a bit's grey level from the threshold
   std::array<Eigen::Vector2d, 4> corner_px{};
-  std::array<double, 4> sigma_px{};  ///< one standard deviation per coordinate; 0 if not `refined`
-  bool refined = false;              ///< corners are placed by the whole pattern (tag_refine.h)
+  std::array<double, 4> sigma_px{};  ///< one standard deviation per coordinate
+  /// Corners are placed by the whole pattern (tag_refine.h); else by its outline, with a wide
+  /// sigma.
+  bool refined = false;
   double explained = 0;  ///< share of the tag's pixels that its pattern explains; about 0.9 is all
+  double contrast_levels = 0;  ///< white above black, grey levels; 0 where it is not known
+  double noise_levels = 0;     ///< of flat places, one standard deviation
+  double roughness_px = 0;     ///< by which printed edges are off, one standard deviation
+  /// The printed cells are there, and so are border and white around them (TagEvidence).
+  bool shows_tag = false;
+  /// Share of the pixels around each corner that the pattern explains; about 0.9 is all.
+  std::array<double, 4> corner_seen{};
+  bool predicted = false;  ///< it was looked for where a prediction had it
+};
+
+/// A tag that should be somewhere: its place by the frame before or by its neighbours.
+struct PredictedTag {
+  int id = 0;
+  Eigen::Matrix3d pixel_from_tag = Eigen::Matrix3d::Identity();  ///< right to a cell
+  std::optional<Eigen::Vector2d> motion_px;  ///< while the shutter is open, where it is known
+  // Bounds of noise and roughness, from tags around it or from the frame before: of a tag that is
+  // half hidden they cannot be told.
+  double most_noise_levels = std::numeric_limits<double>::infinity();
+  double most_roughness_px = std::numeric_limits<double>::infinity();
 };
 
 /// Reads the tags of one family in pictures. Each thread needs its own detector.
@@ -35,6 +59,12 @@ class TagDetector {
 
   /// Finds tags in an 8-bit grey picture, sorted by id, then by place.
   std::vector<TagDetection> detect(const cv::Mat& grey);
+
+  /// Reads tags where they are predicted: their cells are read again there, and what does not show
+  /// them is left out, so that no prediction becomes a place by itself. Parts of a tag may be
+  /// hidden. In the order of `predicted`.
+  std::vector<TagDetection> read_predicted(const cv::Mat& grey,
+                                           std::span<const PredictedTag> predicted);
 
  private:
   struct Library;

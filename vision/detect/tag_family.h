@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "vision/detect/tag_refine.h"
+#include "vision/detect/tag_pattern.h"
 
 struct apriltag_family;  // AprilTag's own; its headers stay out of ours
 

@@ -2,28 +2,35 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <limits>
 #include <opencv2/core.hpp>
-#include <vector>
+#include <optional>
+
+#include "vision/detect/tag_evidence.h"
+#include "vision/detect/tag_pattern.h"
 
 namespace clothfit {
 
-/// A tag as it is printed, in square cells. Tag coordinates (x, y) are those of AprilTag's
-/// homography: the border spans [-1, 1], x to the right and y down on the upright tag.
-struct TagPattern {
-  int border_cells = 0;      ///< across the border
-  int total_cells = 0;       ///< across everything printed; total_cells^2 entries in `white`
-  std::vector<float> white;  ///< 1 white, 0 black; row by row from the top left
-
-  double cell() const { return 2.0 / border_cells; }
-};
-
 /// A tag's four corners as the whole printed pattern places them.
 struct RefinedTag {
-  bool usable = false;  ///< false: the pattern does not explain the picture; corners are then unset
+  bool usable = false;  ///< false: the fit did not converge; corners are then unset
   std::array<Eigen::Vector2d, 4> corner_px{};  ///< order and pixels as in TagDetection
   std::array<double, 4> sigma_px{};            ///< one standard deviation per coordinate
   /// Mean robust weight of the pixels; about 0.9 where the pattern and noise explain all of them.
   double explained = 0;
+  double contrast_levels = 0;  ///< white above black
+  double noise_levels = 0;     ///< of flat places, one standard deviation
+  double roughness_px = 0;     ///< by which edges are off, one standard deviation
+  Eigen::Vector2d motion_px = Eigen::Vector2d::Zero();  ///< blur of motion; its sign means nothing
+  TagEvidence evidence;  ///< cells and corners, whether usable or not
+};
+
+/// What is known of a tag before it is refined.
+struct RefineHints {
+  std::optional<Eigen::Vector2d> motion_px;  ///< while the shutter is open, where a track knows it
+  /// Bounds of noise and roughness, from tags around it; infinite: by the tag alone.
+  double most_noise_levels = std::numeric_limits<double>::infinity();
+  double most_roughness_px = std::numeric_limits<double>::infinity();
 };
 
 /// Places a printed tag on a picture by least squares on the grey levels of all its pixels. The map
@@ -32,19 +39,28 @@ struct RefinedTag {
 ///
 ///   grey(p) = a(q) + c(q) T(q'),   q = homography^-1(p),   q' = q + d(q)
 ///
-/// T is the pattern, blurred by a Gaussian whose widths along the tag's two axes (optics, pixel
-/// size and motion) are estimated too. a and c are linear (light). d holds all polynomials up to
-/// degree 3 with a normal prior: place, size and shear nearly free, the higher degrees small. Noise
-/// grows with the slope of the picture, as ragged edges make it; both parts are estimated. Pixels
-/// that the pattern does not explain (something in front, a fold) lose their weight (Cauchy loss).
-/// A hidden corner is therefore placed by the rest of the tag, with the sigma that this implies.
+/// T is the pattern under the blur of the picture: a round lens and motion along a line, which are
+/// estimated too, and may differ a little over the tag. a and c are linear (light). d holds all
+/// polynomials up to degree 3 with a normal prior: place, size and shear nearly free, the higher
+/// degrees small. Noise grows with the slope of the picture, as ragged edges make it; both parts
+/// are estimated. Pixels that the pattern does not explain (something in front, a fold) lose their
+/// weight (Cauchy loss). A hidden corner is therefore placed by the rest of the tag, with the sigma
+/// that this implies; `evidence` says that it is hidden.
 ///
-/// Sigma is the posterior's plus the size that the next degree of bending may have by the last
-/// one's.
+/// Where the fit does not converge from a sharp picture, it starts from motion in several
+/// directions, the known one before them. Sigma is described at corner_places.
 ///
 /// `pixel_from_tag` maps tag coordinates to pixels (pixel (0, 0) is the centre of the top left one)
 /// and must be right to a third of a cell.
 RefinedTag refine_tag(const cv::Mat& grey, const TagPattern& pattern,
-                      const Eigen::Matrix3d& pixel_from_tag);
+                      const Eigen::Matrix3d& pixel_from_tag, const RefineHints& hints = {});
+
+/// Moves a homography that is right to a cell onto the tag: the pattern is fitted to a picture
+/// smoothed by a third of a cell. Returns nothing where that does not converge.
+std::optional<Eigen::Matrix3d> align_tag(const cv::Mat& grey, const TagPattern& pattern,
+                                         const Eigen::Matrix3d& pixel_from_tag);
+
+/// Returns the homography from tag coordinates to four corners, in the order of TagDetection.
+Eigen::Matrix3d homography_to(const std::array<Eigen::Vector2d, 4>& corner_px);
 
 }  // namespace clothfit

@@ -20,6 +20,7 @@ namespace rejection {
 inline constexpr const char* kLowMargin = "low_margin";
 inline constexpr const char* kCorrectedBits = "corrected_bits";
 inline constexpr const char* kPatternMismatch = "pattern_mismatch";
+inline constexpr const char* kCovered = "covered";
 inline constexpr const char* kUncertain = "uncertain";
 inline constexpr const char* kTouchingBorder = "touching_border";
 inline constexpr const char* kTooOblique = "too_oblique";

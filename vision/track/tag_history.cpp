@@ -82,10 +82,15 @@ Eigen::Vector2d TagReading::centre_px() const {
 
 void judge_alone(TagReading& reading, const TrackOptions& options, const cv::Size& size) {
   const TagDetection& tag = reading.tag;
-  if (tag.decision_margin < options.min_decision_margin) reading.reject(rejection::kLowMargin);
+  // The margin counts on a tag of full contrast, so that a dark picture is no worse by itself.
+  constexpr double kFullContrast = 160;  // grey levels
+  const double of_full =
+      tag.contrast_levels > 0 ? std::min(tag.contrast_levels / kFullContrast, 1.0) : 1;
+  if (tag.decision_margin < of_full * options.min_decision_margin)
+    reading.reject(rejection::kLowMargin);
   if (tag.corrected_bits > options.max_corrected_bits) reading.reject(rejection::kCorrectedBits);
   if (nearly_degenerate(tag.corner_px)) reading.reject(rejection::kTooOblique);
-  if (!tag.refined || tag.explained < options.min_explained)
+  if (!tag.shows_tag || (!tag.predicted && tag.explained < options.min_explained))
     reading.reject(rejection::kPatternMismatch);
   constexpr double kBorder = 2;  // px; reach of an edge's blur
   for (size_t c = 0; c < 4; ++c) {
@@ -93,6 +98,9 @@ void judge_alone(TagReading& reading, const TrackOptions& options, const cv::Siz
     const bool inside = corner.x() >= kBorder && corner.x() <= size.width - 1 - kBorder &&
                         corner.y() >= kBorder && corner.y() <= size.height - 1 - kBorder;
     if (!inside && reading.rejected[c].empty()) reading.rejected[c] = rejection::kTouchingBorder;
+    constexpr double kSeen = 0.6;  // higher loses ragged corners, lower lets half hidden ones pass
+    if (tag.refined && tag.corner_seen[c] < kSeen && reading.rejected[c].empty())
+      reading.rejected[c] = rejection::kCovered;
     if (tag.sigma_px[c] > options.max_sigma_px && reading.rejected[c].empty())
       reading.rejected[c] = rejection::kUncertain;
   }

@@ -7,7 +7,6 @@
 
 #include "data/input_error.h"
 #include "data/text_file.h"
-#include "vision/degrade/shrink.h"
 #include "vision/track/tag_history.h"
 #include "vision/track/track_options.h"
 
@@ -79,13 +78,17 @@ SheetScore score_sheet(const fs::path& folder) {
   const std::vector<JudgedCorner> corners = corners_of(in_photo);
   const double side = mean_side(corners);
   SheetScore result;
-  for (const char* name : {"down_1_8.png", "down_1_16.png", "down_1_20.png"}) {
+  struct Copy {
+    const char* name;
+    double factor;
+  };
+  for (const auto& [name, factor] :
+       {Copy{"down_1_8.png", 1.0 / 8}, {"down_1_16.png", 1.0 / 16}, {"down_1_20.png", 1.0 / 20}}) {
     const cv::Mat copy = read_grey(folder / name);
-    const double factor = static_cast<double>(copy.cols) / photo.cols;
     std::vector<JudgedCorner> truth = corners;
+    // Of shrunk_place, whose sides are whole pixels, this is the exact form.
     for (JudgedCorner& corner : truth)
-      corner.truth.pixel_px = {shrunk_place(corner.truth.pixel_px.x(), photo.cols, copy.cols),
-                               shrunk_place(corner.truth.pixel_px.y(), photo.rows, copy.rows)};
+      corner.truth.pixel_px = factor * (corner.truth.pixel_px.array() + 0.5) - 0.5;
     const std::vector<TagDetection> tags = detector.detect(copy);
     result.score.add(score_tags(tags, truth, {}, copy.size()));
     if (!tags.empty()) result.side_ratio.push_back(mean_side(corners_of(tags)) / factor / side);

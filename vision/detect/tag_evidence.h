@@ -1,0 +1,34 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+
+#include "vision/detect/tag_fit.h"
+
+namespace clothfit {
+
+/// What a converged fit shows of the tag's cells and corners. Each printed cell is asked alone
+/// whether the picture wants it as printed or the other way round, with its neighbours as printed:
+/// the amplitude of that change is 0 where the print is right and 1 where it is wrong. Something in
+/// front of a cell gives other amplitudes.
+struct TagEvidence {
+  int cells = 0;        ///< with enough pixels to tell
+  int right_cells = 0;  ///< as printed
+  int wrong_cells = 0;  ///< the other way round
+  /// Mean robust weight of the pixels within a cell and a half of each corner; about 0.9 where
+  /// nothing hides it, 0 where no pixel is in the picture.
+  std::array<double, 4> corner_seen{};
+
+  /// Says whether the print is there at all, border and white around it included. A tag of another
+  /// border shows wrong cells, a place without a tag hardly any right one.
+  bool shows_tag() const {
+    constexpr double kMostWrong = 0.08, kLeastRight = 0.4;  // higher and lower let more through
+    return wrong_cells <= kMostWrong * cells && right_cells >= kLeastRight * cells && cells > 0;
+  }
+};
+
+/// Reads the cells and corners. `pixel_by_tag` maps small steps from tag coordinates to pixels.
+TagEvidence tag_evidence(const TagFit& fit, const TagPattern& pattern,
+                         const Eigen::Matrix2d& pixel_by_tag);
+
+}  // namespace clothfit

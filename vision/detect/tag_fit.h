@@ -1,0 +1,97 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <limits>
+#include <vector>
+
+#include "vision/detect/picture_blur.h"
+#include "vision/detect/tag_pattern.h"
+#include "vision/detect/tag_samples.h"
+
+namespace clothfit {
+
+/// The unknowns of a tag's fit to a picture, in this order: bending along x and along y
+/// (polynomials up to degree 3 in tag coordinates), blur, light (offset and contrast, each linear).
+struct TagUnknowns {
+  static constexpr int kTerms = 10;
+  static constexpr int kBendX = 0;
+  static constexpr int kBendY = kTerms;
+  static constexpr int kBlur = 2 * kTerms;
+  static constexpr int kBlurSlope = kBlur + 3;
+  static constexpr int kLight = kBlurSlope + 6;
+  static constexpr int kCount = kLight + 6;
+  /// Ratio of each degree's coefficients to those of the degree before: the bending is smooth.
+  static constexpr double kDegreeRatio = 0.2;
+
+  using Terms = Eigen::Matrix<double, kTerms, 1>;
+  using Vector = Eigen::Matrix<double, kCount, 1>;
+  using Matrix = Eigen::Matrix<double, kCount, kCount>;
+
+  /// Returns the polynomials, and their derivatives by x and y.
+  static Terms polynomials(double x, double y);
+  static Eigen::Matrix<double, kTerms, 2> polynomial_slopes(double x, double y);
+  /// Returns the precision (1 / sd^2) of each unknown before the picture is seen. Lengths are in
+  /// half tags.
+  static Vector prior_precision();
+};
+
+/// The fit of a tag's printed pattern to the grey levels of its pixels; tag_refine.h has the model.
+class TagFit {
+ public:
+  /// Single precision suffices for grey levels of 8 bits and is twice as fast.
+  using Rows = Eigen::Matrix<float, Eigen::Dynamic, TagUnknowns::kCount, Eigen::RowMajor>;
+
+  /// Starts without bending, with that blur, and with light from the extremes. `pixel_by_tag` maps
+  /// small steps from tag coordinates to pixels at the middle of the tag.
+  TagFit(const TagPattern& pattern, const Eigen::Matrix2d& pixel_by_tag,
+         std::vector<TagSample> samples, const PictureBlur::Unknowns& start);
+
+  /// Leaves samples out that say little (tag_samples.h).
+  void thin_out();
+  /// Bounds what noise and roughness are taken for. Their estimates are medians over the tag, which
+  /// are too large once half of it is hidden.
+  void bound_noise(double noise_levels, double roughness_px);
+  /// Steps until a step is below 0.3 of a standard deviation; false where that does not happen
+  /// within `most_steps`, or the blur runs away.
+  bool converge(int most_steps);
+
+  const std::vector<TagSample>& samples() const { return samples_; }
+  const TagUnknowns::Vector& unknowns() const { return unknowns_; }
+  const TagUnknowns::Matrix& covariance() const { return covariance_; }
+  /// Returns the derivatives of the grey levels, one row per sample.
+  const Rows& jacobian() const { return jacobian_; }
+  const Eigen::VectorXd& residual() const { return residual_; }  ///< grey levels
+  const Eigen::VectorXd& weight() const {
+    return weight_;
+  }  ///< inverse variance times robust weight
+  /// Returns the derivatives of the model's grey levels by place in the picture, one row per
+  /// sample.
+  const Eigen::MatrixX2d& gradient() const { return gradient_; }
+  const Eigen::VectorXd& robust() const { return robust_; }  ///< robust weight, 0 to 1
+  /// Returns the brightness of white above black in the middle of the tag; negative where inverted.
+  double contrast() const { return unknowns_[TagUnknowns::kLight + 3]; }
+  /// Returns by how much edges are off where the pattern puts them, one standard deviation, px.
+  double roughness_px() const { return roughness_px_; }
+  /// Returns the noise of flat places, one standard deviation, grey levels.
+  double noise_levels() const { return noise_levels_; }
+
+ private:
+  void evaluate();
+  void weigh();
+  double step();
+
+  const TagPattern* pattern_;
+  Eigen::Matrix2d pixel_by_tag_;
+  std::vector<TagSample> samples_;
+  TagUnknowns::Vector unknowns_ = TagUnknowns::Vector::Zero();
+  TagUnknowns::Vector prior_mean_, prior_;
+  TagUnknowns::Matrix covariance_ = TagUnknowns::Matrix::Zero();
+  Rows jacobian_, whitened_;
+  Eigen::VectorXd residual_, slope_, weight_, robust_;
+  Eigen::MatrixX2d gradient_;
+  double noise_levels_ = 0, roughness_px_ = 0;
+  double most_noise_levels_ = std::numeric_limits<double>::infinity();
+  double most_roughness_px_ = std::numeric_limits<double>::infinity();
+};
+
+}  // namespace clothfit

@@ -1,0 +1,105 @@
+#include "vision/detect/tag_layout.h"
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "data/median.h"
+#include "vision/detect/tag_refine.h"
+
+namespace clothfit {
+namespace {
+
+/// A corner that was read.
+struct ReadCorner {
+  Eigen::Vector2d place_m, pixel_px;
+};
+
+/// Predicts one tag; false where too little is read around it.
+bool predict(const std::array<Eigen::Vector2d, 4>& corners_m, const std::vector<ReadCorner>& read,
+             std::array<Eigen::Vector2d, 4>& corner_px) {
+  const Eigen::Vector2d middle = (corners_m[0] + corners_m[1] + corners_m[2] + corners_m[3]) / 4;
+  const double side = (corners_m[1] - corners_m[0]).norm();
+  constexpr int kTerms = 6;
+  const auto terms = [&](const Eigen::Vector2d& place) {
+    const Eigen::Vector2d at = (place - middle) / side;
+    return Eigen::Matrix<double, 1, kTerms>(1, at.x(), at.y(), at.x() * at.x(), at.x() * at.y(),
+                                            at.y() * at.y());
+  };
+  constexpr double kReach = 2;       // tags, standard deviation of the weights
+  constexpr double kNear = 3;        // tags
+  constexpr int kLeastNear = 3 * 4;  // corners of three tags
+  const auto near = std::ranges::count_if(read, [&](const ReadCorner& corner) {
+    return (corner.place_m - middle).norm() < kNear * side;
+  });
+  if (near < kLeastNear) return false;
+  const auto rows = static_cast<Eigen::Index>(read.size());
+  Eigen::Matrix<double, Eigen::Dynamic, kTerms> equations(rows + kTerms, kTerms);
+  Eigen::MatrixX2d right = Eigen::MatrixX2d::Zero(rows + kTerms, 2);
+  for (Eigen::Index row = 0; row < rows; ++row) {
+    const ReadCorner& corner = read[static_cast<size_t>(row)];
+    const double distance = (corner.place_m - middle).norm() / (kReach * side);
+    const double weight = std::exp(-0.5 * distance * distance);
+    equations.row(row) = weight * terms(corner.place_m);
+    right.row(row) = weight * corner.pixel_px.transpose();
+  }
+  // Bending that nothing tells is small.
+  constexpr double kStiff = 0.05;  // 1/px: bends of up to 20 px per tag^2 are likely
+  equations.bottomRows<kTerms>().setZero();
+  equations.bottomRightCorner<3, 3>() = kStiff * Eigen::Matrix3d::Identity();
+  const Eigen::Matrix<double, kTerms, 2> map = equations.colPivHouseholderQr().solve(right);
+  for (size_t c = 0; c < 4; ++c) corner_px[c] = (terms(corners_m[c]) * map).transpose();
+  return true;
+}
+
+}  // namespace
+
+std::vector<PredictedTag> predict_from_neighbours(std::span<const TagDetection> found,
+                                                  const TagLayout& layout) {
+  std::vector<ReadCorner> read;
+  std::map<int, int> times;
+  for (const TagDetection& tag : found) ++times[tag.id];
+  for (const TagDetection& tag : found) {
+    const auto known = layout.find(tag.id);
+    if (known == layout.end() || times[tag.id] > 1 || !tag.refined) continue;
+    for (size_t c = 0; c < 4; ++c)
+      read.push_back({.place_m = known->second[c], .pixel_px = tag.corner_px[c]});
+  }
+  // A tag may be somewhat noisier than most.
+  constexpr double kMore = 1.5;
+  std::vector<double> noise, roughness;
+  for (const TagDetection& tag : found) {
+    if (!tag.refined) continue;
+    noise.push_back(tag.noise_levels);
+    roughness.push_back(tag.roughness_px);
+  }
+  std::vector<PredictedTag> predicted;
+  for (const auto& [id, corners_m] : layout) {
+    std::array<Eigen::Vector2d, 4> corner_px;
+    if (times.contains(id) || !predict(corners_m, read, corner_px)) continue;
+    predicted.push_back({.id = id,
+                         .pixel_from_tag = homography_to(corner_px),
+                         .motion_px = {},
+                         .most_noise_levels = kMore * median(noise),
+                         .most_roughness_px = kMore * median(roughness) + 0.02});
+  }
+  return predicted;
+}
+
+std::vector<TagDetection> detect_on_sheet(TagDetector& detector, const cv::Mat& grey,
+                                          const TagLayout& layout) {
+  std::vector<TagDetection> found = detector.detect(grey);
+  std::set<int> tried;
+  for (;;) {
+    std::vector<PredictedTag> predicted = predict_from_neighbours(found, layout);
+    std::erase_if(predicted, [&](const PredictedTag& tag) { return !tried.insert(tag.id).second; });
+    if (predicted.empty()) break;
+    const std::vector<TagDetection> more = detector.read_predicted(grey, predicted);
+    found.insert(found.end(), more.begin(), more.end());
+  }
+  std::ranges::stable_sort(found, {}, &TagDetection::id);
+  return found;
+}
+
+}  // namespace clothfit
