@@ -110,7 +110,7 @@ double loss_factor(const Eigen::VectorXd& robust) {
 /// Returns the variance of the corners' coordinates.
 ResidualCovariance::Variances coordinate_variances(const TagFit& fit, const Effects& effects,
                                                    const Eigen::Matrix3d& pixel_from_tag) {
-  const Unknowns prior = TagUnknowns::prior_precision();
+  const Unknowns& prior = fit.prior();
   const ResidualCovariance::Variances by_prior = (effects * fit.covariance()).cwiseAbs2() * prior;
   // Residuals are smaller than errors by what the unknowns take up.
   const double count = static_cast<double>(fit.samples().size());

@@ -63,6 +63,7 @@ bool agrees(const RefinedTag& refined, const std::array<Eigen::Vector2d, 4>& out
 void note(const RefinedTag& refined, TagDetection& detection) {
   detection.explained = refined.explained;
   detection.contrast_levels = refined.contrast_levels;
+  detection.black_levels = refined.black_levels;
   detection.noise_levels = refined.noise_levels;
   detection.roughness_px = refined.roughness_px;
   detection.shows_tag = refined.evidence.shows_tag();
@@ -146,12 +147,10 @@ std::vector<TagDetection> TagDetector::read_predicted(const cv::Mat& grey,
   std::vector<TagDetection> detections;
   for (const PredictedTag& one : predicted) {
     const TagPattern& pattern = library_->pattern(one.id);
-    const auto aligned = align_tag(grey, pattern, one.pixel_from_tag);
+    const auto aligned = align_tag(grey, pattern, one.pixel_from_tag, one.picture);
     if (!aligned) continue;
-    const RefinedTag refined = refine_tag(grey, pattern, *aligned,
-                                          {.motion_px = one.motion_px,
-                                           .most_noise_levels = one.most_noise_levels,
-                                           .most_roughness_px = one.most_roughness_px});
+    const RefinedTag refined =
+        refine_tag(grey, pattern, *aligned, {.motion_px = one.motion_px, .picture = one.picture});
     if (!refined.usable || !refined.evidence.shows_tag()) continue;
     TagDetection detection{.id = one.id, .corner_px = refined.corner_px, .predicted = true};
     detection.decision_margin = 0.5 * refined.contrast_levels;

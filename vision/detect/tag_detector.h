@@ -2,13 +2,14 @@
 
 #include <Eigen/Core>
 #include <array>
-#include <limits>
 #include <memory>
 #include <opencv2/core.hpp>
 #include <optional>
 #include <span>
 #include <string>
 #include <vector>
+
+#include "vision/detect/tag_refine.h"
 
 namespace clothfit {
 
@@ -26,8 +27,9 @@ struct TagDetection {
   bool refined = false;
   double explained = 0;  ///< share of the tag's pixels that its pattern explains; about 0.9 is all
   double contrast_levels = 0;  ///< white above black, grey levels; 0 where it is not known
-  double noise_levels = 0;     ///< of flat places, one standard deviation
-  double roughness_px = 0;     ///< by which printed edges are off, one standard deviation
+  double black_levels = 0;
+  double noise_levels = 0;  ///< of flat places, one standard deviation
+  double roughness_px = 0;  ///< by which printed edges are off, one standard deviation
   /// The printed cells are there, and so are border and white around them (TagEvidence).
   bool shows_tag = false;
   /// Share of the pixels around each corner that the pattern explains; about 0.9 is all.
@@ -40,10 +42,7 @@ struct PredictedTag {
   int id = 0;
   Eigen::Matrix3d pixel_from_tag = Eigen::Matrix3d::Identity();  ///< right to a cell
   std::optional<Eigen::Vector2d> motion_px;  ///< while the shutter is open, where it is known
-  // Bounds of noise and roughness, from tags around it or from the frame before: of a tag that is
-  // half hidden they cannot be told.
-  double most_noise_levels = std::numeric_limits<double>::infinity();
-  double most_roughness_px = std::numeric_limits<double>::infinity();
+  std::optional<ExpectedPicture> picture;    ///< by tags around it, or by the frame before
 };
 
 /// Reads the tags of one family in pictures. Each thread needs its own detector.

@@ -48,7 +48,8 @@ TagEvidence tag_evidence(const TagFit& fit, const TagPattern& pattern,
     const Eigen::Vector2d place = place_on_print(fit, fit.samples()[i]);
     for (size_t c = 0; c < 4; ++c) {
       const Eigen::Vector2d corner(c == 1 || c == 2 ? 1 : -1, c < 2 ? 1 : -1);
-      if ((place - corner).cwiseAbs().maxCoeff() > 1.5 * cell) continue;
+      const Eigen::Vector2d outwards = (place - corner).cwiseProduct(corner);
+      if (outwards.minCoeff() < -1.5 * cell || outwards.maxCoeff() > 0.2 * cell) continue;
       evidence.corner_seen[c] += fit.robust()[row];
       ++near[c];
     }

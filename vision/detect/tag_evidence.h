@@ -15,8 +15,9 @@ struct TagEvidence {
   int cells = 0;        ///< with enough pixels to tell
   int right_cells = 0;  ///< as printed
   int wrong_cells = 0;  ///< the other way round
-  /// Mean robust weight of the pixels within a cell and a half of each corner; about 0.9 where
-  /// nothing hides it, 0 where no pixel is in the picture.
+  /// Mean robust weight of the border's pixels within a cell and a half of each corner; about 0.9
+  /// where nothing hides it, 0 where no pixel is in the picture. The white around the border is
+  /// left out, since a hand may be as bright.
   std::array<double, 4> corner_seen{};
 
   /// Says whether the print is there at all, border and white around it included. A tag of another

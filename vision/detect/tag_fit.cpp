@@ -47,7 +47,7 @@ TagUnknowns::Vector TagUnknowns::prior_precision() {
   }
   prior.segment(kBlur, 3).setConstant(precision(1.4));  // of log variances: lens, focus, motion
   prior.segment(kBlurSlope, 6).setConstant(precision(0.4));  // motion that differs over the tag
-  return prior;                                              // light: free
+  return prior;
 }
 
 TagFit::TagFit(const TagPattern& pattern, const Eigen::Matrix2d& pixel_by_tag,
@@ -62,12 +62,27 @@ TagFit::TagFit(const TagPattern& pattern, const Eigen::Matrix2d& pixel_by_tag,
   unknowns_.segment<3>(TagUnknowns::kBlur) = start;
   const auto [darkest, brightest] = std::ranges::minmax_element(samples_, {}, &TagSample::grey);
   unknowns_[TagUnknowns::kLight] = darkest->grey;
-  unknowns_[TagUnknowns::kLight + 3] = brightest->grey - darkest->grey;
+  const double range = brightest->grey - darkest->grey;
+  unknowns_[TagUnknowns::kLight + 3] = range;
+  // Light varies little over a tag; what hides half of one must not pass for its dark side.
+  constexpr double kLightSlope = 0.15;  // of the range, to the edge of the tag
+  for (const int slope : {1, 2, 4, 5})
+    prior_[TagUnknowns::kLight + slope] = 1 / square(kLightSlope * std::max(range, 1.0));
 }
 
 void TagFit::thin_out() {
   evaluate();
   clothfit::thin_out(samples_, slope_);
+}
+
+void TagFit::expect_light(double black_levels, double contrast_levels) {
+  constexpr double kKnown = 0.15;
+  const double precision = 1 / square(kKnown * contrast_levels);
+  for (const auto& [which, level] : {std::pair(0, black_levels), std::pair(3, contrast_levels)}) {
+    unknowns_[TagUnknowns::kLight + which] = level;
+    prior_mean_[TagUnknowns::kLight + which] = level;
+    prior_[TagUnknowns::kLight + which] = precision;
+  }
 }
 
 void TagFit::bound_noise(double noise_levels, double roughness_px) {

@@ -30,8 +30,8 @@ struct TagUnknowns {
   /// Returns the polynomials, and their derivatives by x and y.
   static Terms polynomials(double x, double y);
   static Eigen::Matrix<double, kTerms, 2> polynomial_slopes(double x, double y);
-  /// Returns the precision (1 / sd^2) of each unknown before the picture is seen. Lengths are in
-  /// half tags.
+  /// Returns the precision (1 / sd^2) of bending and blur before the picture is seen, 0 for light.
+  /// Lengths are in half tags.
   static Vector prior_precision();
 };
 
@@ -46,6 +46,9 @@ class TagFit {
   TagFit(const TagPattern& pattern, const Eigen::Matrix2d& pixel_by_tag,
          std::vector<TagSample> samples, const PictureBlur::Unknowns& start);
 
+  /// Starts from a light that is known to 15 % of the contrast: grey levels of black, and of white
+  /// above it.
+  void expect_light(double black_levels, double contrast_levels);
   /// Leaves samples out that say little (tag_samples.h).
   void thin_out();
   /// Bounds what noise and roughness are taken for. Their estimates are medians over the tag, which
@@ -57,6 +60,8 @@ class TagFit {
 
   const std::vector<TagSample>& samples() const { return samples_; }
   const TagUnknowns::Vector& unknowns() const { return unknowns_; }
+  /// Returns the precision of each unknown before the picture is seen.
+  const TagUnknowns::Vector& prior() const { return prior_; }
   const TagUnknowns::Matrix& covariance() const { return covariance_; }
   /// Returns the derivatives of the grey levels, one row per sample.
   const Rows& jacobian() const { return jacobian_; }
@@ -70,6 +75,7 @@ class TagFit {
   const Eigen::VectorXd& robust() const { return robust_; }  ///< robust weight, 0 to 1
   /// Returns the brightness of white above black in the middle of the tag; negative where inverted.
   double contrast() const { return unknowns_[TagUnknowns::kLight + 3]; }
+  double black() const { return unknowns_[TagUnknowns::kLight]; }  ///< in the middle of the tag
   /// Returns by how much edges are off where the pattern puts them, one standard deviation, px.
   double roughness_px() const { return roughness_px_; }
   /// Returns the noise of flat places, one standard deviation, grey levels.

@@ -53,26 +53,44 @@ bool predict(const std::array<Eigen::Vector2d, 4>& corners_m, const std::vector<
   return true;
 }
 
+/// Returns what the tags around a place say of the picture there: light by their mean, weighed by
+/// distance^-4, noise by medians.
+ExpectedPicture expected_picture(const std::vector<const TagDetection*>& tags,
+                                 const TagLayout& layout, const Eigen::Vector2d& place_m) {
+  ExpectedPicture expected;
+  double weights = 0;
+  std::vector<double> noise, roughness;
+  for (const TagDetection* tag : tags) {
+    const double square = (layout.at(tag->id)[0] - place_m).squaredNorm();
+    const double weight = 1 / (square * square);
+    weights += weight;
+    expected.black_levels += weight * tag->black_levels;
+    expected.contrast_levels += weight * tag->contrast_levels;
+    noise.push_back(tag->noise_levels);
+    roughness.push_back(tag->roughness_px);
+  }
+  expected.black_levels /= weights;
+  expected.contrast_levels /= weights;
+  constexpr double kMore = 1.5, kLeast_px = 0.02;  // a tag may be somewhat noisier than most
+  expected.most_noise_levels = kMore * median(std::move(noise));
+  expected.most_roughness_px = kMore * median(std::move(roughness)) + kLeast_px;
+  return expected;
+}
+
 }  // namespace
 
 std::vector<PredictedTag> predict_from_neighbours(std::span<const TagDetection> found,
                                                   const TagLayout& layout) {
   std::vector<ReadCorner> read;
+  std::vector<const TagDetection*> tags;
   std::map<int, int> times;
   for (const TagDetection& tag : found) ++times[tag.id];
   for (const TagDetection& tag : found) {
     const auto known = layout.find(tag.id);
     if (known == layout.end() || times[tag.id] > 1 || !tag.refined) continue;
+    tags.push_back(&tag);
     for (size_t c = 0; c < 4; ++c)
       read.push_back({.place_m = known->second[c], .pixel_px = tag.corner_px[c]});
-  }
-  // A tag may be somewhat noisier than most.
-  constexpr double kMore = 1.5;
-  std::vector<double> noise, roughness;
-  for (const TagDetection& tag : found) {
-    if (!tag.refined) continue;
-    noise.push_back(tag.noise_levels);
-    roughness.push_back(tag.roughness_px);
   }
   std::vector<PredictedTag> predicted;
   for (const auto& [id, corners_m] : layout) {
@@ -81,8 +99,7 @@ std::vector<PredictedTag> predict_from_neighbours(std::span<const TagDetection> 
     predicted.push_back({.id = id,
                          .pixel_from_tag = homography_to(corner_px),
                          .motion_px = {},
-                         .most_noise_levels = kMore * median(noise),
-                         .most_roughness_px = kMore * median(roughness) + 0.02});
+                         .picture = expected_picture(tags, layout, corners_m[0])});
   }
   return predicted;
 }

@@ -32,6 +32,11 @@ Eigen::Matrix2d steps_at_middle(const Eigen::Matrix3d& pixel_from_tag) {
   return steps;
 }
 
+void expect(const ExpectedPicture& expected, TagFit& fit) {
+  fit.expect_light(expected.black_levels, expected.contrast_levels);
+  fit.bound_noise(expected.most_noise_levels, expected.most_roughness_px);
+}
+
 /// Lists the blurs to start from: a sharp picture, the motion known, motion in four directions.
 std::vector<PictureBlur::Unknowns> starts(const std::optional<Eigen::Vector2d>& motion_px) {
   std::vector<PictureBlur::Unknowns> blurs = {PictureBlur::unknowns(kSharp_px, {0, 0})};
@@ -58,16 +63,14 @@ RefinedTag refine_tag(const cv::Mat& grey, const TagPattern& pattern,
     TagFit fit(pattern, pixel_by_tag, samples, start);
     fit.thin_out();
     if (fit.samples().size() < kFewestSamples) return result;
+    if (hints.picture) expect(*hints.picture, fit);
     result.usable = fit.converge(kMostSteps);
-    if (result.usable && std::isfinite(hints.most_noise_levels)) {
-      fit.bound_noise(hints.most_noise_levels, hints.most_roughness_px);
-      result.usable = fit.converge(kMostSteps);
-    }
     result.usable = result.usable && fit.contrast() > 0;  // white is brighter than black
     result.noise_levels = fit.noise_levels();
     result.roughness_px = fit.roughness_px();
     result.explained = fit.robust().mean();
     result.contrast_levels = fit.contrast();
+    result.black_levels = fit.black();
     result.motion_px = PictureBlur(fit.unknowns().segment<3>(TagUnknowns::kBlur)).motion_px();
     if (fit.unknowns().allFinite()) result.evidence = tag_evidence(fit, pattern, pixel_by_tag);
     if (!result.usable) continue;
@@ -84,7 +87,8 @@ RefinedTag refine_tag(const cv::Mat& grey, const TagPattern& pattern,
 }
 
 std::optional<Eigen::Matrix3d> align_tag(const cv::Mat& grey, const TagPattern& pattern,
-                                         const Eigen::Matrix3d& pixel_from_tag) {
+                                         const Eigen::Matrix3d& pixel_from_tag,
+                                         const std::optional<ExpectedPicture>& expected) {
   const Eigen::Matrix2d pixel_by_tag = steps_at_middle(pixel_from_tag);
   Eigen::AlignedBox2d box;
   for (const Eigen::Vector2d& corner : border_corners())
@@ -104,6 +108,7 @@ std::optional<Eigen::Matrix3d> align_tag(const cv::Mat& grey, const TagPattern& 
   if (samples.size() < kFewestSamples) return {};
   TagFit fit(pattern, pixel_by_tag, samples,
              PictureBlur::unknowns(std::hypot(kSharp_px, smooth_px), {0, 0}));
+  if (expected) fit.expect_light(expected->black_levels, expected->contrast_levels);
   fit.thin_out();
   if (fit.samples().size() < kFewestSamples || !fit.converge(kMostSteps) || !(fit.contrast() > 0))
     return {};

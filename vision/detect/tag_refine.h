@@ -2,7 +2,6 @@
 
 #include <Eigen/Core>
 #include <array>
-#include <limits>
 #include <opencv2/core.hpp>
 #include <optional>
 
@@ -19,18 +18,26 @@ struct RefinedTag {
   /// Mean robust weight of the pixels; about 0.9 where the pattern and noise explain all of them.
   double explained = 0;
   double contrast_levels = 0;  ///< white above black
-  double noise_levels = 0;     ///< of flat places, one standard deviation
-  double roughness_px = 0;     ///< by which edges are off, one standard deviation
+  double black_levels = 0;
+  double noise_levels = 0;  ///< of flat places, one standard deviation
+  double roughness_px = 0;  ///< by which edges are off, one standard deviation
   Eigen::Vector2d motion_px = Eigen::Vector2d::Zero();  ///< blur of motion; its sign means nothing
   TagEvidence evidence;  ///< cells and corners, whether usable or not
+};
+
+/// What tags around one, or the frame before, say of its picture. Of a tag that is half hidden, the
+/// picture itself cannot tell it: noise is a median, and the hand's tone may pass for the light.
+struct ExpectedPicture {
+  double black_levels = 0;
+  double contrast_levels = 0;    ///< white above black; right to 15 %
+  double most_noise_levels = 0;  ///< bound of the standard deviation of flat places
+  double most_roughness_px = 0;  ///< bound of that of edges
 };
 
 /// What is known of a tag before it is refined.
 struct RefineHints {
   std::optional<Eigen::Vector2d> motion_px;  ///< while the shutter is open, where a track knows it
-  /// Bounds of noise and roughness, from tags around it; infinite: by the tag alone.
-  double most_noise_levels = std::numeric_limits<double>::infinity();
-  double most_roughness_px = std::numeric_limits<double>::infinity();
+  std::optional<ExpectedPicture> picture;
 };
 
 /// Places a printed tag on a picture by least squares on the grey levels of all its pixels. The map
@@ -58,7 +65,8 @@ RefinedTag refine_tag(const cv::Mat& grey, const TagPattern& pattern,
 /// Moves a homography that is right to a cell onto the tag: the pattern is fitted to a picture
 /// smoothed by a third of a cell. Returns nothing where that does not converge.
 std::optional<Eigen::Matrix3d> align_tag(const cv::Mat& grey, const TagPattern& pattern,
-                                         const Eigen::Matrix3d& pixel_from_tag);
+                                         const Eigen::Matrix3d& pixel_from_tag,
+                                         const std::optional<ExpectedPicture>& expected = {});
 
 /// Returns the homography from tag coordinates to four corners, in the order of TagDetection.
 Eigen::Matrix3d homography_to(const std::array<Eigen::Vector2d, 4>& corner_px);

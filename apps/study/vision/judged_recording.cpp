@@ -68,7 +68,11 @@ JudgedRecording read_judged_recording(const fs::path& folder) {
                          .family = recording.markers.family,
                          .pictures = {},
                          .truth = {},
+                         .layout = {},
                          .other_tags = {}};
+  for (const Marker& marker : recording.markers.markers)
+    if (marker.tag && marker.corner)
+      judged.layout[*marker.tag].at(static_cast<size_t>(*marker.corner)) = {marker.s_m, marker.t_m};
   for (const ReferencePoint& point : recording.reference)
     if (point.tag) judged.other_tags.insert(*point.tag);
   for (const fs::path& file : picture_files(*camera.images))

@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "vision/detect/tag_layout.h"
+
 namespace clothfit {
 
 /// A corner of a tag where it truly is.
@@ -27,6 +29,7 @@ struct JudgedRecording {
   std::string family;
   std::vector<cv::Mat> pictures;  ///< 8-bit grey
   std::vector<TrueCorners> truth;
+  TagLayout layout;          ///< where the cloth's tags lie on it
   std::set<int> other_tags;  ///< of fixed reference points: in the pictures, and not judged
 };
 
