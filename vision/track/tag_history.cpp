@@ -98,7 +98,7 @@ void judge_alone(TagReading& reading, const TrackOptions& options, const cv::Siz
     const bool inside = corner.x() >= kBorder && corner.x() <= size.width - 1 - kBorder &&
                         corner.y() >= kBorder && corner.y() <= size.height - 1 - kBorder;
     if (!inside && reading.rejected[c].empty()) reading.rejected[c] = rejection::kTouchingBorder;
-    constexpr double kSeen = 0.6;  // higher loses ragged corners, lower lets half hidden ones pass
+    constexpr double kSeen = 0.7;  // higher loses ragged corners, lower lets half hidden ones pass
     if (tag.refined && tag.corner_seen[c] < kSeen && reading.rejected[c].empty())
       reading.rejected[c] = rejection::kCovered;
     if (tag.sigma_px[c] > options.max_sigma_px && reading.rejected[c].empty())
