@@ -50,13 +50,14 @@ double outline_sigma_px(const std::array<Eigen::Vector2d, 4>& corner_px) {
   return std::max(kLeast_px, kOfSide * (corner_px[1] - corner_px[0]).norm());
 }
 
-/// Says whether the pattern was found where the outline is, to half a cell of eight.
+/// Says whether the pattern was found where the outline is, to half a cell of eight, by the median
+/// corner: the border of the picture may spoil one or two of an outline.
 bool agrees(const RefinedTag& refined, const std::array<Eigen::Vector2d, 4>& outline_px) {
   constexpr double kMostOfSide = 0.5 / 8;
-  const double most = kMostOfSide * (outline_px[1] - outline_px[0]).norm() + 1;
-  for (size_t c = 0; c < 4; ++c)
-    if (!((refined.corner_px[c] - outline_px[c]).norm() < most)) return false;
-  return true;
+  std::vector<double> apart;
+  for (size_t c = 0; c < 4; ++c) apart.push_back((refined.corner_px[c] - outline_px[c]).norm());
+  std::ranges::sort(apart);
+  return apart[1] < kMostOfSide * (outline_px[1] - outline_px[0]).norm() + 1;
 }
 
 /// Notes what the refinement of a detection found, whose corners are those of the outline.

@@ -6,7 +6,8 @@ struct TrackOptions {
   /// px per frame, > 0: a tag is rejected if it is further than this both from its place before and
   /// from its place after. Higher values let wrongly read tags through.
   double max_speed_px = 60;
-  /// Grey levels, >= 0: weaker readings of a tag's bits are rejected.
+  /// Grey levels, >= 0: weaker readings of a tag's bits are rejected. They are those of a tag whose
+  /// white is 160 above its black or more, and in proportion less on a darker one.
   double min_decision_margin = 20;
   /// 0 to 1: a tag is rejected if the printed pattern explains less of its pixels. A clean one has
   /// 0.9.
