@@ -132,8 +132,9 @@ BlurredPattern::BlurredPattern(const TagPattern& pattern, const Eigen::Matrix2d&
                                const PictureBlur& blur) {
   const double cell_px = pattern.cell() * pixel_by_tag.colwise().norm().minCoeff();
   // Steps below the lens's blur leave the spline's own blur well within it.
-  constexpr double kWidest_px = 0.45, kOfLens = 0.75;
-  const double step_px = std::min(kWidest_px, kOfLens * std::sqrt(blur.lens_variance_px2()));
+  constexpr double kFinest_px = 0.2, kWidest_px = 0.45, kOfLens = 0.75;
+  const double step_px =
+      std::clamp(kOfLens * std::sqrt(blur.lens_variance_px2()), kFinest_px, kWidest_px);
   constexpr int kFewestPerCell = 2, kMostPerCell = 64;
   const int per_cell = static_cast<int>(
       std::clamp(std::ceil(cell_px / step_px), 1.0 * kFewestPerCell, 1.0 * kMostPerCell));

@@ -207,9 +207,11 @@ ResidualCovariance::Variances ResidualCovariance::noise_variances(const Sums& we
 
 void ResidualCovariance::complete(const Sums& places) {
   const BlockSums sums = block_sums(places);
-  const double by_noise = noise_variances(places).mean();
+  const Variances by_noise = noise_variances(places);
   constexpr int kRounds = 3;
-  for (int i = 0; i < kRounds; ++i) set_taken_up(by_noise + shift_variance(sums).mean());
+  // The harmonic mean leaves places out that hardly any pixel tells, since something hides them.
+  for (int i = 0; i < kRounds; ++i)
+    set_taken_up(1 / (by_noise + shift_variance(sums)).cwiseInverse().mean());
 }
 
 ResidualCovariance::Variances ResidualCovariance::variance(const Sums& weights) const {

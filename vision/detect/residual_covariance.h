@@ -26,8 +26,8 @@ class ResidualCovariance {
   Variances variance(const Sums& weights) const;
   /// Adds what the fit has taken up of noise and shift, since residuals show what is left of them:
   /// places that err by some variance take a smooth shift of that variance out of the residuals.
-  /// `places` are the weights of residuals in the coordinates of four points whose variance is the
-  /// mean over the tag.
+  /// `places` are the weights of residuals in the coordinates of four points that stand for
+  /// the tag.
   void complete(const Sums& places);
 
  private:

@@ -1,6 +1,8 @@
 #include "vision/detect/tag_detector.h"
 
 #include <apriltag/apriltag.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <cassert>
@@ -67,6 +69,7 @@ void note(const RefinedTag& refined, TagDetection& detection) {
   detection.black_levels = refined.black_levels;
   detection.noise_levels = refined.noise_levels;
   detection.roughness_px = refined.roughness_px;
+  detection.motion_px = refined.motion_px;
   detection.shows_tag = refined.evidence.shows_tag();
   detection.corner_seen = refined.evidence.corner_seen;
   detection.sigma_px.fill(outline_sigma_px(detection.corner_px));
@@ -75,6 +78,35 @@ void note(const RefinedTag& refined, TagDetection& detection) {
   detection.shows_tag = detection.shows_tag && agrees(refined, detection.corner_px);
   detection.corner_px = refined.corner_px;
   detection.sigma_px = refined.sigma_px;
+}
+
+/// A tag as the library finds it, before it is refined.
+struct Outline {
+  TagDetection tag;
+  Eigen::Matrix3d pixel_from_tag;
+  const TagPattern* pattern = nullptr;
+};
+
+/// Reads a tag where it is predicted, after moving the prediction onto it.
+std::optional<TagDetection> read_one(const cv::Mat& grey, const TagPattern& pattern,
+                                     const PredictedTag& predicted) {
+  const RefineHints hints{.motion_px = predicted.motion_px, .picture = predicted.picture};
+  const auto aligned =
+      align_tag(grey, pattern, homography_to(predicted.corner_px), predicted.picture);
+  if (!aligned) return {};
+  const RefinedTag refined = refine_tag(grey, pattern, *aligned, hints);
+  if (!refined.usable || !refined.evidence.shows_tag()) return {};
+  TagDetection tag{.id = predicted.id, .corner_px = refined.corner_px, .predicted = true};
+  tag.decision_margin = 0.5 * refined.contrast_levels;
+  note(refined, tag);
+  return tag;
+}
+
+/// Calls `read(i)` for 0 to `count` - 1, several at once. A thread that waits for the others takes
+/// no other work up, since that may want the same detector.
+template <class Read>
+void for_each_tag(size_t count, const Read& read) {
+  tbb::this_task_arena::isolate([&] { tbb::parallel_for(size_t{0}, count, read); });
 }
 
 }  // namespace
@@ -90,11 +122,37 @@ struct TagDetector::Library {
     return patterns.emplace(id, printed_tag(*family, id)).first->second;
   }
 
+  /// Finds the outlines of tags, by the order of the library.
+  std::vector<Outline> find(const cv::Mat& grey);
+
   // The detector is destroyed first: it holds a pointer into the family.
   TagFamily family;
   std::unique_ptr<apriltag_detector_t, void (*)(apriltag_detector_t*)> detector;
   std::map<int, TagPattern> patterns;  ///< of the tags seen so far
 };
+
+std::vector<Outline> TagDetector::Library::find(const cv::Mat& grey) {
+  image_u8_t picture{.width = grey.cols,
+                     .height = grey.rows,
+                     .stride = static_cast<int32_t>(grey.step),
+                     .buf = grey.data};
+  const std::unique_ptr<zarray_t, void (*)(zarray_t*)> found(
+      apriltag_detector_detect(detector.get(), &picture), apriltag_detections_destroy);
+  std::vector<Outline> outlines;
+  for (int i = 0; i < zarray_size(found.get()); ++i) {
+    apriltag_detection_t* raw = nullptr;
+    zarray_get(found.get(), i, &raw);
+    TagDetection tag;
+    tag.id = raw->id;
+    tag.corrected_bits = raw->hamming;
+    tag.decision_margin = raw->decision_margin;
+    for (size_t c = 0; c < 4; ++c)
+      tag.corner_px[c] = Eigen::Vector2d(raw->p[c][0], raw->p[c][1]) - kHalfPixel;
+    outlines.push_back(
+        {.tag = tag, .pixel_from_tag = pixel_from_tag(*raw->H), .pattern = &pattern(raw->id)});
+  }
+  return outlines;
+}
 
 TagDetector::TagDetector(const std::string& family, int max_corrected_bits)
     : library_(std::make_unique<Library>(family)) {
@@ -113,31 +171,15 @@ TagDetector& TagDetector::operator=(TagDetector&&) noexcept = default;
 
 std::vector<TagDetection> TagDetector::detect(const cv::Mat& grey) {
   assert(grey.type() == CV_8UC1 && !grey.empty());
-  image_u8_t picture{.width = grey.cols,
-                     .height = grey.rows,
-                     .stride = static_cast<int32_t>(grey.step),
-                     .buf = grey.data};
-  const std::unique_ptr<zarray_t, void (*)(zarray_t*)> found(
-      apriltag_detector_detect(library_->detector.get(), &picture), apriltag_detections_destroy);
-
+  std::vector<Outline> outlines = library_->find(grey);
+  for_each_tag(outlines.size(), [&](size_t i) {
+    Outline& one = outlines[i];
+    note(refine_tag(grey, *one.pattern, one.pixel_from_tag), one.tag);
+  });
   std::vector<TagDetection> detections;
-  for (int i = 0; i < zarray_size(found.get()); ++i) {
-    apriltag_detection_t* raw = nullptr;
-    zarray_get(found.get(), i, &raw);
-    TagDetection detection;
-    detection.id = raw->id;
-    detection.corrected_bits = raw->hamming;
-    detection.decision_margin = raw->decision_margin;
-    for (size_t c = 0; c < 4; ++c)
-      detection.corner_px[c] = Eigen::Vector2d(raw->p[c][0], raw->p[c][1]) - kHalfPixel;
-    note(refine_tag(grey, library_->pattern(raw->id), pixel_from_tag(*raw->H)), detection);
-    detections.push_back(detection);
-  }
-  std::sort(detections.begin(), detections.end(), [](const TagDetection& a, const TagDetection& b) {
-    const auto key = [](const TagDetection& d) {
-      return std::tuple(d.id, d.corner_px[0].x(), d.corner_px[0].y());
-    };
-    return key(a) < key(b);
+  for (const Outline& one : outlines) detections.push_back(one.tag);
+  std::ranges::sort(detections, {}, [](const TagDetection& tag) {
+    return std::tuple(tag.id, tag.corner_px[0].x(), tag.corner_px[0].y());
   });
   return detections;
 }
@@ -145,19 +187,14 @@ std::vector<TagDetection> TagDetector::detect(const cv::Mat& grey) {
 std::vector<TagDetection> TagDetector::read_predicted(const cv::Mat& grey,
                                                       std::span<const PredictedTag> predicted) {
   assert(grey.type() == CV_8UC1 && !grey.empty());
+  std::vector<const TagPattern*> patterns;
+  for (const PredictedTag& one : predicted) patterns.push_back(&library_->pattern(one.id));
+  std::vector<std::optional<TagDetection>> read(predicted.size());
+  for_each_tag(predicted.size(),
+               [&](size_t i) { read[i] = read_one(grey, *patterns[i], predicted[i]); });
   std::vector<TagDetection> detections;
-  for (const PredictedTag& one : predicted) {
-    const TagPattern& pattern = library_->pattern(one.id);
-    const auto aligned = align_tag(grey, pattern, one.pixel_from_tag, one.picture);
-    if (!aligned) continue;
-    const RefinedTag refined =
-        refine_tag(grey, pattern, *aligned, {.motion_px = one.motion_px, .picture = one.picture});
-    if (!refined.usable || !refined.evidence.shows_tag()) continue;
-    TagDetection detection{.id = one.id, .corner_px = refined.corner_px, .predicted = true};
-    detection.decision_margin = 0.5 * refined.contrast_levels;
-    note(refined, detection);
-    detections.push_back(detection);
-  }
+  for (const std::optional<TagDetection>& one : read)
+    if (one) detections.push_back(*one);
   return detections;
 }
 

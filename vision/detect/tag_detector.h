@@ -30,6 +30,7 @@ struct TagDetection {
   double black_levels = 0;
   double noise_levels = 0;  ///< of flat places, one standard deviation
   double roughness_px = 0;  ///< by which printed edges are off, one standard deviation
+  Eigen::Vector2d motion_px = Eigen::Vector2d::Zero();  ///< blur of motion; its sign means nothing
   /// The printed cells are there, and so are border and white around them (TagEvidence).
   bool shows_tag = false;
   /// Share of the pixels around each corner that the pattern explains; about 0.9 is all.
@@ -37,12 +38,12 @@ struct TagDetection {
   bool predicted = false;  ///< it was looked for where a prediction had it
 };
 
-/// A tag that should be somewhere: its place by the frame before or by its neighbours.
+/// A tag that should be somewhere: its place by its neighbours.
 struct PredictedTag {
   int id = 0;
-  Eigen::Matrix3d pixel_from_tag = Eigen::Matrix3d::Identity();  ///< right to a cell
-  std::optional<Eigen::Vector2d> motion_px;  ///< while the shutter is open, where it is known
-  std::optional<ExpectedPicture> picture;    ///< by tags around it, or by the frame before
+  std::array<Eigen::Vector2d, 4> corner_px{};  ///< right to a cell
+  std::optional<Eigen::Vector2d> motion_px;    ///< while the shutter is open, where it is known
+  std::optional<ExpectedPicture> picture;      ///< by tags around it, or by the frame before
 };
 
 /// Reads the tags of one family in pictures. Each thread needs its own detector.

@@ -42,7 +42,7 @@ TagEvidence tag_evidence(const TagFit& fit, const TagPattern& pattern,
 
   std::vector<CellSums> cells(static_cast<size_t>(across * across));
   std::array<int, 4> near{};
-  TagEvidence evidence;
+  TagEvidence evidence{.printed_cells = across * across};
   for (size_t i = 0; i < fit.samples().size(); ++i) {
     const auto row = static_cast<Eigen::Index>(i);
     const Eigen::Vector2d place = place_on_print(fit, fit.samples()[i]);

@@ -12,6 +12,7 @@ namespace clothfit {
 /// the amplitude of that change is 0 where the print is right and 1 where it is wrong. Something in
 /// front of a cell gives other amplitudes.
 struct TagEvidence {
+  int printed_cells = 0;
   int cells = 0;        ///< with enough pixels to tell
   int right_cells = 0;  ///< as printed
   int wrong_cells = 0;  ///< the other way round
@@ -23,8 +24,10 @@ struct TagEvidence {
   /// Says whether the print is there at all, border and white around it included. A tag of another
   /// border shows wrong cells, a place without a tag hardly any right one.
   bool shows_tag() const {
-    constexpr double kMostWrong = 0.08, kLeastRight = 0.4;  // higher and lower let more through
-    return wrong_cells <= kMostWrong * cells && right_cells >= kLeastRight * cells && cells > 0;
+    // Higher and lower let more through.
+    constexpr double kMostWrong = 0.08, kLeastRight = 0.4, kLeastTold = 0.5;
+    return cells > 0 && cells >= kLeastTold * printed_cells && wrong_cells <= kMostWrong * cells &&
+           right_cells >= kLeastRight * cells;
   }
 };
 

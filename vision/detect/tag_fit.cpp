@@ -57,6 +57,8 @@ TagFit::TagFit(const TagPattern& pattern, const Eigen::Matrix2d& pixel_by_tag,
       samples_(std::move(samples)),
       prior_mean_(Unknowns::Zero()),
       prior_(TagUnknowns::prior_precision()) {
+  constexpr double kRoughest = 0.1;  // cells; more would pass for another print
+  most_roughness_px_ = kRoughest * cell_px();
   prior_mean_.segment<3>(TagUnknowns::kBlur) =
       PictureBlur::unknowns(kSharp, Eigen::Vector2d::Zero());
   unknowns_.segment<3>(TagUnknowns::kBlur) = start;
@@ -87,7 +89,23 @@ void TagFit::expect_light(double black_levels, double contrast_levels) {
 
 void TagFit::bound_noise(double noise_levels, double roughness_px) {
   most_noise_levels_ = noise_levels;
-  most_roughness_px_ = roughness_px;
+  most_roughness_px_ = std::min(most_roughness_px_, roughness_px);
+}
+
+double TagFit::cell_px() const {
+  return pattern_->cell() * pixel_by_tag_.colwise().norm().maxCoeff();
+}
+
+/// Says whether a blur leaves cells that can be told apart.
+bool TagFit::leaves_cells(const PictureBlur::Unknowns& unknowns) const {
+  constexpr double kWidestMotion = 3, kWidestLens = 1;  // cells
+  constexpr double kLeastLens_px = 0.1;
+  constexpr double kAnyBlur = 20;  // of the logarithms: larger ones overflow
+  if (!(unknowns.cwiseAbs().maxCoeff() < kAnyBlur)) return false;
+  const PictureBlur blur(unknowns);
+  const double lens_px = std::sqrt(blur.lens_variance_px2());
+  return blur.motion_px().norm() < kWidestMotion * cell_px() && lens_px < kWidestLens * cell_px() &&
+         lens_px > kLeastLens_px;
 }
 
 bool TagFit::converge(int most_steps) {
@@ -96,9 +114,7 @@ bool TagFit::converge(int most_steps) {
   for (int i = 0; i < most_steps; ++i) {
     evaluate();
     const double moved = step();
-    constexpr double kFarBlur = 5;  // of the logarithms: a factor of 12, no tag any more
-    if (!unknowns_.allFinite() ||
-        (unknowns_ - prior_mean_).segment<3>(TagUnknowns::kBlur).cwiseAbs().maxCoeff() > kFarBlur)
+    if (!unknowns_.allFinite() || !leaves_cells(unknowns_.segment<3>(TagUnknowns::kBlur)))
       return false;
     if (moved < kStill) return true;
   }

@@ -55,7 +55,7 @@ class TagFit {
   /// are too large once half of it is hidden.
   void bound_noise(double noise_levels, double roughness_px);
   /// Steps until a step is below 0.3 of a standard deviation; false where that does not happen
-  /// within `most_steps`, or the blur runs away.
+  /// within `most_steps`, or the blur leaves no cells.
   bool converge(int most_steps);
 
   const std::vector<TagSample>& samples() const { return samples_; }
@@ -82,6 +82,8 @@ class TagFit {
   double noise_levels() const { return noise_levels_; }
 
  private:
+  double cell_px() const;
+  bool leaves_cells(const PictureBlur::Unknowns& unknowns) const;
   void evaluate();
   void weigh();
   double step();

@@ -6,7 +6,6 @@
 #include <set>
 
 #include "data/median.h"
-#include "vision/detect/tag_refine.h"
 
 namespace clothfit {
 namespace {
@@ -77,6 +76,15 @@ ExpectedPicture expected_picture(const std::vector<const TagDetection*>& tags,
   return expected;
 }
 
+/// Returns the motion of the tag that lies nearest; there is one.
+Eigen::Vector2d nearest_motion(const std::vector<const TagDetection*>& tags,
+                               const TagLayout& layout, const Eigen::Vector2d& place_m) {
+  const auto distance = [&](const TagDetection* tag) {
+    return (layout.at(tag->id)[0] - place_m).squaredNorm();
+  };
+  return (*std::ranges::min_element(tags, {}, distance))->motion_px;
+}
+
 }  // namespace
 
 std::vector<PredictedTag> predict_from_neighbours(std::span<const TagDetection> found,
@@ -87,36 +95,47 @@ std::vector<PredictedTag> predict_from_neighbours(std::span<const TagDetection> 
   for (const TagDetection& tag : found) ++times[tag.id];
   for (const TagDetection& tag : found) {
     const auto known = layout.find(tag.id);
-    if (known == layout.end() || times[tag.id] > 1 || !tag.refined) continue;
+    if (known == layout.end() || times[tag.id] > 1 || !tag.refined || !tag.shows_tag) continue;
     tags.push_back(&tag);
     for (size_t c = 0; c < 4; ++c)
       read.push_back({.place_m = known->second[c], .pixel_px = tag.corner_px[c]});
   }
   std::vector<PredictedTag> predicted;
+  std::set<int> known;
+  for (const TagDetection* tag : tags) known.insert(tag->id);
   for (const auto& [id, corners_m] : layout) {
     std::array<Eigen::Vector2d, 4> corner_px;
-    if (times.contains(id) || !predict(corners_m, read, corner_px)) continue;
+    if (known.contains(id) || times[id] > 1 || !predict(corners_m, read, corner_px)) continue;
     predicted.push_back({.id = id,
-                         .pixel_from_tag = homography_to(corner_px),
-                         .motion_px = {},
+                         .corner_px = corner_px,
+                         .motion_px = nearest_motion(tags, layout, corners_m[0]),
                          .picture = expected_picture(tags, layout, corners_m[0])});
   }
   return predicted;
 }
 
-std::vector<TagDetection> detect_on_sheet(TagDetector& detector, const cv::Mat& grey,
-                                          const TagLayout& layout) {
-  std::vector<TagDetection> found = detector.detect(grey);
-  std::set<int> tried;
+SheetTags detect_on_sheet(TagDetector& detector, const cv::Mat& grey, const TagLayout& layout) {
+  SheetTags result{.read = detector.detect(grey), .unread = {}};
+  std::map<int, PredictedTag> unread;
   for (;;) {
-    std::vector<PredictedTag> predicted = predict_from_neighbours(found, layout);
-    std::erase_if(predicted, [&](const PredictedTag& tag) { return !tried.insert(tag.id).second; });
+    std::vector<PredictedTag> predicted = predict_from_neighbours(result.read, layout);
+    std::erase_if(predicted, [&](const PredictedTag& tag) { return unread.contains(tag.id); });
     if (predicted.empty()) break;
-    const std::vector<TagDetection> more = detector.read_predicted(grey, predicted);
-    found.insert(found.end(), more.begin(), more.end());
+    for (const PredictedTag& tag : predicted) unread[tag.id] = tag;
+    for (const TagDetection& tag : detector.read_predicted(grey, predicted)) {
+      unread.erase(tag.id);
+      // Outlines that could not be refined give way.
+      std::erase_if(result.read, [&](const TagDetection& one) { return one.id == tag.id; });
+      result.read.push_back(tag);
+    }
   }
-  std::ranges::stable_sort(found, {}, &TagDetection::id);
-  return found;
+  std::ranges::stable_sort(result.read, {}, &TagDetection::id);
+  const auto outlined = [&](int id) {
+    return std::ranges::binary_search(result.read, id, {}, &TagDetection::id);
+  };
+  for (const auto& [id, tag] : unread)
+    if (!outlined(id)) result.unread.push_back(tag);
+  return result;
 }
 
 }  // namespace clothfit

@@ -37,10 +37,16 @@ void expect(const ExpectedPicture& expected, TagFit& fit) {
   fit.bound_noise(expected.most_noise_levels, expected.most_roughness_px);
 }
 
-/// Lists the blurs to start from: a sharp picture, the motion known, motion in four directions.
+/// Lists the blurs to start from. Where the motion is known, that is it and a sharp picture, the
+/// likelier first; else a sharp picture and motion in four directions.
 std::vector<PictureBlur::Unknowns> starts(const std::optional<Eigen::Vector2d>& motion_px) {
   std::vector<PictureBlur::Unknowns> blurs = {PictureBlur::unknowns(kSharp_px, {0, 0})};
-  if (motion_px) blurs.push_back(PictureBlur::unknowns(kSharp_px, *motion_px));
+  constexpr double kSharpMotion_px = 1.5;
+  if (motion_px) {
+    blurs.push_back(PictureBlur::unknowns(kSharp_px, *motion_px));
+    if (motion_px->norm() > kSharpMotion_px) std::swap(blurs[0], blurs[1]);
+    return blurs;
+  }
   constexpr double kLength_px = 6;
   for (int k = 0; k < 4; ++k) {
     const double direction = k * M_PI / 4;

@@ -54,8 +54,8 @@ struct RefineHints {
 /// weight (Cauchy loss). A hidden corner is therefore placed by the rest of the tag, with the sigma
 /// that this implies; `evidence` says that it is hidden.
 ///
-/// Where the fit does not converge from a sharp picture, it starts from motion in several
-/// directions, the known one before them. Sigma is described at corner_places.
+/// Where the fit does not converge from a sharp picture, it starts from the motion that is known,
+/// or from motion in several directions. Sigma is described at corner_places.
 ///
 /// `pixel_from_tag` maps tag coordinates to pixels (pixel (0, 0) is the centre of the top left one)
 /// and must be right to a third of a cell.

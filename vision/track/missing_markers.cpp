@@ -36,8 +36,18 @@ bool reaches_outside(const Corners& corners, const cv::Size& size) {
   });
 }
 
-const char* reason(const TagHistory& history, FramePicture picture, int frame,
-                   const cv::Size& size) {
+/// Returns the signed area of a quadrilateral, px^2; positive for a tag seen from its front.
+double front_area(const Corners& corner_px) {
+  double twice = 0;
+  for (size_t c = 0; c < 4; ++c) {
+    const Eigen::Vector2d &a = corner_px[c], &b = corner_px[(c + 1) % 4];
+    twice += a.y() * b.x() - a.x() * b.y();
+  }
+  return 0.5 * twice;
+}
+
+const char* reason(const TagHistory& history, const std::map<int, const char*>& reasons,
+                   FramePicture picture, int frame, const cv::Size& size) {
   switch (picture) {
     case FramePicture::none:
       return missing::kNoPicture;
@@ -49,18 +59,38 @@ const char* reason(const TagHistory& history, FramePicture picture, int frame,
       break;
   }
   if (history.empty()) return missing::kNeverSeen;
+  if (const auto said = reasons.find(frame); said != reasons.end()) return said->second;
   return reaches_outside(expected(history, frame), size) ? missing::kOutside : missing::kUnread;
 }
 
 }  // namespace
 
+const char* why_unread(const PredictedTag& tag, const cv::Size& size) {
+  for (const Eigen::Vector2d& corner : tag.corner_px)
+    if (corner.x() < 0 || corner.y() < 0 || corner.x() > size.width - 1 ||
+        corner.y() > size.height - 1)
+      return missing::kOutside;
+  double longest_px = 0;
+  for (size_t c = 0; c < 4; ++c)
+    longest_px = std::max(longest_px, (tag.corner_px[(c + 1) % 4] - tag.corner_px[c]).norm());
+  constexpr double kEdgeOn = 0.15;  // of the area seen head on
+  if (front_area(tag.corner_px) < kEdgeOn * longest_px * longest_px) return missing::kHidden;
+  constexpr double kFaint = 6;  // standard deviations of noise
+  if (tag.picture && tag.picture->contrast_levels < kFaint * tag.picture->most_noise_levels)
+    return missing::kDark;
+  constexpr double kSmeared = 0.2;  // of the side: cells run into one another
+  if (tag.motion_px && tag.motion_px->norm() > kSmeared * longest_px) return missing::kBlurred;
+  return missing::kCovered;
+}
+
 std::map<std::string, int> missing_frames_of(const TagHistory& history,
+                                             const std::map<int, const char*>& reasons,
                                              const std::vector<FramePicture>& frames,
                                              const cv::Size& size) {
   std::map<std::string, int> count;
   for (int frame = 0; frame < static_cast<int>(frames.size()); ++frame)
     if (!std::ranges::binary_search(history, frame, {}, &TagReading::frame))
-      ++count[reason(history, frames[static_cast<size_t>(frame)], frame, size)];
+      ++count[reason(history, reasons, frames[static_cast<size_t>(frame)], frame, size)];
   return count;
 }
 

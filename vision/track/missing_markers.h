@@ -16,16 +16,24 @@ inline constexpr const char* kDamaged = "damaged_picture";
 inline constexpr const char* kDark = "dark";        ///< the picture is nearly black
 inline constexpr const char* kOutside = "outside";  ///< beyond the picture's border, or across it
 inline constexpr const char* kNeverSeen = "never_seen";  ///< its tag is in no picture
-inline constexpr const char* kUnread = "unread";  ///< covered, blurred, folded or turned away
+inline constexpr const char* kHidden = "hidden";         ///< the cloth turns away there
+inline constexpr const char* kBlurred = "blurred";       ///< cells run into one another
+inline constexpr const char* kCovered = "covered";       ///< the picture shows something else there
+inline constexpr const char* kUnread = "unread";         ///< nothing tells where it would be
 }  // namespace missing
 
 /// What there is of a frame.
 enum class FramePicture { none, damaged, dark, whole };
 
+/// Returns why a tag was not read where its neighbours expect it. `size` is the picture's.
+const char* why_unread(const PredictedTag& tag, const cv::Size& size);
+
 /// Counts the frames in which each of a tag's corners is not found, by reason. `history` holds a
-/// reading for each frame that shows the tag. Where it would be in others is interpolated between
-/// those before and after, and continued with their last motion at the ends.
+/// reading for each frame that shows the tag, `reasons` why it was not read in others, by frame.
+/// Where nothing is known of it, the tag's place is interpolated between the readings before and
+/// after, and continued with their last motion at the ends.
 std::map<std::string, int> missing_frames_of(const TagHistory& history,
+                                             const std::map<int, const char*>& reasons,
                                              const std::vector<FramePicture>& frames,
                                              const cv::Size& size);
 

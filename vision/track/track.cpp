@@ -11,7 +11,7 @@
 #include <set>
 
 #include "data/input_error.h"
-#include "vision/detect/tag_detector.h"
+#include "vision/detect/tag_layout.h"
 #include "vision/ingest/footage.h"
 #include "vision/ingest/frame_list.h"
 #include "vision/track/missing_markers.h"
@@ -51,6 +51,7 @@ PointsByTag points_by_tag(const std::vector<Point>& points, const std::string& f
 /// Readings of all listed tags in all pictures.
 struct Readings {
   std::map<int, TagHistory> by_tag;
+  std::map<int, std::map<int, const char*>> missing;  ///< why a tag (key) is in no row of a frame
   std::set<int> unlisted;            ///< tags that no marker and no reference point names
   std::vector<FramePicture> frames;  ///< up to the last that has a picture
   int whole = 0;                     ///< pictures that are not damaged
@@ -66,7 +67,7 @@ struct Picture {
   int frame = 0;
   FramePicture state = FramePicture::whole;
   cv::Mat grey;
-  std::vector<TagDetection> tags;
+  SheetTags tags;
 
   bool readable() const { return state != FramePicture::damaged; }
 };
@@ -87,12 +88,30 @@ std::string list_of(const std::set<int>& ids) {
   return list_numbers({ids.begin(), ids.end()});
 }
 
+std::set<int> tags_of(const PointsByTag& points) {
+  std::set<int> ids;
+  for (const auto& [id, corners] : points) ids.insert(id);
+  return ids;
+}
+
 /// Returns the tags of the cloth and of reference points.
 std::set<int> listed_tags(const PointsByTag& markers, const PointsByTag& reference) {
-  std::set<int> ids;
-  for (const PointsByTag* points : {&markers, &reference})
-    for (const auto& [id, corners] : *points) ids.insert(id);
+  std::set<int> ids = tags_of(markers);
+  ids.merge(tags_of(reference));
   return ids;
+}
+
+/// Returns where tags lie on the sheet, of those with four markers.
+TagLayout layout_of(const MarkerSet& sheet, const PointsByTag& markers) {
+  TagLayout layout;
+  for (const auto& [id, corners] : markers) {
+    if (std::ranges::count(corners, kNone) > 0) continue;
+    for (size_t c = 0; c < 4; ++c) {
+      const Marker& marker = sheet.markers[static_cast<size_t>(corners[c])];
+      layout[id][c] = {marker.s_m, marker.t_m};
+    }
+  }
+  return layout;
 }
 
 /// Throws InputError where a picture shows the listed tags once it is turned, and not as it is.
@@ -104,12 +123,13 @@ void refuse_turned(const cv::Mat& grey, const std::string& where, const std::str
                    fmt::format("tags {} of {}", list_of(listed), family), shows);
 }
 
-Readings read_all(ImageSource& images, const std::string& where, const std::string& family,
+Readings read_all(ImageSource& images, const std::string& where, const MarkerSet& sheet,
                   const PointsByTag& markers, const PointsByTag& reference,
                   const ProgressCallback& progress) {
   Readings readings;
   std::atomic<bool> cancelled = false;
-  tbb::enumerable_thread_specific<TagDetector> detectors([&] { return TagDetector(family); });
+  tbb::enumerable_thread_specific<TagDetector> detectors([&] { return TagDetector(sheet.family); });
+  const TagLayout layout = layout_of(sheet, markers);
 
   int next = 0;
   const auto load = [&](tbb::flow_control& control) {
@@ -125,29 +145,31 @@ Readings read_all(ImageSource& images, const std::string& where, const std::stri
     return picture;
   };
   const auto detect = [&](Picture picture) {
-    if (picture.readable()) picture.tags = detectors.local().detect(picture.grey);
+    if (picture.readable()) picture.tags = detect_on_sheet(detectors.local(), picture.grey, layout);
     return picture;
   };
   const auto collect = [&](const Picture& picture) {
     if (cancelled) return;
     if (picture.readable()) keep_pictures(picture, images.count(), readings);
-    for (const TagDetection& tag : picture.tags) {
+    for (const TagDetection& tag : picture.tags.read) {
       if (markers.contains(tag.id) || reference.contains(tag.id)) {
         readings.by_tag[tag.id].push_back({.frame = picture.frame, .tag = tag, .rejected = {}});
       } else {
         readings.unlisted.insert(tag.id);
       }
     }
+    for (const PredictedTag& tag : picture.tags.unread)
+      readings.missing[tag.id][picture.frame] = why_unread(tag, readings.size);
     const bool first = picture.readable() && readings.whole++ == 0;
     if (first && readings.by_tag.empty())
-      refuse_turned(picture.grey, where, family, listed_tags(markers, reference));
+      refuse_turned(picture.grey, where, sheet.family, listed_tags(markers, reference));
     readings.frames.resize(static_cast<size_t>(picture.frame) + 1, FramePicture::none);
     readings.frames.back() = picture.state;
     const Progress report{.stage = "track",
                           .done = static_cast<double>(picture.number + 1),
                           .total = static_cast<double>(images.count()),
                           .unit = "frames",
-                          .note = fmt::format("{} tags", picture.tags.size())};
+                          .note = fmt::format("{} tags", picture.tags.read.size())};
     if (progress && !progress(report)) cancelled = true;
   };
 
@@ -203,8 +225,12 @@ std::map<std::string, int> count_missing(const Readings& readings, const PointsB
     const auto found = readings.by_tag.find(id);
     static const TagHistory kNever;
     const TagHistory& history = found != readings.by_tag.end() ? found->second : kNever;
+    static const std::map<int, const char*> kNothing;
+    const auto said = readings.missing.find(id);
+    const auto& reasons = said != readings.missing.end() ? said->second : kNothing;
     const auto corners = static_cast<int>(4 - std::ranges::count(points, kNone));
-    for (const auto& [reason, frames] : missing_frames_of(history, readings.frames, readings.size))
+    for (const auto& [reason, frames] :
+         missing_frames_of(history, reasons, readings.frames, readings.size))
       missing[reason] += frames * corners;
   }
   return missing;
@@ -253,8 +279,7 @@ TrackResult track(const Recording& recording, ImageSource& pictures, const std::
   const PointsByTag reference =
       points_by_tag(recording.reference, recording.reference_file.value_or("reference").string());
 
-  Readings readings =
-      read_all(pictures, where, recording.markers.family, markers, reference, progress);
+  Readings readings = read_all(pictures, where, recording.markers, markers, reference, progress);
 
   TrackResult result;
   result.footage = pictures.findings();

@@ -100,8 +100,8 @@ TagScore score_recording(const JudgedRecording& recording, const Spoil& spoil,
   std::vector<TagScore> scores(pictures.size());
   for_each_index(pictures.size(), [&](size_t i) {
     const SpoiledPicture& picture = pictures[i];
-    scores[i] = score_tags(detect_on_sheet(detectors.local(), picture.grey, recording.layout),
-                           picture.truth, recording.other_tags, picture.grey.size());
+    const SheetTags tags = detect_on_sheet(detectors.local(), picture.grey, recording.layout);
+    scores[i] = score_tags(tags.read, picture.truth, recording.other_tags, picture.grey.size());
   });
   TagScore all;
   for (const TagScore& score : scores) all.add(score);

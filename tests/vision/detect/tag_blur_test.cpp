@@ -117,7 +117,7 @@ TEST(TagDetector, ReadsAPredictedTagAndInventsNone) {
   const auto truth = true_corners(tag, camera);
   std::array<Eigen::Vector2d, 4> guess = truth;
   for (Eigen::Vector2d& corner : guess) corner += Eigen::Vector2d(2.5, -2);  // half a cell
-  const PredictedTag there{.id = 0, .pixel_from_tag = homography_to(guess), .motion_px = {}};
+  const PredictedTag there{.id = 0, .corner_px = guess, .motion_px = {}};
   PredictedTag other = there;
   other.id = 1;
   TagDetector detector("tag36h11");
@@ -140,7 +140,7 @@ TEST(TagDetector, SaysWhichCornerIsHidden) {
   const cv::Point corner(static_cast<int>(truth[2].x()), static_cast<int>(truth[2].y()));
   cv::rectangle(picture, corner + cv::Point(-12, -12), corner + cv::Point(12, 12), cv::Scalar(150),
                 cv::FILLED);
-  const PredictedTag there{.id = 0, .pixel_from_tag = homography_to(truth), .motion_px = {}};
+  const PredictedTag there{.id = 0, .corner_px = truth, .motion_px = {}};
 
   const auto read = TagDetector("tag36h11").read_predicted(picture, std::array{there});
 
