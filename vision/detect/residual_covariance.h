@@ -24,8 +24,8 @@ class ResidualCovariance {
   using Variances = Eigen::Matrix<double, 8, 1>;
   /// Returns the variance of each of these sums.
   Variances variance(const Sums& weights) const;
-  /// Adds what the fit has taken up of noise and shift, since residuals show what is left of them:
-  /// places that err by some variance take a smooth shift of that variance out of the residuals.
+  /// Adds what the fit has taken up of noise and shift, since residuals lack it: places that err
+  /// by some variance take a smooth shift of that variance out of the residuals.
   /// `places` are the weights of residuals in the coordinates of four points that stand for
   /// the tag.
   void complete(const Sums& places);

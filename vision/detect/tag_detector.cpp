@@ -74,7 +74,11 @@ void note(const RefinedTag& refined, TagDetection& detection) {
   detection.corner_seen = refined.evidence.corner_seen;
   detection.sigma_px.fill(outline_sigma_px(detection.corner_px));
   detection.refined = refined.usable;
-  if (!refined.usable) return;
+  if (!refined.usable) {
+    // Nothing but the code tells such a tag from one of another border.
+    detection.shows_tag = detection.shows_tag && detection.corrected_bits == 0;
+    return;
+  }
   detection.shows_tag = detection.shows_tag && agrees(refined, detection.corner_px);
   detection.corner_px = refined.corner_px;
   detection.sigma_px = refined.sigma_px;

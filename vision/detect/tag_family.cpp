@@ -27,12 +27,25 @@ struct Family {
   void (*destroy)(apriltag_family_t*);
 };
 
+/// Makes tag36h11 as Kalibr prints its AprilGrid: with a black border of two cells.
+apriltag_family_t* create_36h11_border2() {
+  apriltag_family_t* family = tag36h11_create();
+  family->width_at_border += 2;
+  family->total_width += 2;
+  for (uint32_t bit = 0; bit < family->nbits; ++bit) {
+    ++family->bit_x[bit];
+    ++family->bit_y[bit];
+  }
+  return family;
+}
+
 constexpr std::array kFamilies = {
     // alphabetical
     Family{"tag16h5", tag16h5_create, tag16h5_destroy},
     Family{"tag25h9", tag25h9_create, tag25h9_destroy},
     Family{"tag36h10", tag36h10_create, tag36h10_destroy},
     Family{"tag36h11", tag36h11_create, tag36h11_destroy},
+    Family{"tag36h11_border2", create_36h11_border2, tag36h11_destroy},
     Family{"tagCircle21h7", tagCircle21h7_create, tagCircle21h7_destroy},
     Family{"tagCircle49h12", tagCircle49h12_create, tagCircle49h12_destroy},
     Family{"tagCustom48h12", tagCustom48h12_create, tagCustom48h12_destroy},

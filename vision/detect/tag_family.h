@@ -10,7 +10,8 @@ struct apriltag_family;  // AprilTag's own; its headers stay out of ours
 
 namespace clothfit {
 
-/// Returns all tag families that can be read and printed, such as tag36h11; alphabetical.
+/// Returns all tag families that can be read and printed, such as tag36h11; alphabetical. Those of
+/// Kalibr's AprilGrid, whose border is two cells wide, are tag36h11_border2.
 std::vector<std::string> tag_families();
 
 /// AprilTag's description of a family, freed with it.

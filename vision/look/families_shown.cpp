@@ -27,7 +27,8 @@ std::vector<std::string> families_shown(const std::filesystem::path& images) {
     if (n % stride != stride / 2 || !source->damage().empty()) continue;
     for (size_t f = 0; f < detectors.size(); ++f)
       for (const TagDetection& tag : detectors[f].detect(grey))
-        if (tag.decision_margin > kClearMargin && tag.refined) ++seen[tag_families()[f]];
+        if (tag.decision_margin > kClearMargin && tag.refined && tag.shows_tag)
+          ++seen[tag_families()[f]];
   }
   std::vector<std::string> families;
   for (const auto& [family, tags] : seen)

@@ -22,7 +22,7 @@ std::string list(const std::set<int>& ids) {
 std::set<int> clear_tags(const cv::Mat& grey, const std::string& family) {
   std::set<int> ids;
   for (const TagDetection& tag : TagDetector(family, 0).detect(grey))
-    if (tag.decision_margin > kClearMargin) ids.insert(tag.id);
+    if (tag.decision_margin > kClearMargin && tag.shows_tag) ids.insert(tag.id);
   return ids;
 }
 
