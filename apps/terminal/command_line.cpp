@@ -58,7 +58,7 @@ Option Option::check(const TextCheck& check) const {
 }
 
 Option Option::one_of(const std::vector<std::string>& texts) const {
-  option_->check(CLI::IsMember(texts));
+  option_->transform(CLI::IsMember(texts, CLI::ignore_case));
   return *this;
 }
 

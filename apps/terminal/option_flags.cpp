@@ -10,11 +10,21 @@ namespace {
 /// Returns the flag that sets a member: its name with dashes, but for these.
 std::string flag_of(std::string member) {
   static const std::map<std::string, std::string> kOthers = {
-      {"beam_width", "lines"},   {"budget_s", "budget"},
-      {"effects", "effect"},     {"marker_offset_sigma_m", "marker-offsets"},
-      {"mesh_columns", "mesh"},  {"mesh_rows", "mesh"},
-      {"plants", "plant"},       {"priors", "prior"},
+      {"beam_width", "lines"},
+      {"budget_s", "budget"},
+      {"columns", "grid"},
+      {"dots_per_inch", "dpi"},
+      {"effects", "effect"},
+      {"height_m", "size"},
+      {"marker_offset_sigma_m", "marker-offsets"},
+      {"mesh_columns", "mesh"},
+      {"mesh_rows", "mesh"},
+      {"plants", "plant"},
+      {"priors", "prior"},
       {"spring_set", "springs"},
+      {"square_m", "square"},
+      {"tag_m", "tag"},
+      {"width_m", "size"},
   };
   if (const auto other = kOthers.find(member); other != kOthers.end()) return "--" + other->second;
   std::ranges::replace(member, '_', '-');
@@ -24,8 +34,7 @@ std::string flag_of(std::string member) {
 }  // namespace
 
 std::string with_flags(const std::string& message) {
-  static const std::regex kMember(
-      R"((?:FitOptions|DiagnoseOptions|JournalStart)::([a-z_]+)( = )?)");
+  static const std::regex kMember(R"((?:[A-Z][A-Za-z]*Options|JournalStart)::([a-z_]+)( = )?)");
   std::string result;
   auto rest = message.begin();
   for (std::sregex_iterator match(message.begin(), message.end(), kMember), end; match != end;

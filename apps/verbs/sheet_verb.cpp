@@ -1,7 +1,9 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <memory>
+#include <optional>
 #include <tuple>
 
 #include "apps/terminal/exit_code.h"
@@ -9,6 +11,7 @@
 #include "apps/terminal/number_text.h"
 #include "apps/verbs/verb.h"
 #include "data/input_error.h"
+#include "data/number_text.h"
 #include "data/output_folder.h"
 #include "data/text_file.h"
 #include "vision/print/draw_sheet.h"
@@ -30,20 +33,12 @@ struct SheetVerbOptions {
 
 /// Reads metres from "0.4" or "0.4x0.3".
 std::pair<double, double> parse_size(const std::string& text) {
-  const auto refuse = [&]() -> InputError {
-    return {"--size", fmt::format("'{}'", text), "metres, WIDTHxHEIGHT or one number",
-            "such as 0.4x0.3"};
-  };
   const auto number = [&](const std::string& part) {
-    size_t used = 0;
-    double value = 0;
-    try {
-      value = std::stod(part, &used);
-    } catch (const std::exception&) {
-      throw refuse();
-    }
-    if (used != part.size()) throw refuse();
-    return value;
+    const std::optional<double> value = parse_number(part);
+    if (!value)
+      throw InputError("--size", fmt::format("'{}'", text), "metres, WIDTHxHEIGHT or one number",
+                       "such as 0.4x0.3");
+    return *value;
   };
   const size_t cross = text.find('x');
   const double width_m = number(text.substr(0, cross));
@@ -64,12 +59,56 @@ PrintedSheet make_sheet(const SheetVerbOptions& options) {
     return make_board_sheet(
         {.columns = corners.columns, .rows = corners.rows, .square_m = options.square_m});
   }
+  if (options.kind == "dots") {
+    DotSheetOptions dots;
+    std::tie(dots.width_m, dots.height_m) = parse_size(options.size);
+    const auto [columns, rows] = usual_dot_grid(dots.width_m, dots.height_m);
+    const GridSize grid = grid_of(options, {columns, rows});
+    dots.columns = grid.columns;
+    dots.rows = grid.rows;
+    return make_dot_sheet(dots);
+  }
   TagSheetOptions tags = options.tags;
   std::tie(tags.width_m, tags.height_m) = parse_size(options.size);
   const GridSize grid = grid_of(options, {8, 8});
   tags.columns = grid.columns;
   tags.rows = grid.rows;
   return make_tag_sheet(tags);
+}
+
+/// Warns of what a print shows too small, or over too many pages.
+void warn_of(const PrintedSheet& sheet, const SheetVerbOptions& options) {
+  const int pages = page_count(sheet, options.draw.paper);
+  constexpr int kMostPages = 12;
+  if (options.kind == "board" && pages > 1)
+    spdlog::warn(
+        "the board is spread over {} pages, which seldom join flat; use smaller fields or "
+        "larger paper, or have it printed on one plate",
+        pages);
+  else if (pages > kMostPages)
+    spdlog::warn(
+        "the sheet is spread over {} pages, and each joint errs; use larger paper, or have it "
+        "printed in one piece: --paper whole",
+        pages);
+  if (sheet.markers.kind != MarkerKind::apriltag) return;
+  // A cloth that fills the middle half of a picture of full HD.
+  constexpr double kPicture_px = 960, kRead_px = 15, kPrinted_m = 8e-3;
+  const Marker &left = sheet.markers.markers[0], &right = sheet.markers.markers[1];
+  const double tag_m = right.s_m - left.s_m;
+  const double tag_px = kPicture_px * tag_m / std::max(sheet.width_m, sheet.height_m);
+  if (tag_px < kRead_px || tag_m < kPrinted_m)
+    spdlog::warn(
+        "the tags are {} mm wide: {} px where the cloth fills half of a picture of 1920 px, and "
+        "below {} px few are read; use fewer or larger ones",
+        significant(1e3 * tag_m, 2), significant(tag_px, 2), kRead_px);
+}
+
+/// Returns the line of a recording.yaml that names a sheet's markers.
+std::string markers_line(const MarkerSet& markers) {
+  if (markers.kind == MarkerKind::dots)
+    return "markers: {kind: dots, family: tag36h11, file: markers.csv}  # the family is that of "
+           "reference tags beside the cloth";
+  return fmt::format("markers: {{kind: apriltag, family: {}, file: markers.csv}}", markers.family);
 }
 
 /// Writes the start of a recording of a cloth that carries the sheet.
@@ -81,13 +120,13 @@ void write_recording_start(const PrintedSheet& sheet, const fs::path& folder) {
                   "cloth:\n"
                   "  size: [{}, {}]  # m; measure the ruler of the print: 100 mm, or scale this\n"
                   "  mass: null      # kg; weigh the cloth with its print\n"
-                  "markers: {{kind: apriltag, family: {}, file: markers.csv}}\n"
-                  "time: {{frame_rate: 30}}  # per second; leave it out where a video has its own "
-                  "times\n"
+                  "{}\n"
+                  "# time: {{frame_rate: 60}}  # per second, as filmed; left out where a video has "
+                  "its own times\n"
                   "cameras: []      # {{name: front, images: VIDEO, file: cameras/front.yaml}}\n"
                   "held: []         # {{at: [0, 0], motion: fixed}}, s to the right and t down\n"
                   "start: released_flat  # or at_rest, unknown\n",
-                  sheet.name, sheet.width_m, sheet.height_m, sheet.markers.family),
+                  sheet.name, sheet.width_m, sheet.height_m, markers_line(sheet.markers)),
       folder / "recording.yaml");
 }
 
@@ -116,12 +155,7 @@ int run_sheet(const SheetVerbOptions& options) {
   if (const double dpi = png_dots_per_inch(sheet, options.draw); dpi < options.draw.dots_per_inch)
     fmt::print("sheet.png has {} dots per inch, which so large a sheet allows.\n",
                significant(dpi, 3));
-  const int pages = page_count(sheet, options.draw.paper);
-  if (options.kind == "board" && pages > 1)
-    spdlog::warn(
-        "the board is spread over {} pages, which seldom join flat; use smaller fields or "
-        "larger paper, or have it printed on one plate",
-        pages);
+  warn_of(sheet, options);
   if (!sheet.markers.markers.empty())
     fmt::print("Markers and the start of a recording: {}\n",
                shown_path(out.final_path() / "recording.yaml"));
@@ -134,11 +168,13 @@ void add_sheet_verb(Verb program) {
   const auto options = std::make_shared<SheetVerbOptions>();
   Verb verb = program.add_verb("sheet", "Print markers for a cloth, or a calibration board");
   verb.add_option("kind", &options->kind, "What to print")
-      .one_of({"tags", "board"})
+      .one_of({"tags", "dots", "board"})
       .shows_default();
   verb.add_option("--size", &options->size, "Cloth, WIDTHxHEIGHT in metres").shows_default();
-  verb.add_option("--grid", &options->grid,
-                  "COLUMNSxROWS: tags (8x8), or inner corners of a board (9x6)")
+  verb.add_option(
+          "--grid", &options->grid,
+          "COLUMNSxROWS: tags (8x8), dots (16 along the longer side), or inner corners of a "
+          "board (9x6)")
       .type_name("GRID");
   verb.add_option("--tag", &options->tags.tag_m,
                   "Side of a tag's black border; as large as fits, unless told")

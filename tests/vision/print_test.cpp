@@ -13,6 +13,7 @@
 #include "vision/detect/board_search.h"
 #include "vision/detect/tag_detector.h"
 #include "vision/print/draw_sheet.h"
+#include "vision/track/dot_tracks.h"
 
 namespace clothfit {
 namespace {
@@ -84,6 +85,50 @@ TEST(TagSheet, RefusesWhatDoesNotFit) {
   EXPECT_THROW(make_tag_sheet({.columns = 0}), InputError);
 }
 
+/// Largest distance (px) of dots that a tracker names in a picture from the places of their
+/// markers.
+double worst_dot_px(const PrintedSheet& sheet, const cv::Mat& picture) {
+  const DotFrame frame = DotTracker(sheet.markers, "markers.csv").next(picture);
+  if (frame.dots.size() < sheet.markers.markers.size()) return INFINITY;
+  double worst_px = 0;
+  for (const DotRow& dot : frame.dots) {
+    const Marker& marker = sheet.markers.markers[static_cast<size_t>(dot.marker)];
+    const Eigen::Vector2d place_px =
+        kPixelsPerMetre * Eigen::Vector2d(marker.s_m, marker.t_m) - Eigen::Vector2d(0.5, 0.5);
+    worst_px = std::max(worst_px, (dot.pixel_px - place_px).norm());
+  }
+  return worst_px;
+}
+
+TEST(DotSheet, PrintsDotsWhereATrackerFindsTheirMarkers) {
+  for (const DotSheetOptions& options :
+       {DotSheetOptions{.width_m = 0.16, .height_m = 0.12, .columns = 8, .rows = 6},
+        DotSheetOptions{.width_m = 0.11, .height_m = 0.15, .columns = 5, .rows = 7}}) {
+    const PrintedSheet sheet = make_dot_sheet(options);
+    ASSERT_EQ(sheet.markers.markers.size(), static_cast<size_t>(options.columns * options.rows));
+    EXPECT_LT(worst_dot_px(sheet, printed(sheet)), 0.1);
+  }
+}
+
+TEST(DotSheet, LiesInTheMiddleOfTheClothWithTheSameSpacingBothWays) {
+  const PrintedSheet sheet =
+      make_dot_sheet({.width_m = 0.11, .height_m = 0.15, .columns = 5, .rows = 7});
+  const double spacing_m = 0.15 / 7;
+  EXPECT_NEAR(sheet.markers.markers[1].s_m - sheet.markers.markers[0].s_m, spacing_m, 1e-12);
+  EXPECT_NEAR(sheet.markers.markers[5].t_m - sheet.markers.markers[0].t_m, spacing_m, 1e-12);
+  EXPECT_NEAR(sheet.markers.markers[0].s_m + sheet.markers.markers[4].s_m, 0.11, 1e-12);
+  EXPECT_EQ(usual_dot_grid(0.4, 0.3), std::pair(16, 12));
+  EXPECT_EQ(usual_dot_grid(0.4, 0.4), std::pair(16, 16));
+}
+
+TEST(DotSheet, RefusesWhatCannotBePrintedOrNamed) {
+  EXPECT_THROW(make_dot_sheet({.columns = 2, .rows = 2}), InputError);
+  EXPECT_THROW(make_dot_sheet({.columns = 65, .rows = 65}), InputError);
+  EXPECT_THROW(make_dot_sheet({.width_m = 0.04, .height_m = 0.04}), InputError) << "0.7 mm wide";
+  EXPECT_THROW(make_dot_sheet({.width_m = 0.4, .height_m = 0.2}), InputError) << "16 x 8 fit";
+  EXPECT_THROW(make_dot_sheet({.width_m = 40, .height_m = 40}), InputError);
+}
+
 TEST(BoardSheet, PrintsABoardOfThatSize) {
   const PrintedSheet sheet = make_board_sheet({.columns = 9, .rows = 6, .square_m = 0.02});
   const auto seen = search_board(printed(sheet));
@@ -93,7 +138,7 @@ TEST(BoardSheet, PrintsABoardOfThatSize) {
   EXPECT_NEAR((seen->corner_px[8] - seen->corner_px[0]).norm(), 8 * 0.02 * kPixelsPerMetre, 0.1);
   EXPECT_EQ(page_count(sheet, "a4"), 1);
   EXPECT_EQ(page_count(sheet, "letter"), 1);
-  EXPECT_THROW(make_board_sheet({.columns = 2, .rows = 6, .square_m = 0.02}), InputError);
+  EXPECT_THROW(make_board_sheet({.columns = 3, .rows = 6, .square_m = 0.02}), InputError);
   EXPECT_THROW(make_board_sheet({.columns = 9, .rows = 6, .square_m = 20}), InputError);
 }
 

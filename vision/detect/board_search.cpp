@@ -30,7 +30,7 @@ std::optional<SeenBoard> search_board(const cv::Mat& grey) {
   if (scale < 1) cv::resize(grey, small, {}, scale, scale, cv::INTER_AREA);
   std::vector<cv::Point2f> corners;
   cv::Mat kinds;  // one entry per corner
-  const cv::Size least(4, 4);
+  const cv::Size least(kFewestFoundCorners, kFewestFoundCorners);
   if (!cv::findChessboardCornersSB(small, least, corners,
                                    cv::CALIB_CB_LARGER | cv::CALIB_CB_NORMALIZE_IMAGE, kinds))
     return std::nullopt;

@@ -7,6 +7,9 @@
 
 namespace clothfit {
 
+/// Number of inner corners along a side from which a board is found.
+inline constexpr int kFewestFoundCorners = 4;
+
 /// A chessboard that a picture shows, of a size that was not told.
 struct SeenBoard {
   int columns = 0, rows = 0;               ///< inner corners that are seen; columns >= rows

@@ -149,10 +149,10 @@ int nearest_dot_symbol(double radius_over_spacing) {
 }
 
 DotPattern make_dot_pattern(int columns, int rows) {
-  constexpr int kFewest = 3, kMost = 64;
-  if (std::min(columns, rows) < kFewest || std::max(columns, rows) > kMost)
-    throw InputError("dots", fmt::format("{} x {}", columns, rows),
-                     fmt::format("{} x {} to {} x {} dots", kFewest, kFewest, kMost, kMost));
+  if (std::min(columns, rows) < kFewestPatternDots || std::max(columns, rows) > kMostPatternDots)
+    throw InputError(
+        "dots", fmt::format("{} x {}", columns, rows),
+        fmt::format("{} to {} dots along each side", kFewestPatternDots, kMostPatternDots));
   constexpr long kTries = 200000;  // the margins named in the header are found within a tenth
   for (const DotPatternMargin margin :
        {DotPatternMargin::any_misread, DotPatternMargin::step_misread, DotPatternMargin::none}) {

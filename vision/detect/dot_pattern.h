@@ -11,6 +11,8 @@ namespace clothfit {
 
 /// Number of sizes that a dot of a pattern may have. Symbol 0 is the smallest.
 inline constexpr int kDotSymbols = 4;
+/// Number of dots that a pattern may have along a side.
+inline constexpr int kFewestPatternDots = 3, kMostPatternDots = 64;
 
 /// Returns the radius of a dot over the spacing of dots: 0.13, 0.164, 0.206 or 0.26. Steps of 1.26
 /// are some twenty standard deviations of the radius that a fit finds in a picture with dots 8 px

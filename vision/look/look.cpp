@@ -81,7 +81,7 @@ bool is_drawn(int number, int count, int every) {
 }  // namespace
 
 void LookOptions::validate() const {
-  if (every < 1) throw InputError("every", fmt::format("{}", every), "a whole number, 1 or more");
+  if (every < 1) throw InputError("LookOptions::every", fmt::format("{}", every), "a whole number, 1 or more");
 }
 
 LookResult look(const std::filesystem::path& images, const LookOptions& options,

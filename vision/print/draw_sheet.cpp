@@ -138,11 +138,12 @@ struct PagePlan {
 };
 
 PagePlan plan_on(double paper_width_mm, double paper_height_mm, const PrintedSheet& sheet) {
+  const Eigen::Vector2d bare_mm = 1e3 * sheet.bare_m, share_mm = 1e3 * sheet.share_m;
   return {.width_mm = paper_width_mm,
           .height_mm = paper_height_mm,
-          .columns = page_spans(width_mm(sheet), kMargin_mm, 1e3 * sheet.share_m.x(),
+          .columns = page_spans(width_mm(sheet), kMargin_mm + bare_mm.x(), share_mm.x(),
                                 paper_width_mm - 2 * kFree_mm),
-          .rows = page_spans(height_mm(sheet), kMargin_mm, 1e3 * sheet.share_m.y(),
+          .rows = page_spans(height_mm(sheet), kMargin_mm + bare_mm.y(), share_mm.y(),
                              paper_height_mm - 2 * kFree_mm - kStrip_mm)};
 }
 
@@ -211,9 +212,11 @@ std::vector<std::string> paper_names() {
 void PageOptions::validate() const {
   const std::vector<std::string> names = paper_names();
   if (std::ranges::find(names, paper) == names.end())
-    throw InputError("paper", fmt::format("unknown paper '{}'", paper), "a4, a3, letter or whole");
+    throw InputError("PageOptions::paper", fmt::format("unknown paper '{}'", paper),
+                     "a4, a3, letter or whole");
   if (!(dots_per_inch >= 50 && dots_per_inch <= 1200))
-    throw InputError("dots_per_inch", fmt::format("{}", dots_per_inch), "50 to 1200 dots per inch");
+    throw InputError("PageOptions::dots_per_inch", fmt::format("{}", dots_per_inch),
+                     "50 to 1200 dots per inch");
 }
 
 std::vector<PageSpan> page_spans(double length_mm, double margin_mm, double share_mm,

@@ -43,6 +43,7 @@ TEST(OptionFlags, ReplaceMembersByFlags) {
   EXPECT_EQ(with_flags("use FitOptions::cost = shooting, or DiagnoseOptions::beam_width"),
             "use --cost shooting, or --lines");
   EXPECT_EQ(with_flags("FitOptions::priors = mass: twice"), "--prior mass: twice");
+  EXPECT_EQ(with_flags("TagSheetOptions::tag_m: 3 m"), "--tag: 3 m");
 }
 
 TEST(OptionFlags, LeaveOtherWordsAlone) {
@@ -54,12 +55,13 @@ TEST(OptionFlags, LeaveOtherWordsAlone) {
 // A member without a flag would send a user to an option that is not there.
 TEST(OptionFlags, ExistForEveryMemberThatTheLibraryNames) {
   const std::set<std::string> flags = captures("apps/verbs", "\"(--[a-z-]+)\"");
-  const std::regex member_name("(?:FitOptions|DiagnoseOptions|JournalStart)::[a-z_]+");
+  const std::regex member_name("(?:[A-Z][A-Za-z]*Options|JournalStart)::[a-z_]+");
   std::set<std::string> members;
-  for (const std::string& text : captures("fit", "\"([^\"\n]*)\""))
-    for (std::sregex_iterator match(text.begin(), text.end(), member_name), end; match != end;
-         ++match)
-      members.insert(match->str());
+  for (const char* room : {"fit", "vision/look", "vision/print"})
+    for (const std::string& text : captures(room, "\"([^\"\n]*)\""))
+      for (std::sregex_iterator match(text.begin(), text.end(), member_name), end; match != end;
+           ++match)
+        members.insert(match->str());
   ASSERT_GE(members.size(), 8u);
   for (const std::string& member : members)
     EXPECT_THAT(flags, ::testing::Contains(with_flags(member)));
