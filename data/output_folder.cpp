@@ -121,7 +121,8 @@ OutputFolder::OutputFolder(fs::path final_path) {
   std::error_code error;
   if (!fs::is_directory(parent, error))
     throw InputError(final_path.string(), "the folder " + parent.string() + " does not exist",
-                     "an existing folder to write into", "create it");
+                     "an existing folder to write into",
+                     "create it: mkdir -p '" + parent.string() + "'");
   require_replaceable(final_path_);
   remove_stale(final_path_);
   work_path_ = parent / fmt::format("{}{}", partial_prefix(final_path_), getpid());

@@ -81,12 +81,15 @@ std::vector<CameraEntry> read_cameras(const YamlValue& value, const RecordingFil
   return cameras;
 }
 
-/// Refuses a recording whose frames nothing gives a time: videos alone state them.
+/// Refuses a recording whose frames nothing gives a time: videos alone state them. One without
+/// pictures and tracks, such as that of a printed sheet, has no frames.
 void require_time(const Recording& recording, const std::filesystem::path& file) {
   const auto has_video = [](const CameraEntry& camera) {
     return camera.images && std::filesystem::is_regular_file(*camera.images);
   };
-  if (recording.frame_rate_hz || recording.times_file ||
+  const bool has_frames =
+      !recording.cameras.empty() || recording.tracks3d || !recording.tracks2d.empty();
+  if (!has_frames || recording.frame_rate_hz || recording.times_file ||
       std::ranges::any_of(recording.cameras, has_video))
     return;
   throw InputError(file.string(), "no `time` is given, and no video states it", kTimeWords,

@@ -11,7 +11,10 @@
 
 #include "data/input_error.h"
 #include "data/number_text.h"
+#include "vision/ingest/frame_list.h"
+#include "vision/ingest/frame_times.h"
 #include "vision/look/seen_motion.h"
+#include "vision/look/sheet_match.h"
 
 namespace clothfit {
 namespace {
@@ -42,20 +45,11 @@ struct ClothSide {
 constexpr std::array kSides = {ClothSide{"top", 0, 0, true}, ClothSide{"bottom", 0, 1, true},
                                ClothSide{"left", 0, 0, false}, ClothSide{"right", 1, 0, false}};
 
-/// The tags of a sheet, and how they move.
-class MovingTags {
+/// A sheet, and how its tags or dots move.
+class MovingSheet {
  public:
-  MovingTags(const Recording& sheet, SeenMotion motion)
-      : sheet_(sheet), motion_(std::move(motion)) {
-    std::map<int, int> corners;
-    for (const Marker& marker : sheet.markers.markers)
-      if (marker.tag) {
-        middle_m_.try_emplace(*marker.tag, Eigen::Vector2d::Zero()).first->second +=
-            Eigen::Vector2d(marker.s_m, marker.t_m);
-        ++corners[*marker.tag];
-      }
-    for (auto& [id, middle_m] : middle_m_) middle_m /= corners.at(id);
-  }
+  MovingSheet(const Recording& sheet, SeenMotion motion)
+      : sheet_(sheet), motion_(std::move(motion)) {}
 
   const SeenMotion& motion() const { return motion_; }
   bool moves() const { return motion_.typical_px > kMoves_px; }
@@ -81,30 +75,29 @@ class MovingTags {
   /// Share of the way of most tags. Raised: cloth near a held point is taken for held itself.
   static constexpr double kRests = 0.12;
 
-  /// Returns the way at a place, continued linearly from the four nearest tags: tags do not reach
-  /// the border.
+  /// Returns the way at a place, continued linearly from the four nearest tags or dots: they do not
+  /// reach the border.
   double way_at(const Eigen::Vector2d& place_m) const {
-    std::vector<std::pair<double, int>> nearest;
-    for (const auto& [id, way_px] : motion_.way_px)
-      nearest.emplace_back((middle_m_.at(id) - place_m).norm(), id);
-    std::ranges::sort(nearest);
-    constexpr size_t kTags = 4;
-    if (nearest.size() < kTags) return INFINITY;
-    Eigen::Matrix<double, kTags, 3> plane;
-    Eigen::Matrix<double, kTags, 1> ways_px;
-    for (size_t i = 0; i < kTags; ++i) {
+    std::vector<std::pair<double, const SeenWay*>> nearest;
+    for (const SeenWay& way : motion_.ways)
+      nearest.emplace_back((way.place_m - place_m).norm(), &way);
+    std::ranges::stable_sort(nearest, {}, [](const auto& one) { return one.first; });
+    constexpr size_t kWays = 4;
+    if (nearest.size() < kWays) return INFINITY;
+    Eigen::Matrix<double, kWays, 3> plane;
+    Eigen::Matrix<double, kWays, 1> ways_px;
+    for (size_t i = 0; i < kWays; ++i) {
       const auto row = static_cast<Eigen::Index>(i);
-      const Eigen::Vector2d apart_m = middle_m_.at(nearest[i].second) - place_m;
+      const Eigen::Vector2d apart_m = nearest[i].second->place_m - place_m;
       plane.row(row) << 1, apart_m.x(), apart_m.y();
-      ways_px[row] = motion_.way_px.at(nearest[i].second);
+      ways_px[row] = nearest[i].second->way_px;
     }
-    // Four tags in a line leave the slope across it open; the smallest one is taken then.
+    // Four in a line leave the slope across it open; the smallest one is taken then.
     return plane.completeOrthogonalDecomposition().solve(ways_px)[0];
   }
 
   const Recording& sheet_;
   SeenMotion motion_;
-  std::map<int, Eigen::Vector2d> middle_m_;
 };
 
 /// Writes the draft part by part.
@@ -113,12 +106,12 @@ class Draft {
   Draft(const DraftInput& input, const std::string& name, const fs::path& folder)
       : input_(input),
         folder_(folder),
-        tags_(input.sheet, measure_motion(input.footage.front().seen, input.sheet.markers)) {
+        moving_(input.sheet, measure_motion(input.footage.front().seen, input.sheet.markers)) {
     yaml_ = fmt::format("format: clothfit-recording/1\nname: {}\n", yaml_text(name));
   }
 
   RecordingDraft write() {
-    require_tags();
+    require_sheet();
     cloth();
     time();
     cameras();
@@ -138,14 +131,36 @@ class Draft {
     return fs::proximate(fs::absolute(path), fs::absolute(folder_)).string();
   }
 
-  void require_tags() const {
+  bool of_dots() const { return input_.sheet.markers.kind == MarkerKind::dots; }
+  const char* word() const { return of_dots() ? "dots" : "tags"; }
+
+  /// Refuses footage that shows another sheet, and says how much of the sheet it shows.
+  void require_sheet() {
     const MarkerSet& markers = input_.sheet.markers;
     for (const LookedFootage& footage : input_.footage) {
-      if (measure_motion(footage.seen, markers).way_px.empty())
-        throw InputError(footage.images.string(), "shows no tag of the sheet",
-                         fmt::format("tags of {}", markers.family),
+      const SheetMatch match = match_sheet(footage.seen, markers);
+      const std::string seen =
+          fmt::format("shows {} of the {} {} of the sheet", match.shown, match.listed, word());
+      std::string others;
+      if (!match.others.empty())
+        others = fmt::format(", and {} tags that it does not list: {}", match.others.size(),
+                             list_numbers({match.others.begin(), match.others.end()}));
+      if (match.shown == 0)
+        throw InputError(footage.images.string(), seen + others,
+                         of_dots() ? "the dots of the sheet, 4 px wide or more"
+                                   : fmt::format("tags of {}", markers.family),
                          footage.seen.turned.empty() ? "give the sheet that is on the cloth"
                                                      : footage.seen.turned);
+      if (match.is_another())
+        throw InputError(footage.images.string(),
+                         match.misplaced > 0
+                             ? fmt::format("{}{}; {} of {} neighbours do not lie as it says", seen,
+                                           others, match.misplaced, match.pairs)
+                             : seen + others,
+                         "the sheet that is on the cloth",
+                         "look at the ids with clothfit detect, and give that sheet");
+      assumed_.push_back(
+          fmt::format("the sheet: {} {}{}", footage.images.filename().string(), seen, others));
     }
   }
 
@@ -163,7 +178,9 @@ class Draft {
     }
     if (cloth.masses == MassDistribution::equal) line("  masses: equal  # as the sheet has it");
     line("  mesh: {{columns: {}, rows: {}}}", cloth.mesh_columns, cloth.mesh_rows);
-    line("markers: {{kind: apriltag, family: {}, file: markers.csv}}", input_.sheet.markers.family);
+    const std::string& family = input_.sheet.markers.family;
+    line("markers: {{kind: {},{} file: markers.csv}}", to_string(input_.sheet.markers.kind),
+         family.empty() ? "" : fmt::format(" family: {},", family));
     const Eigen::Vector3d& gravity = input_.sheet.gravity_m_per_s2;
     line("gravity: [{}, {}, {}]  # m/s2", number_text(gravity.x()), number_text(gravity.y()),
          number_text(gravity.z()));
@@ -177,6 +194,11 @@ class Draft {
     const bool states_times = std::ranges::all_of(
         input_.footage, [](const LookedFootage& one) { return !one.seen.times_s.empty(); });
     if (input_.frame_rate_hz) {
+      // A rate that a video's own times contradict is refused here, as it would be when tracked.
+      for (const LookedFootage& footage : input_.footage)
+        if (footage.seen.times_s.size() > 1)
+          number_by_rate(footage.seen.times_s, *input_.frame_rate_hz, footage.images.string(),
+                         "--frame-rate");
       line("time: {{frame_rate: {}}}", number_text(*input_.frame_rate_hz));
     } else if (states_times) {
       line(
@@ -193,6 +215,10 @@ class Draft {
   }
 
   void cameras() {
+    if (input_.footage.size() > 1)
+      assumed_.push_back(
+          "cameras: their pictures of one number, or time, were taken at one moment, which no "
+          "picture tells");
     line("cameras:");
     std::set<std::string> names;
     for (const LookedFootage& footage : input_.footage) {
@@ -247,15 +273,9 @@ class Draft {
   }
 
   void reference() {
-    std::set<int> on_cloth, others;
-    for (const Marker& marker : input_.sheet.markers.markers)
-      if (marker.tag) on_cloth.insert(*marker.tag);
+    std::set<int> others;
     for (const LookedFootage& footage : input_.footage)
-      for (const SeenPicture& picture : footage.seen.pictures)
-        for (const SeenTag& tag : picture.tags)
-          if (tag.family == input_.sheet.markers.family && tag.reading.good() &&
-              !on_cloth.contains(tag.reading.tag.id))
-            others.insert(tag.reading.tag.id);
+      others.merge(match_sheet(footage.seen, input_.sheet.markers).others);
     line(
         "# NEEDED: reference: reference.csv, fixed points that say where the vertical is "
         "(point,x,y,z,tag,corner)");
@@ -264,20 +284,20 @@ class Draft {
             ? "fixed reference points: without them nothing says where the vertical is"
             : fmt::format("where the tags {} stand: they are not on the cloth. Measure their "
                           "corners, and write them to reference.csv",
-                          fmt::join(others, ", ")));
+                          list_numbers({others.begin(), others.end()})));
   }
 
   void held() {
     std::vector<std::string> entries, words;
-    if (tags_.moves()) {
+    if (moving_.moves()) {
       for (const ClothSide& side : kSides)
-        if (tags_.rests_along(side)) {
+        if (moving_.rests_along(side)) {
           entries.push_back(fmt::format("{{edge: {}, motion: fixed}}", side.name));
           words.push_back(fmt::format("the {} edge", side.name));
         }
       const bool edges = !entries.empty();
       for (const ClothCorner& corner : kCorners)
-        if (!edges && tags_.rests_at(corner.s, corner.t)) {
+        if (!edges && moving_.rests_at(corner.s, corner.t)) {
           entries.push_back(fmt::format("{{at: [{}, {}], motion: fixed}}",
                                         number_text(corner.s * input_.sheet.cloth.width_m),
                                         number_text(corner.t * input_.sheet.cloth.height_m)));
@@ -291,17 +311,25 @@ class Draft {
     }
     line("held:  # s to the right and t down from the top left of the print; correct the places");
     for (const std::string& entry : entries) line("  - {}", entry);
-    assumed_.push_back(fmt::format("held: {}, where the tags hardly move while most move {:.0f} px",
-                                   fmt::join(words, " and "), tags_.motion().typical_px));
+    assumed_.push_back(fmt::format("held: {}, where the {} hardly move while most move {:.0f} px",
+                                   fmt::join(words, " and "), word(), moving_.motion().typical_px));
   }
 
   void start() {
     constexpr double kInMotion = 0.6;  // 1/3 is a release, 1 is motion
     constexpr double kFlat = 0.01;     // of the sheet's size; a strong lens bends by as much
-    const SeenMotion& motion = tags_.motion();
-    const bool rests = !tags_.moves() || motion.first_step.value_or(1) < kInMotion;
+    const SeenMotion& motion = moving_.motion();
+    if (moving_.moves() && !motion.first_step) {
+      line("start: unknown  # NEEDED: released_flat, at_rest or unknown (in motion)");
+      needed_.push_back(
+          "how the motion starts: the first three frames were not all seen. released_flat is a "
+          "flat "
+          "sheet let go in frame 0");
+      return;
+    }
+    const bool rests = !moving_.moves() || *motion.first_step < kInMotion;
     const bool flat = motion.not_flat.value_or(1) < kFlat;
-    const char* start = !rests ? "unknown" : flat && tags_.moves() ? "released_flat" : "at_rest";
+    const char* start = !rests ? "unknown" : flat && moving_.moves() ? "released_flat" : "at_rest";
     line("start: {}  # released_flat, at_rest or unknown (in motion)", start);
     assumed_.push_back(fmt::format("start: {}, since the cloth {} in the first frame and is {}",
                                    start, rests ? "rests" : "moves already",
@@ -320,13 +348,36 @@ class Draft {
 
   const DraftInput& input_;
   fs::path folder_;
-  MovingTags tags_;
+  MovingSheet moving_;
   int boards_given_ = 0;
   std::string yaml_;
   std::vector<std::string> assumed_, needed_;
 };
 
 }  // namespace
+
+void refuse_without_sheet(const LookedFootage& footage) {
+  std::set<int> ids;
+  std::string family;
+  for (const SeenPicture& picture : footage.seen.pictures)
+    for (const SeenTag& tag : picture.tags) {
+      if (family.empty()) family = tag.family;
+      if (tag.family == family && tag.reading.good()) ids.insert(tag.reading.tag.id);
+    }
+  const std::string images = footage.images.string();
+  if (ids.empty())
+    throw InputError("--sheet", "missing, and " + images + " shows no tag",
+                     "the sheet on the cloth", "print one: clothfit sheet tags");
+  throw InputError(
+      "--sheet",
+      fmt::format("missing; {} shows {} tags of {}: {}", images, ids.size(), family,
+                  list_numbers({ids.begin(), ids.end()})),
+      "the folder that says where on the cloth they are",
+      fmt::format("give that of your print or, where a grid of them covers the cloth, make it: "
+                  "clothfit sheet tags --size WIDTHxHEIGHT --grid COLUMNSxROWS --tag SIDE "
+                  "--family {} --first-id {}",
+                  family, *ids.begin()));
+}
 
 RecordingDraft draft_recording(const DraftInput& input, const std::string& name,
                                const fs::path& folder) {

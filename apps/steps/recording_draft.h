@@ -34,9 +34,14 @@ struct RecordingDraft {
   std::vector<std::string> needed;   ///< what no picture tells, and what to do about it
 };
 
+/// Throws InputError: nobody said which sheet the cloth carries. It says which tags the footage
+/// shows, and how such a sheet is made.
+[[noreturn]] void refuse_without_sheet(const LookedFootage& footage);
+
 /// Describes footage of a cloth that carries a known sheet. Which points are held, and how the
 /// motion starts, is concluded from what moves. `folder` will hold recording.yaml. Throws
-/// InputError where no tag of the sheet appears.
+/// InputError where nothing of the sheet appears, or another one does, and for a frame rate that
+/// the videos' own times contradict.
 RecordingDraft draft_recording(const DraftInput& input, const std::string& name,
                                const std::filesystem::path& folder);
 

@@ -58,6 +58,13 @@ Table detections(const LookResult& result) {
                               reason.empty() ? "ok" : "rejected:" + reason});
       }
     }
+    const std::string pattern =
+        result.pattern ? fmt::format("{}x{}", result.pattern->columns, result.pattern->rows) : "";
+    for (const SeenDot& dot : picture.dots)
+      table.rows.push_back({picture.name, frame, "dot", pattern,
+                            dot.named() ? dot_name(dot.row, dot.column) : "", "",
+                            pixel_text(dot.pixel_px.x()), pixel_text(dot.pixel_px.y()),
+                            pixel_text(dot.sigma_px), "ok"});
     if (!picture.board) continue;
     const std::string size = fmt::format("{}x{}", picture.board->columns, picture.board->rows);
     for (size_t c = 0; c < picture.board->corner_px.size(); ++c)
@@ -95,9 +102,9 @@ int run_detect(const DetectVerbOptions& options) {
   const SeenSummary summary = summarise(result);
   for (const Finding& warning : with_state(result.footage, FindingState::warning))
     spdlog::warn("{}", sentence(warning));
-  if (summary.families.empty() && summary.boards.empty())
-    throw NoResult(fmt::format("no tag and no chessboard appears in {} pictures of {}{}",
-                               result.pictures.size(), options.images.string(),
+  if (summary.families.empty() && summary.boards.empty() && summary.dots.pictures == 0)
+    throw NoResult(fmt::format("no tag, no dots and no chessboard appear in {}: {}{}",
+                               options.images.string(), footage_text(result),
                                result.turned.empty() ? "" : "; " + result.turned));
   write_results(result, summary, out.path());
   out.publish();
@@ -113,7 +120,8 @@ int run_detect(const DetectVerbOptions& options) {
 
 void add_detect_verb(Verb program) {
   const auto options = std::make_shared<DetectVerbOptions>();
-  Verb verb = program.add_verb("detect", "List the tags and boards that pictures or a video show");
+  Verb verb =
+      program.add_verb("detect", "List the tags, dots and boards that pictures or a video show");
   verb.add_option("pictures", &options->images, "Folder of pictures, or a video")
       .required()
       .type_name("PICTURES");

@@ -49,7 +49,7 @@ class FamilyCount {
     family.each_shows = median_or_zero(shown_);
     family.width_px = median_or_zero(widths_px_);
     family.sigma_px = median_or_zero(sigmas_px_);
-    family.moves_px = median_or_zero(ways_px_);
+    if (!ways_px_.empty()) family.moves_px = median(ways_px_);
     return family;
   }
 
@@ -88,6 +88,48 @@ std::string id_text(const std::set<int>& ids) {
   return text;
 }
 
+/// Gathers dots from picture to picture.
+SeenDots summarise_dots(const LookResult& result) {
+  SeenDots dots;
+  if (result.pattern) {
+    dots.columns = result.pattern->columns;
+    dots.rows = result.pattern->rows;
+  }
+  std::vector<double> shown, widths_px, sigmas_px, ways_px;
+  std::map<std::pair<int, int>, std::pair<int, Eigen::Vector2d>> last;  // frame and place by name
+  for (const SeenPicture& picture : result.pictures) {
+    if (picture.dots.empty()) continue;
+    ++dots.pictures;
+    shown.push_back(static_cast<double>(picture.dots.size()));
+    for (const SeenDot& dot : picture.dots) {
+      ++dots.count;
+      widths_px.push_back(dot.width_px);
+      sigmas_px.push_back(dot.sigma_px);
+      if (!dot.named()) continue;
+      ++dots.named;
+      const auto [before, is_new] =
+          last.try_emplace({dot.row, dot.column}, picture.frame, dot.pixel_px);
+      if (!is_new && before->second.first < picture.frame)
+        ways_px.push_back((dot.pixel_px - before->second.second).norm() /
+                          (picture.frame - before->second.first));
+      before->second = {picture.frame, dot.pixel_px};
+    }
+  }
+  dots.each_shows = median_or_zero(shown);
+  dots.width_px = median_or_zero(widths_px);
+  dots.sigma_px = median_or_zero(sigmas_px);
+  if (!ways_px.empty()) dots.moves_px = median(ways_px);
+  return dots;
+}
+
+nlohmann::ordered_json way_json(const std::optional<double>& way_px) {
+  return way_px ? nlohmann::ordered_json(*way_px) : nlohmann::ordered_json();
+}
+
+std::string way_text(const std::optional<double>& way_px) {
+  return way_px ? significant(*way_px, 2) : "-";
+}
+
 }  // namespace
 
 SeenSummary summarise(const LookResult& result) {
@@ -98,6 +140,7 @@ SeenSummary summarise(const LookResult& result) {
     if (SeenFamily family = count.summary(); !family.ids.empty())
       summary.families.push_back(std::move(family));
   }
+  summary.dots = summarise_dots(result);
   std::map<std::pair<int, int>, int> boards;
   for (const SeenPicture& picture : result.pictures)
     if (picture.board) ++boards[{picture.board->columns, picture.board->rows}];
@@ -109,7 +152,8 @@ SeenSummary summarise(const LookResult& result) {
 
 std::string footage_text(const LookResult& result) {
   std::string text =
-      fmt::format("{} pictures of {} x {} px", result.count, result.width, result.height);
+      fmt::format("{} {} of {} x {} px", result.count, result.count == 1 ? "picture" : "pictures",
+                  result.width, result.height);
   if (result.times_s.size() > 1) {
     const double seconds = result.times_s.back() - result.times_s.front();
     text += fmt::format(", {} s, {} per second in the mean", significant(seconds, 4),
@@ -126,8 +170,17 @@ Table summary_table(const SeenSummary& summary) {
     table.rows.push_back({family.name, id_text(family.ids), fmt::format("{}", family.pictures),
                           significant(family.each_shows, 3), significant(family.width_px, 3),
                           significant(family.sigma_px, 2),
-                          family.repeated > 0 ? "-" : significant(family.moves_px, 2),
+                          family.repeated > 0 ? "-" : way_text(family.moves_px),
                           fmt::format("{} of {}", family.doubted, family.corners)});
+  if (const SeenDots& dots = summary.dots; dots.pictures > 0)
+    table.rows.push_back(
+        {"dots",
+         dots.columns > 0 ? fmt::format("a pattern of {} x {}", dots.columns, dots.rows)
+                          : "not named by a pattern",
+         fmt::format("{}", dots.pictures), significant(dots.each_shows, 3),
+         significant(dots.width_px, 3), significant(dots.sigma_px, 2), way_text(dots.moves_px),
+         dots.columns > 0 ? fmt::format("{} of {} unnamed", dots.count - dots.named, dots.count)
+                          : ""});
   for (const SeenBoards& board : summary.boards)
     table.rows.push_back({"chessboard",
                           fmt::format("{} x {} inner corners", board.columns, board.rows),
@@ -150,10 +203,21 @@ nlohmann::ordered_json to_json(const LookResult& result, const SeenSummary& summ
                             {"in_each", family.each_shows},
                             {"width_px", family.width_px},
                             {"sigma_px", family.sigma_px},
-                            {"moves_px", family.moves_px},
+                            {"moves_px", way_json(family.moves_px)},
                             {"corners", family.corners},
                             {"doubted", family.doubted},
                             {"repeated", family.repeated}});
+  json["dots"] = nlohmann::ordered_json::array();
+  if (const SeenDots& dots = summary.dots; dots.pictures > 0)
+    json["dots"].push_back({{"columns", dots.columns},
+                            {"rows", dots.rows},
+                            {"pictures", dots.pictures},
+                            {"in_each", dots.each_shows},
+                            {"width_px", dots.width_px},
+                            {"sigma_px", dots.sigma_px},
+                            {"moves_px", way_json(dots.moves_px)},
+                            {"dots", dots.count},
+                            {"named", dots.named}});
   json["boards"] = nlohmann::ordered_json::array();
   for (const SeenBoards& board : summary.boards)
     json["boards"].push_back(

@@ -435,7 +435,10 @@ TEST(Recording, MayLeaveItsTimesToItsVideos) {
 
 TEST(Recording, NeedsTimesWhereNoVideoStatesThem) {
   const TemporaryFolder folder;
-  folder.write("recording.yaml", replaced(kLeastRecording, "time: {frame_rate: 60}\n", ""));
+  const std::string timeless = replaced(kLeastRecording, "time: {frame_rate: 60}\n", "");
+  folder.write("recording.yaml", timeless);
+  EXPECT_NO_THROW(read_recording(folder.path())) << "it has no frames";
+  folder.write("recording.yaml", timeless + "cameras: [{name: front}]\n");
   expect_refused(folder, "recording.yaml: no `time` is given, and no video states it",
                  [&] { read_recording(folder.path()); });
 }

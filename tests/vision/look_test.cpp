@@ -12,6 +12,8 @@
 #include "tests/data/temporary_folder.h"
 #include "tests/vision/synthetic_tag.h"
 #include "vision/detect/board_search.h"
+#include "vision/look/sheet_match.h"
+#include "vision/print/draw_sheet.h"
 
 namespace clothfit {
 namespace {
@@ -96,6 +98,109 @@ TEST(Look, FindsABoardWhoseSizeItWasNotTold) {
   ASSERT_TRUE(result.pictures.at(0).board);
   EXPECT_EQ(result.pictures[0].board->columns, 7);
   EXPECT_EQ(result.pictures[0].board->rows, 5);
+}
+
+/// Draws a sheet of dots of so many pixels a metre, turned by quarter turns.
+cv::Mat drawn_dots(const PrintedSheet& sheet, double pixels_per_metre, int quarter_turns) {
+  const TemporaryFolder folder;
+  write_sheet_png(sheet, {.dots_per_inch = pixels_per_metre * 0.0254}, folder / "a.png");
+  cv::Mat picture = cv::imread((folder / "a.png").string(), cv::IMREAD_GRAYSCALE);
+  cv::copyMakeBorder(picture, picture, 30, 30, 30, 30, cv::BORDER_CONSTANT, cv::Scalar(255));
+  for (int turn = 0; turn < quarter_turns; ++turn)
+    cv::rotate(picture, picture, cv::ROTATE_90_CLOCKWISE);
+  return picture;
+}
+
+TEST(Look, NamesDotsByAPatternWhoseSizeItWasNotTold) {
+  const PrintedSheet sheet =
+      make_dot_sheet({.width_m = 0.16, .height_m = 0.12, .columns = 8, .rows = 6});
+  const TemporaryFolder folder;
+  const cv::Mat upright = drawn_dots(sheet, 2500, 0);
+  cv::Mat part = upright.clone();
+  part.colRange(0, 180).setTo(255);  // the first column and more
+  write_pictures(folder, {upright, part});
+  const LookResult result = look(folder.path(), {}, {});
+  ASSERT_TRUE(result.pattern);
+  EXPECT_EQ(result.pattern->columns, 8);
+  EXPECT_EQ(result.pattern->rows, 6);
+  ASSERT_EQ(result.pictures.size(), 2U);
+  ASSERT_EQ(result.pictures[0].dots.size(), 48U);
+  ASSERT_EQ(result.pictures[1].dots.size(), 30U) << "three columns are covered";
+  for (const SeenPicture& picture : result.pictures)
+    for (const SeenDot& dot : picture.dots) {
+      ASSERT_TRUE(dot.named());
+      const Marker& marker =
+          sheet.markers.markers.at(static_cast<size_t>(dot.row * 8 + dot.column));
+      const Eigen::Vector2d place_px =
+          2500 * Eigen::Vector2d(marker.s_m, marker.t_m) + Eigen::Vector2d(29.5, 29.5);
+      EXPECT_LT((dot.pixel_px - place_px).norm(), 0.1);
+    }
+
+  const TemporaryFolder turned;
+  write_pictures(turned, {drawn_dots(sheet, 2500, 1)});
+  const LookResult lying = look(turned.path(), {}, {});
+  ASSERT_TRUE(lying.pattern);
+  EXPECT_EQ(lying.pattern->columns, 8);
+}
+
+TEST(Look, ListsNoDotsWhereThereAreTagsOrTexture) {
+  const TemporaryFolder folder;
+  cv::Mat noise(240, 320, CV_8UC1);
+  cv::RNG random(7);
+  random.fill(noise, cv::RNG::UNIFORM, 0, 255);
+  cv::GaussianBlur(noise, noise, {}, 2);
+  write_pictures(folder, {noise});
+  EXPECT_THAT(look(folder.path(), {}, {}).pictures.at(0).dots, IsEmpty());
+  const TemporaryFolder tags;
+  write_pictures(tags, {three_tags("tag36h11", 0)});
+  EXPECT_THAT(look(tags.path(), {}, {}).pictures.at(0).dots, IsEmpty());
+}
+
+/// Returns what a picture of a printed sheet shows, tags or dots of it.
+LookResult looked_at(const PrintedSheet& filmed, const MarkerSet& sheet) {
+  const TemporaryFolder folder;
+  cv::Mat picture = drawn_dots(filmed, 2500, 0);
+  cv::GaussianBlur(picture, picture, {}, 1);
+  write_pictures(folder, {picture});
+  LookOptions options{.boards = false, .dots = false};
+  if (!sheet.family.empty()) options.families = {sheet.family};
+  if (sheet.kind == MarkerKind::dots) options.sheet = &sheet;
+  return look(folder.path(), options, {});
+}
+
+TEST(SheetMatch, TellsAnotherSheetByWhereItsTagsLie) {
+  const PrintedSheet four =
+      make_tag_sheet({.width_m = 0.2, .height_m = 0.2, .columns = 4, .rows = 4});
+  const PrintedSheet eight =
+      make_tag_sheet({.width_m = 0.2, .height_m = 0.05, .columns = 8, .rows = 2});
+  const SheetMatch right = match_sheet(looked_at(four, four.markers), four.markers);
+  EXPECT_EQ(right.shown, 16);
+  EXPECT_GT(right.pairs, 40);
+  EXPECT_EQ(right.misplaced, 0);
+  EXPECT_FALSE(right.is_another());
+  const SheetMatch wrong = match_sheet(looked_at(four, eight.markers), eight.markers);
+  EXPECT_EQ(wrong.shown, 16) << "the ids are the same";
+  EXPECT_TRUE(wrong.is_another());
+}
+
+TEST(SheetMatch, CountsTagsThatTheSheetDoesNotList) {
+  const PrintedSheet filmed =
+      make_tag_sheet({.width_m = 0.2, .height_m = 0.2, .columns = 4, .rows = 4});
+  const PrintedSheet sheet = make_tag_sheet({.columns = 4, .rows = 4, .first_id = 12});
+  const SheetMatch match = match_sheet(looked_at(filmed, sheet.markers), sheet.markers);
+  EXPECT_EQ(match.listed, 16);
+  EXPECT_EQ(match.shown, 4);
+  EXPECT_EQ(match.others.size(), 12U);
+  EXPECT_TRUE(match.is_another());
+}
+
+TEST(SheetMatch, NamesTheDotsOfItsOwnSheetAlone) {
+  const PrintedSheet sheet =
+      make_dot_sheet({.width_m = 0.16, .height_m = 0.12, .columns = 8, .rows = 6});
+  const PrintedSheet other =
+      make_dot_sheet({.width_m = 0.18, .height_m = 0.12, .columns = 9, .rows = 6});
+  EXPECT_EQ(match_sheet(looked_at(sheet, sheet.markers), sheet.markers).shown, 48);
+  EXPECT_EQ(match_sheet(looked_at(sheet, other.markers), other.markers).shown, 0);
 }
 
 TEST(SearchBoard, PlacesCornersOfLargePicturesInTheirOwnPixels) {

@@ -165,6 +165,10 @@ DotPattern make_dot_pattern(int columns, int rows) {
                    "another number of dots");
 }
 
+std::string dot_name(int row, int column) {
+  return fmt::format("d{:02}_{:02}", row, column);
+}
+
 DotNeighbourhood turned(const DotNeighbourhood& symbols, int quarter_turns, bool mirrored) {
   DotNeighbourhood result = symbols;
   if (mirrored)

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <unordered_map>
 #include <utility>
 #include <vector>
@@ -47,6 +48,9 @@ struct DotPattern {
 /// `any_misread` up to about 24 x 24 dots, `step_misread` up to about 34 x 34. Throws InputError
 /// below 3 x 3 dots and above 64 x 64.
 DotPattern make_dot_pattern(int columns, int rows);
+
+/// Returns the name of a pattern's dot, such as d03_11.
+std::string dot_name(int row, int column);
 
 /// Where a neighbourhood lies in a pattern. A picture's neighbourhood, turned clockwise by
 /// `quarter_turns` after being mirrored left to right where `mirrored`, reads as the pattern's.

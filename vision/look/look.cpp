@@ -7,11 +7,14 @@
 
 #include <algorithm>
 #include <atomic>
+#include <set>
+#include <utility>
 
 #include "data/input_error.h"
 #include "vision/detect/tag_detector.h"
 #include "vision/ingest/open_images.h"
 #include "vision/look/families_shown.h"
+#include "vision/track/dot_tracks.h"
 #include "vision/track/overlay.h"
 #include "vision/track/track_options.h"
 #include "vision/track/what_appears.h"
@@ -28,17 +31,37 @@ struct LookedAt {
 
 using Detectors = std::vector<TagDetector>;
 
+/// What is looked for.
+struct LookFor {
+  const LookOptions& options;
+  std::vector<std::string> families;
+  DotsShown dots;
+};
+
+LookFor what_to_look_for(const std::filesystem::path& images, const LookOptions& options) {
+  LookFor wanted{.options = options, .families = options.families, .dots = {}};
+  if (options.sheet == nullptr && options.families.empty())
+    wanted.families = families_shown(images);
+  if (options.sheet == nullptr && options.dots) wanted.dots = dots_shown(images);
+  return wanted;
+}
+
 /// Finds what one picture shows.
-void look_at(LookedAt& picture, Detectors& detectors, const LookOptions& options,
-             const std::vector<std::string>& families) {
+void look_at(LookedAt& picture, Detectors& detectors, const LookFor& wanted) {
+  const auto& [options, families, dots] = wanted;
   for (size_t f = 0; f < families.size(); ++f)
     for (const TagDetection& tag : detectors[f].detect(picture.grey)) {
       TagReading reading{.frame = picture.seen.frame, .tag = tag, .rejected = {}};
       judge_alone(reading, TrackOptions(), picture.grey.size());
       picture.seen.tags.push_back({families[f], std::move(reading)});
     }
+  if (dots.any) picture.seen.dots = find_seen_dots(picture.grey, dots.pattern);
+  // What was looked at before may be long ago, so that nothing is followed from it.
+  if (options.sheet != nullptr)
+    for (const DotRow& row : DotTracker(*options.sheet, "markers").next(picture.grey).dots)
+      picture.seen.markers.push_back({row.marker, row.pixel_px});
   constexpr size_t kFewTags = 3;  // where there are more, a grid of corners is a tag's
-  if (options.boards && picture.seen.tags.size() < kFewTags)
+  if (options.boards && picture.seen.tags.size() < kFewTags && picture.seen.dots.empty())
     picture.seen.board = search_board(picture.grey);
 }
 
@@ -54,6 +77,18 @@ std::string turned(const std::filesystem::path& images, const std::vector<std::s
   return "";
 }
 
+/// Leaves out tags that no picture shows well: weak families find such ids in any texture.
+void leave_out_invented(std::vector<SeenPicture>& pictures) {
+  std::set<std::pair<std::string, int>> good;
+  for (const SeenPicture& picture : pictures)
+    for (const SeenTag& tag : picture.tags)
+      if (tag.reading.good()) good.emplace(tag.family, tag.reading.tag.id);
+  for (SeenPicture& picture : pictures)
+    std::erase_if(picture.tags, [&](const SeenTag& tag) {
+      return !good.contains({tag.family, tag.reading.tag.id});
+    });
+}
+
 cv::Mat draw_seen(const cv::Mat& grey, const SeenPicture& seen) {
   std::vector<OverlayPoint> points;
   for (const SeenTag& tag : seen.tags)
@@ -65,6 +100,11 @@ cv::Mat draw_seen(const cv::Mat& grey, const SeenPicture& seen) {
            .pixel_px = tag.reading.tag.corner_px[c],
            .label = c == kTopLeft ? fmt::format("{}", tag.reading.tag.id) : ""});
     }
+  for (const SeenDot& dot : seen.dots)
+    points.push_back(
+        {.kind = OverlayPoint::Kind::good,
+         .pixel_px = dot.pixel_px,
+         .label = dot.named() && dot.column == 0 ? dot_name(dot.row, dot.column) : ""});
   if (seen.board)
     for (const Eigen::Vector2d& corner : seen.board->corner_px)
       points.push_back({.kind = OverlayPoint::Kind::reference, .pixel_px = corner, .label = ""});
@@ -81,17 +121,20 @@ bool is_drawn(int number, int count, int every) {
 }  // namespace
 
 void LookOptions::validate() const {
-  if (every < 1) throw InputError("LookOptions::every", fmt::format("{}", every), "a whole number, 1 or more");
+  if (every < 1)
+    throw InputError("LookOptions::every", fmt::format("{}", every), "a whole number, 1 or more");
 }
 
 LookResult look(const std::filesystem::path& images, const LookOptions& options,
                 const ProgressCallback& progress) {
   options.validate();
   LookResult result;
-  result.families = options.families.empty() ? families_shown(images) : options.families;
-  result.turned = turned(images, result.families);
+  LookFor wanted = what_to_look_for(images, options);
+  result.turned = turned(images, wanted.families);
   // What else seems to appear in mirrored tags is chance.
-  if (!result.turned.empty() && options.families.empty()) result.families.clear();
+  if (!result.turned.empty() && options.families.empty()) wanted.families.clear();
+  result.families = wanted.families;
+  result.pattern = wanted.dots.pattern;
   const auto source = open_images(images);
   result.count = source->count();
   result.times_s = source->times_s();
@@ -118,7 +161,7 @@ LookResult look(const std::filesystem::path& images, const LookOptions& options,
     return picture;
   };
   const auto detect = [&](LookedAt picture) {
-    if (picture.wanted) look_at(picture, detectors.local(), options, result.families);
+    if (picture.wanted) look_at(picture, detectors.local(), wanted);
     return picture;
   };
   const auto collect = [&](const LookedAt& picture) {
@@ -140,6 +183,7 @@ LookResult look(const std::filesystem::path& images, const LookOptions& options,
                      tbb::make_filter<LookedAt, LookedAt>(tbb::filter_mode::parallel, detect) &
                      tbb::make_filter<LookedAt, void>(tbb::filter_mode::serial_in_order, collect));
 
+  leave_out_invented(result.pictures);
   result.cancelled = cancelled;
   result.width = first.cols;
   result.height = first.rows;

@@ -7,8 +7,10 @@
 #include <vector>
 
 #include "data/finding.h"
+#include "data/markers.h"
 #include "data/progress.h"
 #include "vision/detect/board_search.h"
+#include "vision/look/dots_shown.h"
 #include "vision/track/tag_history.h"
 
 namespace clothfit {
@@ -19,11 +21,19 @@ struct SeenTag {
   TagReading reading;  ///< with the reasons that one picture gives to doubt corners
 };
 
+/// A dot of a known sheet.
+struct SeenMarker {
+  int marker = 0;  ///< index into the sheet's markers
+  Eigen::Vector2d pixel_px = Eigen::Vector2d::Zero();
+};
+
 struct SeenPicture {
   std::string name;
   int frame = 0;
-  std::vector<SeenTag> tags;       ///< by family, then id
-  std::optional<SeenBoard> board;  ///< looked for where fewer than three tags are seen
+  std::vector<SeenTag> tags;        ///< by family, then id; of ids that some picture shows well
+  std::optional<SeenBoard> board;   ///< looked for where few tags and no dots are seen
+  std::vector<SeenDot> dots;        ///< of any sheet
+  std::vector<SeenMarker> markers;  ///< dots of LookOptions::sheet
 };
 
 struct LookOptions {
@@ -33,6 +43,10 @@ struct LookOptions {
   int looks = 0;       ///< > 0: looks at about so many pictures, spread over all, whatever `every`
   int head = 0;        ///< looks at each of the first so many besides
   bool boards = true;  ///< looks for chessboards
+  bool dots = true;    ///< looks for dots on a square lattice
+  /// The markers of a cloth with dots, which are then looked for in place of unknown ones; else
+  /// null.
+  const MarkerSet* sheet = nullptr;
   void validate() const;  ///< throws InputError
 };
 
@@ -48,6 +62,7 @@ struct LookResult {
   int width = 0, height = 0;
   std::vector<double> times_s;        ///< of each picture, where the container states them
   std::vector<std::string> families;  ///< that were looked for
+  std::optional<DotPattern> pattern;  ///< that names dots
   std::vector<SeenPicture> pictures;  ///< whole ones that were looked at, in order
   std::vector<Overlay> overlays;      ///< of the first, the middle and the last of these
   Findings footage;                   ///< faults of the pictures and their files

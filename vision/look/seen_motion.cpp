@@ -2,33 +2,54 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <opencv2/calib3d.hpp>
-#include <set>
+#include <vector>
 
 #include "data/median.h"
 
 namespace clothfit {
 namespace {
 
+/// Centres by tag, or dots by marker.
 using Centres = std::map<int, Eigen::Vector2d>;
 
-/// Returns the centres of the cloth's tags in each picture.
-std::vector<Centres> centres_of(const LookResult& seen, const MarkerSet& markers) {
-  std::set<int> ids;
-  for (const Marker& marker : markers.markers)
-    if (marker.tag) ids.insert(*marker.tag);
+/// Returns where tags or dots lie on the cloth.
+Centres places_on_cloth(const MarkerSet& markers) {
+  Centres places;
+  std::map<int, int> corners;
+  for (size_t m = 0; m < markers.markers.size(); ++m) {
+    const Marker& marker = markers.markers[m];
+    const Eigen::Vector2d place_m(marker.s_m, marker.t_m);
+    if (markers.kind == MarkerKind::dots && !marker.tag) {
+      places[static_cast<int>(m)] = place_m;
+    } else if (markers.kind != MarkerKind::dots && marker.tag) {
+      places.try_emplace(*marker.tag, Eigen::Vector2d::Zero()).first->second += place_m;
+      ++corners[*marker.tag];
+    }
+  }
+  for (const auto& [id, count] : corners) places[id] /= count;
+  return places;
+}
+
+/// Returns where each picture shows them.
+std::vector<Centres> centres_of(const LookResult& seen, const MarkerSet& markers,
+                                const Centres& on_cloth) {
   std::vector<Centres> pictures;
   for (const SeenPicture& picture : seen.pictures) {
     Centres centres;
+    for (const SeenMarker& dot : picture.markers)
+      if (on_cloth.contains(dot.marker)) centres[dot.marker] = dot.pixel_px;
     for (const SeenTag& tag : picture.tags)
-      if (tag.family == markers.family && tag.reading.good() && ids.contains(tag.reading.tag.id))
+      if (markers.kind != MarkerKind::dots && tag.family == markers.family && tag.reading.good() &&
+          on_cloth.contains(tag.reading.tag.id))
         centres[tag.reading.tag.id] = tag.reading.centre_px();
     pictures.push_back(std::move(centres));
   }
   return pictures;
 }
 
-/// Returns the median way of the tags that both pictures show; nothing where none is.
+/// Returns the median way of what both pictures show; nothing where they share nothing.
 std::optional<double> median_way_px(const Centres& from, const Centres& to) {
   std::vector<double> ways_px;
   for (const auto& [id, centre] : from)
@@ -54,6 +75,11 @@ std::optional<double> distance_from_flat(const SeenPicture& picture, const Marke
       pixels.emplace_back(tag.reading.tag.corner_px[corner].x(),
                           tag.reading.tag.corner_px[corner].y());
     }
+  for (const SeenMarker& dot : picture.markers) {
+    const Marker& marker = markers.markers[static_cast<size_t>(dot.marker)];
+    sheet.emplace_back(marker.s_m, marker.t_m);
+    pixels.emplace_back(dot.pixel_px.x(), dot.pixel_px.y());
+  }
   constexpr size_t kFewest = 12;  // three tags
   if (sheet.size() < kFewest) return std::nullopt;
   const cv::Mat homography = cv::findHomography(sheet, pixels, 0);
@@ -72,15 +98,20 @@ std::optional<double> distance_from_flat(const SeenPicture& picture, const Marke
 
 SeenMotion measure_motion(const LookResult& seen, const MarkerSet& markers) {
   SeenMotion motion;
-  const std::vector<Centres> pictures = centres_of(seen, markers);
+  const Centres on_cloth = places_on_cloth(markers);
+  const std::vector<Centres> pictures = centres_of(seen, markers, on_cloth);
   Centres first;
+  std::map<int, double> way_px;
   for (const Centres& centres : pictures)
     for (const auto& [id, centre] : centres) {
       first.emplace(id, centre);
-      motion.way_px[id] = std::max(motion.way_px[id], (centre - first[id]).norm());
+      way_px[id] = std::max(way_px[id], (centre - first[id]).norm());
     }
   std::vector<double> ways_px;
-  for (const auto& [id, way_px] : motion.way_px) ways_px.push_back(way_px);
+  for (const auto& [id, way] : way_px) {
+    motion.ways.push_back({.place_m = on_cloth.at(id), .way_px = way});
+    ways_px.push_back(way);
+  }
   if (!ways_px.empty()) motion.typical_px = median(ways_px);
 
   const bool in_a_row = seen.pictures.size() > 2 && seen.pictures[1].frame == 1 &&

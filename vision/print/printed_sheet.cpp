@@ -152,7 +152,7 @@ PrintedSheet make_dot_sheet(const DotSheetOptions& options) {
       sheet.discs.push_back(
           {.centre_m = place_m,
            .radius_m = spacing_m * dot_radius_over_spacing(pattern.symbol(row, column))});
-      sheet.markers.markers.push_back({.name = fmt::format("d{:02}_{:02}", row, column),
+      sheet.markers.markers.push_back({.name = dot_name(row, column),
                                        .s_m = place_m.x(),
                                        .t_m = place_m.y(),
                                        .tag = {},

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <tuple>
+#include <utility>
 
 namespace clothfit {
 namespace {
@@ -136,15 +136,15 @@ struct LatticePose {
 };
 
 /// Every full neighbourhood's vote.
-std::map<LatticePose, int> collect_votes(const std::vector<int>& symbols, int side,
+std::map<LatticePose, int> collect_votes(const std::vector<int>& symbols, int rows, int columns,
                                          const DotPatternIndex& index) {
   std::map<LatticePose, int> votes;
-  for (int row = 1; row + 1 < side; ++row)
-    for (int column = 1; column + 1 < side; ++column) {
+  for (int row = 1; row + 1 < rows; ++row)
+    for (int column = 1; column + 1 < columns; ++column) {
       DotNeighbourhood around{};
       for (int i = 0; i < 9; ++i)
         around[static_cast<size_t>(i)] =
-            symbols[static_cast<size_t>((row - 1 + i / 3) * side + column - 1 + i % 3)];
+            symbols[static_cast<size_t>((row - 1 + i / 3) * columns + column - 1 + i % 3)];
       const std::optional<DotPatternPlace> place = index.find(around);
       if (!place) continue;
       LatticePose pose{.quarter_turns = place->quarter_turns, .mirrored = place->mirrored};
@@ -156,6 +156,63 @@ std::map<LatticePose, int> collect_votes(const std::vector<int>& symbols, int si
   return votes;
 }
 
+/// Returns the pose that nearly all of enough neighbourhoods agree on.
+std::optional<LatticePose> agreed_pose(const std::map<LatticePose, int>& votes) {
+  int all = 0;
+  auto most = votes.end();
+  for (auto it = votes.begin(); it != votes.end(); ++it) {
+    all += it->second;
+    if (most == votes.end() || it->second > most->second) most = it;
+  }
+  constexpr int kFewest = 3;
+  if (most == votes.end() || most->second < kFewest || 10 * most->second < 9 * all)
+    return std::nullopt;
+  return most->first;
+}
+
+/// A dot to grow a lattice from.
+struct LatticeSeed {
+  size_t middle = 0;
+  Cross cross;
+};
+
+/// Returns the dots whose neighbours make the evenest crosses.
+std::vector<LatticeSeed> lattice_seeds(const std::vector<Dot>& found) {
+  std::vector<LatticeSeed> seeds;
+  for (size_t i = 0; i < found.size(); ++i)
+    if (const std::optional<Cross> cross = cross_around(found, i)) seeds.push_back({i, *cross});
+  std::ranges::sort(seeds, {}, [](const LatticeSeed& seed) {
+    return std::pair(seed.cross.evenness, seed.middle);
+  });
+  constexpr size_t kMostSeeds = 12;
+  if (seeds.size() > kMostSeeds) seeds.resize(kMostSeeds);
+  return seeds;
+}
+
+/// Returns the part of a lattice that its dots reach over.
+SeenLattice cropped(const DotLayout& lattice, int side, const PlacedDots& placed) {
+  int top = side, left = side, bottom = -1, right = -1;
+  for (int i = 0; i < side * side; ++i) {
+    if (!placed.dots[static_cast<size_t>(i)]) continue;
+    top = std::min(top, i / side);
+    bottom = std::max(bottom, i / side);
+    left = std::min(left, i % side);
+    right = std::max(right, i % side);
+  }
+  SeenLattice seen;
+  if (bottom < 0) return seen;
+  const std::vector<int> symbols = read_symbols(lattice, placed);
+  seen.columns = right - left + 1;
+  seen.rows = bottom - top + 1;
+  seen.count = placed.count();
+  for (int row = top; row <= bottom; ++row)
+    for (int column = left; column <= right; ++column) {
+      seen.dots.push_back(placed.dots[static_cast<size_t>(row * side + column)]);
+      seen.symbols.push_back(symbols[static_cast<size_t>(row * side + column)]);
+    }
+  return seen;
+}
+
 }  // namespace
 
 bool name_by_pattern(const DotLayout& layout, const DotPattern& pattern,
@@ -163,27 +220,12 @@ bool name_by_pattern(const DotLayout& layout, const DotPattern& pattern,
                      PlacedDots& placed) {
   const int half = std::max(pattern.columns, pattern.rows);
   const int side = 2 * half + 1;
-  std::vector<std::tuple<double, size_t>> seeds;
-  for (size_t i = 0; i < found.size(); ++i)
-    if (const std::optional<Cross> cross = cross_around(found, i))
-      seeds.emplace_back(cross->evenness, i);
-  std::sort(seeds.begin(), seeds.end());
   const DotLayout lattice = blank_lattice(half);
-  constexpr size_t kMostSeeds = 12;
-  for (size_t k = 0; k < std::min(seeds.size(), kMostSeeds); ++k) {
-    const size_t middle = std::get<1>(seeds[k]);
-    const PlacedDots grown =
-        grow_lattice(lattice, half, found, middle, *cross_around(found, middle));
-    const std::map<LatticePose, int> votes =
-        collect_votes(read_symbols(lattice, grown), side, index);
-    int all = 0;
-    auto most = votes.end();
-    for (auto it = votes.begin(); it != votes.end(); ++it) {
-      all += it->second;
-      if (most == votes.end() || it->second > most->second) most = it;
-    }
-    constexpr int kFewest = 3;
-    if (most == votes.end() || most->second < kFewest || 10 * most->second < 9 * all) continue;
+  for (const LatticeSeed& seed : lattice_seeds(found)) {
+    const PlacedDots grown = grow_lattice(lattice, half, found, seed.middle, seed.cross);
+    const std::optional<LatticePose> pose =
+        agreed_pose(collect_votes(read_symbols(lattice, grown), side, side, index));
+    if (!pose) continue;
 
     std::map<std::pair<int, int>, int> site_at;
     Eigen::Vector2d low = layout.sites[0].place_m;
@@ -195,12 +237,40 @@ bool name_by_pattern(const DotLayout& layout, const DotPattern& pattern,
     }
     for (int i = 0; i < side * side; ++i) {
       if (!grown.dots[static_cast<size_t>(i)]) continue;
-      const auto at = site_at.find(most->first.of(i / side, i % side));
+      const auto at = site_at.find(pose->of(i / side, i % side));
       if (at != site_at.end()) placed.place(at->second, *grown.dots[static_cast<size_t>(i)]);
     }
     return true;
   }
   return false;
+}
+
+std::optional<SeenLattice> find_lattice(const std::vector<Dot>& found) {
+  // n dots reach over n columns at most; a larger half only takes time.
+  const int half = std::min(kMostPatternDots, static_cast<int>(found.size()));
+  const int side = 2 * half + 1;
+  const DotLayout lattice = blank_lattice(half);
+  std::optional<SeenLattice> best;
+  for (const LatticeSeed& seed : lattice_seeds(found)) {
+    SeenLattice seen =
+        cropped(lattice, side, grow_lattice(lattice, half, found, seed.middle, seed.cross));
+    if (!best || seen.count > best->count) best = std::move(seen);
+    if (2 * static_cast<size_t>(best->count) > found.size()) break;
+  }
+  if (best && best->count == 0) best.reset();
+  return best;
+}
+
+std::optional<std::vector<std::pair<int, int>>> places_in_pattern(const SeenLattice& lattice,
+                                                                  const DotPatternIndex& index) {
+  const std::optional<LatticePose> pose =
+      agreed_pose(collect_votes(lattice.symbols, lattice.rows, lattice.columns, index));
+  if (!pose) return std::nullopt;
+  std::vector<std::pair<int, int>> places;
+  for (int row = 0; row < lattice.rows; ++row)
+    for (int column = 0; column < lattice.columns; ++column)
+      places.push_back(pose->of(row, column));
+  return places;
 }
 
 }  // namespace clothfit

@@ -3,8 +3,10 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <optional>
 
 #include "data/input_error.h"
+#include "vision/detect/tag_detector.h"
 #include "vision/track/dot_tracks.h"
 #include "vision/track/missing_markers.h"
 #include "vision/track/tag_history.h"
@@ -43,7 +45,29 @@ void add_gap(int from, int to, int dots, DotReadings& readings) {
   if (to > from) readings.missing[missing::kNoPicture] += dots * (to - from);
 }
 
-DotReadings read_dots(DotTracker& tracker, int dots, ImageSource& pictures,
+/// Reads the tags of a scene whose cloth carries none. They are fixed, so that some pictures do.
+class BesideTags {
+ public:
+  explicit BesideTags(const Recording& recording) {
+    const auto has_tag = [](const auto& point) { return point.tag.has_value(); };
+    if (std::ranges::none_of(recording.markers.markers, has_tag) &&
+        std::ranges::any_of(recording.reference, has_tag) && !recording.markers.family.empty())
+      detector_.emplace(recording.markers.family);
+  }
+
+  void read(const cv::Mat& grey, int number, int pictures, DotReadings& readings) {
+    constexpr int kLooks = 25;
+    if (!detector_ || count_++ % std::max(1, pictures / kLooks) != 0) return;
+    for (const TagDetection& tag : detector_->detect(grey))
+      readings.tags[tag.id].push_back({.frame = number, .tag = tag, .rejected = {}});
+  }
+
+ private:
+  std::optional<TagDetector> detector_;
+  int count_ = 0;
+};
+
+DotReadings read_dots(DotTracker& tracker, BesideTags& beside, int dots, ImageSource& pictures,
                       const ProgressCallback& progress) {
   DotReadings readings;
   cv::Mat grey;
@@ -57,6 +81,7 @@ DotReadings read_dots(DotTracker& tracker, int dots, ImageSource& pictures,
       readings.size = grey.size();
       const DotFrame frame = tracker.next(grey);
       add_frame(frame, number, readings);
+      beside.read(grey, number, pictures.count(), readings);
       found = frame.dots.size();
       if (readings.pictures <= pictures.count() / 2 + 1) {
         readings.overlay_picture = grey.clone();
@@ -114,7 +139,8 @@ TrackResult track_dots(const Recording& recording, ImageSource& pictures, const 
   DotTracker tracker(recording.markers, recording.markers_file.string());
   const auto sheet_dots = static_cast<int>(std::ranges::count_if(
       recording.markers.markers, [](const Marker& marker) { return !marker.tag; }));
-  DotReadings readings = read_dots(tracker, sheet_dots, pictures, progress);
+  BesideTags beside(recording);
+  DotReadings readings = read_dots(tracker, beside, sheet_dots, pictures, progress);
   TrackResult result;
   result.footage = pictures.findings();
   result.frames = readings.frames;

@@ -169,6 +169,50 @@ TEST(RecordingDraft, CanBeReadAsARecording) {
   EXPECT_EQ(recording.held_out_from_frame, 8);
 }
 
+TEST(RecordingDraft, DescribesAClothOfDots) {
+  Filmed filmed(falling(from_top_corners));
+  filmed.input.sheet.markers = make_dot_sheet({.columns = 5, .rows = 5}).markers;
+  for (SeenPicture& picture : filmed.input.footage[0].seen.pictures) {
+    picture.tags.clear();
+    for (int m = 0; m < 25; ++m) {
+      const Marker& dot = filmed.input.sheet.markers.markers[static_cast<size_t>(m)];
+      picture.markers.push_back({m, falling(from_top_corners)(dot.s_m, dot.t_m, picture.frame)});
+    }
+  }
+  const RecordingDraft draft = filmed.draft();
+  EXPECT_THAT(draft.yaml, AllOf(HasSubstr("markers: {kind: dots, file: markers.csv}"),
+                                HasSubstr("- {at: [0.4, 0], motion: fixed}"),
+                                HasSubstr("start: released_flat  #")));
+  EXPECT_THAT(draft.assumed, Contains(HasSubstr("25 of the 25 dots")));
+}
+
+TEST(RecordingDraft, SaysThatTheFirstPicturesAreMissingAndConcludesNothing) {
+  Filmed filmed(falling(from_top_corners));
+  std::vector<SeenPicture>& pictures = filmed.input.footage[0].seen.pictures;
+  pictures.erase(pictures.begin());  // damaged
+  const RecordingDraft draft = filmed.draft();
+  EXPECT_THAT(draft.yaml, HasSubstr("start: unknown  # NEEDED"));
+  EXPECT_THAT(draft.needed, Contains(HasSubstr("the first three frames were not all seen")));
+}
+
+TEST(RecordingDraft, RefusesAFrameRateThatTheVideoContradicts) {
+  Filmed filmed(falling(from_top_corners));
+  for (int n = 0; n < 12; ++n) filmed.input.footage[0].seen.times_s.push_back(n / 25.0);
+  EXPECT_THROW(filmed.draft(), InputError) << "60 is declared";
+  filmed.input.frame_rate_hz = 25;
+  EXPECT_NO_THROW(filmed.draft());
+}
+
+TEST(RecordingDraft, SaysWhatTagsAreSeenWhereNoSheetIsGiven) {
+  const Filmed filmed(falling(from_top_corners));
+  try {
+    refuse_without_sheet(filmed.input.footage[0]);
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), AllOf(HasSubstr("shows 16 tags of tag36h11: 0 to 15"),
+                                    HasSubstr("clothfit sheet tags --size")));
+  }
+}
+
 TEST(RecordingDraft, RefusesFootageWithoutTheSheet) {
   Filmed filmed(falling(from_top_corners));
   for (SeenPicture& picture : filmed.input.footage[0].seen.pictures) picture.tags.clear();
