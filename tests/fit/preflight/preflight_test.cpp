@@ -145,6 +145,14 @@ TEST(Preflight, NamesTheFrameRate) {
   }
 }
 
+TEST(Preflight, WarnsOfAWrongFrameRateOfOneCamera) {
+  for (const double declared : {30.0, 120.0}) {
+    FitInput input = in_pictures(sound());
+    input.recording.frame_rate_hz = declared;
+    EXPECT_TRUE(warns(input, "gravity", "frame rate"));
+  }
+}
+
 TEST(Preflight, LeavesAWindToTheDiagnosis) {
   // Drag that takes a good part of the first fall is an effect, and no wrong gravity.
   SyntheticCloth cloth = kSoundCloth;

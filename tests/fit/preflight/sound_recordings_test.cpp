@@ -10,6 +10,7 @@
 #include <numbers>
 #include <random>
 #include <string>
+#include <vector>
 
 #include "fit/preflight/preflight.h"
 
@@ -187,6 +188,64 @@ TEST(SoundRecordings, TellTheRateOfAFall) {
   for (const double declared : {60.0, 120.0, 240.0}) {
     input.recording.frame_rate_hz = declared;
     EXPECT_THAT(refused(input), HasSubstr("30 Hz in place of")) << declared;
+  }
+}
+
+/// Replaces tracks in space by those of cameras that stand at these places and look at the sheet.
+FitInput in_pictures(FitInput input, const std::vector<Eigen::Vector3d>& stands_m) {
+  std::mt19937 random(5);
+  std::normal_distribution<double> noise(0, 0.1);
+  for (const Eigen::Vector3d& stand_m : stands_m) {
+    const Eigen::Vector3d forward =
+        (Eigen::Vector3d(kSize_m / 2, -kSize_m / 2, 1) - stand_m).normalized();
+    const Eigen::Vector3d right = forward.cross(Eigen::Vector3d::UnitZ()).normalized();
+    Eigen::Matrix3d camera_from_world;
+    camera_from_world << right.transpose(), forward.cross(right).transpose(), forward.transpose();
+    CameraParameters camera{.name = fmt::format("camera{}", input.cameras.size()),
+                            .image_width = 960,
+                            .image_height = 720,
+                            .focal_px = {900, 900},
+                            .centre_px = {479.5, 359.5}};
+    camera.camera_from_world = {.rotation = Eigen::Quaterniond(camera_from_world),
+                                .translation_m = -camera_from_world * stand_m};
+    Tracks2d& tracks = input.tracks2d[camera.name];
+    for (const Position3d& row : input.tracks3d) {
+      const Eigen::Vector3d at = camera_from_world * (row.position_m - stand_m);
+      tracks.push_back({.frame = row.frame,
+                        .marker = row.marker,
+                        .position_px = camera.centre_px + 900 * at.head<2>() / at.z() +
+                                       Eigen::Vector2d(noise(random), noise(random)),
+                        .sigma_px = 0.1});
+    }
+    input.recording.cameras.push_back({.name = camera.name});
+    input.cameras.push_back(camera);
+  }
+  input.tracks3d.clear();
+  return input;
+}
+
+/// A sheet out of the level by so much, in axes in which it is level. It falls along itself by half
+/// of what its weight would make it.
+FitInput tilted_fall(double tilt_rad) {
+  const Eigen::Vector3d gravity =
+      kGravity * Eigen::Vector3d(0, -std::sin(tilt_rad), -std::cos(tilt_rad));
+  const Eigen::Vector3d falls = gravity.cwiseProduct(Eigen::Vector3d(0, 0.5, 1));
+  FitInput input = made({.frames = 20, .noise_m = 1e-5, .moved = [falls](const auto&, double t_s) {
+                           return Eigen::Vector3d(falls * t_s * t_s / 2);
+                         }});
+  input.recording.gravity_m_per_s2 = gravity;
+  return input;
+}
+
+// What moves along a sheet looks in a picture as if it moved across, too.
+TEST(SoundRecordings, TellTheFallAcrossThemFromThatAlongThem) {
+  for (const std::vector<Eigen::Vector3d>& stands_m :
+       {std::vector<Eigen::Vector3d>{{1.2, -1.2, 1.9}},
+        std::vector<Eigen::Vector3d>{{0.25, -1.4, 2}, {1.3, -0.9, 1.8}}}) {
+    FitInput input = in_pictures(tilted_fall(1.1), stands_m);
+    EXPECT_EQ(text_of(input), "") << stands_m.size();
+    input.recording.frame_rate_hz = 30;
+    EXPECT_THAT(refused(input), HasSubstr("60 Hz in place of 30")) << stands_m.size();
   }
 }
 
