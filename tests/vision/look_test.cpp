@@ -156,6 +156,18 @@ TEST(Look, ListsNoDotsWhereThereAreTagsOrTexture) {
   EXPECT_THAT(look(tags.path(), {}, {}).pictures.at(0).dots, IsEmpty());
 }
 
+TEST(Look, ListsNoIdsThatNoPictureShowsWell) {
+  const TemporaryFolder folder;
+  cv::Mat noise(480, 640, CV_8UC1);
+  cv::RNG random(3);
+  random.fill(noise, cv::RNG::UNIFORM, 0, 255);
+  cv::GaussianBlur(noise, noise, {}, 4);
+  cv::normalize(noise, noise, 0, 255, cv::NORM_MINMAX);
+  write_pictures(folder, {noise});
+  const LookResult result = look(folder.path(), {.families = {"tag16h5"}}, {});
+  EXPECT_THAT(result.pictures.at(0).tags, IsEmpty());
+}
+
 /// Returns what a picture of a printed sheet shows, tags or dots of it.
 LookResult looked_at(const PrintedSheet& filmed, const MarkerSet& sheet) {
   const TemporaryFolder folder;
@@ -214,6 +226,18 @@ TEST(SearchBoard, PlacesCornersOfLargePicturesInTheirOwnPixels) {
     EXPECT_NEAR(u, std::round(u), 0.1 / 150);
     EXPECT_NEAR(v, std::round(v), 0.1 / 150);
   }
+}
+
+TEST(SearchBoard, TakesNoGridOfTagsOrMarkersForABoard) {
+  cv::Mat marked = board(8, 6, 60, {800, 560});
+  ASSERT_TRUE(search_board(marked));
+  // Each bright field carries a mark, as on a ChArUco board.
+  for (int r = 0; r < 6; ++r)
+    for (int c = 0; c < 8; ++c)
+      if ((r + c) % 2 == 1)
+        cv::rectangle(marked, cv::Rect(160 + c * 60 + 14, 84 + r * 60 + 14, 32, 32), cv::Scalar(30),
+                      cv::FILLED);
+  EXPECT_FALSE(search_board(marked));
 }
 
 TEST(SearchBoard, FindsNoneWhereThereIsNone) {

@@ -17,7 +17,8 @@ struct SeenBoard {
 };
 
 /// Looks for a chessboard of any size from 4 x 4 inner corners on in an 8-bit grey picture. A board
-/// that is seen in part counts with the largest grid that is. Pictures of more than a megapixel are
+/// that is seen in part counts with the largest grid that is; one whose fields are not of one shade
+/// each, dark and bright in turn, is none. Pictures of more than a megapixel are
 /// searched at a smaller size; corners are placed in the picture itself.
 std::optional<SeenBoard> search_board(const cv::Mat& grey);
 

@@ -31,8 +31,8 @@ std::optional<SeenLattice> lattice_at_blur(const cv::Mat& grey, double blur_px) 
       good.push_back(dot);
       misfits.push_back(dot.misfit);
     }
-  // The fields of a chessboard lie on a lattice too, and are no discs: 0.22.
-  constexpr double kDiscs = 0.18;
+  // Fields of boards and corners of tag grids lie on lattices too, and are no discs: 0.16 and more.
+  constexpr double kDiscs = 0.12;
   if (misfits.empty() || median(std::move(misfits)) > kDiscs) return std::nullopt;
   std::optional<SeenLattice> lattice = find_lattice(good);
   if (lattice && (lattice->count < kFewest ||

@@ -65,16 +65,26 @@ void look_at(LookedAt& picture, Detectors& detectors, const LookFor& wanted) {
     picture.seen.board = search_board(picture.grey);
 }
 
-/// Says how the first whole picture would show tags, mirrored or inverted, where it shows none of
-/// the family that most people print.
+/// Says how the first whole picture would show tags of some families, mirrored or inverted.
 std::string turned(const std::filesystem::path& images, const std::vector<std::string>& families) {
-  constexpr const char* kUsual = "tag36h11";
-  if (std::ranges::find(families, kUsual) != families.end()) return "";
   const auto source = open_images(images);
   cv::Mat grey;
-  while (source->next(grey))
-    if (source->damage().empty()) return turned_picture_shows(grey, kUsual, {});
+  while (source->next(grey)) {
+    if (!source->damage().empty()) continue;
+    for (const std::string& family : families)
+      if (const std::string shown = turned_picture_shows(grey, family, {}); !shown.empty())
+        return shown;
+    return "";
+  }
   return "";
+}
+
+/// The family that most people print.
+constexpr const char* kUsualFamily = "tag36h11";
+
+bool shows_no_tag(const LookResult& result) {
+  return std::ranges::all_of(result.pictures,
+                             [](const SeenPicture& picture) { return picture.tags.empty(); });
 }
 
 /// Leaves out tags that no picture shows well: weak families find such ids in any texture.
@@ -130,9 +140,11 @@ LookResult look(const std::filesystem::path& images, const LookOptions& options,
   options.validate();
   LookResult result;
   LookFor wanted = what_to_look_for(images, options);
-  result.turned = turned(images, wanted.families);
-  // What else seems to appear in mirrored tags is chance.
-  if (!result.turned.empty() && options.families.empty()) wanted.families.clear();
+  // What else seems to appear in mirrored tags of the usual family is chance.
+  if (options.families.empty() &&
+      std::ranges::find(wanted.families, kUsualFamily) == wanted.families.end())
+    result.turned = turned(images, {kUsualFamily});
+  if (!result.turned.empty()) wanted.families.clear();
   result.families = wanted.families;
   result.pattern = wanted.dots.pattern;
   const auto source = open_images(images);
@@ -184,6 +196,8 @@ LookResult look(const std::filesystem::path& images, const LookOptions& options,
                      tbb::make_filter<LookedAt, void>(tbb::filter_mode::serial_in_order, collect));
 
   leave_out_invented(result.pictures);
+  if (!options.families.empty() && shows_no_tag(result))
+    result.turned = turned(images, options.families);
   result.cancelled = cancelled;
   result.width = first.cols;
   result.height = first.rows;
