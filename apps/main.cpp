@@ -1,3 +1,4 @@
+#include <glog/logging.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
@@ -58,6 +59,8 @@ int run(int argc, char** argv) {
 int main(int argc, char** argv) {
   spdlog::set_default_logger(spdlog::stderr_color_mt("clothfit"));
   spdlog::set_pattern("%n: %^%l%$: %v");
+  // Ceres logs what its results say too.
+  FLAGS_minloglevel = google::GLOG_FATAL;
   try {
     return run(argc, argv);
   } catch (const std::exception& error) {
