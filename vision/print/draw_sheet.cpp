@@ -4,11 +4,15 @@
 #include <cairo-svg.h>
 #include <cairo.h>
 #include <fmt/core.h>
+#include <zlib.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
+#include <fstream>
 #include <memory>
+#include <sstream>
 
 #include "data/input_error.h"
 
@@ -50,6 +54,29 @@ double width_mm(const PrintedSheet& sheet) {
 }
 double height_mm(const PrintedSheet& sheet) {
   return 1e3 * sheet.height_m + 2 * kMargin_mm;
+}
+
+std::string big_endian(std::uint32_t value) {
+  std::string bytes;
+  for (const int shift : {24, 16, 8, 0}) bytes += static_cast<char>(value >> shift & 0xff);
+  return bytes;
+}
+
+/// Puts the scale into a PNG (its chunk pHYs), which Cairo leaves out: viewers print by it.
+void state_scale(const fs::path& file, double pixels_per_m) {
+  std::stringstream bytes;
+  bytes << std::ifstream(file, std::ios::binary).rdbuf();
+  std::string png = bytes.str();
+  constexpr size_t kAfterHeader = 8 + 4 + 4 + 13 + 4;  // signature, and the chunk IHDR
+  const std::string scale = big_endian(static_cast<std::uint32_t>(std::lround(pixels_per_m)));
+  const std::string chunk = "pHYs" + scale + scale + '\x01';
+  const uLong check =
+      crc32(0, reinterpret_cast<const Bytef*>(chunk.data()), static_cast<uInt>(chunk.size()));
+  png.insert(kAfterHeader, big_endian(static_cast<std::uint32_t>(chunk.size() - 4)) + chunk +
+                               big_endian(static_cast<std::uint32_t>(check)));
+  std::ofstream out(file, std::ios::binary);
+  out.write(png.data(), static_cast<std::streamsize>(png.size()));
+  if (!out.flush()) require(CAIRO_STATUS_WRITE_ERROR, file);
 }
 
 /// Fills all that is black with one path, since paths of their own would leave fine lines between
@@ -298,6 +325,7 @@ void write_sheet_png(const PrintedSheet& sheet, const PageOptions& options, cons
   }
   fill_sheet(pen.get(), sheet);
   require(cairo_surface_write_to_png(surface.get(), file.c_str()), file);
+  state_scale(file, 1e3 * pixels_per_mm);
 }
 
 }  // namespace clothfit
