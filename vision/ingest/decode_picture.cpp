@@ -12,6 +12,8 @@
 #include <fstream>
 #include <iterator>
 #include <memory>
+#include <sstream>
+#include <vector>
 
 #include "data/input_error.h"
 #include "vision/ingest/libav.h"
@@ -67,6 +69,46 @@ void read_turn(const std::string& bytes, DecodedPicture& picture) {
   picture.flipped = orientation == 2 || orientation == 4 || orientation == 5 || orientation == 7;
 }
 
+/// Says whether libjpeg warns of nothing but oddities that cost no pixel. `message` is its last
+/// warning. What follows the last marker of the data comes too late to spoil them, but may hide an
+/// earlier warning, so that the first one is asked for.
+bool is_harmless(const std::string& message, const std::string& bytes, cv::Mat& scratch) {
+  for (const char* oddity : {"Invalid SOS parameters", "Unknown Adobe color transform",
+                             "Warning: unknown JFIF revision"})
+    if (message.find(oddity) != std::string::npos) return true;
+  constexpr const char* kBeforeTheEnd = "extraneous bytes before marker 0xd9";
+  if (message.find(kBeforeTheEnd) == std::string::npos) return false;
+  const std::unique_ptr<void, int (*)(tjhandle)> decoder(tjInitDecompress(), tjDestroy);
+  tjDecompress2(decoder.get(), reinterpret_cast<const unsigned char*>(bytes.data()),
+                static_cast<unsigned long>(bytes.size()), scratch.data, scratch.cols,
+                static_cast<int>(scratch.step), scratch.rows, TJPF_GRAY, TJFLAG_STOPONWARNING);
+  return std::string(tjGetErrorStr2(decoder.get())).find(kBeforeTheEnd) != std::string::npos;
+}
+
+/// Returns what a file holds that is no picture, by its first bytes; empty where that is not known.
+std::string other_content(const std::string& bytes) {
+  if (bytes.empty()) return "it is empty";
+  const bool video = bytes.compare(4, 4, "ftyp") == 0 || bytes.compare(4, 4, "moov") == 0 ||
+                     bytes.starts_with("\x1a\x45\xdf\xa3") ||
+                     (bytes.starts_with("RIFF") && bytes.compare(8, 4, "AVI ") == 0);
+  return video ? "it holds a video, whatever its name says: rename it, to .mp4 for one" : "";
+}
+
+/// Says whether a PGM states a white level of its own, which its decoder then brings to 16 bits.
+/// One of 65535 may hold fewer bits.
+bool states_white(const std::string& bytes) {
+  std::istringstream header(bytes.substr(0, 512));
+  std::string word;
+  std::vector<std::string> words;
+  while (words.size() < 4 && header >> word) {
+    if (word.starts_with('#'))
+      std::getline(header, word);
+    else
+      words.push_back(word);
+  }
+  return words.size() == 4 && words[0] == "P5" && words[3] != "65535";
+}
+
 DecodedPicture decode_jpeg(const std::string& bytes, const std::string& file) {
   DecodedPicture picture;
   const std::unique_ptr<void, int (*)(tjhandle)> decoder(tjInitDecompress(), tjDestroy);
@@ -90,7 +132,12 @@ DecodedPicture decode_jpeg(const std::string& bytes, const std::string& file) {
   if (tjDecompress2(decoder.get(), data, size, picture.grey.data, width,
                     static_cast<int>(picture.grey.step), height, TJPF_GRAY, 0) != 0) {
     picture.damage = tjGetErrorStr2(decoder.get());
-    if (tjGetErrorCode(decoder.get()) == TJERR_FATAL) picture.grey.release();
+    if (tjGetErrorCode(decoder.get()) == TJERR_FATAL) {
+      picture.grey.release();
+    } else {
+      cv::Mat scratch(picture.grey.size(), CV_8UC1);
+      if (is_harmless(picture.damage, bytes, scratch)) picture.damage.clear();
+    }
   }
   read_turn(bytes, picture);
   return picture;
@@ -108,6 +155,8 @@ DecodedPicture decode_picture(const fs::path& file) {
   if (jpeg) return decode_jpeg(bytes, file.string());
   const PictureKind* kind = kind_of(file);
   DecodedPicture picture;
+  picture.damage = other_content(bytes);
+  if (!picture.damage.empty()) return picture;
   if (kind == nullptr || kind->codec == AV_CODEC_ID_MJPEG) {
     picture.damage = "it is no JPEG";
     return picture;
@@ -116,6 +165,7 @@ DecodedPicture decode_picture(const fs::path& file) {
       libav::decode_still(bytes, kind->codec, file.string(), picture.damage);
   picture.grey = grey.levels;
   picture.bits = grey.bits;
+  picture.white_stated = kind->codec == AV_CODEC_ID_PGM && grey.bits == 16 && states_white(bytes);
   return picture;
 }
 

@@ -10,9 +10,10 @@ namespace clothfit {
 struct DecodedPicture {
   cv::Mat grey;  ///< CV_8UC1 for 8 bits, else CV_16UC1; 0 is black, 2^bits - 1 white
   int bits = 8;
-  int turn_deg = 0;      ///< clockwise, asked for by EXIF; 0 where none is
-  bool flipped = false;  ///< EXIF asks for a mirrored picture
-  std::string damage;    ///< what is wrong with the file; `grey` may then be empty
+  bool white_stated = false;  ///< the file says what white is; else levels of 16 bits may use fewer
+  int turn_deg = 0;           ///< clockwise, asked for by EXIF; 0 where none is
+  bool flipped = false;       ///< EXIF asks for a mirrored picture
+  std::string damage;         ///< what is wrong with the file; `grey` may then be empty
 };
 
 /// Says by its extension whether a file can be decoded here.

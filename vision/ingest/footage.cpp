@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <numeric>
 
 #include "data/input_error.h"
@@ -21,6 +22,33 @@ std::vector<int> in_order(int count) {
   return frames;
 }
 
+/// Numbers pictures of a folder, of which some are missing, among so many frames. Names may count
+/// from 0, from 1, or from the first picture on, whichever makes the last picture the last frame.
+void number_by_names(const std::string& file, const std::string& where, int frames,
+                     ImageSource& images, Findings& findings) {
+  const std::vector<std::int64_t> numbers = images.name_numbers();
+  if (numbers.empty()) return;
+  std::vector<std::int64_t> bases;
+  for (const std::int64_t base : {std::int64_t{0}, std::int64_t{1}, numbers.front()})
+    if (base <= numbers.front() && numbers.back() - base < frames) bases.push_back(base);
+  if (bases.empty()) return;  // what counts beyond the frames is refused by its frame
+  const auto ends = std::ranges::find(bases, numbers.back() - (frames - 1));
+  const std::int64_t base = ends != bases.end() ? *ends : numbers.front();
+  std::vector<int> number;
+  for (const std::int64_t one : numbers) number.push_back(static_cast<int>(one - base));
+  images.number_frames(std::move(number));
+  if (ends == bases.end() && numbers.front() > 1)
+    findings.push_back(
+        {.check = "time",
+         .state = FindingState::warning,
+         .found = fmt::format("it lists {} frames, and the pictures of {} are numbered {} to {}; "
+                              "the first is taken for frame 0",
+                              frames, where, numbers.front(), numbers.back()),
+         .where = file,
+         .expected = "numbers that begin or end with the frames",
+         .remedy = "give the time of every picture, and of no other"});
+}
+
 /// Numbers pictures by the times that times.csv gives to frames.
 void number_by_file(const Recording& recording, const std::string& where, ImageSource& images,
                     Findings& findings) {
@@ -36,7 +64,10 @@ void number_by_file(const Recording& recording, const std::string& where, ImageS
     return;
   }
   const std::vector<double> times_s = images.times_s();
-  if (times_s.empty()) return;  // the numbers of a folder's pictures stand
+  if (times_s.empty()) {
+    number_by_names(file, where, frames, images, findings);
+    return;
+  }
   if (const auto by_time = number_by_times(recording.times_s, times_s)) {
     images.number_frames(*by_time);
     return;
@@ -67,6 +98,7 @@ void number_by_videos(const std::string& yaml, Footage& footage) {
   for (auto& [camera, frames] : joint.frame_of_picture)
     footage.cameras.at(camera)->number_frames(std::move(frames));
   footage.times_s = std::move(joint.times_s);
+  add(footage.findings, joint.findings);
 }
 
 }  // namespace

@@ -34,6 +34,18 @@ bool equal(const cv::Mat& a, const cv::Mat& b) {
 /// Grey levels by which a line must stick out, and a pixel change to be in motion. Beyond noise.
 constexpr int kStep = 12;
 
+/// Says whether something moves from a picture to the next, beyond what a codec refines.
+bool moves_between(const cv::Mat& before, const cv::Mat& after) {
+  if (before.size() != after.size()) return true;
+  constexpr long kOfPixels = 5000;
+  long changed = 0;
+  for (int y = 0; y < after.rows; ++y) {
+    const uchar *a = before.ptr(y), *b = after.ptr(y);
+    for (int x = 0; x < after.cols; ++x) changed += std::abs(a[x] - b[x]) >= kStep ? 1 : 0;
+  }
+  return changed > static_cast<long>(after.total()) / kOfPixels;
+}
+
 /// Says whether seven levels in a line, `stride` apart, are two curves woven into one: the middle
 /// five stick out in turn on the same side of both neighbours, which agree better. Returns on which
 /// side the middle one does, 1 or -1, and 0 where they are not.
@@ -75,12 +87,13 @@ void FootageWatch::see(const cv::Mat& grey, int frame) {
 void FootageWatch::compare(const cv::Mat& grey, int frame) {
   if (!last_.empty()) {
     if (equal(grey, last_)) {
-      if (moved_) equal_.push_back(frame);
+      if (moves_) equal_.push_back(frame);
     } else {
-      // Pictures that stay equal to the end show a scene at rest.
-      repeated_.insert(repeated_.end(), equal_.begin(), equal_.end());
+      // A codec repeats pictures of a scene at rest. A copy lies between two that move.
+      const bool moves = moves_between(last_, grey);
+      if (moves) repeated_.insert(repeated_.end(), equal_.begin(), equal_.end());
       equal_.clear();
-      moved_ = true;
+      moves_ = moves;
     }
   }
   grey.copyTo(last_);

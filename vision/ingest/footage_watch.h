@@ -46,7 +46,7 @@ class FootageWatch {
   void count_combs(const cv::Mat& grey);
 
   cv::Mat last_;
-  bool moved_ = false;      ///< some picture differed from the one before
+  bool moves_ = false;      ///< the last picture that differed from the one before showed motion
   std::vector<int> equal_;  ///< frames equal to the one before, not yet followed by another
   std::vector<int> repeated_;
   std::vector<int> dark_;

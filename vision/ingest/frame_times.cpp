@@ -85,11 +85,30 @@ double allowed_s(const std::vector<double>& frame_times_s) {
   return median_interval_s(frame_times_s) / 4;
 }
 
+bool agree(const Match& match, const std::vector<double>& frame_times_s) {
+  return match.one_each && match.worst_s <= allowed_s(frame_times_s);
+}
+
 /// Compares times as they stand or, where that fails, from the first of both on.
 Match best_match(const std::vector<double>& frame_times_s, const std::vector<double>& times_s) {
-  const Match found = match(frame_times_s, times_s, 0);
-  if (found.one_each && found.worst_s <= allowed_s(frame_times_s)) return found;
+  Match found = match(frame_times_s, times_s, 0);
+  if (agree(found, frame_times_s)) return found;
   return match(frame_times_s, times_s, frame_times_s.front() - times_s.front());
+}
+
+/// Adds the times at which a camera took pictures and the frames have a gap: both dropped some.
+std::vector<double> with_dropped(const std::vector<double>& frame_times_s,
+                                 const std::vector<double>& times_s, double offset_s) {
+  constexpr double kApart = 0.75;  // intervals from the frames beside it
+  const double least_s = kApart * median_interval_s(frame_times_s);
+  std::vector<double> all_s = frame_times_s;
+  for (const double time_s : times_s) {
+    const double at_s = time_s + offset_s;
+    const double beside_s = std::abs(all_s[static_cast<size_t>(nearest(all_s, at_s))] - at_s);
+    const bool within = at_s > frame_times_s.front() && at_s < frame_times_s.back();
+    if (within && beside_s >= least_s) all_s.insert(std::ranges::lower_bound(all_s, at_s), at_s);
+  }
+  return all_s;
 }
 
 }  // namespace
@@ -137,8 +156,27 @@ JointTimes join_times(const std::map<std::string, std::vector<double>>& times_of
     joint.times_s = times_s;
     most_pictures = camera;
   }
+  // Offsets by which times of cameras are moved to those of the camera with most pictures.
+  std::map<std::string, double> offset_s;
+  const std::vector<double> most_s = joint.times_s;
   for (const auto& [camera, times_s] : times_of_camera_s) {
-    Match found = best_match(joint.times_s, times_s);
+    const std::vector<double> all_s = with_dropped(joint.times_s, times_s, 0);
+    const bool stand = agree(match(all_s, times_s, 0), most_s);
+    if (!stand) offset_s[camera] = most_s.front() - times_s.front();
+    joint.times_s = stand ? all_s : with_dropped(joint.times_s, times_s, offset_s[camera]);
+  }
+  for (const auto& [camera, times_s] : times_of_camera_s) {
+    Match found = match(joint.times_s, times_s, offset_s[camera]);
+    if (const double offset = offset_s[camera]; std::abs(offset) > allowed_s(most_s))
+      joint.findings.push_back(
+          {.check = "time",
+           .state = FindingState::warning,
+           .found = fmt::format("the first pictures of cameras '{}' and '{}' are taken for one "
+                                "moment, though their times are {:.4g} s apart",
+                                camera, most_pictures, std::abs(offset)),
+           .where = yaml,
+           .expected = "cameras whose clocks agree, or that were started by one signal",
+           .remedy = "give times.csv where they were not"});
     if (!found.one_each || found.worst_s > allowed_s(joint.times_s))
       throw InputError(
           yaml,

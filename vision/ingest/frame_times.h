@@ -26,12 +26,14 @@ FrameNumbers number_by_rate(const std::vector<double>& times_s, double rate_hz,
 struct JointTimes {
   std::vector<double> times_s;                               ///< of each frame
   std::map<std::string, std::vector<int>> frame_of_picture;  ///< of each camera, rising
+  Findings findings;                                         ///< offsets that were assumed
 };
 
 /// Brings the times of several cameras' videos together. Frames are the pictures of the camera that
-/// has most. Times are compared as they stand or, where that fails, counted from each camera's
-/// first picture. Throws InputError where pictures of two cameras lie further apart than a quarter
-/// of an interval either way; `yaml` names the cameras.
+/// has most, and those that others took where it dropped one. Times are compared as they stand or,
+/// where that fails, counted from each camera's first picture. Throws InputError where pictures of
+/// two cameras lie further apart than a quarter of an interval either way; `yaml` names the
+/// cameras.
 JointTimes join_times(const std::map<std::string, std::vector<double>>& times_of_camera_s,
                       const std::string& yaml);
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <opencv2/core.hpp>
 #include <string>
 #include <vector>
@@ -36,6 +37,9 @@ class ImageSource {
   virtual int count() const = 0;
   /// Returns the time of each picture (s) as the container states it; empty where there is none.
   virtual std::vector<double> times_s() const { return {}; }
+  /// Returns the number of each picture by which names count them, in steps of one; empty where
+  /// none does.
+  virtual std::vector<std::int64_t> name_numbers() const { return {}; }
   /// Returns what has been noticed so far, warnings and notes.
   Findings findings() const;
 

@@ -245,6 +245,9 @@ GreyLevels decode_still(const std::string& bytes, AVCodecID codec, const std::st
   if (errors_logged() != before || frame->decode_error_flags != 0 ||
       (frame->flags & AV_FRAME_FLAG_CORRUPT) != 0)
     damage = "its data are damaged";
+  // TIFF's YCbCr has the whole range, unlike a video's, unless ReferenceBlackWhite says otherwise.
+  if (codec == AV_CODEC_ID_TIFF && frame->color_range == AVCOL_RANGE_UNSPECIFIED)
+    frame->color_range = AVCOL_RANGE_JPEG;
   return grey_levels(*frame, where);
 }
 

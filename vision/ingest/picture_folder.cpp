@@ -64,10 +64,12 @@ class PictureFolder : public ImageSource {
       damaged_.push_back(frame());
       last_damaged_ = fmt::format("{}: {}", current_name(), damage_);
       if (2 * damaged_.size() > pictures_.files.size())
-        throw InputError(current().string(),
-                         fmt::format("the picture cannot be decoded ({}), nor can {} others",
-                                     damage_, damaged_.size() - 1),
-                         "whole pictures", "copy them again or remove them");
+        throw InputError(
+            current().string(),
+            fmt::format(
+                "the picture cannot be decoded ({}){}", damage_,
+                damaged_.size() > 1 ? fmt::format(", nor can {} more", damaged_.size() - 1) : ""),
+            "whole pictures", "copy them again or remove them");
       return true;
     }
     note_turn(picture);
@@ -80,6 +82,7 @@ class PictureFolder : public ImageSource {
 
   int own_number() const override { return next_ == 0 ? -1 : pictures_.frames[next_ - 1]; }
   int picture_index() const override { return static_cast<int>(next_) - 1; }
+  std::vector<std::int64_t> name_numbers() const override { return pictures_.numbers; }
   std::string where() const override { return folder_.string(); }
 
   Findings own_findings() const override {
@@ -117,7 +120,7 @@ class PictureFolder : public ImageSource {
   /// Brings levels of more bits to 8, by the bits that the folder's pictures use: sensors of 10 to
   /// 14 bits write files of 16.
   void to_8_bits(const DecodedPicture& picture, cv::Mat& grey) {
-    if (bits_ == 0) bits_ = picture.bits < 16 ? picture.bits : bits_used();
+    if (bits_ == 0) bits_ = picture.bits < 16 || picture.white_stated ? picture.bits : bits_used();
     const int level = brightest(picture.grey);
     if (level >= 1 << bits_)
       throw InputError(
@@ -127,15 +130,14 @@ class PictureFolder : public ImageSource {
     picture.grey.convertTo(grey, CV_8U, 255.0 / ((1 << bits_) - 1));
   }
 
-  /// Returns the bits that some pictures, spread over the folder, use.
+  /// Returns the bits that the folder's pictures use. All are looked at until one uses 16: the
+  /// brightest may be any.
   int bits_used() const {
-    constexpr size_t kLooks = 12;
-    const size_t count = pictures_.files.size();
     int level = 0;
-    for (size_t i = 0; i < std::min(kLooks, count); ++i) {
-      const DecodedPicture one =
-          decode_picture(pictures_.files[i * count / std::min(kLooks, count)]);
+    for (const fs::path& file : pictures_.files) {
+      const DecodedPicture one = decode_picture(file);
       if (one.damage.empty() && one.bits == 16) level = std::max(level, brightest(one.grey));
+      if (bits_for(level) == 16) break;
     }
     return bits_for(level);
   }

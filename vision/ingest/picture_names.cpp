@@ -67,6 +67,26 @@ std::optional<std::vector<std::int64_t>> changing_numbers(const std::vector<fs::
   return numbers;
 }
 
+/// Counts on where a camera's counter of so many digits began again: IMG_9999, then IMG_0001.
+/// Brings files and numbers, which rise, into that order.
+void count_on_after_the_last(std::vector<fs::path>& files, std::vector<std::int64_t>& numbers) {
+  const std::int64_t first = numbers.front(), last = numbers.back();
+  std::int64_t most = 999;  // shorter counters are none of cameras
+  while (most < last) most = 10 * most + 9;
+  if (last != most || first > 1) return;
+  // Nearly all of the range must lie between what was written after and before.
+  constexpr double kMissing = 0.5;
+  for (size_t i = 1; i < numbers.size(); ++i) {
+    if (static_cast<double>(numbers[i] - numbers[i - 1]) < kMissing * static_cast<double>(most))
+      continue;
+    for (size_t j = 0; j < i; ++j) numbers[j] += first == 0 ? most + 1 : most;
+    const auto begin = static_cast<std::ptrdiff_t>(i);
+    std::rotate(numbers.begin(), numbers.begin() + begin, numbers.end());
+    std::rotate(files.begin(), files.begin() + begin, files.end());
+    return;
+  }
+}
+
 Finding uncounted(const std::string& folder, const std::string& found) {
   return {.check = "pictures",
           .state = FindingState::warning,
@@ -107,12 +127,13 @@ NumberedPictures number_pictures(std::vector<fs::path> files) {
       throw InputError(result.files[i].string(),
                        fmt::format("has the name of {}", result.files[i - 1].filename().string()),
                        "one picture for each name", "remove the one that is not a frame");
-  const auto numbers = changing_numbers(result.files);
+  auto numbers = changing_numbers(result.files);
   if (!numbers) {
     result.findings.push_back(uncounted(folder, "no single number counts the pictures"));
     return result;
   }
 
+  count_on_after_the_last(result.files, *numbers);
   std::int64_t step = 0;
   for (size_t i = 1; i < count; ++i) {
     if ((*numbers)[i] == (*numbers)[i - 1])
@@ -137,6 +158,7 @@ NumberedPictures number_pictures(std::vector<fs::path> files) {
     for (int f = i > 0 ? result.frames[i - 1] + 1 : 0; f < result.frames[i]; ++f)
       missing.push_back(f);
   }
+  for (const std::int64_t number : *numbers) result.numbers.push_back(number / step);
   if (!missing.empty()) result.findings.push_back(missing_frames(missing, last + 1, folder));
   return result;
 }

@@ -142,5 +142,36 @@ TEST(DecodePicture, RefusesTheInksOfAPrint) {
   EXPECT_THROW(decode_picture(folder / "print.jpg"), InputError);
 }
 
+TEST(DecodePicture, SaysThatAFileIsAVideoOrEmpty) {
+  const TemporaryFolder folder;
+  folder.write("film.jpg", std::string("\0\0\0\x18", 4) + "ftypmp42 and so on");
+  EXPECT_THAT(decode_picture(folder / "film.jpg").damage, testing::HasSubstr("holds a video"));
+  folder.write("none.png", "");
+  EXPECT_THAT(decode_picture(folder / "none.png").damage, testing::HasSubstr("empty"));
+}
+
+TEST(DecodePicture, TakesTheWhiteLevelThatAPgmStates) {
+  const TemporaryFolder folder;
+  folder.write("a.pgm", std::string("P5 2 1 4095\n\x0f\xff\x00\x00", 16));
+  const DecodedPicture picture = decode_picture(folder / "a.pgm");
+  ASSERT_EQ(picture.damage, "");
+  EXPECT_TRUE(picture.white_stated);
+  EXPECT_GE(picture.grey.at<std::uint16_t>(0, 0), 65530) << "4095 is white";
+}
+
+TEST(DecodePicture, PassesBytesThatAJpegHasBeforeItsEnd) {
+  const TemporaryFolder folder;
+  const cv::Mat grey(16, 16, CV_8UC1, cv::Scalar(90));
+  std::vector<uchar> bytes;
+  cv::imencode(".jpg", grey, bytes);
+  bytes.insert(bytes.end() - 2, 3, 0x11);
+  folder.write("a.jpg", std::string(bytes.begin(), bytes.end()));
+  EXPECT_EQ(decode_picture(folder / "a.jpg").damage, "");
+  bytes.erase(bytes.end() - 2, bytes.end());
+  bytes.resize(bytes.size() - 8);
+  folder.write("b.jpg", std::string(bytes.begin(), bytes.end()));
+  EXPECT_NE(decode_picture(folder / "b.jpg").damage, "");
+}
+
 }  // namespace
 }  // namespace clothfit

@@ -124,6 +124,8 @@ TEST(OpenFootage, MatchesPicturesWithTimesCsv) {
   footages.set_times(kUneven);
   EXPECT_THAT(footages.frames("front"), ElementsAre(0, 2, 3, 4)) << "by their times";
   EXPECT_THAT(footages.frames("side"), ElementsAre(0, 1, 3)) << "by their numbers";
+  footages.add_folder("late", {2, 3, 4});
+  EXPECT_THAT(footages.frames("late"), ElementsAre(2, 3, 4)) << "the first two are missing";
 
   footages.set_times({3, 3.5, 4, 4.5});
   EXPECT_THAT(footages.frames("front"), ElementsAre(0, 1, 2, 3)) << "a time each";

@@ -102,5 +102,17 @@ TEST(FootageWatch, SaysNothingOfSoundFootage) {
   EXPECT_THAT(watched({.noise = 2}, false).findings("folder"), IsEmpty());
 }
 
+TEST(FootageWatch, TakesPicturesThatACodecRepeatsAtRestForNoCopies) {
+  cv::RNG random(46);
+  FootageWatch watch;
+  const cv::Mat still = draw({}, 0, random);
+  for (int frame = 0; frame < 12; ++frame) {
+    cv::Mat grey = still.clone();
+    grey.at<uchar>(4, 4 + frame / 3) = 128;  // what a codec refines now and then
+    watch.see(grey, frame);
+  }
+  EXPECT_THAT(watch.findings("folder"), IsEmpty());
+}
+
 }  // namespace
 }  // namespace clothfit

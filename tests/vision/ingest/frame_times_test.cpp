@@ -111,5 +111,25 @@ TEST(NumberByTimes, TakesTheNearestFrameOrNone) {
   EXPECT_FALSE(number_by_times(frames_s, {0, 0.035, 0.07}));
 }
 
+TEST(JoinTimes, KeepsTheFramesThatEachOfTwoCamerasDropped) {
+  const std::vector<double> whole_s = even(8, 50);
+  std::vector<double> a_s = whole_s, b_s = whole_s;
+  a_s.erase(a_s.begin() + 2);
+  b_s.erase(b_s.begin() + 5);
+  const JointTimes joint = join_times({{"a", a_s}, {"b", b_s}}, "recording.yaml");
+  EXPECT_EQ(joint.times_s, whole_s);
+  EXPECT_THAT(joint.frame_of_picture.at("a"), ElementsAre(0, 1, 3, 4, 5, 6, 7));
+  EXPECT_THAT(joint.frame_of_picture.at("b"), ElementsAre(0, 1, 2, 3, 4, 6, 7));
+  EXPECT_TRUE(joint.findings.empty());
+}
+
+TEST(JoinTimes, SayWhatOffsetTheyAssume) {
+  const JointTimes joint =
+      join_times({{"a", even(6, 50)}, {"b", even(5, 50, 1e-3, 1.5)}}, "recording.yaml");
+  ASSERT_EQ(joint.findings.size(), 1U);
+  EXPECT_NE(joint.findings[0].found.find("1.5 s apart"), std::string::npos)
+      << joint.findings[0].found;
+}
+
 }  // namespace
 }  // namespace clothfit

@@ -101,5 +101,14 @@ TEST(NumberPictures, RefusesTwoPicturesOfOneNumber) {
   EXPECT_THROW(number({"1.jpg", "1.png"}), InputError);
 }
 
+TEST(NumberPictures, CountsOnWhereACamerasCounterBeginsAgain) {
+  const NumberedPictures pictures =
+      number({"IMG_0002.jpg", "IMG_9998.jpg", "IMG_0001.jpg", "IMG_9999.jpg"});
+  EXPECT_THAT(names_of(pictures),
+              ElementsAre("IMG_9998.jpg", "IMG_9999.jpg", "IMG_0001.jpg", "IMG_0002.jpg"));
+  EXPECT_THAT(pictures.frames, ElementsAre(0, 1, 2, 3));
+  EXPECT_THAT(pictures.findings, IsEmpty());
+}
+
 }  // namespace
 }  // namespace clothfit
