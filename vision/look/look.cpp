@@ -36,19 +36,14 @@ struct LookFor {
   const LookOptions& options;
   std::vector<std::string> families;
   DotsShown dots;
+  std::string turned;  ///< as in LookResult
 };
-
-LookFor what_to_look_for(const std::filesystem::path& images, const LookOptions& options) {
-  LookFor wanted{.options = options, .families = options.families, .dots = {}};
-  if (options.sheet == nullptr && options.families.empty())
-    wanted.families = families_shown(images);
-  if (options.sheet == nullptr && options.dots) wanted.dots = dots_shown(images);
-  return wanted;
-}
 
 /// Finds what one picture shows.
 void look_at(LookedAt& picture, Detectors& detectors, const LookFor& wanted) {
-  const auto& [options, families, dots] = wanted;
+  const LookOptions& options = wanted.options;
+  const std::vector<std::string>& families = wanted.families;
+  const DotsShown& dots = wanted.dots;
   for (size_t f = 0; f < families.size(); ++f)
     for (const TagDetection& tag : detectors[f].detect(picture.grey)) {
       TagReading reading{.frame = picture.seen.frame, .tag = tag, .rejected = {}};
@@ -81,6 +76,18 @@ std::string turned(const std::filesystem::path& images, const std::vector<std::s
 
 /// The family that most people print.
 constexpr const char* kUsualFamily = "tag36h11";
+
+LookFor what_to_look_for(const std::filesystem::path& images, const LookOptions& options) {
+  LookFor wanted{.options = options, .families = options.families, .dots = {}, .turned = {}};
+  if (options.sheet == nullptr && options.dots) wanted.dots = dots_shown(images);
+  if (options.sheet != nullptr || !options.families.empty()) return wanted;
+  wanted.families = families_shown(images);
+  if (std::ranges::find(wanted.families, kUsualFamily) == wanted.families.end())
+    wanted.turned = turned(images, {kUsualFamily});
+  // What else seems to appear in mirrored tags of the usual family is chance.
+  if (!wanted.turned.empty()) wanted.families.clear();
+  return wanted;
+}
 
 bool shows_no_tag(const LookResult& result) {
   return std::ranges::all_of(result.pictures,
@@ -128,6 +135,14 @@ bool is_drawn(int number, int count, int every) {
          (number == 0 || number / every == last / 2 || number / every == last);
 }
 
+Progress looked_report(int number, int count, size_t tags) {
+  return {.stage = "look",
+          .done = static_cast<double>(number + 1),
+          .total = static_cast<double>(count),
+          .unit = "pictures",
+          .note = fmt::format("{} tags", tags)};
+}
+
 }  // namespace
 
 void LookOptions::validate() const {
@@ -139,19 +154,14 @@ LookResult look(const std::filesystem::path& images, const LookOptions& options,
                 const ProgressCallback& progress) {
   options.validate();
   LookResult result;
-  LookFor wanted = what_to_look_for(images, options);
-  // What else seems to appear in mirrored tags of the usual family is chance.
-  if (options.families.empty() &&
-      std::ranges::find(wanted.families, kUsualFamily) == wanted.families.end())
-    result.turned = turned(images, {kUsualFamily});
-  if (!result.turned.empty()) wanted.families.clear();
+  const LookFor wanted = what_to_look_for(images, options);
   result.families = wanted.families;
+  result.turned = wanted.turned;
   result.pattern = wanted.dots.pattern;
   const auto source = open_images(images);
   result.count = source->count();
   result.times_s = source->times_s();
   const int every = options.looks > 0 ? std::max(1, result.count / options.looks) : options.every;
-
   std::atomic<bool> cancelled = false;
   cv::Mat first;
   tbb::enumerable_thread_specific<Detectors> detectors([&] {
@@ -182,11 +192,7 @@ LookResult look(const std::filesystem::path& images, const LookOptions& options,
     if (is_drawn(picture.number, result.count, every))
       result.overlays.push_back({picture.seen.frame, draw_seen(picture.grey, picture.seen)});
     result.pictures.push_back(picture.seen);
-    const Progress report{.stage = "look",
-                          .done = static_cast<double>(picture.number + 1),
-                          .total = static_cast<double>(result.count),
-                          .unit = "pictures",
-                          .note = fmt::format("{} tags", picture.seen.tags.size())};
+    const Progress report = looked_report(picture.number, result.count, picture.seen.tags.size());
     if (progress && !progress(report)) cancelled = true;
   };
   const size_t in_flight = 2 * static_cast<size_t>(tbb::info::default_concurrency());
