@@ -91,20 +91,22 @@ SheetPrint::SheetPrint(const MarkerSet& markers, double width_m, double height_m
   options.validate();
   if (!(width_m > 0 && height_m > 0 && std::isfinite(width_m) && std::isfinite(height_m)))
     throw InputError("cloth", fmt::format("size = [{}, {}]", width_m, height_m), "metres, > 0");
+  const bool has_tags = std::ranges::any_of(
+      markers.markers, [](const Marker& marker) { return marker.tag.has_value(); });
   switch (markers.kind) {
     case MarkerKind::apriltag:
       add_tags(markers);
       return;
     case MarkerKind::dots:
-      if (std::ranges::any_of(markers.markers,
-                              [](const Marker& marker) { return marker.tag.has_value(); }))
-        add_tags(markers);
+      if (has_tags) add_tags(markers);
       add_dots(markers);
       return;
     case MarkerKind::none:
       return;
     case MarkerKind::texture:
-      throw InputError("markers", "a texture cannot be printed", "kind apriltag, dots or none");
+      if (has_tags) add_tags(markers);
+      texture_.emplace(width_m, height_m, options.texture);
+      return;
   }
 }
 
@@ -194,6 +196,19 @@ double SheetPrint::Tag::ink_share(const Eigen::Vector2d& place_m,
   return ink;
 }
 
+double SheetPrint::Tag::cover(const Eigen::Vector2d& place_m,
+                              const Eigen::Matrix2d& footprint_m) const {
+  const Eigen::Vector2d cell = cell_from_material * (place_m - origin_m);
+  const Eigen::Vector2d side = (cell_from_material * footprint_m).rowwise().norm();
+  double covered = 1;
+  for (int axis = 0; axis < 2; ++axis) {
+    const double low = cell[axis] - 0.5 * side[axis], high = cell[axis] + 0.5 * side[axis];
+    const double inside = std::min(high, cells + 0.0) - std::max(low, 0.0);
+    covered *= high > low ? std::max(0.0, inside) / (high - low) : (inside >= 0 ? 1 : 0);
+  }
+  return covered;
+}
+
 double SheetPrint::Dot::ink_share(const Eigen::Vector2d& place_m,
                                   const Eigen::Matrix2d& footprint_m) const {
   const Eigen::Vector2d from_centre_m = place_m - centre_m;
@@ -213,7 +228,15 @@ double SheetPrint::reflectance(const Eigen::Vector2d& place_m,
     ink = std::max(ink, tags_[static_cast<size_t>(index)].ink_share(place_m, footprint_m));
   for (const int index : bin.dots)
     ink = std::max(ink, dots_[static_cast<size_t>(index)].ink_share(place_m, footprint_m));
-  return options_.paper + ink * (options_.ink - options_.paper);
+  double ground = options_.paper;
+  if (texture_) {
+    double covered = 0;
+    for (const int index : bin.tags)
+      covered = std::max(covered, tags_[static_cast<size_t>(index)].cover(place_m, footprint_m));
+    if (covered < 1)
+      ground += (1 - covered) * (texture_->reflectance(place_m, footprint_m) - options_.paper);
+  }
+  return ground + ink * (options_.ink - options_.paper);
 }
 
 }  // namespace clothfit

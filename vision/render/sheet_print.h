@@ -1,9 +1,11 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <vector>
 
 #include "data/markers.h"
+#include "vision/render/cloth_texture.h"
 
 namespace clothfit {
 
@@ -15,7 +17,8 @@ struct PrintOptions {
   /// > 0; radius of each marker's disc, as a pattern has them (vision/detect/dot_pattern.h). Empty:
   /// all have `dot_radius_m`. Those of tags' corners are not used.
   std::vector<double> dot_radii_m;
-  void validate() const;  ///< throws InputError
+  ClothTextureOptions texture;  ///< of markers of kind `texture`
+  void validate() const;        ///< throws InputError
 };
 
 /// The printed side of a sheet, as reflectance over material coordinates (s to the right, t down,
@@ -24,13 +27,14 @@ struct PrintOptions {
 /// Markers of kind `apriltag` are corners of tags: the printed tag, whose border ends at the four
 /// corners, is laid out between them, with the cells outside the border that its family has. Ink
 /// wins where white margins overlap a neighbour. Markers of kind `dots` are the centres of filled
-/// circles, but for corners of anchor tags, which are printed as tags. Those of kind `none` show
-/// nothing.
+/// circles, but for corners of anchor tags, which are printed as tags. Those of kind `texture` lie
+/// on a texture that covers the sheet, with anchor tags and their white margins on top. Those of
+/// kind `none` show nothing.
 class SheetPrint {
  public:
-  /// Throws InputError for a cloth without size, an unknown family and markers of kind `texture`.
-  /// It also refuses a tag that the family lacks, that lacks one of its four corners, or whose
-  /// corners are not a rectangle's in the order of data/markers.h.
+  /// Throws InputError for a cloth without size and an unknown family. It also refuses a tag that
+  /// the family lacks, that lacks one of its four corners, or whose corners are not a rectangle's
+  /// in the order of data/markers.h.
   SheetPrint(const MarkerSet& markers, double width_m, double height_m,
              const PrintOptions& options = {});
 
@@ -56,6 +60,8 @@ class SheetPrint {
     std::vector<bool> black;  ///< row by row from the top left
 
     double ink_share(const Eigen::Vector2d& place_m, const Eigen::Matrix2d& footprint_m) const;
+    /// Returns the share of the footprint that its cells cover.
+    double cover(const Eigen::Vector2d& place_m, const Eigen::Matrix2d& footprint_m) const;
   };
   struct Dot {
     Eigen::Vector2d centre_m;
@@ -82,6 +88,7 @@ class SheetPrint {
   std::vector<Tag> tags_;
   std::vector<Dot> dots_;
   std::vector<Bin> bins_;
+  std::optional<ClothTexture> texture_;
 };
 
 }  // namespace clothfit

@@ -148,11 +148,47 @@ TEST(SheetPrint, RefusesWhatCannotBePrinted) {
                    std::swap(m.markers[0].corner, m.markers[1].corner);  // a mirror image
                    std::swap(m.markers[2].corner, m.markers[3].corner);
                  }));
-  expect_refused("a texture cannot be printed",
-                 print([](MarkerSet& m) { m.kind = MarkerKind::texture; }));
+  MarkerSet textured = good;
+  textured.kind = MarkerKind::texture;
+  expect_refused("finest_m",
+                 [&] { SheetPrint(textured, width_m, width_m, {.texture = {.finest_m = 0}}); });
   expect_refused("size = [0, 1]", [&] { SheetPrint(good, 0, 1); });
   expect_refused("paper", [&] { SheetPrint(good, width_m, width_m, {.paper = 1.5}); });
   expect_refused("dot_radius_m", [&] { SheetPrint(good, width_m, width_m, {.dot_radius_m = 0}); });
+}
+
+TEST(SheetPrint, CoversASheetWithASeededTextureOfTheStatedContrast) {
+  const MarkerSet markers{.kind = MarkerKind::texture, .family = {}, .markers = {}, .index = {}};
+  for (const TexturePattern pattern : {TexturePattern::noise, TexturePattern::weave}) {
+    SCOPED_TRACE(static_cast<int>(pattern));
+    const ClothTextureOptions texture{.pattern = pattern, .seed = 3, .contrast = 0.1};
+    const SheetPrint print(markers, 0.2, 0.2, {.texture = texture});
+    const SheetPrint again(markers, 0.2, 0.2, {.texture = texture});
+    double sum = 0, squares = 0;
+    constexpr int kAcross = 60;
+    for (int i = 0; i < kAcross; ++i)
+      for (int j = 0; j < kAcross; ++j) {
+        const Eigen::Vector2d place_m = 0.2 / kAcross * Eigen::Vector2d(j + 0.3, i + 0.3);
+        const double value = print.reflectance(place_m);
+        EXPECT_EQ(value, again.reflectance(place_m));
+        sum += value;
+        squares += value * value;
+      }
+    const double mean = sum / (kAcross * kAcross);
+    const double spread = std::sqrt(squares / (kAcross * kAcross) - mean * mean);
+    EXPECT_NEAR(mean, texture.mean, 0.01);
+    // A weave's checks add a quarter of the variance.
+    EXPECT_NEAR(spread, texture.mean * texture.contrast, 0.2 * texture.mean * texture.contrast);
+  }
+}
+
+TEST(SheetPrint, LaysTagsWithTheirMarginsOnATexture) {
+  MarkerSet markers = tag_markers(2, 0.2);
+  markers.kind = MarkerKind::texture;
+  const SheetPrint print(markers, 0.2, 0.2);
+  // The margin is a cell wide, an eighth of the border's 72 mm.
+  EXPECT_DOUBLE_EQ(print.reflectance({0.05, 0.05 - 0.036 - 0.0045}), PrintOptions().paper);
+  EXPECT_DOUBLE_EQ(print.reflectance({0.05, 0.05 - 0.036 + 0.0045}), PrintOptions().ink);
 }
 
 }  // namespace
