@@ -163,8 +163,7 @@ TrackStepResult track_step(const Recording& recording, const std::vector<std::st
 
     CameraTracks tracks;
     tracks.camera = camera.name;
-    tracks.result = track(recording, *footage.cameras.at(camera.name), given.images->string(),
-                          options, progress);
+    tracks.result = track(recording, given, *footage.cameras.at(camera.name), options, progress);
     step.footage.insert(step.footage.end(), tracks.result.footage.begin(),
                         tracks.result.footage.end());
     if (tracks.result.cancelled) throw Cancelled();

@@ -18,6 +18,7 @@
 #include "vision/track/tag_history.h"
 #include "vision/track/track_dots.h"
 #include "vision/track/track_rows.h"
+#include "vision/track/track_texture.h"
 #include "vision/track/what_appears.h"
 
 namespace clothfit {
@@ -260,10 +261,18 @@ TrackResult track(const Recording& recording, const CameraEntry& camera,
     throw InputError(yaml, fmt::format("camera '{}' has no images", camera.name),
                      "`images` with a folder or a video to track in");
   const Footage footage = open_footage(recording, {camera.name});
-  TrackResult result = track(recording, *footage.cameras.at(camera.name), camera.images->string(),
-                             options, progress);
+  TrackResult result =
+      track(recording, camera, *footage.cameras.at(camera.name), options, progress);
   result.footage.insert(result.footage.begin(), footage.findings.begin(), footage.findings.end());
   return result;
+}
+
+TrackResult track(const Recording& recording, const CameraEntry& camera, ImageSource& pictures,
+                  const TrackOptions& options, const ProgressCallback& progress) {
+  options.validate();
+  if (recording.markers.kind == MarkerKind::texture)
+    return track_texture(recording, camera, pictures, options, progress);
+  return track(recording, pictures, camera.images->string(), options, progress);
 }
 
 TrackResult track(const Recording& recording, ImageSource& pictures, const std::string& where,

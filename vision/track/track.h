@@ -11,7 +11,8 @@
 namespace clothfit {
 
 /// Finds the cloth's tags in every picture of one camera, or its dots and their anchor tags
-/// (track_dots.h) where the markers are of that kind. Tags are the markers and reference points
+/// (track_dots.h), or the points of a texture (track_texture.h), where the markers are of that
+/// kind. Tags are the markers and reference points
 /// that carry a tag and a corner. Pictures are worked on in parallel; the result does not depend on
 /// the number of threads. `progress` (may be empty) is called once per picture, in order, by one
 /// thread at a time but not always the same. Throws InputError for pictures that cannot be read,
@@ -20,7 +21,12 @@ namespace clothfit {
 TrackResult track(const Recording& recording, const CameraEntry& camera,
                   const TrackOptions& options, const ProgressCallback& progress);
 
-/// Finds them in pictures that come from elsewhere; refusals call the pictures `where`.
+/// Finds them in pictures of the camera that are open already.
+TrackResult track(const Recording& recording, const CameraEntry& camera, ImageSource& pictures,
+                  const TrackOptions& options, const ProgressCallback& progress);
+
+/// Finds them in pictures that come from elsewhere, not those of a texture, which need their
+/// camera; refusals call the pictures `where`.
 TrackResult track(const Recording& recording, ImageSource& pictures, const std::string& where,
                   const TrackOptions& options, const ProgressCallback& progress);
 
