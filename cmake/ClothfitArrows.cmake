@@ -80,7 +80,8 @@ set(CLOTHFIT_ARROWS
                             apps/report/fit"
   "apps/study/foreign   -> data fit/jobs fit/diagnosis apps/terminal apps/steps
                            apps/study/recordings"
-  "apps/study/vision    -> data vision/degrade vision/detect vision/track fit/jobs apps/terminal"
+  "apps/study/vision    -> data vision/degrade vision/ingest vision/detect vision/track
+                           vision/render fit/jobs apps/terminal"
   "apps/report/study    -> data vision/track apps/terminal apps/report/page apps/report/fit
                            apps/study/trials apps/study/louchet1995 apps/study/recordings
                            apps/study/foreign apps/study/vision"

@@ -10,6 +10,7 @@
 #include <functional>
 #include <map>
 
+#include "apps/study/vision/judge_texture.h"
 #include "apps/study/vision/photo_sets.h"
 #include "apps/study/vision/spoiled_pictures.h"
 #include "apps/terminal/exit_code.h"
@@ -63,6 +64,21 @@ const std::vector<PhotoRow>& photo_rows() {
       {{"false", "pictures without a tag of the family"},
        {"aprilgrid-kalibr", "opencv-aruco", "cloth-colour-grid-nc"},
        score_false_tags},
+  };
+  return rows;
+}
+
+/// Rows that draw the motion of recordings with another cloth.
+struct ClothRow {
+  VisionRow row;
+  ClothTextureOptions texture;
+};
+
+const std::vector<ClothRow>& cloth_rows() {
+  static const std::vector<ClothRow> rows = {
+      {{"texture", "the motion with a printed texture, rendered"}, {}},
+      {{"weave", "the same with a plain weave of low contrast"},
+       {.pattern = TexturePattern::weave, .finest_m = 1e-3, .contrast = 0.06}},
   };
   return rows;
 }
@@ -129,6 +145,7 @@ const std::vector<VisionRow>& vision_rows() {
     std::vector<VisionRow> all;
     for (const SpoilRow& one : spoil_rows()) all.push_back(one.row);
     for (const PhotoRow& one : photo_rows()) all.push_back(one.row);
+    for (const ClothRow& one : cloth_rows()) all.push_back(one.row);
     return all;
   }();
   return rows;
@@ -177,6 +194,16 @@ std::vector<VisionResult> study_vision(const VisionStudyOptions& options,
       report(one.row.name, set);
       results.push_back(measured(one.row.name, set, [&] { return one.score(folder); }));
     }
+  for (const ClothRow& one : cloth_rows()) {
+    if (!asked_for(options, one.row.name)) continue;
+    TexturedFootageOptions footage{.texture = one.texture};
+    footage.texture.seed = options.seed;
+    for (const fs::path& folder : judged_recordings(options.data)) {
+      report(one.row.name, folder.filename().string());
+      results.push_back(measured(one.row.name, folder.filename().string(),
+                                 [&] { return score_texture(render_textured(folder, footage)); }));
+    }
+  }
   return results;
 }
 

@@ -71,6 +71,13 @@ constexpr Limit kLimits[] = {
     {"sheet", "error over sigma", over_sigma, kLeast, 1 / 1.5, ""},
     {"sheet", "error over sigma", over_sigma, kMost, 1.5, ""},
     {"false", "false tags", false_ones, kMost, 0, ""},
+    {"texture", "found", share, kLeast, 99, "%"},
+    {"texture", "median error", middle, kMost, 0.15, "px"},
+    {"texture", "95 % error", tail, kMost, 0.4, "px"},
+    {"texture", "error over sigma", over_sigma, kLeast, 0.75, ""},
+    {"texture", "error over sigma", over_sigma, kMost, 1.25, ""},
+    {"weave", "error over sigma", over_sigma, kLeast, 0.75, ""},
+    {"weave", "error over sigma", over_sigma, kMost, 1.25, ""},
 };
 
 /// Adds up the sets of a row; nothing where none was measured.
