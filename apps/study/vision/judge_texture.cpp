@@ -7,9 +7,9 @@
 #include <map>
 #include <set>
 
+#include "apps/study/vision/pictures_in_memory.h"
 #include "data/input_error.h"
 #include "data/tracks.h"
-#include "vision/ingest/image_source.h"
 #include "vision/render/render_cloth.h"
 #include "vision/track/track.h"
 
@@ -126,27 +126,6 @@ MarkerSet textured_markers(const MarkerSet& tags, const ClothDescription& cloth)
   return textured;
 }
 
-/// Gives pictures that are in memory.
-class RenderedPictures : public ImageSource {
- public:
-  explicit RenderedPictures(const std::vector<cv::Mat>& pictures) : pictures_(pictures) {}
-  std::string current_name() const override { return fmt::format("picture {}", next_ - 1); }
-  int count() const override { return static_cast<int>(pictures_.size()); }
-
- protected:
-  bool read_next(cv::Mat& grey) override {
-    if (next_ == count()) return false;
-    grey = pictures_[static_cast<size_t>(next_++)];
-    return true;
-  }
-  int own_number() const override { return next_ - 1; }
-  std::string where() const override { return "rendered pictures"; }
-
- private:
-  const std::vector<cv::Mat>& pictures_;
-  int next_ = 0;
-};
-
 }  // namespace
 
 Eigen::MatrixXd cubic_spline_weights(const std::vector<double>& nodes,
@@ -219,7 +198,7 @@ TexturedFootage render_textured(const fs::path& folder, const TexturedFootageOpt
 }
 
 TagScore score_texture(const TexturedFootage& footage) {
-  RenderedPictures pictures(footage.pictures);
+  PicturesInMemory pictures(footage.pictures);
   const TrackResult result =
       track(footage.recording, footage.recording.cameras.front(), pictures, TrackOptions(), {});
   TagScore score;

@@ -9,7 +9,10 @@
 #include <cmath>
 #include <functional>
 #include <map>
+#include <memory>
+#include <optional>
 
+#include "apps/study/vision/dot_rows.h"
 #include "apps/study/vision/judge_texture.h"
 #include "apps/study/vision/photo_sets.h"
 #include "apps/study/vision/spoiled_pictures.h"
@@ -83,24 +86,49 @@ const std::vector<ClothRow>& cloth_rows() {
   return rows;
 }
 
+/// Rows that track the pictures of recordings of dots.
+struct DotRow {
+  VisionRow row;
+  PictureSpoil spoil;
+};
+
+const std::vector<DotRow>& dot_rows() {
+  static const std::vector<DotRow> rows = {
+      {{"dots", "dots as they are"}, untouched()},
+      {{"dots_noise8", "dots under noise of 8 levels"}, with_noise(8)},
+      {{"dots_blur3", "dots under 3 px of blur along the motion"}, blurred_by(3)},
+  };
+  return rows;
+}
+
 bool asked_for(const VisionStudyOptions& options, const std::string& row) {
   return options.rows.empty() || std::ranges::find(options.rows, row) != options.rows.end();
 }
 
-/// Finds recordings of tags whose truth is known.
-std::vector<fs::path> judged_recordings(const fs::path& data) {
-  std::vector<fs::path> found;
+/// A camera of a recording whose truth is known.
+struct JudgedCamera {
+  fs::path folder;
+  std::string camera;
+};
+
+/// Finds cameras with pictures and truth in recordings of one kind of markers, all of them or the
+/// first of each recording.
+std::vector<JudgedCamera> judged_cameras(const fs::path& data, MarkerKind kind, bool all) {
+  std::vector<JudgedCamera> found;
   const fs::path folder = data / "recordings";
   if (!fs::is_directory(folder)) return found;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
     if (!fs::exists(entry.path() / "recording.yaml")) continue;
     const Recording recording = read_recording(entry.path());
-    if (recording.markers.kind != MarkerKind::apriltag || recording.cameras.empty()) continue;
-    const std::string truth = "truth_tracks2d_" + recording.cameras.front().name + ".csv.gz";
-    if (recording.cameras.front().images && fs::exists(entry.path() / truth))
-      found.push_back(entry.path());
+    if (recording.markers.kind != kind) continue;
+    for (const CameraEntry& camera : recording.cameras) {
+      if (camera.images && fs::exists(entry.path() / ("truth_tracks2d_" + camera.name + ".csv.gz")))
+        found.push_back({.folder = entry.path(), .camera = camera.name});
+      if (!all) break;
+    }
   }
-  std::ranges::sort(found);
+  std::ranges::sort(found, {},
+                    [](const JudgedCamera& one) { return std::pair(one.folder, one.camera); });
   return found;
 }
 
@@ -124,13 +152,71 @@ TagScore score_recording(const JudgedRecording& recording, const Spoil& spoil,
   return all;
 }
 
+/// A row of one set, measured when it is asked for.
+struct Measurement {
+  std::string row, set;
+  std::function<TagScore()> score;
+};
+
+/// Adds the rows that spoil recordings of tags. Pictures are read once for all rows of one.
+void add_spoiled(const VisionStudyOptions& options, std::vector<Measurement>& all) {
+  for (const JudgedCamera& one : judged_cameras(options.data, MarkerKind::apriltag, false)) {
+    const auto recording = std::make_shared<std::optional<JudgedRecording>>();
+    for (const SpoilRow& row : spoil_rows()) {
+      if (!asked_for(options, row.row.name)) continue;
+      all.push_back({row.row.name, one.folder.filename().string(), [=, &options, &row] {
+                       if (!*recording) *recording = read_judged_recording(one.folder);
+                       return score_recording(**recording, row.spoil, options);
+                     }});
+    }
+  }
+}
+
+void add_photos(const VisionStudyOptions& options, std::vector<Measurement>& all) {
+  for (const PhotoRow& row : photo_rows())
+    for (const char* set : row.sets) {
+      const fs::path folder = options.data / "vision" / set;
+      if (asked_for(options, row.row.name) && fs::is_directory(folder))
+        all.push_back({row.row.name, set, [=, &row] { return row.score(folder); }});
+    }
+}
+
+void add_dots(const VisionStudyOptions& options, std::vector<Measurement>& all) {
+  for (const DotRow& row : dot_rows())
+    for (const JudgedCamera& one : judged_cameras(options.data, MarkerKind::dots, true))
+      if (asked_for(options, row.row.name))
+        all.push_back(
+            {row.row.name, one.folder.filename().string() + ", " + one.camera, [=, &options, &row] {
+               return score_dots(one.folder, one.camera, row.spoil, options.seed);
+             }});
+}
+
+void add_cloths(const VisionStudyOptions& options, std::vector<Measurement>& all) {
+  for (const ClothRow& row : cloth_rows())
+    for (const JudgedCamera& one : judged_cameras(options.data, MarkerKind::apriltag, false)) {
+      if (!asked_for(options, row.row.name)) continue;
+      TexturedFootageOptions footage{.texture = row.texture};
+      footage.texture.seed = options.seed;
+      all.push_back({row.row.name, one.folder.filename().string(),
+                     [=] { return score_texture(render_textured(one.folder, footage)); }});
+    }
+}
+
+std::vector<Measurement> measurements(const VisionStudyOptions& options) {
+  std::vector<Measurement> all;
+  add_spoiled(options, all);
+  add_photos(options, all);
+  add_dots(options, all);
+  add_cloths(options, all);
+  return all;
+}
+
 /// Measures with a clock, and keeps why nothing could be measured.
-VisionResult measured(const std::string& row, const std::string& set,
-                      const std::function<TagScore()>& score) {
-  VisionResult result{.row = row, .set = set, .score = {}, .reason = {}};
+VisionResult measured(const Measurement& one) {
+  VisionResult result{.row = one.row, .set = one.set, .score = {}, .reason = {}};
   const auto begin = std::chrono::steady_clock::now();
   try {
-    result.score = score();
+    result.score = one.score();
   } catch (const InputError& error) {
     result.reason = error.what();
   }
@@ -145,6 +231,7 @@ const std::vector<VisionRow>& vision_rows() {
     std::vector<VisionRow> all;
     for (const SpoilRow& one : spoil_rows()) all.push_back(one.row);
     for (const PhotoRow& one : photo_rows()) all.push_back(one.row);
+    for (const DotRow& one : dot_rows()) all.push_back(one.row);
     for (const ClothRow& one : cloth_rows()) all.push_back(one.row);
     return all;
   }();
@@ -167,42 +254,14 @@ std::vector<VisionResult> study_vision(const VisionStudyOptions& options,
                                        const ProgressCallback& progress) {
   options.validate();
   std::vector<VisionResult> results;
-  const auto report = [&](const std::string& row, const std::string& set) {
+  for (const Measurement& one : measurements(options)) {
     const Progress now{.stage = "judge",
                        .done = static_cast<double>(results.size()),
                        .total = 0,
                        .unit = "rows",
-                       .note = row + " of " + set};
+                       .note = one.row + " of " + one.set};
     if (interrupted() || (progress && !progress(now))) throw Cancelled();
-  };
-  for (const fs::path& folder : judged_recordings(options.data)) {
-    if (std::ranges::none_of(spoil_rows(),
-                             [&](const SpoilRow& one) { return asked_for(options, one.row.name); }))
-      break;
-    const JudgedRecording recording = read_judged_recording(folder);
-    for (const SpoilRow& one : spoil_rows()) {
-      if (!asked_for(options, one.row.name)) continue;
-      report(one.row.name, recording.name);
-      results.push_back(measured(one.row.name, recording.name,
-                                 [&] { return score_recording(recording, one.spoil, options); }));
-    }
-  }
-  for (const PhotoRow& one : photo_rows())
-    for (const char* set : one.sets) {
-      const fs::path folder = options.data / "vision" / set;
-      if (!asked_for(options, one.row.name) || !fs::is_directory(folder)) continue;
-      report(one.row.name, set);
-      results.push_back(measured(one.row.name, set, [&] { return one.score(folder); }));
-    }
-  for (const ClothRow& one : cloth_rows()) {
-    if (!asked_for(options, one.row.name)) continue;
-    TexturedFootageOptions footage{.texture = one.texture};
-    footage.texture.seed = options.seed;
-    for (const fs::path& folder : judged_recordings(options.data)) {
-      report(one.row.name, folder.filename().string());
-      results.push_back(measured(one.row.name, folder.filename().string(),
-                                 [&] { return score_texture(render_textured(folder, footage)); }));
-    }
+    results.push_back(measured(one));
   }
   return results;
 }

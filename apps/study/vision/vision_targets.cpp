@@ -44,7 +44,7 @@ double count(const TagScore& score) {
 
 constexpr Sense kLeast = Sense::at_least, kMost = Sense::at_most;
 
-// The numbers; errors are distances.
+// What is aimed at; errors are distances.
 constexpr Limit kLimits[] = {
     {"stills", "found", share, kLeast, 99.9, "%"},
     {"stills", "median error", middle, kMost, 0.055, "px"},
@@ -71,6 +71,18 @@ constexpr Limit kLimits[] = {
     {"sheet", "error over sigma", over_sigma, kLeast, 1 / 1.5, ""},
     {"sheet", "error over sigma", over_sigma, kMost, 1.5, ""},
     {"false", "false tags", false_ones, kMost, 0, ""},
+    {"dots", "found", share, kLeast, 99.5, "%"},
+    {"dots", "median error", middle, kMost, 0.035, "px"},
+    {"dots", "95 % error", tail, kMost, 0.10, "px"},
+    {"dots", "false identities", false_ones, kMost, 0, ""},
+    {"dots_noise8", "found", share, kLeast, 99, "%"},
+    {"dots_noise8", "median error", middle, kMost, 0.05, "px"},
+    {"dots_noise8", "95 % error", tail, kMost, 0.13, "px"},
+    {"dots_noise8", "false identities", false_ones, kMost, 0, ""},
+    {"dots_blur3", "found", share, kLeast, 99, "%"},
+    {"dots_blur3", "median error", middle, kMost, 0.05, "px"},
+    {"dots_blur3", "95 % error", tail, kMost, 0.13, "px"},
+    {"dots_blur3", "false identities", false_ones, kMost, 0, ""},
     {"texture", "found", share, kLeast, 99, "%"},
     {"texture", "median error", middle, kMost, 0.15, "px"},
     {"texture", "95 % error", tail, kMost, 0.4, "px"},
