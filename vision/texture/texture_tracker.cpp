@@ -10,6 +10,7 @@
 #include <opencv2/video/tracking.hpp>
 
 #include "data/input_error.h"
+#include "data/median.h"
 #include "vision/texture/residual_correlation.h"
 
 namespace clothfit {
@@ -66,6 +67,7 @@ class TextureTracker::Follower {
   void seek_lost(Working& working) const;
   int seek_once(Working& working) const;
   void leave_out_contradicting(Working& working) const;
+  void leave_out_cut(Working& working) const;
   bool acceptable(const PatchFit& fit) const;
   PatchFit align_from_afar(const Working& working, size_t marker, const PatchWarp& start) const;
   const char* why_missing(const Working& working, size_t marker) const;
@@ -188,6 +190,47 @@ void TextureTracker::Follower::leave_out_contradicting(Working& working) const {
     working.remove(static_cast<size_t>(marker));
 }
 
+/// Leaves out patches that something covers in part: the rest fits, and its edge bends the warp.
+/// They keep less weight, or their residuals are larger, than is usual in the picture, or they lie
+/// aside of where their neighbours lead by more than others do.
+void TextureTracker::Follower::leave_out_cut(Working& working) const {
+  std::vector<double> kept, residual, share, aside;
+  std::vector<double> aside_px(size(), 0);
+  const auto contrast = [&](size_t m) {
+    return working.fits[m]->gain * double{templates_[m].fine.contrast_levels};
+  };
+  for (size_t m = 0; m < size(); ++m) {
+    if (!working.fits[m]) continue;
+    kept.push_back(working.fits[m]->kept);
+    residual.push_back(working.fits[m]->residual_levels);
+    share.push_back(working.fits[m]->residual_levels / contrast(m));
+    const std::optional<ExpectedWarp> expected = expected_warp(layout_, working.placed, m);
+    constexpr int kFewestNeighbours = 3;
+    constexpr size_t kMany = 6;  // neighbours on the cloth, of which few are seen
+    if (!expected || expected->neighbours < kFewestNeighbours) {
+      if (layout_.neighbours(m).size() >= kMany) aside_px[m] = HUGE_VAL;  // nothing confirms it
+      continue;
+    }
+    const double apart_px = (expected->warp.place_px - working.fits[m]->warp.place_px).norm();
+    aside.push_back(apart_px);
+    if (apart_px > options_.cut_spread * expected->spread_px) aside_px[m] = apart_px;
+  }
+  constexpr size_t kFewest = 8;  // that say what is usual
+  if (aside.size() < kFewest) return;
+  const double least_kept = options_.cut_kept * median(std::move(kept));
+  const double usual_residual = median(std::move(residual)), usual_share = median(std::move(share));
+  const double most_aside_px = std::max(1.0, options_.cut_aside * median(std::move(aside)));
+  // Noise is alike in all patches, what the model lacks grows with their contrast.
+  const auto too_large = [&](size_t m) {
+    return working.fits[m]->residual_levels >
+           options_.cut_residual * std::hypot(usual_residual, usual_share * contrast(m));
+  };
+  for (size_t m = 0; m < size(); ++m)
+    if (working.fits[m] &&
+        (working.fits[m]->kept < least_kept || too_large(m) || aside_px[m] > most_aside_px))
+      working.remove(m);
+}
+
 /// Seeks the markers that are not placed where their neighbours expect them, or, where none is
 /// placed, where they were last. Returns how many it found.
 int TextureTracker::Follower::seek_once(Working& working) const {
@@ -198,9 +241,10 @@ int TextureTracker::Follower::seek_once(Working& working) const {
     if (!expected && !history_[m].last) return;
     const PatchWarp& start = expected ? expected->warp : *history_[m].last;
     PatchFit fit = align_from_afar(working, m, start);
-    constexpr double kLeast_px = 3, kSpreads = 3;
+    constexpr double kLeast_px = 3, kMost_px = 6, kSpreads = 3;
     const double aside_px = (fit.warp.place_px - start.place_px).norm();
-    const bool near = !expected || aside_px < std::max(kLeast_px, kSpreads * expected->spread_px);
+    const bool near =
+        !expected || aside_px < std::clamp(kSpreads * expected->spread_px, kLeast_px, kMost_px);
     if (acceptable(fit) && near)
       found[m] = std::move(fit);
     else
@@ -315,6 +359,7 @@ TextureFrame TextureTracker::Follower::next(const cv::Mat& grey) {
   working.coarse = SmoothPicture(grey, options_.coarse_blur_px);
   follow(starts_by_flow(grey), working);
   seek_lost(working);
+  leave_out_cut(working);
   TextureFrame frame = report(working);
   remember(grey, working);
   return frame;

@@ -30,7 +30,12 @@ struct TextureTrackOptions {
   double radius_share = 0.62;
   double least_radius_px = 9, most_radius_px = 24;
   double least_explained = 0.5;  ///< 0 to 1; share of a patch's variance that must be explained
-  void validate() const;         ///< throws InputError
+  /// A patch is left out as covered in part if it keeps less than this share of the weight that is
+  /// usual in the picture, or has residuals this many times as large as usual, or lies aside of
+  /// where its neighbours lead by this many times the usual and that many times their spread, and
+  /// by a pixel. A higher share and lower ratios drop more good ones.
+  double cut_kept = 0.88, cut_residual = 2.2, cut_aside = 8, cut_spread = 2;
+  void validate() const;  ///< throws InputError
 };
 
 /// A marker of the sheet in one picture.
