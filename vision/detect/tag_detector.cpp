@@ -70,7 +70,11 @@ void note(const RefinedTag& refined, TagDetection& detection) {
   detection.noise_levels = refined.noise_levels;
   detection.roughness_px = refined.roughness_px;
   detection.motion_px = refined.motion_px;
-  detection.shows_tag = refined.evidence.shows_tag();
+  // Bits that the library corrected are doubted where the fit finds more wrong cells than these:
+  // that is how tags of another border come through.
+  detection.shows_tag =
+      refined.evidence.shows_tag() &&
+      (detection.corrected_bits == 0 || refined.evidence.wrong_cells <= detection.corrected_bits);
   detection.corner_seen = refined.evidence.corner_seen;
   detection.sigma_px.fill(outline_sigma_px(detection.corner_px));
   detection.refined = refined.usable;
@@ -93,13 +97,17 @@ struct Outline {
 
 /// Reads a tag where it is predicted, after moving the prediction onto it.
 std::optional<TagDetection> read_one(const cv::Mat& grey, const TagPattern& pattern,
-                                     const PredictedTag& predicted) {
+                                     const PredictedTag& predicted,
+                                     std::span<const TagPattern* const> rivals) {
+  if (!shows_front(predicted.corner_px)) return {};
   const RefineHints hints{.motion_px = predicted.motion_px, .picture = predicted.picture};
   const auto aligned =
       align_tag(grey, pattern, homography_to(predicted.corner_px), predicted.picture);
   if (!aligned) return {};
   const RefinedTag refined = refine_tag(grey, pattern, *aligned, hints);
   if (!refined.usable || !refined.evidence.shows_tag()) return {};
+  for (const TagPattern* rival : rivals)
+    if (rival != &pattern && !speaks_for(refined.evidence, pattern, *rival)) return {};
   TagDetection tag{.id = predicted.id, .corner_px = refined.corner_px, .predicted = true};
   tag.decision_margin = 0.5 * refined.contrast_levels;
   note(refined, tag);
@@ -189,13 +197,16 @@ std::vector<TagDetection> TagDetector::detect(const cv::Mat& grey) {
 }
 
 std::vector<TagDetection> TagDetector::read_predicted(const cv::Mat& grey,
-                                                      std::span<const PredictedTag> predicted) {
+                                                      std::span<const PredictedTag> predicted,
+                                                      std::span<const int> rivals) {
   assert(grey.type() == CV_8UC1 && !grey.empty());
   std::vector<const TagPattern*> patterns;
   for (const PredictedTag& one : predicted) patterns.push_back(&library_->pattern(one.id));
+  std::vector<const TagPattern*> others;
+  for (const int id : rivals) others.push_back(&library_->pattern(id));
   std::vector<std::optional<TagDetection>> read(predicted.size());
   for_each_tag(predicted.size(),
-               [&](size_t i) { read[i] = read_one(grey, *patterns[i], predicted[i]); });
+               [&](size_t i) { read[i] = read_one(grey, *patterns[i], predicted[i], others); });
   std::vector<TagDetection> detections;
   for (const std::optional<TagDetection>& one : read)
     if (one) detections.push_back(*one);

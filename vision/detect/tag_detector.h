@@ -43,7 +43,7 @@ struct PredictedTag {
   int id = 0;
   std::array<Eigen::Vector2d, 4> corner_px{};  ///< right to a cell
   std::optional<Eigen::Vector2d> motion_px;    ///< while the shutter is open, where it is known
-  std::optional<ExpectedPicture> picture;      ///< by tags around it, or by the frame before
+  std::optional<ExpectedPicture> picture;      ///< by tags around it
 };
 
 /// Reads the tags of one family in pictures. Each thread needs its own detector.
@@ -62,9 +62,11 @@ class TagDetector {
 
   /// Reads tags where they are predicted: their cells are read again there, and what does not show
   /// them is left out, so that no prediction becomes a place by itself. Parts of a tag may be
-  /// hidden. In the order of `predicted`.
+  /// hidden. The cells must speak against each of the `rivals`, tags that may be there instead. In
+  /// the order of `predicted`.
   std::vector<TagDetection> read_predicted(const cv::Mat& grey,
-                                           std::span<const PredictedTag> predicted);
+                                           std::span<const PredictedTag> predicted,
+                                           std::span<const int> rivals = {});
 
  private:
   struct Library;

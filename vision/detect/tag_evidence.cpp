@@ -1,6 +1,7 @@
 #include "vision/detect/tag_evidence.h"
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -31,6 +32,15 @@ Eigen::Vector2d place_on_print(const TagFit& fit, const TagSample& sample) {
 
 }  // namespace
 
+bool speaks_for(const TagEvidence& evidence, const TagPattern& own, const TagPattern& rival) {
+  constexpr int kLead = 4;  // cells; fewer let a pleat's tag pass for its neighbour
+  if (evidence.verdict.size() != own.white.size()) return false;
+  int lead = 0;
+  for (size_t k = 0; k < own.white.size(); ++k)
+    if (own.white[k] != rival.white[k]) lead += evidence.verdict[k];
+  return lead >= kLead;
+}
+
 TagEvidence tag_evidence(const TagFit& fit, const TagPattern& pattern,
                          const Eigen::Matrix2d& pixel_by_tag) {
   const int across = pattern.total_cells;
@@ -42,7 +52,8 @@ TagEvidence tag_evidence(const TagFit& fit, const TagPattern& pattern,
 
   std::vector<CellSums> cells(static_cast<size_t>(across * across));
   std::array<int, 4> near{};
-  TagEvidence evidence{.printed_cells = across * across};
+  const int reached = std::min(across, pattern.border_cells + 2);
+  TagEvidence evidence{.printed_cells = reached * reached, .verdict = {}};
   for (size_t i = 0; i < fit.samples().size(); ++i) {
     const auto row = static_cast<Eigen::Index>(i);
     const Eigen::Vector2d place = place_on_print(fit, fit.samples()[i]);
@@ -69,12 +80,16 @@ TagEvidence tag_evidence(const TagFit& fit, const TagPattern& pattern,
     if (near[c] > 0) evidence.corner_seen[c] /= near[c];
   for (const CellSums& sums : cells) {
     constexpr double kTold = 9;  // three standard deviations between right and wrong
+    evidence.verdict.push_back(0);
     if (sums.information < kTold) continue;
     ++evidence.cells;
     const double amplitude = sums.moment / sums.information;
     const double slack = 0.25 + 1 / std::sqrt(sums.information);
-    evidence.right_cells += std::abs(amplitude) < slack;
-    evidence.wrong_cells += std::abs(amplitude) >= slack && std::abs(amplitude - 1) < slack;
+    const bool right = std::abs(amplitude) < slack;
+    const bool wrong = !right && std::abs(amplitude - 1) < slack;
+    evidence.right_cells += right;
+    evidence.wrong_cells += wrong;
+    evidence.verdict.back() = static_cast<signed char>(right - wrong);
   }
   return evidence;
 }

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <vector>
 
 #include "vision/detect/tag_fit.h"
 
@@ -12,10 +13,12 @@ namespace clothfit {
 /// the amplitude of that change is 0 where the print is right and 1 where it is wrong. Something in
 /// front of a cell gives other amplitudes.
 struct TagEvidence {
-  int printed_cells = 0;
-  int cells = 0;        ///< with enough pixels to tell
-  int right_cells = 0;  ///< as printed
-  int wrong_cells = 0;  ///< the other way round
+  int printed_cells = 0;  ///< within reach of the samples (tag_samples.h)
+  int cells = 0;          ///< with enough pixels to tell
+  int right_cells = 0;    ///< as printed
+  int wrong_cells = 0;    ///< the other way round
+  /// Of each cell, as in TagPattern::white: 1 right, -1 wrong, 0 where the picture does not tell.
+  std::vector<signed char> verdict;
   /// Mean robust weight of the border's pixels within a cell and a half of each corner; about 0.9
   /// where nothing hides it, 0 where no pixel is in the picture. The white around the border is
   /// left out, since a hand may be as bright.
@@ -30,6 +33,10 @@ struct TagEvidence {
            right_cells >= kLeastRight * cells;
   }
 };
+
+/// Says whether the cells speak for `own` rather than for another print of the same family: of
+/// those in which the two differ, at least 4 more are right than wrong.
+bool speaks_for(const TagEvidence& evidence, const TagPattern& own, const TagPattern& rival);
 
 /// Reads the cells and corners. `pixel_by_tag` maps small steps from tag coordinates to pixels.
 TagEvidence tag_evidence(const TagFit& fit, const TagPattern& pattern,

@@ -60,8 +60,10 @@ ExpectedPicture expected_picture(const std::vector<const TagDetection*>& tags,
   double weights = 0;
   std::vector<double> noise, roughness;
   for (const TagDetection* tag : tags) {
-    const double square = (layout.at(tag->id)[0] - place_m).squaredNorm();
-    const double weight = 1 / (square * square);
+    const auto& corners_m = layout.at(tag->id);
+    const double square = (corners_m[0] - place_m).squaredNorm();
+    const double side = (corners_m[1] - corners_m[0]).squaredNorm();
+    const double weight = 1 / (square * square + side * side);
     weights += weight;
     expected.black_levels += weight * tag->black_levels;
     expected.contrast_levels += weight * tag->contrast_levels;
@@ -83,6 +85,18 @@ Eigen::Vector2d nearest_motion(const std::vector<const TagDetection*>& tags,
     return (layout.at(tag->id)[0] - place_m).squaredNorm();
   };
   return (*std::ranges::min_element(tags, {}, distance))->motion_px;
+}
+
+/// Says whether two predictions of a tag differ by a quarter of a cell or more, so that the later
+/// one may be read where the earlier one was not.
+bool differs(const PredictedTag& one, const PredictedTag& other) {
+  constexpr double kOfSide = 0.25 / 8;
+  double apart = 0, side = 0;
+  for (size_t c = 0; c < 4; ++c) {
+    apart = std::max(apart, (one.corner_px[c] - other.corner_px[c]).norm());
+    side = std::max(side, (one.corner_px[(c + 1) % 4] - one.corner_px[c]).norm());
+  }
+  return apart > kOfSide * side;
 }
 
 }  // namespace
@@ -116,13 +130,19 @@ std::vector<PredictedTag> predict_from_neighbours(std::span<const TagDetection> 
 
 SheetTags detect_on_sheet(TagDetector& detector, const cv::Mat& grey, const TagLayout& layout) {
   SheetTags result{.read = detector.detect(grey), .unread = {}};
+  std::vector<int> ids;
+  for (const auto& [id, corners] : layout) ids.push_back(id);
   std::map<int, PredictedTag> unread;
-  for (;;) {
+  constexpr int kMostRounds = 12;  // a sheet of 24 rows, read from its middle
+  for (int round = 0; round < kMostRounds; ++round) {
     std::vector<PredictedTag> predicted = predict_from_neighbours(result.read, layout);
-    std::erase_if(predicted, [&](const PredictedTag& tag) { return unread.contains(tag.id); });
+    std::erase_if(predicted, [&](const PredictedTag& tag) {
+      const auto before = unread.find(tag.id);
+      return before != unread.end() && !differs(tag, before->second);
+    });
     if (predicted.empty()) break;
     for (const PredictedTag& tag : predicted) unread[tag.id] = tag;
-    for (const TagDetection& tag : detector.read_predicted(grey, predicted)) {
+    for (const TagDetection& tag : detector.read_predicted(grey, predicted, ids)) {
       unread.erase(tag.id);
       // Outlines that could not be refined give way.
       std::erase_if(result.read, [&](const TagDetection& one) { return one.id == tag.id; });

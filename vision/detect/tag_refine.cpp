@@ -56,12 +56,40 @@ std::vector<PictureBlur::Unknowns> starts(const std::optional<Eigen::Vector2d>& 
   return blurs;
 }
 
+/// Fits from where the fit starts, and notes what it shows.
+RefinedTag refined_from(TagFit& fit, const TagPattern& pattern,
+                        const Eigen::Matrix3d& pixel_from_tag,
+                        const Eigen::Matrix2d& pixel_by_tag) {
+  RefinedTag result;
+  result.corner_px.fill(Eigen::Vector2d::Zero());
+  result.usable = fit.converge(kMostSteps);
+  result.usable = result.usable && fit.contrast() > 0;  // white is brighter than black
+  if (!fit.unknowns().allFinite()) return RefinedTag{.corner_px = result.corner_px};
+  result.noise_levels = fit.noise_levels();
+  result.roughness_px = fit.roughness_px();
+  result.explained = fit.robust().mean();
+  result.contrast_levels = fit.contrast();
+  result.black_levels = fit.black();
+  result.motion_px = PictureBlur(fit.unknowns().segment<3>(TagUnknowns::kBlur)).motion_px();
+  result.evidence = tag_evidence(fit, pattern, pixel_by_tag);
+  if (!result.usable) return result;
+  const std::array<CornerPlace, 4> places = corner_places(fit, pixel_from_tag, pixel_by_tag);
+  for (size_t c = 0; c < 4; ++c) {
+    result.corner_px[c] = places[c].pixel_px;
+    result.sigma_px[c] = places[c].sigma_px;
+    result.usable =
+        result.usable && places[c].pixel_px.allFinite() && std::isfinite(places[c].sigma_px);
+  }
+  return result;
+}
+
 }  // namespace
 
 RefinedTag refine_tag(const cv::Mat& grey, const TagPattern& pattern,
                       const Eigen::Matrix3d& pixel_from_tag, const RefineHints& hints) {
   assert(grey.type() == CV_8UC1);
   RefinedTag result;
+  result.corner_px.fill(Eigen::Vector2d::Zero());
   const std::vector<TagSample> samples = tag_samples(grey, pattern, pixel_from_tag);
   if (samples.size() < kFewestSamples) return result;
   const Eigen::Matrix2d pixel_by_tag = steps_at_middle(pixel_from_tag);
@@ -70,24 +98,12 @@ RefinedTag refine_tag(const cv::Mat& grey, const TagPattern& pattern,
     fit.thin_out();
     if (fit.samples().size() < kFewestSamples) return result;
     if (hints.picture) expect(*hints.picture, fit);
-    result.usable = fit.converge(kMostSteps);
-    result.usable = result.usable && fit.contrast() > 0;  // white is brighter than black
-    result.noise_levels = fit.noise_levels();
-    result.roughness_px = fit.roughness_px();
-    result.explained = fit.robust().mean();
-    result.contrast_levels = fit.contrast();
-    result.black_levels = fit.black();
-    result.motion_px = PictureBlur(fit.unknowns().segment<3>(TagUnknowns::kBlur)).motion_px();
-    if (fit.unknowns().allFinite()) result.evidence = tag_evidence(fit, pattern, pixel_by_tag);
-    if (!result.usable) continue;
-    const std::array<CornerPlace, 4> places = corner_places(fit, pixel_from_tag, pixel_by_tag);
-    for (size_t c = 0; c < 4; ++c) {
-      result.corner_px[c] = places[c].pixel_px;
-      result.sigma_px[c] = places[c].sigma_px;
-      result.usable =
-          result.usable && places[c].pixel_px.allFinite() && std::isfinite(places[c].sigma_px);
-    }
-    break;
+    const RefinedTag refined = refined_from(fit, pattern, pixel_from_tag, pixel_by_tag);
+    if (refined.usable && refined.evidence.shows_tag()) return refined;
+    // What a start says that led nowhere counts less than what a better one does.
+    if (refined.usable > result.usable ||
+        (refined.usable == result.usable && refined.explained > result.explained))
+      result = refined;
   }
   return result;
 }
@@ -121,7 +137,22 @@ std::optional<Eigen::Matrix3d> align_tag(const cv::Mat& grey, const TagPattern& 
   const std::array<CornerPlace, 4> places = corner_places(fit, pixel_from_tag, pixel_by_tag);
   std::array<Eigen::Vector2d, 4> corners;
   for (size_t c = 0; c < 4; ++c) corners[c] = places[c].pixel_px;
+  if (!shows_front(corners)) return {};
   return homography_to(corners);
+}
+
+bool shows_front(const std::array<Eigen::Vector2d, 4>& corner_px) {
+  constexpr double kEdgeOn = 0.15;  // of the area seen head on
+  double twice = 0, longest = 0;
+  for (size_t c = 0; c < 4; ++c) {
+    const Eigen::Vector2d& here = corner_px[c];
+    const Eigen::Vector2d to = corner_px[(c + 1) % 4] - here, back = corner_px[(c + 3) % 4] - here;
+    // Corners run counter-clockwise as seen, which is a negative turn with y pointing down.
+    if (!(to.y() * back.x() - to.x() * back.y() > 0)) return false;
+    twice += here.y() * corner_px[(c + 1) % 4].x() - here.x() * corner_px[(c + 1) % 4].y();
+    longest = std::max(longest, to.norm());
+  }
+  return std::isfinite(twice) && 0.5 * twice > kEdgeOn * longest * longest;
 }
 
 Eigen::Matrix3d homography_to(const std::array<Eigen::Vector2d, 4>& corner_px) {

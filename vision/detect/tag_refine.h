@@ -12,7 +12,7 @@ namespace clothfit {
 
 /// A tag's four corners as the whole printed pattern places them.
 struct RefinedTag {
-  bool usable = false;  ///< false: the fit did not converge; corners are then unset
+  bool usable = false;  ///< false: the fit did not converge; corners then mean nothing
   std::array<Eigen::Vector2d, 4> corner_px{};  ///< order and pixels as in TagDetection
   std::array<double, 4> sigma_px{};            ///< one standard deviation per coordinate
   /// Mean robust weight of the pixels; about 0.9 where the pattern and noise explain all of them.
@@ -25,7 +25,7 @@ struct RefinedTag {
   TagEvidence evidence;  ///< cells and corners, whether usable or not
 };
 
-/// What tags around one, or the frame before, say of its picture. Of a tag that is half hidden, the
+/// What the tags around one say of its picture. Of a tag that is half hidden, the
 /// picture itself cannot tell it: noise is a median, and the hand's tone may pass for the light.
 struct ExpectedPicture {
   double black_levels = 0;
@@ -36,7 +36,8 @@ struct ExpectedPicture {
 
 /// What is known of a tag before it is refined.
 struct RefineHints {
-  std::optional<Eigen::Vector2d> motion_px;  ///< while the shutter is open, where a track knows it
+  std::optional<Eigen::Vector2d>
+      motion_px;  ///< while the shutter is open, where tags around it tell it
   std::optional<ExpectedPicture> picture;
 };
 
@@ -67,6 +68,10 @@ RefinedTag refine_tag(const cv::Mat& grey, const TagPattern& pattern,
 std::optional<Eigen::Matrix3d> align_tag(const cv::Mat& grey, const TagPattern& pattern,
                                          const Eigen::Matrix3d& pixel_from_tag,
                                          const std::optional<ExpectedPicture>& expected = {});
+
+/// Says whether corners, in the order of TagDetection, are those of a tag seen from its front and
+/// not edge on: convex, and with 0.15 of the area that its longest side would have head on.
+bool shows_front(const std::array<Eigen::Vector2d, 4>& corner_px);
 
 /// Returns the homography from tag coordinates to four corners, in the order of TagDetection.
 Eigen::Matrix3d homography_to(const std::array<Eigen::Vector2d, 4>& corner_px);

@@ -4,6 +4,8 @@
 #include <array>
 #include <iterator>
 
+#include "vision/detect/tag_refine.h"
+
 namespace clothfit {
 namespace {
 
@@ -36,16 +38,6 @@ bool reaches_outside(const Corners& corners, const cv::Size& size) {
   });
 }
 
-/// Returns the signed area of a quadrilateral, px^2; positive for a tag seen from its front.
-double front_area(const Corners& corner_px) {
-  double twice = 0;
-  for (size_t c = 0; c < 4; ++c) {
-    const Eigen::Vector2d &a = corner_px[c], &b = corner_px[(c + 1) % 4];
-    twice += a.y() * b.x() - a.x() * b.y();
-  }
-  return 0.5 * twice;
-}
-
 const char* reason(const TagHistory& history, const std::map<int, const char*>& reasons,
                    FramePicture picture, int frame, const cv::Size& size) {
   switch (picture) {
@@ -73,8 +65,7 @@ const char* why_unread(const PredictedTag& tag, const cv::Size& size) {
   double longest_px = 0;
   for (size_t c = 0; c < 4; ++c)
     longest_px = std::max(longest_px, (tag.corner_px[(c + 1) % 4] - tag.corner_px[c]).norm());
-  constexpr double kEdgeOn = 0.15;  // of the area seen head on
-  if (front_area(tag.corner_px) < kEdgeOn * longest_px * longest_px) return missing::kHidden;
+  if (!shows_front(tag.corner_px)) return missing::kHidden;
   constexpr double kFaint = 6;  // standard deviations of noise
   if (tag.picture && tag.picture->contrast_levels < kFaint * tag.picture->most_noise_levels)
     return missing::kDark;

@@ -99,7 +99,7 @@ void judge_alone(TagReading& reading, const TrackOptions& options, const cv::Siz
                         corner.y() >= kBorder && corner.y() <= size.height - 1 - kBorder;
     if (!inside && reading.rejected[c].empty()) reading.rejected[c] = rejection::kTouchingBorder;
     constexpr double kSeen = 0.7;  // higher loses ragged corners, lower lets half hidden ones pass
-    if (tag.refined && tag.corner_seen[c] < kSeen && reading.rejected[c].empty())
+    if (tag.corner_seen[c] < kSeen && reading.rejected[c].empty())
       reading.rejected[c] = rejection::kCovered;
     if (tag.sigma_px[c] > options.max_sigma_px && reading.rejected[c].empty())
       reading.rejected[c] = rejection::kUncertain;

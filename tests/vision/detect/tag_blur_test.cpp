@@ -131,6 +131,42 @@ TEST(TagDetector, ReadsAPredictedTagAndInventsNone) {
   EXPECT_TRUE(detector.read_predicted(with_brightness(empty, 1, 2, 3), std::array{there}).empty());
 }
 
+TEST(TagDetector, DoesNotTakeHalfATagForAnother) {
+  // Tags 8 and 19 differ in 2 cells of their left halves.
+  const SyntheticCamera camera;
+  std::mt19937_64 rng(14);
+  SyntheticTag tag = place_tag(camera, 60, 0, 0);
+  tag.id = 19;
+  cv::Mat picture = render(tag, camera, rng);
+  const auto truth = true_corners(tag, camera);
+  const PredictedTag as_19{.id = 19, .corner_px = truth, .motion_px = {}};
+  const PredictedTag as_8{.id = 8, .corner_px = truth, .motion_px = {}};
+  constexpr std::array kIds = {8, 19};
+  TagDetector detector("tag36h11");
+  EXPECT_EQ(detector.read_predicted(picture, std::array{as_19}, kIds).size(), 1U);
+
+  const cv::Point middle(static_cast<int>((truth[0].x() + truth[1].x()) / 2), 0);
+  cv::rectangle(picture, middle, cv::Point(picture.cols, picture.rows), cv::Scalar(125),
+                cv::FILLED);
+
+  EXPECT_TRUE(detector.read_predicted(picture, std::array{as_8}, kIds).empty());
+}
+
+TEST(TagDetector, ReadsNothingWhereATagIsExpectedEdgeOn) {
+  const cv::Mat picture(200, 200, CV_8UC1, cv::Scalar(128));
+  const PredictedTag edge_on{
+      .id = 0,
+      .corner_px = {Eigen::Vector2d(20, 100), {180, 100.4}, {182, 100}, {22, 99.6}},
+      .motion_px = {}};
+  const PredictedTag crossed{
+      .id = 0,
+      .corner_px = {Eigen::Vector2d(50, 150), {150, 150}, {50, 50}, {150, 50}},
+      .motion_px = {}};
+
+  EXPECT_TRUE(
+      TagDetector("tag36h11").read_predicted(picture, std::array{edge_on, crossed}).empty());
+}
+
 TEST(TagDetector, SaysWhichCornerIsHidden) {
   const SyntheticCamera camera;
   std::mt19937_64 rng(13);
