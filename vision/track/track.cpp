@@ -183,22 +183,6 @@ Readings read_all(ImageSource& images, const std::string& where, const MarkerSet
   return readings;
 }
 
-std::vector<ReferencePixel> average_reference(const Readings& readings,
-                                              const PointsByTag& reference) {
-  std::vector<ReferencePixel> result;
-  for (const auto& [id, points] : reference) {
-    const auto history = readings.by_tag.find(id);
-    if (history == readings.by_tag.end()) continue;
-    for (size_t c = 0; c < 4; ++c)
-      if (points[c] != kNone)
-        if (const auto corner = average_corner(history->second, c, points[c]))
-          result.push_back(*corner);
-  }
-  std::sort(result.begin(), result.end(),
-            [](const ReferencePixel& a, const ReferencePixel& b) { return a.point < b.point; });
-  return result;
-}
-
 Tracks2d collect_tracks(const Readings& readings, const PointsByTag& markers) {
   Tracks2d tracks;
   for (const auto& [id, points] : markers) {
@@ -313,7 +297,7 @@ TrackResult track(const Recording& recording, ImageSource& pictures, const std::
         what_appears_instead(readings.first_picture, recording.markers.family,
                              listed_tags(markers, reference), readings.unlisted));
   result.missing = count_missing(readings, markers);
-  result.reference = average_reference(readings, reference);
+  result.reference = average_reference(readings.by_tag, recording.reference);
 
   int good = 0;
   for (const Position2d& row : result.tracks)

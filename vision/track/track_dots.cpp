@@ -118,20 +118,6 @@ void add_tag_rows(const DotReadings& readings, const std::vector<Marker>& marker
   sort_rows(tracks);
 }
 
-std::vector<ReferencePixel> average_references(const DotReadings& readings,
-                                               const std::vector<ReferencePoint>& points) {
-  std::vector<ReferencePixel> result;
-  for (size_t i = 0; i < points.size(); ++i) {
-    if (!points[i].tag || !points[i].corner) continue;
-    const auto history = readings.tags.find(*points[i].tag);
-    if (history == readings.tags.end()) continue;
-    if (const auto corner = average_corner(history->second, static_cast<size_t>(*points[i].corner),
-                                           static_cast<int>(i)))
-      result.push_back(*corner);
-  }
-  return result;
-}
-
 }  // namespace
 
 TrackResult track_dots(const Recording& recording, ImageSource& pictures, const std::string& where,
@@ -159,7 +145,7 @@ TrackResult track_dots(const Recording& recording, ImageSource& pictures, const 
   result.tracks = std::move(readings.dots);
   const size_t dots = result.tracks.size();
   add_tag_rows(readings, recording.markers.markers, result.tracks);
-  result.reference = average_references(readings, recording.reference);
+  result.reference = average_reference(readings.tags, recording.reference);
   for (const Position2d& row : result.tracks)
     if (!row.rejected.empty()) ++result.rejected[row.rejected];
   int missing = 0;

@@ -27,6 +27,20 @@ std::optional<ReferencePixel> average_corner(const TagHistory& history, size_t c
       .point = point, .pixel_px = mean.pixel_px, .sigma_px = mean.sigma_px, .frames = mean.frames};
 }
 
+std::vector<ReferencePixel> average_reference(const std::map<int, TagHistory>& by_tag,
+                                              const std::vector<ReferencePoint>& points) {
+  std::vector<ReferencePixel> result;
+  for (size_t i = 0; i < points.size(); ++i) {
+    if (!points[i].tag || !points[i].corner) continue;
+    const auto history = by_tag.find(*points[i].tag);
+    if (history == by_tag.end()) continue;
+    if (const auto corner = average_corner(history->second, static_cast<size_t>(*points[i].corner),
+                                           static_cast<int>(i)))
+      result.push_back(*corner);
+  }
+  return result;
+}
+
 cv::Mat draw_rows(const cv::Mat& grey, int frame, const TrackResult& result) {
   std::vector<OverlayPoint> points;
   for (const ReferencePixel& pixel : result.reference)

@@ -122,20 +122,6 @@ TextureReadings read_texture(const Recording& recording, const CameraEntry& came
   return readings;
 }
 
-std::vector<ReferencePixel> average_fixed(const std::map<int, TagHistory>& histories,
-                                          const std::vector<ReferencePoint>& points) {
-  std::vector<ReferencePixel> result;
-  for (size_t i = 0; i < points.size(); ++i) {
-    if (!points[i].tag || !points[i].corner) continue;
-    const auto history = histories.find(*points[i].tag);
-    if (history == histories.end()) continue;
-    if (const auto corner = average_corner(history->second, static_cast<size_t>(*points[i].corner),
-                                           static_cast<int>(i)))
-      result.push_back(*corner);
-  }
-  return result;
-}
-
 }  // namespace
 
 TrackResult track_texture(const Recording& recording, const CameraEntry& camera,
@@ -167,7 +153,7 @@ TrackResult track_texture(const Recording& recording, const CameraEntry& camera,
     else
       ++result.rejected[row.rejected];
   }
-  result.reference = average_fixed(readings.reference_tags, recording.reference);
+  result.reference = average_reference(readings.reference_tags, recording.reference);
   int missing = 0;
   for (const auto& [reason, count] : readings.missing) missing += count;
   result.missing = std::move(readings.missing);
