@@ -52,8 +52,8 @@ double outline_sigma_px(const std::array<Eigen::Vector2d, 4>& corner_px) {
   return std::max(kLeast_px, kOfSide * (corner_px[1] - corner_px[0]).norm());
 }
 
-/// Says whether the pattern was found where the outline is, to half a cell of eight, by the median
-/// corner: the border of the picture may spoil one or two of an outline.
+/// Says whether the pattern was found where the outline is, to half a cell of eight and a pixel, by
+/// the two corners that agree best: the border of the picture may spoil two of an outline.
 bool agrees(const RefinedTag& refined, const std::array<Eigen::Vector2d, 4>& outline_px) {
   constexpr double kMostOfSide = 0.5 / 8;
   std::vector<double> apart;

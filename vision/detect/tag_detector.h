@@ -19,7 +19,8 @@ namespace clothfit {
 struct TagDetection {
   int id = 0;
   int corrected_bits = 0;      ///< bits of the code that were read wrong
-  double decision_margin = 0;  ///< mean distance of a bit's grey level from the threshold
+  double decision_margin = 0;  ///< mean distance of a bit's grey level from the threshold; of
+                               ///< predicted tags half the contrast
   std::array<Eigen::Vector2d, 4> corner_px{};
   std::array<double, 4> sigma_px{};  ///< one standard deviation per coordinate
   /// Corners are placed by the whole pattern (tag_refine.h); else by its outline, with a wide
