@@ -99,7 +99,7 @@ set(CLOTHFIT_ARROWS
 set(CLOTHFIT_TEST_ARROWS
   "tests/data   -> data"
   "tests/calib  -> calib data"
-  "tests/vision -> vision calib data tests/data"
+  "tests/vision -> vision calib data tests/data tests/model"
   "tests/model  -> model data"
   "tests/fit    -> fit model calib data tests/data"
   "tests/apps   -> apps fit model vision calib data tests/data"

@@ -9,15 +9,9 @@ namespace {
 
 using Weights = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-/// A shift by whole grid steps with its weight.
-struct Shift {
-  int columns = 0, rows = 0;
-  float weight = 0;
-};
-
 /// The kernel that is left to do on the grid, and the variance along the axes that is not.
 struct GridKernel {
-  std::vector<Shift> shifts;
+  std::vector<GridShift> shifts;                            ///< from the corner at -reach
   int reach = 0;                                            ///< the largest shift
   Eigen::Vector2d axis_variance = Eigen::Vector2d::Zero();  ///< grid steps^2
 };
@@ -41,12 +35,13 @@ class ShiftTable {
   }
 
   const Eigen::Vector2d& widened() const { return widened_; }
-  std::vector<Shift> shifts() const {
-    std::vector<Shift> result;
+  /// Returns the shifts from the corner at -reach.
+  std::vector<GridShift> shifts() const {
+    std::vector<GridShift> result;
     for (int row = -reach_; row <= reach_; ++row)
       for (int column = -reach_; column <= reach_; ++column)
         if (const float weight = weights_(reach_ + row, reach_ + column); weight > 0)
-          result.push_back({.columns = column, .rows = row, .weight = weight});
+          result.push_back({.columns = reach_ + column, .rows = reach_ + row, .weight = weight});
     return result;
   }
 
@@ -90,41 +85,42 @@ GridKernel grid_kernel(const Eigen::Matrix2d& grid_by_pixel, const PictureBlur& 
 }
 
 /// Weighs the pattern's cells (columns) at the grid's places (rows) along one axis under a
-/// Gaussian. The first and the last cell reach on beyond the pattern.
-Weights cell_weights(int places, double first, double step, int cells, double spread) {
-  // Places are in cells from the pattern's edge.
-  Weights weights(places, cells);
+/// Gaussian of that spread (grid steps). The first place lies `before` steps before the first cell.
+/// The first and the last cell reach on beyond the pattern.
+Weights cell_weights(int places, int before, int per_cell, int cells, double spread) {
   constexpr double kReach = 5;  // standard deviations
+  const int reach = static_cast<int>(std::ceil(kReach * spread));
+  // Edges lie on places, so that one table serves all of them.
+  std::vector<float> left_of_edge(static_cast<size_t>(2 * reach + 1));
+  for (int k = -reach; k <= reach; ++k)
+    left_of_edge[static_cast<size_t>(k + reach)] =
+        static_cast<float>(0.5 * std::erfc(k / spread * M_SQRT1_2));
+  Weights weights(places, cells);
   for (int place = 0; place < places; ++place) {
-    double left = 0;  // share of the Gaussian left of the cell
+    float left = 0;  // share of the Gaussian left of the cell
     for (int cell = 0; cell < cells; ++cell) {
-      const double u = (cell + 1 - (first + place * step)) / spread;
-      double right = u > 0 ? 1 : 0;
+      const int beyond = place - before - (cell + 1) * per_cell;  // the cell's right edge
+      float right = beyond > 0 ? 0 : 1;
       if (cell + 1 == cells)
         right = 1;
-      else if (std::abs(u) < kReach)
-        right = 0.5 * std::erfc(-u * M_SQRT1_2);
-      weights(place, cell) = static_cast<float>(right - left);
+      else if (std::abs(beyond) <= reach)
+        right = left_of_edge[static_cast<size_t>(beyond + reach)];
+      weights(place, cell) = right - left;
       left = right;
     }
   }
   return weights;
 }
 
-/// Cubic B-spline weights of four coefficients at a share (0 to 1) between the inner two, with
-/// first and second derivatives by the share.
-struct SplineWeights {
-  Eigen::Array4f value, slope, curvature;
-
-  explicit SplineWeights(float t) {
-    const float s = 1 - t;
-    constexpr float kSixth = 1.0F / 6;
-    value << kSixth * s * s * s, kSixth * (4 - t * t * (6 - 3 * t)),
-        kSixth * (4 - s * s * (6 - 3 * s)), kSixth * t * t * t;
-    slope << -0.5F * s * s, 0.5F * t * (3 * t - 4), 0.5F * s * (4 - 3 * s), 0.5F * t * t;
-    curvature << s, 3 * t - 2, 3 * s - 2, t;
-  }
-};
+/// Returns weights * lines, where most weights are 0.
+Weights sparse_product(const Weights& weights, const Weights& lines) {
+  Weights product = Weights::Zero(weights.rows(), lines.cols());
+  for (Eigen::Index row = 0; row < weights.rows(); ++row)
+    for (Eigen::Index cell = 0; cell < weights.cols(); ++cell)
+      if (const float weight = weights(row, cell); weight != 0)
+        product.row(row) += weight * lines.row(cell);
+  return product;
+}
 
 }  // namespace
 
@@ -150,45 +146,17 @@ BlurredPattern::BlurredPattern(const TagPattern& pattern, const Eigen::Matrix2d&
   const int margin = per_cell + 2;
   const int side = pattern.total_cells * per_cell + 2 * margin + 1;
   const int places = side + 2 * kernel.reach;
-  const double first_cell = -static_cast<double>(margin + kernel.reach) / per_cell;
   const Eigen::Map<const Weights> white(pattern.white.data(), pattern.total_cells,
                                         pattern.total_cells);
   const auto weights = [&](double axis_spread) {
-    return cell_weights(places, first_cell, 1.0 / per_cell, pattern.total_cells,
-                        axis_spread / per_cell);
+    return cell_weights(places, margin + kernel.reach, per_cell, pattern.total_cells, axis_spread);
   };
-  const Grid along_axes = ((weights(spread.y()) * white) * weights(spread.x()).transpose()).array();
-  coefficients_ = Grid::Zero(side, side);
-  for (const Shift& shift : kernel.shifts)
-    coefficients_ += shift.weight * along_axes.block(kernel.reach + shift.rows,
-                                                     kernel.reach + shift.columns, side, side);
+  const Weights lines = white * weights(spread.x()).transpose();
+  const Weights along_axes = sparse_product(weights(spread.y()), lines);
+  coefficients_.resize(static_cast<size_t>(side * side));
+  sum_of_shifts(along_axes.data(), places, kernel.shifts, side, coefficients_.data());
+  side_ = side;
   first_ = -0.5 * pattern.cell() * pattern.total_cells - margin * step_;
-}
-
-BlurredPattern::Value BlurredPattern::at(double x, double y) const {
-  const auto last = static_cast<double>(coefficients_.cols() - 1);
-  // Beyond the margin the pattern is as white as at its end; a poor step may ask for any place.
-  const auto grid_place = [&](double tag) {
-    return std::clamp((tag - first_) / step_, 1.0, last - 2);
-  };
-  const double u = grid_place(x), v = grid_place(y);
-  const auto column = static_cast<Eigen::Index>(u), row = static_cast<Eigen::Index>(v);
-  const SplineWeights across(static_cast<float>(u - static_cast<double>(column)));
-  const SplineWeights down(static_cast<float>(v - static_cast<double>(row)));
-  Eigen::Array4f value = Eigen::Array4f::Zero(), slope = value, curvature = value;
-  for (Eigen::Index j = 0; j < 4; ++j) {
-    const Eigen::Map<const Eigen::Array4f> four(&coefficients_(row - 1 + j, column - 1));
-    value += down.value[j] * four;
-    slope += down.slope[j] * four;
-    curvature += down.curvature[j] * four;
-  }
-  const auto per_step = static_cast<float>(1 / step_);
-  return {.value = (across.value * value).sum(),
-          .by_x = per_step * (across.slope * value).sum(),
-          .by_y = per_step * (across.value * slope).sum(),
-          .by_xx = per_step * per_step * (across.curvature * value).sum(),
-          .by_xy = per_step * per_step * (across.slope * slope).sum(),
-          .by_yy = per_step * per_step * (across.value * curvature).sum()};
 }
 
 }  // namespace clothfit

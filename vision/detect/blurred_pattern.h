@@ -1,8 +1,10 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <vector>
 
 #include "vision/detect/picture_blur.h"
+#include "vision/detect/tag_kernels.h"
 #include "vision/detect/tag_pattern.h"
 
 namespace clothfit {
@@ -20,21 +22,19 @@ class BlurredPattern {
   BlurredPattern(const TagPattern& pattern, const Eigen::Matrix2d& pixel_by_tag,
                  const PictureBlur& blur);
 
-  /// The pattern's value at a place and its derivatives in tag coordinates. By the heat equation,
-  /// half of the second derivatives is how it changes with the blur's covariance.
-  struct Value {
-    float value = 0;
-    float by_x = 0, by_y = 0;
-    float by_xx = 0, by_xy = 0, by_yy = 0;
-  };
-  Value at(double x, double y) const;
+  /// Returns the coefficients, which live as long as this does.
+  SplineGrid grid() const {
+    return {.coefficients = coefficients_.data(),
+            .side = side_,
+            .first = static_cast<float>(first_),
+            .per_step = static_cast<float>(1 / step_)};
+  }
 
  private:
-  using Grid = Eigen::Array<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-
   double first_;  ///< tag coordinate of the first column and row
   double step_;   ///< between columns and rows
-  Grid coefficients_;
+  int side_;      ///< columns and rows
+  std::vector<float> coefficients_;
 };
 
 }  // namespace clothfit

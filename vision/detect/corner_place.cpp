@@ -77,31 +77,28 @@ Effects effects_on(const TagUnknowns::Vector& unknowns,
   return effects;
 }
 
-/// Returns the weight of each residual in the estimates of some coordinates, up to its robust
-/// weight, which is shared between it and the residual.
-ResidualCovariance::Sums residual_weights(const TagFit& fit, const Effects& effects) {
-  const Eigen::VectorXf share = fit.weight().cwiseQuotient(fit.robust().cwiseSqrt()).cast<float>();
-  return share.asDiagonal() *
-         (fit.jacobian() * (effects * fit.covariance()).transpose().cast<float>());
-}
-
-/// Returns the residuals' covariance with what the fit has taken up of it. The mean over the tag is
-/// that over the four points of Gauss's quadrature.
-ResidualCovariance completed_covariance(const TagFit& fit, const Eigen::Matrix3d& pixel_from_tag) {
+/// Returns the weight of each residual in the coordinates of four points that stand for the tag and
+/// in those of the corners, up to its robust weight, which is shared between it and the residual.
+/// The mean over the tag is that over the four points of Gauss's quadrature.
+ResidualSums coordinate_sums(const TagFit& fit, const Effects& on_corners,
+                             const Eigen::Matrix3d& pixel_from_tag) {
   const double inner = 1 / std::sqrt(3.0);
   const std::array<Eigen::Vector2d, 4> points = {
       {{-inner, -inner}, {inner, -inner}, {inner, inner}, {-inner, inner}}};
-  ResidualCovariance covariance(fit);
-  covariance.complete(residual_weights(fit, effects_on(fit.unknowns(), points, pixel_from_tag)));
-  return covariance;
+  Eigen::Matrix<double, kUnknowns, 16> effects;
+  effects.leftCols<8>() = effects_on(fit.unknowns(), points, pixel_from_tag).transpose();
+  effects.rightCols<8>() = on_corners.transpose();
+  const TagRows& rows = fit.rows();
+  const Eigen::Index count = fit.samples().count;
+  const Eigen::ArrayXf share = rows.weight.head(count) / fit.robust().sqrt();
+  return residual_sums(fit.samples(), rows, share, (fit.covariance() * effects).cast<float>());
 }
 
 /// Returns the factor that Cauchy's loss brings. An estimate with the influence psi = w r (w:
 /// robust weight, r: residual over its sigma) has the variance E[psi^2] / E[psi']^2; from the
 /// normal matrix with weights w and residuals sqrt(w) r, one finds E[w r^2] / E[w]. In terms of w,
 /// psi' = 2 w^2 - w, psi^2 ~ w - w^2, and w r^2 ~ 1 - w.
-double loss_factor(const Eigen::VectorXd& robust) {
-  const Eigen::ArrayXd w = robust.array();
+double loss_factor(const Eigen::ArrayXd& w) {
   constexpr double kLeastSlope = 0.1;  // hardly anything is explained
   const double slope = std::max((2 * w.square() - w).mean(), kLeastSlope);
   return (w - w.square()).mean() * w.mean() / (slope * slope * (1 - w).mean());
@@ -113,27 +110,35 @@ ResidualCovariance::Variances coordinate_variances(const TagFit& fit, const Effe
   const Unknowns& prior = fit.prior();
   const ResidualCovariance::Variances by_prior = (effects * fit.covariance()).cwiseAbs2() * prior;
   // Residuals are smaller than errors by what the unknowns take up.
-  const double count = static_cast<double>(fit.samples().size());
+  const auto count = static_cast<double>(fit.samples().count);
   const double taken = kUnknowns - fit.covariance().diagonal().dot(prior);
-  return by_prior +
-         loss_factor(fit.robust()) * count / std::max(count - taken, 1.0) *
-             completed_covariance(fit, pixel_from_tag).variance(residual_weights(fit, effects));
+  ResidualCovariance covariance(fit);
+  return by_prior + loss_factor(fit.robust().cast<double>()) * count /
+                        std::max(count - taken, 1.0) *
+                        covariance.variance(coordinate_sums(fit, effects, pixel_from_tag));
 }
 
 }  // namespace
 
+std::array<Eigen::Vector2d, 4> corner_pixels(const TagFit& fit,
+                                             const Eigen::Matrix3d& pixel_from_tag) {
+  std::array<Eigen::Vector2d, 4> pixels;
+  for (size_t c = 0; c < 4; ++c)
+    pixels[c] = corner_of(fit.unknowns(), border_corners()[c], pixel_from_tag).pixel;
+  return pixels;
+}
+
 std::array<CornerPlace, 4> corner_places(const TagFit& fit, const Eigen::Matrix3d& pixel_from_tag,
                                          const Eigen::Matrix2d& pixel_by_tag) {
-  const std::array<Eigen::Vector2d, 4> corners = {{{-1, 1}, {1, 1}, {1, -1}, {-1, -1}}};
+  const std::array<Eigen::Vector2d, 4> pixels = corner_pixels(fit, pixel_from_tag);
+  const ResidualCovariance::Variances variances = coordinate_variances(
+      fit, effects_on(fit.unknowns(), border_corners(), pixel_from_tag), pixel_from_tag);
+  const double left_out = left_out_variance(fit.unknowns(), pixel_by_tag);
   std::array<CornerPlace, 4> places;
   for (size_t c = 0; c < 4; ++c)
-    places[c].pixel_px = corner_of(fit.unknowns(), corners[c], pixel_from_tag).pixel;
-  const ResidualCovariance::Variances variances = coordinate_variances(
-      fit, effects_on(fit.unknowns(), corners, pixel_from_tag), pixel_from_tag);
-  const double left_out = left_out_variance(fit.unknowns(), pixel_by_tag);
-  for (size_t c = 0; c < 4; ++c)
-    places[c].sigma_px =
-        std::sqrt(variances.segment<2>(2 * static_cast<Eigen::Index>(c)).mean() + left_out);
+    places[c] = {.pixel_px = pixels[c],
+                 .sigma_px = std::sqrt(
+                     variances.segment<2>(2 * static_cast<Eigen::Index>(c)).mean() + left_out)};
   return places;
 }
 

@@ -13,6 +13,10 @@ struct CornerPlace {
   double sigma_px = 0;  ///< one standard deviation per coordinate
 };
 
+/// Returns the pixels of the four corners, in the order of TagDetection, of a fit.
+std::array<Eigen::Vector2d, 4> corner_pixels(const TagFit& fit,
+                                             const Eigen::Matrix3d& pixel_from_tag);
+
 /// Returns the four corners, in the order of TagDetection, of a fit that has converged.
 ///
 /// A corner solves q + d(q) = corner. Its variance is that of the unknowns, A^-1 (P + J' W C W J)

@@ -19,46 +19,36 @@ class ResidualCovariance {
  public:
   explicit ResidualCovariance(const TagFit& fit);
 
-  /// One column per sum of residuals, with the weight of each sample in it.
-  using Sums = Eigen::Matrix<float, Eigen::Dynamic, 8>;
-  using Variances = Eigen::Matrix<double, 8, 1>;
-  /// Returns the variance of each of these sums.
-  Variances variance(const Sums& weights) const;
-  /// Adds what the fit has taken up of noise and shift, since residuals lack it: places that err
-  /// by some variance take a smooth shift of that variance out of the residuals.
-  /// `places` are the weights of residuals in the coordinates of four points that stand for
-  /// the tag.
-  void complete(const Sums& places);
+  using Variances = Eigen::Array<double, 8, 1>;
+  /// Returns the variances of the last 8 of these sums of residuals. The first 8 are the
+  /// coordinates of four points that stand for the tag: they tell what of noise and shift the fit
+  /// has taken up, which residuals lack. Places that err by some variance take a smooth shift of
+  /// that variance out of the residuals.
+  Variances variance(const ResidualSums& sums);
 
  private:
-  using Map = Eigen::Array<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  using AllVariances = Eigen::Array<double, 16, 1>;
+  static constexpr int kMostAcross = 8;  ///< blocks
 
-  /// Sums of slopes times weights over square blocks of pixels.
-  struct BlockSums {
-    int side_px = 0;
-    int across = 0;  ///< blocks in a row
-    Sums along_u, along_v;
-    Variances alone;  ///< sums of squares over single pixels
-  };
-
-  Map to_map(const Eigen::VectorXf& values) const;
-  void estimate(const TagFit& fit);
-  BlockSums block_sums(const Sums& weights) const;
-  Variances shift_variance(const BlockSums& sums) const;
-  Variances noise_variances(const Sums& weights) const;
-  double noise_variance(const Map& weight) const;
+  void estimate();
+  void add_blocks(const ResidualSums& weights);
+  AllVariances shift_variances() const;
+  AllVariances noise_variances(const ResidualSums& weights) const;
   void set_taken_up(double taken_up_px2);
   double shift_at(double distance_px) const;
 
-  Eigen::Vector2i first_px_;       ///< of the smallest box that holds all samples
-  Eigen::Vector2i size_px_;        ///< of the box
-  Eigen::MatrixX2i place_px_;      ///< of each sample, in the box
-  Eigen::MatrixX2f gradient_;      ///< of each sample
+  const TagFit* fit_;
   double noise_ = 0;               ///< variance, grey levels^2
-  std::vector<double> noise_lag_;  ///< covariances, one per class of near lags
+  std::vector<double> noise_lag_;  ///< covariances, one per lag of the near classes
   // Covariances of the shift, px^2 per coordinate: at the same pixel, then one per class of lags.
   std::vector<double> seen_shift_;  ///< of the residuals
-  std::vector<double> shift_;       ///< completed
+  std::vector<double> shift_;       ///< with what the fit has taken up
+  std::vector<int> place_;          ///< of each sample in the maps
+  // Sums of slopes times weights over square blocks of pixels: products of those of pairs of
+  // blocks, one row per offset down and across, and squares of single pixels.
+  int block_px_ = 0;  ///< side
+  ResidualSums by_offset_;
+  AllVariances alone_;
 };
 
 }  // namespace clothfit

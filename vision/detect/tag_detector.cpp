@@ -69,6 +69,7 @@ void note(const RefinedTag& refined, TagDetection& detection) {
   detection.black_levels = refined.black_levels;
   detection.noise_levels = refined.noise_levels;
   detection.roughness_px = refined.roughness_px;
+  detection.lens_px = refined.lens_px;
   detection.motion_px = refined.motion_px;
   // Bits that the library corrected are doubted where the fit finds more wrong cells than these:
   // that is how tags of another border come through.
@@ -95,22 +96,44 @@ struct Outline {
   const TagPattern* pattern = nullptr;
 };
 
-/// Reads a tag where it is predicted, after moving the prediction onto it.
+/// Says whether the refined cells speak for that tag and for no rival.
+bool is_read(const RefinedTag& refined, const TagPattern& pattern,
+             std::span<const TagPattern* const> rivals) {
+  return refined.usable && refined.evidence.shows_tag() &&
+         std::ranges::all_of(rivals, [&](const TagPattern* rival) {
+           return rival == &pattern || speaks_for(refined.evidence, pattern, *rival);
+         });
+}
+
+/// Refines a tag at its predicted place. Nothing is returned where it is not read there, or moves
+/// further than a close prediction is off.
+std::optional<RefinedTag> read_close(const cv::Mat& grey, const TagPattern& pattern,
+                                     const PredictedTag& predicted, const RefineHints& hints,
+                                     std::span<const TagPattern* const> rivals) {
+  const RefinedTag refined = refine_tag(grey, pattern, homography_to(predicted.corner_px), hints);
+  if (!is_read(refined, pattern, rivals) || !agrees(refined, predicted.corner_px)) return {};
+  return refined;
+}
+
+/// Reads a tag where it is predicted, after moving the prediction onto it where it is not close.
 std::optional<TagDetection> read_one(const cv::Mat& grey, const TagPattern& pattern,
                                      const PredictedTag& predicted,
                                      std::span<const TagPattern* const> rivals) {
   if (!shows_front(predicted.corner_px)) return {};
-  const RefineHints hints{.motion_px = predicted.motion_px, .picture = predicted.picture};
-  const auto aligned =
-      align_tag(grey, pattern, homography_to(predicted.corner_px), predicted.picture);
-  if (!aligned) return {};
-  const RefinedTag refined = refine_tag(grey, pattern, *aligned, hints);
-  if (!refined.usable || !refined.evidence.shows_tag()) return {};
-  for (const TagPattern* rival : rivals)
-    if (rival != &pattern && !speaks_for(refined.evidence, pattern, *rival)) return {};
-  TagDetection tag{.id = predicted.id, .corner_px = refined.corner_px, .predicted = true};
-  tag.decision_margin = 0.5 * refined.contrast_levels;
-  note(refined, tag);
+  const RefineHints hints{
+      .lens_px = predicted.lens_px, .motion_px = predicted.motion_px, .picture = predicted.picture};
+  std::optional<RefinedTag> refined;
+  if (predicted.close) refined = read_close(grey, pattern, predicted, hints, rivals);
+  if (!refined) {
+    const auto aligned =
+        align_tag(grey, pattern, homography_to(predicted.corner_px), predicted.picture);
+    if (!aligned) return {};
+    refined = refine_tag(grey, pattern, *aligned, hints);
+    if (!is_read(*refined, pattern, rivals)) return {};
+  }
+  TagDetection tag{.id = predicted.id, .corner_px = refined->corner_px, .predicted = true};
+  tag.decision_margin = 0.5 * refined->contrast_levels;
+  note(*refined, tag);
   return tag;
 }
 

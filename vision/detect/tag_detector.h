@@ -31,6 +31,7 @@ struct TagDetection {
   double black_levels = 0;
   double noise_levels = 0;  ///< of flat places, one standard deviation
   double roughness_px = 0;  ///< by which printed edges are off, one standard deviation
+  double lens_px = 0;       ///< blur of the lens, one standard deviation
   Eigen::Vector2d motion_px = Eigen::Vector2d::Zero();  ///< blur of motion; its sign means nothing
   /// The printed cells are there, and so are border and white around them (TagEvidence).
   bool shows_tag = false;
@@ -39,12 +40,14 @@ struct TagDetection {
   bool predicted = false;  ///< it was looked for where a prediction had it
 };
 
-/// A tag that should be somewhere: its place by its neighbours.
+/// A tag that should be somewhere: its place by its neighbours, or by the pictures before.
 struct PredictedTag {
   int id = 0;
   std::array<Eigen::Vector2d, 4> corner_px{};  ///< right to a cell
+  bool close = false;                          ///< right to a third of a cell, most likely
+  std::optional<double> lens_px;               ///< blur of the lens, where it is known
   std::optional<Eigen::Vector2d> motion_px;    ///< while the shutter is open, where it is known
-  std::optional<ExpectedPicture> picture;      ///< by tags around it
+  std::optional<ExpectedPicture> picture;      ///< by tags around it, or by itself before
 };
 
 /// Reads the tags of one family in pictures. Each thread needs its own detector.

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <vector>
 
+#include "vision/detect/tag_fit.h"
+
 namespace clothfit {
 namespace {
 
@@ -14,20 +16,48 @@ struct CellSums {
   double moment = 0;
 };
 
-/// Returns the share of a cell's own grey level at a place `from_middle` of it along one axis.
-double own_share(double from_middle, double half_cell, double spread) {
+/// Returns the shares of a cell's own grey level from its middle to its edge along one axis.
+std::array<float, CellGrid::kSteps + 2> own_shares(double half_cell, double spread) {
+  std::array<float, CellGrid::kSteps + 2> shares{};
   const double scale = M_SQRT1_2 / spread;
-  return 0.5 * (std::erf((from_middle + half_cell) * scale) -
-                std::erf((from_middle - half_cell) * scale));
+  for (size_t k = 0; k < shares.size(); ++k) {
+    const double from_middle = static_cast<double>(k) / CellGrid::kSteps * half_cell;
+    shares[k] = static_cast<float>(0.5 * (std::erf((from_middle + half_cell) * scale) -
+                                          std::erf((from_middle - half_cell) * scale)));
+  }
+  return shares;
 }
 
-/// Returns where the print of a sample lies, by the bending found.
-Eigen::Vector2d place_on_print(const TagFit& fit, const TagSample& sample) {
-  const TagUnknowns::Terms terms = TagUnknowns::polynomials(sample.x, sample.y);
-  const auto bend = [&](int first) {
-    return terms.dot(fit.unknowns().segment<TagUnknowns::kTerms>(first));
+/// Returns the mean robust weight along the edge at a corner that is seen worse.
+double edges_seen(const CellRows& rows, size_t corner) {
+  double least = 1;
+  for (size_t edge = 0; edge < 2; ++edge) {
+    const double slope = rows.slope[corner][edge];
+    least = std::min(least, slope > 0 ? rows.seen[corner][edge] / slope : 0);
+  }
+  return least;
+}
+
+/// Returns the share that is as printed of the cells told around a corner: those that touch it, and
+/// the border's next ones along both edges.
+double right_around(size_t corner, const TagPattern& pattern, const std::vector<bool>& told,
+                    const std::vector<signed char>& verdict) {
+  const int across = pattern.total_cells, before = (across - pattern.border_cells) / 2;
+  // Cells are counted from the corner, inwards; negative ones are the white outside.
+  const auto cell = [&](int column, int row) {
+    const int from = before + column, down = before + row;
+    const Eigen::Vector2d sign = border_corners()[corner];
+    return static_cast<size_t>((sign.y() < 0 ? down : across - 1 - down) * across +
+                               (sign.x() < 0 ? from : across - 1 - from));
   };
-  return {sample.x + bend(TagUnknowns::kBendX), sample.y + bend(TagUnknowns::kBendY)};
+  int all = 0, right = 0;
+  for (const auto& [column, row] :
+       {std::pair(-1, -1), {-1, 0}, {0, -1}, {0, 0}, {1, 0}, {0, 1}, {-1, 1}, {1, -1}}) {
+    const size_t k = cell(column, row);
+    all += told[k];
+    right += verdict[k] > 0;
+  }
+  return all > 0 ? static_cast<double>(right) / all : 0;
 }
 
 }  // namespace
@@ -44,44 +74,38 @@ bool speaks_for(const TagEvidence& evidence, const TagPattern& own, const TagPat
 TagEvidence tag_evidence(const TagFit& fit, const TagPattern& pattern,
                          const Eigen::Matrix2d& pixel_by_tag) {
   const int across = pattern.total_cells;
-  const double cell = pattern.cell(), first = -0.5 * cell * across;
+  const double cell = pattern.cell();
   const Eigen::Matrix2d tag_by_pixel = pixel_by_tag.inverse();
   const PictureBlur blur(fit.unknowns().segment<3>(TagUnknowns::kBlur));
   const Eigen::Vector2d spread =
       (tag_by_pixel * blur.covariance_px2() * tag_by_pixel.transpose()).diagonal().cwiseSqrt();
+  std::vector<float> turned;
+  for (const float white : pattern.white) turned.push_back(white > 0.5F ? -1.0F : 1.0F);
+  const CellRows rows = cell_rows(fit.model(),
+                                  {.across = across,
+                                   .first = static_cast<float>(-0.5 * cell * across),
+                                   .per_unit = static_cast<float>(1 / cell),
+                                   .turned = turned.data(),
+                                   .share_x = own_shares(0.5 * cell, spread.x()),
+                                   .share_y = own_shares(0.5 * cell, spread.y())},
+                                  fit.samples(), fit.rows());
 
-  std::vector<CellSums> cells(static_cast<size_t>(across * across));
-  std::array<int, 4> near{};
   const int reached = std::min(across, pattern.border_cells + 2);
   TagEvidence evidence{.printed_cells = reached * reached, .verdict = {}};
-  for (size_t i = 0; i < fit.samples().size(); ++i) {
-    const auto row = static_cast<Eigen::Index>(i);
-    const Eigen::Vector2d place = place_on_print(fit, fit.samples()[i]);
-    for (size_t c = 0; c < 4; ++c) {
-      const Eigen::Vector2d corner(c == 1 || c == 2 ? 1 : -1, c < 2 ? 1 : -1);
-      const Eigen::Vector2d outwards = (place - corner).cwiseProduct(corner);
-      if (outwards.minCoeff() < -1.5 * cell || outwards.maxCoeff() > 0.2 * cell) continue;
-      evidence.corner_seen[c] += fit.robust()[row];
-      ++near[c];
-    }
-    const int column = static_cast<int>(std::floor((place.x() - first) / cell));
-    const int line = static_cast<int>(std::floor((place.y() - first) / cell));
-    if (column < 0 || line < 0 || column >= across || line >= across) continue;
-    const auto k = static_cast<size_t>(line * across + column);
-    const double share =
-        own_share(place.x() - first - (column + 0.5) * cell, 0.5 * cell, spread.x()) *
-        own_share(place.y() - first - (line + 0.5) * cell, 0.5 * cell, spread.y());
-    const double change = (pattern.white[k] > 0.5F ? -1 : 1) * fit.contrast() * share;
-    const double weight = fit.weight()[row] / fit.robust()[row];  // of the pixel unharmed
-    cells[k].information += weight * change * change;
-    cells[k].moment += weight * change * fit.residual()[row];
+  for (size_t c = 0; c < 4; ++c) evidence.corner_seen[c] = edges_seen(rows, c);
+  std::vector<CellSums> cells(static_cast<size_t>(across * across));
+  for (Eigen::Index i = 0; i < fit.samples().count; ++i) {
+    const int k = rows.cell[static_cast<size_t>(i)];
+    if (k < 0) continue;
+    cells[static_cast<size_t>(k)].information += static_cast<double>(rows.information[i]);
+    cells[static_cast<size_t>(k)].moment += static_cast<double>(rows.moment[i]);
   }
-  for (size_t c = 0; c < 4; ++c)
-    if (near[c] > 0) evidence.corner_seen[c] /= near[c];
+  std::vector<bool> told;
   for (const CellSums& sums : cells) {
     constexpr double kTold = 9;  // three standard deviations between right and wrong
     evidence.verdict.push_back(0);
-    if (sums.information < kTold) continue;
+    told.push_back(sums.information >= kTold);
+    if (!told.back()) continue;
     ++evidence.cells;
     const double amplitude = sums.moment / sums.information;
     const double slack = 0.25 + 1 / std::sqrt(sums.information);
@@ -91,6 +115,9 @@ TagEvidence tag_evidence(const TagFit& fit, const TagPattern& pattern,
     evidence.wrong_cells += wrong;
     evidence.verdict.back() = static_cast<signed char>(right - wrong);
   }
+  for (size_t c = 0; c < 4; ++c)
+    evidence.corner_seen[c] =
+        std::min(evidence.corner_seen[c], right_around(c, pattern, told, evidence.verdict));
   return evidence;
 }
 

@@ -4,9 +4,11 @@
 #include <array>
 #include <vector>
 
-#include "vision/detect/tag_fit.h"
+#include "vision/detect/tag_pattern.h"
 
 namespace clothfit {
+
+class TagFit;
 
 /// What a converged fit shows of the tag's cells and corners. Each printed cell is asked alone
 /// whether the picture wants it as printed or the other way round, with its neighbours as printed:
@@ -19,9 +21,9 @@ struct TagEvidence {
   int wrong_cells = 0;    ///< the other way round
   /// Of each cell, as in TagPattern::white: 1 right, -1 wrong, 0 where the picture does not tell.
   std::vector<signed char> verdict;
-  /// Mean robust weight of the border's pixels within a cell and a half of each corner; about 0.9
-  /// where nothing hides it, 0 where no pixel is in the picture. The white around the border is
-  /// left out, since a hand may be as bright.
+  /// What is least at each corner: the mean robust weights along the two edges that meet there, by
+  /// slope, or the share that is as printed of the cells around it. About 0.9 where nothing hides
+  /// it. Flat places do not count by themselves, since something in front may be as bright or dark.
   std::array<double, 4> corner_seen{};
 
   /// Says whether the print is there at all, border and white around it included. A tag of another

@@ -1,10 +1,10 @@
 #include "vision/detect/tag_fit.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <vector>
 
 #include "data/median.h"
 #include "vision/detect/blurred_pattern.h"
@@ -13,7 +13,6 @@ namespace clothfit {
 namespace {
 
 using Unknowns = TagUnknowns::Vector;
-using Normal = TagUnknowns::Matrix;
 
 double square(double x) {
   return x * x;
@@ -51,10 +50,10 @@ TagUnknowns::Vector TagUnknowns::prior_precision() {
 }
 
 TagFit::TagFit(const TagPattern& pattern, const Eigen::Matrix2d& pixel_by_tag,
-               std::vector<TagSample> samples, const PictureBlur::Unknowns& start)
+               const TagSamples& samples, const PictureBlur::Unknowns& start)
     : pattern_(&pattern),
+      samples_(&samples),
       pixel_by_tag_(pixel_by_tag),
-      samples_(std::move(samples)),
       prior_mean_(Unknowns::Zero()),
       prior_(TagUnknowns::prior_precision()) {
   constexpr double kRoughest = 0.1;  // cells; more would pass for another print
@@ -62,19 +61,14 @@ TagFit::TagFit(const TagPattern& pattern, const Eigen::Matrix2d& pixel_by_tag,
   prior_mean_.segment<3>(TagUnknowns::kBlur) =
       PictureBlur::unknowns(kSharp, Eigen::Vector2d::Zero());
   unknowns_.segment<3>(TagUnknowns::kBlur) = start;
-  const auto [darkest, brightest] = std::ranges::minmax_element(samples_, {}, &TagSample::grey);
-  unknowns_[TagUnknowns::kLight] = darkest->grey;
-  const double range = brightest->grey - darkest->grey;
+  const auto grey = samples.grey.head(samples.count);
+  unknowns_[TagUnknowns::kLight] = grey.minCoeff();
+  const double range = grey.maxCoeff() - grey.minCoeff();
   unknowns_[TagUnknowns::kLight + 3] = range;
   // Light varies little over a tag; what hides half of one must not pass for its dark side.
   constexpr double kLightSlope = 0.15;  // of the range, to the edge of the tag
   for (const int slope : {1, 2, 4, 5})
     prior_[TagUnknowns::kLight + slope] = 1 / square(kLightSlope * std::max(range, 1.0));
-}
-
-void TagFit::thin_out() {
-  evaluate();
-  clothfit::thin_out(samples_, slope_);
 }
 
 void TagFit::expect_light(double black_levels, double contrast_levels) {
@@ -116,7 +110,10 @@ bool TagFit::converge(int most_steps) {
     const double moved = step();
     if (!unknowns_.allFinite() || !leaves_cells(unknowns_.segment<3>(TagUnknowns::kBlur)))
       return false;
-    if (moved < kStill) return true;
+    if (moved < kStill) {
+      covariance_ = solver_.solve(TagUnknowns::Matrix::Identity());
+      return true;
+    }
   }
   return false;
 }
@@ -128,95 +125,72 @@ bool TagFit::converge(int most_steps) {
 /// because edges are ragged (print, weave, sampling) by some share of a pixel. Both are estimated
 /// from medians over this tag. A Cauchy loss comes on top.
 void TagFit::weigh() {
-  const double steepest = slope_.maxCoeff();
+  const Eigen::Index count = samples_->count;
+  const auto residual = rows_.residual.head(count), slope = rows_.slope.head(count);
+  const float steepest = slope.maxCoeff();
   std::vector<double> flat, rough, inverse_square_slope;
-  for (Eigen::Index i = 0; i < residual_.size(); ++i) {
-    if (slope_[i] < 0.1 * steepest) flat.push_back(std::abs(residual_[i]));
-    if (slope_[i] > 0.4 * steepest) {
-      rough.push_back(std::abs(residual_[i]) / slope_[i]);
-      inverse_square_slope.push_back(1 / square(slope_[i]));
+  constexpr Eigen::Index kEnough = 1000;  // samples; medians are then right to some per cent
+  for (Eigen::Index i = 0; i < count; i += std::max<Eigen::Index>(1, count / kEnough)) {
+    if (slope[i] < 0.1F * steepest) flat.push_back(std::abs(residual[i]));
+    if (slope[i] > 0.4F * steepest) {
+      rough.push_back(std::abs(residual[i] / slope[i]));
+      inverse_square_slope.push_back(1 / square(slope[i]));
     }
   }
   constexpr double kRounding = 0.3;  // grey levels; what 8 bits leave
   const double by_median = flat.empty() ? 0 : kMadToSigma * median(std::move(flat));
-  const double noise = std::max(std::min(by_median, most_noise_levels_), kRounding);
+  noise_levels_ = std::max(std::min(by_median, most_noise_levels_), kRounding);
   double square_roughness = 0;
   if (!rough.empty())
     square_roughness = square(kMadToSigma * median(std::move(rough))) -
-                       square(noise) * median(std::move(inverse_square_slope));
-  square_roughness = std::clamp(square_roughness, 0.0, square(most_roughness_px_));
-  noise_levels_ = noise;
-  roughness_px_ = std::sqrt(square_roughness);
-
-  constexpr double kCauchy = 3;
-  const Eigen::ArrayXd variance = square(noise) + square_roughness * slope_.array().square();
-  robust_ = (1 + residual_.array().square() / (square(kCauchy) * variance)).inverse();
-  weight_ = robust_.array() / variance;
+                       square(noise_levels_) * median(std::move(inverse_square_slope));
+  roughness_px_ = std::sqrt(std::clamp(square_roughness, 0.0, square(most_roughness_px_)));
+  constexpr float kCauchy = 3;
+  weigh_rows({.noise_levels = static_cast<float>(noise_levels_),
+              .roughness_px = static_cast<float>(roughness_px_),
+              .loss = kCauchy},
+             *samples_, rows_);
 }
 
 void TagFit::evaluate() {
   using Layout = TagUnknowns;
-  const auto rows = static_cast<Eigen::Index>(samples_.size());
-  jacobian_.resize(rows, Layout::kCount);
-  residual_.resize(rows);
-  gradient_.resize(rows, 2);
   const PictureBlur blur(unknowns_.segment<3>(Layout::kBlur));
   const BlurredPattern blurred(*pattern_, pixel_by_tag_, blur);
   const Eigen::Matrix2d tag_by_pixel = pixel_by_tag_.inverse();
-  // Change of the pattern with each unknown of the blur: these times its second derivatives.
-  std::array<Eigen::Matrix2d, 3> half_slopes = blur.covariance_slopes();
-  for (Eigen::Matrix2d& slope : half_slopes)
-    slope = 0.5 * tag_by_pixel * slope * tag_by_pixel.transpose();
-  for (Eigen::Index row = 0; row < rows; ++row) {
-    const TagSample& sample = samples_[static_cast<size_t>(row)];
-    const Layout::Terms terms = Layout::polynomials(sample.x, sample.y);
-    const double x = sample.x + terms.dot(unknowns_.segment<Layout::kTerms>(Layout::kBendX));
-    const double y = sample.y + terms.dot(unknowns_.segment<Layout::kTerms>(Layout::kBendY));
-    const BlurredPattern::Value white = blurred.at(x, y);
-    const Eigen::Vector3d linear(1, sample.x, sample.y);
-    const double offset = linear.dot(unknowns_.segment<3>(Layout::kLight));
-    const double contrast = linear.dot(unknowns_.segment<3>(Layout::kLight + 3));
-    Eigen::Matrix<double, 1, Layout::kCount> derivative;
-    derivative.segment<Layout::kTerms>(Layout::kBendX) = contrast * white.by_x * terms;
-    derivative.segment<Layout::kTerms>(Layout::kBendY) = contrast * white.by_y * terms;
-    double level = white.value;
-    for (int k = 0; k < 3; ++k) {
-      const Eigen::Matrix2d& half = half_slopes[static_cast<size_t>(k)];
-      const double by_blur =
-          half(0, 0) * white.by_xx + 2 * half(0, 1) * white.by_xy + half(1, 1) * white.by_yy;
-      derivative[Layout::kBlur + k] = contrast * by_blur;
-      derivative[Layout::kBlurSlope + 2 * k] = contrast * by_blur * sample.x;
-      derivative[Layout::kBlurSlope + 2 * k + 1] = contrast * by_blur * sample.y;
-      level += by_blur * (sample.x * unknowns_[Layout::kBlurSlope + 2 * k] +
-                          sample.y * unknowns_[Layout::kBlurSlope + 2 * k + 1]);
-    }
-    derivative.segment<3>(Layout::kLight) = linear;
-    derivative.segment<3>(Layout::kLight + 3) = level * linear;
-    jacobian_.row(row) = derivative.cast<float>();
-    residual_[row] = sample.grey - (offset + contrast * level);
-    gradient_.row(row) = contrast * Eigen::RowVector2d(white.by_x, white.by_y) * tag_by_pixel;
+  model_.grid = blurred.grid();
+  const auto copy = [&](int first, auto& to) {
+    for (size_t k = 0; k < to.size(); ++k)
+      to[k] = static_cast<float>(unknowns_[first + static_cast<int>(k)]);
+  };
+  copy(Layout::kBendX, model_.bend_x);
+  copy(Layout::kBendY, model_.bend_y);
+  copy(Layout::kBlurSlope, model_.blur_slope);
+  copy(Layout::kLight, model_.offset);
+  copy(Layout::kLight + 3, model_.contrast);
+  const std::array<Eigen::Matrix2d, 3> slopes = blur.covariance_slopes();
+  for (size_t k = 0; k < 3; ++k) {
+    const Eigen::Matrix2f half =
+        (0.5 * tag_by_pixel * slopes[k] * tag_by_pixel.transpose()).cast<float>();
+    model_.by_blur[k] = {half(0, 0), 2 * half(0, 1), half(1, 1)};
   }
-  slope_ = gradient_.rowwise().norm();
+  for (size_t k = 0; k < 4; ++k)
+    model_.tag_by_pixel[k] = static_cast<float>(
+        tag_by_pixel(static_cast<Eigen::Index>(k / 2), static_cast<Eigen::Index>(k % 2)));
+  evaluate_rows(model_, *samples_, rows_);
+  model_.grid = {};
   weigh();
 }
 
-/// Adds one Gauss-Newton step to the unknowns and sets the covariance to the posterior's. Returns
-/// the length of the step in standard deviations per unknown; not finite when there is no step.
+/// Adds one Gauss-Newton step to the unknowns. Returns its length in standard deviations per
+/// unknown; not finite when there is no step.
 double TagFit::step() {
-  constexpr int kCount = TagUnknowns::kCount;
-  whitened_ = weight_.cwiseSqrt().cast<float>().asDiagonal() * jacobian_;
-  Eigen::Matrix<float, kCount, kCount> lower = Eigen::Matrix<float, kCount, kCount>::Zero();
-  lower.selfadjointView<Eigen::Lower>().rankUpdate(whitened_.transpose());
-  Normal information = lower.cast<double>().selfadjointView<Eigen::Lower>();
-  information.diagonal() += prior_;
-  const Unknowns gradient =
-      (jacobian_.transpose() * weight_.cwiseProduct(residual_).cast<float>()).cast<double>() -
-      prior_.cwiseProduct(unknowns_ - prior_mean_);
-  const Eigen::LDLT<Normal> solver(information);
-  const Unknowns change = solver.solve(gradient);
-  covariance_ = solver.solve(Normal::Identity());
+  NormalEquations equations = normal_equations(*samples_, rows_);
+  equations.information.diagonal() += prior_;
+  const Unknowns gradient = equations.gradient - prior_.cwiseProduct(unknowns_ - prior_mean_);
+  solver_.compute(equations.information);
+  const Unknowns change = solver_.solve(gradient);
   unknowns_ += change;
-  return std::sqrt(change.dot(gradient) / kCount);
+  return std::sqrt(change.dot(gradient) / TagUnknowns::kCount);
 }
 
 }  // namespace clothfit

@@ -1,10 +1,11 @@
 #pragma once
 
+#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <limits>
-#include <vector>
 
 #include "vision/detect/picture_blur.h"
+#include "vision/detect/tag_kernels.h"
 #include "vision/detect/tag_pattern.h"
 #include "vision/detect/tag_samples.h"
 
@@ -36,21 +37,18 @@ struct TagUnknowns {
 };
 
 /// The fit of a tag's printed pattern to the grey levels of its pixels; tag_refine.h has the model.
+/// Pixels are those of the samples' window.
 class TagFit {
  public:
-  /// Single precision suffices for grey levels of 8 bits and is twice as fast.
-  using Rows = Eigen::Matrix<float, Eigen::Dynamic, TagUnknowns::kCount, Eigen::RowMajor>;
-
   /// Starts without bending, with that blur, and with light from the extremes. `pixel_by_tag` maps
-  /// small steps from tag coordinates to pixels at the middle of the tag.
-  TagFit(const TagPattern& pattern, const Eigen::Matrix2d& pixel_by_tag,
-         std::vector<TagSample> samples, const PictureBlur::Unknowns& start);
+  /// small steps from tag coordinates to pixels at the middle of the tag. Keeps references to the
+  /// pattern and to the samples, of which there must be some.
+  TagFit(const TagPattern& pattern, const Eigen::Matrix2d& pixel_by_tag, const TagSamples& samples,
+         const PictureBlur::Unknowns& start);
 
   /// Starts from a light that is known to 15 % of the contrast: grey levels of black, and of white
   /// above it.
   void expect_light(double black_levels, double contrast_levels);
-  /// Leaves samples out that say little (tag_samples.h).
-  void thin_out();
   /// Bounds what noise and roughness are taken for. Their estimates are medians over the tag, which
   /// are too large once half of it is hidden.
   void bound_noise(double noise_levels, double roughness_px);
@@ -58,21 +56,16 @@ class TagFit {
   /// within `most_steps`, or the blur leaves no cells.
   bool converge(int most_steps);
 
-  const std::vector<TagSample>& samples() const { return samples_; }
+  const TagSamples& samples() const { return *samples_; }
+  const TagRows& rows() const { return rows_; }
+  /// Returns what the rows were evaluated with, without its grid.
+  const TagModel& model() const { return model_; }
   const TagUnknowns::Vector& unknowns() const { return unknowns_; }
   /// Returns the precision of each unknown before the picture is seen.
   const TagUnknowns::Vector& prior() const { return prior_; }
   const TagUnknowns::Matrix& covariance() const { return covariance_; }
-  /// Returns the derivatives of the grey levels, one row per sample.
-  const Rows& jacobian() const { return jacobian_; }
-  const Eigen::VectorXd& residual() const { return residual_; }  ///< grey levels
-  const Eigen::VectorXd& weight() const {
-    return weight_;
-  }  ///< inverse variance times robust weight
-  /// Returns the derivatives of the model's grey levels by place in the picture, one row per
-  /// sample.
-  const Eigen::MatrixX2d& gradient() const { return gradient_; }
-  const Eigen::VectorXd& robust() const { return robust_; }  ///< robust weight, 0 to 1
+  /// Returns the robust weights, 0 to 1, of the samples.
+  auto robust() const { return rows_.robust.head(samples_->count); }
   /// Returns the brightness of white above black in the middle of the tag; negative where inverted.
   double contrast() const { return unknowns_[TagUnknowns::kLight + 3]; }
   double black() const { return unknowns_[TagUnknowns::kLight]; }  ///< in the middle of the tag
@@ -89,14 +82,14 @@ class TagFit {
   double step();
 
   const TagPattern* pattern_;
+  const TagSamples* samples_;
   Eigen::Matrix2d pixel_by_tag_;
-  std::vector<TagSample> samples_;
   TagUnknowns::Vector unknowns_ = TagUnknowns::Vector::Zero();
   TagUnknowns::Vector prior_mean_, prior_;
   TagUnknowns::Matrix covariance_ = TagUnknowns::Matrix::Zero();
-  Rows jacobian_, whitened_;
-  Eigen::VectorXd residual_, slope_, weight_, robust_;
-  Eigen::MatrixX2d gradient_;
+  Eigen::LDLT<TagUnknowns::Matrix> solver_;
+  TagModel model_;
+  TagRows rows_;
   double noise_levels_ = 0, roughness_px_ = 0;
   double most_noise_levels_ = std::numeric_limits<double>::infinity();
   double most_roughness_px_ = std::numeric_limits<double>::infinity();

@@ -15,6 +15,19 @@ struct ReadCorner {
   Eigen::Vector2d place_m, pixel_px;
 };
 
+/// Lists the corners of the refined tags of a sheet but one.
+std::vector<ReadCorner> read_corners(std::span<const TagDetection> tags, const TagLayout& layout,
+                                     int but) {
+  std::vector<ReadCorner> corners;
+  for (const TagDetection& tag : tags) {
+    const auto known = layout.find(tag.id);
+    if (tag.id == but || known == layout.end() || !tag.refined || !tag.shows_tag) continue;
+    for (size_t c = 0; c < 4; ++c)
+      corners.push_back({.place_m = known->second[c], .pixel_px = tag.corner_px[c]});
+  }
+  return corners;
+}
+
 /// Predicts one tag; false where too little is read around it.
 bool predict(const std::array<Eigen::Vector2d, 4>& corners_m, const std::vector<ReadCorner>& read,
              std::array<Eigen::Vector2d, 4>& corner_px) {
@@ -78,13 +91,13 @@ ExpectedPicture expected_picture(const std::vector<const TagDetection*>& tags,
   return expected;
 }
 
-/// Returns the motion of the tag that lies nearest; there is one.
-Eigen::Vector2d nearest_motion(const std::vector<const TagDetection*>& tags,
-                               const TagLayout& layout, const Eigen::Vector2d& place_m) {
+/// Returns the tag that lies nearest; there is one.
+const TagDetection& nearest(const std::vector<const TagDetection*>& tags, const TagLayout& layout,
+                            const Eigen::Vector2d& place_m) {
   const auto distance = [&](const TagDetection* tag) {
     return (layout.at(tag->id)[0] - place_m).squaredNorm();
   };
-  return (*std::ranges::min_element(tags, {}, distance))->motion_px;
+  return **std::ranges::min_element(tags, {}, distance);
 }
 
 /// Says whether two predictions of a tag differ by a quarter of a cell or more, so that the later
@@ -97,6 +110,36 @@ bool differs(const PredictedTag& one, const PredictedTag& other) {
     side = std::max(side, (one.corner_px[(c + 1) % 4] - one.corner_px[c]).norm());
   }
   return apart > kOfSide * side;
+}
+
+/// Notes corners of half hidden tags as hidden that lie where neither the tags around nor the tag's
+/// other corners expect them: the border was taken to the edge of something in front. Tags whose
+/// pixels are all explained are left alone, since folds too are where neighbours do not expect
+/// them.
+void doubt_corners(const TagLayout& layout, std::vector<TagDetection>& tags) {
+  constexpr double kAllExplained = 0.88;  // of drawn tags, one clean one in a thousand has less
+  constexpr double kMostOfSide = 0.03, kMostSigmas = 4;
+  const std::vector<TagDetection> read = tags;
+  for (TagDetection& tag : tags) {
+    const auto known = layout.find(tag.id);
+    if (known == layout.end() || !tag.refined || !tag.shows_tag) continue;
+    if (tag.explained >= kAllExplained) continue;
+    std::array<Eigen::Vector2d, 4> expected;
+    if (!predict(known->second, read_corners(read, layout, tag.id), expected)) continue;
+    std::array<double, 4> off_u, off_v;
+    for (size_t c = 0; c < 4; ++c) {
+      off_u[c] = tag.corner_px[c].x() - expected[c].x();
+      off_v[c] = tag.corner_px[c].y() - expected[c].y();
+    }
+    // The median of four ignores the one that is out of place.
+    const Eigen::Vector2d common(median({off_u.begin(), off_u.end()}),
+                                 median({off_v.begin(), off_v.end()}));
+    const double side = (tag.corner_px[1] - tag.corner_px[0]).norm();
+    for (size_t c = 0; c < 4; ++c)
+      if ((Eigen::Vector2d(off_u[c], off_v[c]) - common).norm() >
+          kMostOfSide * side + kMostSigmas * tag.sigma_px[c])
+        tag.corner_seen[c] = 0;
+  }
 }
 
 }  // namespace
@@ -122,20 +165,20 @@ std::vector<PredictedTag> predict_from_neighbours(std::span<const TagDetection> 
     if (known.contains(id) || times[id] > 1 || !predict(corners_m, read, corner_px)) continue;
     predicted.push_back({.id = id,
                          .corner_px = corner_px,
-                         .motion_px = nearest_motion(tags, layout, corners_m[0]),
+                         .motion_px = nearest(tags, layout, corners_m[0]).motion_px,
                          .picture = expected_picture(tags, layout, corners_m[0])});
   }
   return predicted;
 }
 
-SheetTags detect_on_sheet(TagDetector& detector, const cv::Mat& grey, const TagLayout& layout) {
-  SheetTags result{.read = detector.detect(grey), .unread = {}};
+void read_by_neighbours(TagDetector& detector, const cv::Mat& grey, const TagLayout& layout,
+                        SheetTags& tags) {
   std::vector<int> ids;
   for (const auto& [id, corners] : layout) ids.push_back(id);
   std::map<int, PredictedTag> unread;
   constexpr int kMostRounds = 12;  // a sheet of 24 rows, read from its middle
   for (int round = 0; round < kMostRounds; ++round) {
-    std::vector<PredictedTag> predicted = predict_from_neighbours(result.read, layout);
+    std::vector<PredictedTag> predicted = predict_from_neighbours(tags.read, layout);
     std::erase_if(predicted, [&](const PredictedTag& tag) {
       const auto before = unread.find(tag.id);
       return before != unread.end() && !differs(tag, before->second);
@@ -145,17 +188,23 @@ SheetTags detect_on_sheet(TagDetector& detector, const cv::Mat& grey, const TagL
     for (const TagDetection& tag : detector.read_predicted(grey, predicted, ids)) {
       unread.erase(tag.id);
       // Outlines that could not be refined give way.
-      std::erase_if(result.read, [&](const TagDetection& one) { return one.id == tag.id; });
-      result.read.push_back(tag);
+      std::erase_if(tags.read, [&](const TagDetection& one) { return one.id == tag.id; });
+      tags.read.push_back(tag);
     }
   }
-  std::ranges::stable_sort(result.read, {}, &TagDetection::id);
+  doubt_corners(layout, tags.read);
+  std::ranges::stable_sort(tags.read, {}, &TagDetection::id);
   const auto outlined = [&](int id) {
-    return std::ranges::binary_search(result.read, id, {}, &TagDetection::id);
+    return std::ranges::binary_search(tags.read, id, {}, &TagDetection::id);
   };
   for (const auto& [id, tag] : unread)
-    if (!outlined(id)) result.unread.push_back(tag);
-  return result;
+    if (!outlined(id)) tags.unread.push_back(tag);
+}
+
+SheetTags detect_on_sheet(TagDetector& detector, const cv::Mat& grey, const TagLayout& layout) {
+  SheetTags tags{.read = detector.detect(grey), .unread = {}};
+  read_by_neighbours(detector, grey, layout, tags);
+  return tags;
 }
 
 }  // namespace clothfit

@@ -27,6 +27,11 @@ struct SheetTags {
   std::vector<PredictedTag> unread;  ///< expected, and not read; sorted by id
 };
 
+/// Adds the tags of a sheet that their neighbours predict, then those that these predict, and notes
+/// which stay unread.
+void read_by_neighbours(TagDetector& detector, const cv::Mat& grey, const TagLayout& layout,
+                        SheetTags& tags);
+
 /// Finds the tags of a sheet: those that are read at once, then those that their neighbours
 /// predict, then those that these predict.
 SheetTags detect_on_sheet(TagDetector& detector, const cv::Mat& grey, const TagLayout& layout);

@@ -16,13 +16,8 @@ namespace clothfit {
 namespace {
 
 constexpr double kSharp_px = 0.5;  // blur of a good lens and a pixel
-constexpr size_t kFewestSamples = 2 * TagUnknowns::kCount;
+constexpr Eigen::Index kFewestSamples = 2 * TagUnknowns::kCount;
 constexpr int kMostSteps = 20;
-
-const std::array<Eigen::Vector2d, 4>& border_corners() {
-  static const std::array<Eigen::Vector2d, 4> corners = {{{-1, 1}, {1, 1}, {1, -1}, {-1, -1}}};
-  return corners;
-}
 
 /// Returns small steps from tag coordinates to pixels at the middle of the tag.
 Eigen::Matrix2d steps_at_middle(const Eigen::Matrix3d& pixel_from_tag) {
@@ -37,14 +32,14 @@ void expect(const ExpectedPicture& expected, TagFit& fit) {
   fit.bound_noise(expected.most_noise_levels, expected.most_roughness_px);
 }
 
-/// Lists the blurs to start from. Where the motion is known, that is it and a sharp picture, the
+/// Lists the blurs to start from: where the motion is known, that is it and a sharp picture, the
 /// likelier first; else a sharp picture and motion in four directions.
-std::vector<PictureBlur::Unknowns> starts(const std::optional<Eigen::Vector2d>& motion_px) {
+std::vector<PictureBlur::Unknowns> starts(const RefineHints& hints) {
   std::vector<PictureBlur::Unknowns> blurs = {PictureBlur::unknowns(kSharp_px, {0, 0})};
   constexpr double kSharpMotion_px = 1.5;
-  if (motion_px) {
-    blurs.push_back(PictureBlur::unknowns(kSharp_px, *motion_px));
-    if (motion_px->norm() > kSharpMotion_px) std::swap(blurs[0], blurs[1]);
+  if (hints.motion_px) {
+    blurs.push_back(PictureBlur::unknowns(hints.lens_px.value_or(kSharp_px), *hints.motion_px));
+    if (hints.lens_px || hints.motion_px->norm() > kSharpMotion_px) std::swap(blurs[0], blurs[1]);
     return blurs;
   }
   constexpr double kLength_px = 6;
@@ -56,7 +51,7 @@ std::vector<PictureBlur::Unknowns> starts(const std::optional<Eigen::Vector2d>& 
   return blurs;
 }
 
-/// Fits from where the fit starts, and notes what it shows.
+/// Fits from where the fit starts, and notes what it shows, in pixels of the window.
 RefinedTag refined_from(TagFit& fit, const TagPattern& pattern,
                         const Eigen::Matrix3d& pixel_from_tag,
                         const Eigen::Matrix2d& pixel_by_tag) {
@@ -70,7 +65,9 @@ RefinedTag refined_from(TagFit& fit, const TagPattern& pattern,
   result.explained = fit.robust().mean();
   result.contrast_levels = fit.contrast();
   result.black_levels = fit.black();
-  result.motion_px = PictureBlur(fit.unknowns().segment<3>(TagUnknowns::kBlur)).motion_px();
+  const PictureBlur blur(fit.unknowns().segment<3>(TagUnknowns::kBlur));
+  result.lens_px = std::sqrt(blur.lens_variance_px2());
+  result.motion_px = blur.motion_px();
   result.evidence = tag_evidence(fit, pattern, pixel_by_tag);
   if (!result.usable) return result;
   const std::array<CornerPlace, 4> places = corner_places(fit, pixel_from_tag, pixel_by_tag);
@@ -83,6 +80,26 @@ RefinedTag refined_from(TagFit& fit, const TagPattern& pattern,
   return result;
 }
 
+/// Takes lengths to pixels of the picture.
+RefinedTag in_picture(RefinedTag tag, const TagWindow& window) {
+  for (size_t c = 0; c < 4; ++c) {
+    tag.corner_px[c] = window.to_picture(tag.corner_px[c]);
+    tag.sigma_px[c] *= window.shrunk_by;
+  }
+  tag.roughness_px *= window.shrunk_by;
+  tag.lens_px *= window.shrunk_by;
+  tag.motion_px *= window.shrunk_by;
+  return tag;
+}
+
+/// Takes lengths to pixels of the window.
+RefineHints in_window(RefineHints hints, const TagWindow& window) {
+  if (hints.lens_px) *hints.lens_px /= window.shrunk_by;
+  if (hints.motion_px) *hints.motion_px /= window.shrunk_by;
+  if (hints.picture) hints.picture->most_roughness_px /= window.shrunk_by;
+  return hints;
+}
+
 }  // namespace
 
 RefinedTag refine_tag(const cv::Mat& grey, const TagPattern& pattern,
@@ -90,53 +107,46 @@ RefinedTag refine_tag(const cv::Mat& grey, const TagPattern& pattern,
   assert(grey.type() == CV_8UC1);
   RefinedTag result;
   result.corner_px.fill(Eigen::Vector2d::Zero());
-  const std::vector<TagSample> samples = tag_samples(grey, pattern, pixel_from_tag);
-  if (samples.size() < kFewestSamples) return result;
-  const Eigen::Matrix2d pixel_by_tag = steps_at_middle(pixel_from_tag);
-  for (const PictureBlur::Unknowns& start : starts(hints.motion_px)) {
+  const auto window = tag_window(grey, pixel_from_tag, sample_reach(pattern));
+  if (!window) return result;
+  const Eigen::Matrix3d window_from_tag = window->from_picture(pixel_from_tag);
+  const TagSamples samples = tag_samples(*window, pattern, window_from_tag);
+  if (samples.count < kFewestSamples) return result;
+  const Eigen::Matrix2d pixel_by_tag = steps_at_middle(window_from_tag);
+  const RefineHints near = in_window(hints, *window);
+  for (const PictureBlur::Unknowns& start : starts(near)) {
     TagFit fit(pattern, pixel_by_tag, samples, start);
-    fit.thin_out();
-    if (fit.samples().size() < kFewestSamples) return result;
-    if (hints.picture) expect(*hints.picture, fit);
-    const RefinedTag refined = refined_from(fit, pattern, pixel_from_tag, pixel_by_tag);
-    if (refined.usable && refined.evidence.shows_tag()) return refined;
+    if (near.picture) expect(*near.picture, fit);
+    const RefinedTag refined = refined_from(fit, pattern, window_from_tag, pixel_by_tag);
+    const bool shows_tag = refined.usable && refined.evidence.shows_tag();
     // What a start says that led nowhere counts less than what a better one does.
-    if (refined.usable > result.usable ||
+    if (shows_tag || refined.usable > result.usable ||
         (refined.usable == result.usable && refined.explained > result.explained))
       result = refined;
+    if (shows_tag) break;
   }
-  return result;
+  return in_picture(result, *window);
 }
 
 std::optional<Eigen::Matrix3d> align_tag(const cv::Mat& grey, const TagPattern& pattern,
                                          const Eigen::Matrix3d& pixel_from_tag,
                                          const std::optional<ExpectedPicture>& expected) {
-  const Eigen::Matrix2d pixel_by_tag = steps_at_middle(pixel_from_tag);
-  Eigen::AlignedBox2d box;
-  for (const Eigen::Vector2d& corner : border_corners())
-    box.extend(mapped(pixel_from_tag, 1.5 * corner));
-  if (!box.sizes().allFinite()) return {};
-  const cv::Rect whole(0, 0, grey.cols, grey.rows);
-  const cv::Rect window = whole & cv::Rect(cv::Point2d(box.min().x(), box.min().y()),
-                                           cv::Point2d(box.max().x() + 1, box.max().y() + 1));
-  if (window.empty()) return {};
+  constexpr double kReach = 1.5;  // half a tag around it, for the smoothing
+  auto window = tag_window(grey, pixel_from_tag, kReach);
+  if (!window) return {};
+  const Eigen::Matrix3d window_from_tag = window->from_picture(pixel_from_tag);
+  const Eigen::Matrix2d pixel_by_tag = steps_at_middle(window_from_tag);
   const double smooth_px = pattern.cell() * pixel_by_tag.colwise().norm().mean() / 3;
-  cv::Mat smooth;
-  cv::GaussianBlur(grey(window), smooth, cv::Size(), smooth_px, smooth_px, cv::BORDER_REPLICATE);
-  Eigen::Matrix3d window_from_tag = pixel_from_tag;
-  window_from_tag.row(0) -= window.x * pixel_from_tag.row(2);
-  window_from_tag.row(1) -= window.y * pixel_from_tag.row(2);
-  const std::vector<TagSample> samples = tag_samples(smooth, pattern, window_from_tag);
-  if (samples.size() < kFewestSamples) return {};
+  cv::GaussianBlur(window->levels, window->levels, cv::Size(), smooth_px, smooth_px,
+                   cv::BORDER_REPLICATE);
+  const TagSamples samples = tag_samples(*window, pattern, window_from_tag);
+  if (samples.count < kFewestSamples) return {};
   TagFit fit(pattern, pixel_by_tag, samples,
              PictureBlur::unknowns(std::hypot(kSharp_px, smooth_px), {0, 0}));
   if (expected) fit.expect_light(expected->black_levels, expected->contrast_levels);
-  fit.thin_out();
-  if (fit.samples().size() < kFewestSamples || !fit.converge(kMostSteps) || !(fit.contrast() > 0))
-    return {};
-  const std::array<CornerPlace, 4> places = corner_places(fit, pixel_from_tag, pixel_by_tag);
-  std::array<Eigen::Vector2d, 4> corners;
-  for (size_t c = 0; c < 4; ++c) corners[c] = places[c].pixel_px;
+  if (!fit.converge(kMostSteps) || !(fit.contrast() > 0)) return {};
+  std::array<Eigen::Vector2d, 4> corners = corner_pixels(fit, window_from_tag);
+  for (Eigen::Vector2d& corner : corners) corner = window->to_picture(corner);
   if (!shows_front(corners)) return {};
   return homography_to(corners);
 }

@@ -21,6 +21,7 @@ struct RefinedTag {
   double black_levels = 0;
   double noise_levels = 0;  ///< of flat places, one standard deviation
   double roughness_px = 0;  ///< by which edges are off, one standard deviation
+  double lens_px = 0;       ///< blur of the lens, one standard deviation
   Eigen::Vector2d motion_px = Eigen::Vector2d::Zero();  ///< blur of motion; its sign means nothing
   TagEvidence evidence;  ///< cells and corners, whether usable or not
 };
@@ -36,6 +37,7 @@ struct ExpectedPicture {
 
 /// What is known of a tag before it is refined.
 struct RefineHints {
+  std::optional<double> lens_px;  ///< where tags around it or the picture before tell it
   std::optional<Eigen::Vector2d>
       motion_px;  ///< while the shutter is open, where tags around it tell it
   std::optional<ExpectedPicture> picture;
@@ -55,8 +57,9 @@ struct RefineHints {
 /// weight (Cauchy loss). A hidden corner is therefore placed by the rest of the tag, with the sigma
 /// that this implies; `evidence` says that it is hidden.
 ///
-/// Where the fit does not converge from a sharp picture, it starts from the motion that is known,
-/// or from motion in several directions. Sigma is described at corner_places.
+/// It starts from the blur that is known. Where it does not converge it starts from a sharp
+/// picture, and where no blur is known from motion in several directions. Sigma is described at
+/// corner_places.
 ///
 /// `pixel_from_tag` maps tag coordinates to pixels (pixel (0, 0) is the centre of the top left one)
 /// and must be right to a third of a cell.

@@ -1,8 +1,6 @@
 #include "vision/track/track.h"
 
 #include <fmt/core.h>
-#include <tbb/enumerable_thread_specific.h>
-#include <tbb/info.h>
 #include <tbb/parallel_pipeline.h>
 
 #include <algorithm>
@@ -16,6 +14,7 @@
 #include "vision/ingest/frame_list.h"
 #include "vision/track/missing_markers.h"
 #include "vision/track/tag_history.h"
+#include "vision/track/tag_tracker.h"
 #include "vision/track/track_dots.h"
 #include "vision/track/track_rows.h"
 #include "vision/track/track_texture.h"
@@ -129,8 +128,7 @@ Readings read_all(ImageSource& images, const std::string& where, const MarkerSet
                   const ProgressCallback& progress) {
   Readings readings;
   std::atomic<bool> cancelled = false;
-  tbb::enumerable_thread_specific<TagDetector> detectors([&] { return TagDetector(sheet.family); });
-  const TagLayout layout = layout_of(sheet, markers);
+  TagTracker tracker(sheet.family, layout_of(sheet, markers), listed_tags(markers, reference));
 
   int next = 0;
   const auto load = [&](tbb::flow_control& control) {
@@ -145,8 +143,8 @@ Readings read_all(ImageSource& images, const std::string& where, const MarkerSet
                                              : FramePicture::whole;
     return picture;
   };
-  const auto detect = [&](Picture picture) {
-    if (picture.readable()) picture.tags = detect_on_sheet(detectors.local(), picture.grey, layout);
+  const auto read = [&](Picture picture) {
+    if (picture.readable()) picture.tags = tracker.next(picture.grey, picture.frame);
     return picture;
   };
   const auto collect = [&](const Picture& picture) {
@@ -174,11 +172,12 @@ Readings read_all(ImageSource& images, const std::string& where, const MarkerSet
     if (progress && !progress(report)) cancelled = true;
   };
 
-  const size_t in_flight = 2 * static_cast<size_t>(tbb::info::default_concurrency());
-  tbb::parallel_pipeline(
-      in_flight, tbb::make_filter<void, Picture>(tbb::filter_mode::serial_in_order, load) &
-                     tbb::make_filter<Picture, Picture>(tbb::filter_mode::parallel, detect) &
-                     tbb::make_filter<Picture, void>(tbb::filter_mode::serial_in_order, collect));
+  // The next picture is decoded while the tags of one are read.
+  constexpr size_t kInFlight = 3;
+  constexpr auto kInOrder = tbb::filter_mode::serial_in_order;
+  tbb::parallel_pipeline(kInFlight, tbb::make_filter<void, Picture>(kInOrder, load) &
+                                        tbb::make_filter<Picture, Picture>(kInOrder, read) &
+                                        tbb::make_filter<Picture, void>(kInOrder, collect));
   readings.cancelled = cancelled;
   return readings;
 }

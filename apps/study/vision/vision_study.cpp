@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <tbb/enumerable_thread_specific.h>
 
 #include <algorithm>
 #include <chrono>
@@ -11,6 +10,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 
 #include "apps/study/vision/dot_rows.h"
 #include "apps/study/vision/judge_texture.h"
@@ -20,8 +20,7 @@
 #include "apps/terminal/interrupt.h"
 #include "data/input_error.h"
 #include "data/recording.h"
-#include "fit/jobs/parallel.h"
-#include "vision/detect/tag_layout.h"
+#include "vision/track/tag_tracker.h"
 
 namespace clothfit {
 namespace {
@@ -132,6 +131,7 @@ std::vector<JudgedCamera> judged_cameras(const fs::path& data, MarkerKind kind, 
   return found;
 }
 
+/// Tracks the pictures in order, as `clothfit track` does.
 TagScore score_recording(const JudgedRecording& recording, const Spoil& spoil,
                          const VisionStudyOptions& options) {
   std::vector<size_t> frames;
@@ -139,16 +139,15 @@ TagScore score_recording(const JudgedRecording& recording, const Spoil& spoil,
        frame += static_cast<size_t>(options.stride))
     frames.push_back(frame);
   const std::vector<SpoiledPicture> pictures = spoil(recording, frames, options.seed);
-  tbb::enumerable_thread_specific<TagDetector> detectors(
-      [&] { return TagDetector(recording.family); });
-  std::vector<TagScore> scores(pictures.size());
-  for_each_index(pictures.size(), [&](size_t i) {
-    const SpoiledPicture& picture = pictures[i];
-    const SheetTags tags = detect_on_sheet(detectors.local(), picture.grey, recording.layout);
-    scores[i] = score_tags(tags.read, picture.truth, recording.other_tags, picture.grey.size());
-  });
+  std::set<int> tags = recording.other_tags;
+  for (const auto& [id, corners] : recording.layout) tags.insert(id);
+  TagTracker tracker(recording.family, recording.layout, tags);
   TagScore all;
-  for (const TagScore& score : scores) all.add(score);
+  for (size_t i = 0; i < pictures.size(); ++i) {
+    const SpoiledPicture& picture = pictures[i];
+    const SheetTags read = tracker.next(picture.grey, static_cast<int>(frames[i]));
+    all.add(score_tags(read.read, picture.truth, recording.other_tags, picture.grey.size()));
+  }
   return all;
 }
 

@@ -54,9 +54,17 @@ TEST(BlurredPattern, IsTheErrorFunctionAcrossALongEdge) {
   const BlurredPattern blurred(half, pixel_by_tag,
                                PictureBlur(PictureBlur::unknowns(0.7, Eigen::Vector2d::Zero())));
 
-  for (double x_px = -2; x_px <= 2; x_px += 0.1)
-    EXPECT_NEAR(blurred.at(x_px / 16, 0.1).value, 0.5 * std::erfc(-x_px / 0.7 * M_SQRT1_2), 0.004)
-        << x_px;
+  TagSamples places;
+  places.count = 41;
+  places.x = Eigen::ArrayXf::LinSpaced(TagSamples::kTogether, -2.0F / 16, 4.3F / 16);
+  places.y = Eigen::ArrayXf::Constant(TagSamples::kTogether, 0.1F);
+  places.grey = Eigen::ArrayXf::Zero(TagSamples::kTogether);
+  TagRows rows;
+  evaluate_rows({.grid = blurred.grid(), .contrast = {1, 0, 0}}, places, rows);
+  for (Eigen::Index i = 0; i < places.count; ++i) {
+    const double x_px = 16 * static_cast<double>(places.x[i]);
+    EXPECT_NEAR(rows.white[i], 0.5 * std::erfc(-x_px / 0.7 * M_SQRT1_2), 0.004) << x_px;
+  }
 }
 
 /// Errors of the corners of tags 30 to 40 px wide that move by `length_px` in any direction.

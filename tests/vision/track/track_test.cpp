@@ -371,9 +371,9 @@ TEST(Track, LeavesOutDamagedPicturesAndKeepsTheTimesOfTheOthers) {
 
 TEST(Track, CountsMarkersThatItDidNotFindByReason) {
   DrawnRecording drawn;
-  // Frame 3 hides the tag, 4 is nearly black, 5 has no picture, 6 is damaged. From 10 on the tag,
-  // 40 px wide, is out of the picture of 320.
-  for (int n = 0; n < 12; ++n) {
+  // Frame 3 hides the tag, 4 is nearly black, 5 has no picture, 6 is damaged. The tag, 40 px wide,
+  // is cut by the picture's border in 10 and 11, and out of the picture from 12 on.
+  for (int n = 0; n < 14; ++n) {
     cv::Mat picture = drawn.draw(20 * n - 60, 0);
     if (n == 3) picture.setTo(200);
     if (n == 4) picture *= 0.01;

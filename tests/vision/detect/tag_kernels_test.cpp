@@ -1,0 +1,144 @@
+// Checks the loops over a tag's samples against plain arithmetic: derivatives against differences,
+// sums against dense products, and each instruction set against the others.
+
+#include "vision/detect/tag_kernels.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "tests/model/instruction_sets.h"
+#include "vision/detect/blurred_pattern.h"
+#include "vision/detect/tag_family.h"
+
+namespace clothfit {
+namespace {
+
+constexpr int kUnknowns = 35;
+constexpr double kHalfSide_px = 20;
+
+/// A tag 40 px wide under a model that is off everywhere a little, and its samples.
+struct OddTag {
+  OddTag()
+      : pattern(printed_tag(*make_tag_family("tag36h11"), 3)),
+        blurred(pattern, kHalfSide_px * Eigen::Matrix2d::Identity(),
+                PictureBlur(PictureBlur::unknowns(0.6, {2, 1}))) {
+    std::mt19937_64 rng(5);
+    std::normal_distribution<float> normal;
+    samples.count = 1500;  // not a multiple of what is taken together
+    const Eigen::Index size = 1536;
+    samples.x = samples.y = samples.grey = Eigen::ArrayXf::Zero(size);
+    for (Eigen::Index i = 0; i < samples.count; ++i) {
+      samples.x[i] = static_cast<float>(i % 39 - 19) / 18;
+      samples.y[i] = static_cast<float>(i / 39 - 19) / 18;
+      samples.grey[i] = 120 + 40 * normal(rng);
+    }
+    model.grid = blurred.grid();
+    for (float& one : model.bend_x) one = 0.01F * normal(rng);
+    for (float& one : model.bend_y) one = 0.01F * normal(rng);
+    for (float& one : model.blur_slope) one = 0.1F * normal(rng);
+    model.offset = {40, 3, -2};
+    model.contrast = {150, -4, 5};
+    model.by_blur = {{{4e-4F, 1e-4F, 5e-4F}, {2e-4F, 3e-4F, -1e-4F}, {-3e-4F, 2e-4F, 1e-4F}}};
+    model.tag_by_pixel = {0.05F, 0, 0, 0.05F};
+  }
+
+  TagRows rows(const TagModel& of) const {
+    TagRows result;
+    evaluate_rows(of, samples, result);
+    weigh_rows({.noise_levels = 2, .roughness_px = 0.1F, .loss = 3}, samples, result);
+    return result;
+  }
+
+  TagPattern pattern;
+  BlurredPattern blurred;
+  TagSamples samples;
+  TagModel model;
+};
+
+/// Returns the unknown at a place in the order of TagUnknowns; the blur's own are not in the model.
+float* unknown(TagModel& model, int k) {
+  if (k < 10) return &model.bend_x[static_cast<size_t>(k)];
+  if (k < 20) return &model.bend_y[static_cast<size_t>(k - 10)];
+  if (k < 23) return nullptr;
+  if (k < 29) return &model.blur_slope[static_cast<size_t>(k - 23)];
+  if (k < 32) return &model.offset[static_cast<size_t>(k - 29)];
+  return &model.contrast[static_cast<size_t>(k - 32)];
+}
+
+/// Returns the derivatives of the grey levels by differences.
+Eigen::MatrixXd jacobian(const OddTag& tag) {
+  const TagRows rows = tag.rows(tag.model);
+  Eigen::MatrixXd result(tag.samples.count, kUnknowns);
+  for (int k = 0; k < kUnknowns; ++k) {
+    TagModel up = tag.model, down = tag.model;
+    if (unknown(up, k) == nullptr) {
+      result.col(k) =
+          rows.by_blur[static_cast<size_t>(k - 20)].head(tag.samples.count).cast<double>();
+      continue;
+    }
+    const float step = k < 29 ? 2e-3F : 1.0F;
+    *unknown(up, k) += step;
+    *unknown(down, k) -= step;
+    const double apart = static_cast<double>(*unknown(up, k)) - *unknown(down, k);
+    result.col(k) = ((tag.rows(down).residual - tag.rows(up).residual).head(tag.samples.count) /
+                     static_cast<float>(apart))
+                        .matrix()
+                        .cast<double>();
+  }
+  return result;
+}
+
+TEST(TagKernels, NormalEquationsAreThoseOfTheDerivatives) {
+  const OddTag tag;
+  const TagRows rows = tag.rows(tag.model);
+  const Eigen::MatrixXd by = jacobian(tag);
+  const Eigen::VectorXd weight = rows.weight.head(tag.samples.count).matrix().cast<double>();
+  const Eigen::VectorXd residual = rows.residual.head(tag.samples.count).matrix().cast<double>();
+
+  const NormalEquations equations = normal_equations(tag.samples, rows);
+
+  const Eigen::MatrixXd information = by.transpose() * weight.asDiagonal() * by;
+  const Eigen::VectorXd scale = information.diagonal().cwiseSqrt();
+  EXPECT_LT((equations.information - information)
+                .cwiseQuotient(scale * scale.transpose())
+                .cwiseAbs()
+                .maxCoeff(),
+            3e-3);
+  const Eigen::VectorXd gradient = by.transpose() * weight.cwiseProduct(residual);
+  EXPECT_LT((equations.gradient - gradient).cwiseQuotient(scale).norm(),
+            3e-3 * gradient.cwiseQuotient(scale).norm());
+}
+
+TEST(TagKernels, ResidualSumsAreSharesOfTheDerivatives) {
+  const OddTag tag;
+  const TagRows rows = tag.rows(tag.model);
+  const Eigen::Matrix<float, 35, 16, Eigen::RowMajor> combination =
+      Eigen::Matrix<float, 35, 16>::Random();
+  const Eigen::ArrayXf share = Eigen::ArrayXf::LinSpaced(tag.samples.count, 0.5F, 2);
+
+  const ResidualSums sums = residual_sums(tag.samples, rows, share, combination);
+
+  const Eigen::MatrixXd expected =
+      share.matrix().cast<double>().asDiagonal() * jacobian(tag) * combination.cast<double>();
+  EXPECT_LT((sums.cast<double>() - expected).norm(), 3e-3 * expected.norm());
+}
+
+TEST(TagKernels, GivesTheSameBitsOnEachInstructionSet) {
+  const OddTag tag;
+  const TagRows rows = tag.rows(tag.model);
+  const NormalEquations equations = normal_equations(tag.samples, rows);
+  for (const InstructionSet& set : instruction_sets()) {
+    const OnInstructionSet only(set);
+    const TagRows here = tag.rows(tag.model);
+    EXPECT_TRUE((here.residual == rows.residual).all());
+    EXPECT_TRUE((here.weight == rows.weight).all());
+    EXPECT_TRUE((here.slope == rows.slope).all());
+    const NormalEquations same = normal_equations(tag.samples, here);
+    EXPECT_EQ(same.information, equations.information);
+    EXPECT_EQ(same.gradient, equations.gradient);
+  }
+}
+
+}  // namespace
+}  // namespace clothfit
