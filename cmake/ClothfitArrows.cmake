@@ -61,7 +61,8 @@ set(CLOTHFIT_ARROWS
                            fit/uncertainty fit"
   "apps/terminal        -> data"
   "apps/steps           -> data calib/placement calib/boards vision/ingest vision/detect
-                           vision/track vision/look fit/interface fit/observe apps/terminal"
+                           vision/track vision/look fit/interface fit/observe fit/verdict fit
+                           fit/diagnosis apps/terminal"
   "apps/report/page     -> apps/terminal"
   "apps/report/fit      -> data vision/ingest fit/interface apps/terminal apps/report/page"
   "apps/report/diagnosis -> data fit/problem fit/diagnosis apps/terminal apps/report/page
