@@ -4,15 +4,18 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
 #include <opencv2/imgproc.hpp>
 #include <random>
 
 #include "vision/degrade/brightness.h"
 #include "vision/degrade/displacement_field.h"
 #include "vision/degrade/h264.h"
+#include "vision/degrade/h264_video.h"
 #include "vision/degrade/hand.h"
 #include "vision/degrade/motion_blur.h"
 #include "vision/degrade/shrink.h"
+#include "vision/ingest/open_images.h"
 
 namespace clothfit {
 namespace {
@@ -127,6 +130,31 @@ TEST(H264, LosesMoreAtAHigherRateFactorAndKeepsOrderAndSize) {
     EXPECT_LT(cv::norm(fine[i], pictures[i]), cv::norm(coarse[i], pictures[i]));
     EXPECT_NEAR(moments(cv::Mat(fine[i] > 100)).mean.x(), 20 + 4 * static_cast<double>(i), 0.5);
   }
+}
+
+TEST(H264Video, HoldsTheTimesOfItsPicturesAndWhatTheCodecLeavesOfThem) {
+  std::vector<cv::Mat> pictures;
+  std::vector<double> times_s;
+  for (const int frame : {0, 1, 3, 4, 8, 9}) {
+    pictures.push_back(spot(20 + 2 * frame, 30));
+    times_s.push_back(frame / 60.0);
+  }
+  const std::filesystem::path file =
+      std::filesystem::path(testing::TempDir()) / "h264_video_test.mp4";
+
+  write_h264_video(pictures, times_s, 18, file);
+
+  const auto video = open_images(file);
+  const std::vector<double> read_s = video->times_s();
+  ASSERT_EQ(read_s.size(), times_s.size());
+  cv::Mat grey;
+  for (size_t i = 0; i < pictures.size(); ++i) {
+    EXPECT_NEAR(read_s[i], times_s[i], 1e-9);  // 1/60 s is 1500 ticks
+    ASSERT_TRUE(video->next(grey));
+    EXPECT_NEAR(moments(cv::Mat(grey > 100)).mean.x(), moments(cv::Mat(pictures[i] > 100)).mean.x(),
+                0.5);
+  }
+  std::filesystem::remove(file);
 }
 
 }  // namespace
