@@ -47,6 +47,10 @@ struct Mean {
 
 }  // namespace
 
+double mean_square_to_nearest_m2(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to) {
+  return mean_square_to_nearest(points_of(from), Tree(points_of(to)));
+}
+
 double chamfer_distance_m2(const Eigen::Matrix3Xd& a, const Eigen::Matrix3Xd& b) {
   const std::vector<Point> first = points_of(a), second = points_of(b);
   return mean_square_to_nearest(first, Tree(second)) + mean_square_to_nearest(second, Tree(first));

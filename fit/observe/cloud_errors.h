@@ -9,6 +9,10 @@
 
 namespace clothfit {
 
+/// Returns the mean squared distance (m²) from each point of one set to the nearest of another, 3 x
+/// n, neither empty.
+double mean_square_to_nearest_m2(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to);
+
 /// Returns the Chamfer distance (m²) of two sets of points, 3 x n, neither empty. It adds the mean
 /// squared distances from each point to the nearest of the other set, there and back.
 /// Reconstructions of cloth from one camera are judged by it [kairanda2022].

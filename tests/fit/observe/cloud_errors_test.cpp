@@ -27,6 +27,8 @@ TEST(ChamferDistance, CountsBothWays) {
   second(0, 1) = 2;
   EXPECT_NEAR(chamfer_distance_m2(first, second), 4.0 / 2, 1e-12);
   EXPECT_NEAR(chamfer_distance_m2(second, first), 4.0 / 2, 1e-12);
+  EXPECT_EQ(mean_square_to_nearest_m2(first, second), 0);
+  EXPECT_NEAR(mean_square_to_nearest_m2(second, first), 4.0 / 2, 1e-12);
 }
 
 class CloudsOfASheet : public testing::Test {
