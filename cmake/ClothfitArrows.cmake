@@ -81,8 +81,9 @@ set(CLOTHFIT_ARROWS
                             apps/report/fit"
   "apps/study/foreign   -> data fit/jobs fit/diagnosis apps/terminal apps/steps
                            apps/study/recordings"
-  "apps/study/vision    -> data vision/degrade vision/ingest vision/detect vision/track
-                           vision/render fit/jobs apps/terminal"
+  "apps/study/vision    -> data calib/camera vision/degrade vision/ingest vision/detect vision/track
+                           vision/render model/topology fit/interface fit/jobs fit/observe
+                           fit/diagnosis apps/terminal apps/steps"
   "apps/report/study    -> data vision/track apps/terminal apps/report/page apps/report/fit
                            apps/study/trials apps/study/louchet1995 apps/study/recordings
                            apps/study/foreign apps/study/vision"

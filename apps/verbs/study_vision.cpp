@@ -3,10 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <iterator>
 #include <memory>
 #include <nlohmann/json.hpp>
 
 #include "apps/report/study/vision_tables.h"
+#include "apps/study/vision/chain_study.h"
 #include "apps/study/vision/vision_study.h"
 #include "apps/terminal/csv_table.h"
 #include "apps/terminal/exit_code.h"
@@ -45,26 +47,42 @@ nlohmann::ordered_json targets_json(const std::vector<VisionTarget>& targets,
   return json;
 }
 
+/// Throws NoResult where every row has a reason, or none is there.
+void require_measured(const std::vector<VisionResult>& results,
+                      const std::vector<ChainResult>& chains) {
+  std::vector<std::string> reasons;
+  for (const VisionResult& one : results) reasons.push_back(one.reason);
+  for (const ChainResult& one : chains) reasons.push_back(one.reason);
+  if (std::ranges::none_of(reasons, &std::string::empty))
+    throw NoResult("nothing could be measured: " +
+                   (reasons.empty() ? "no set is there" : reasons.front()));
+}
+
 int run_vision_study(const VisionFlags& flags, const std::string& command) {
   flags.options.validate();
   OutputFolder out(out_folder(flags.out, kVisionFolder));
   const ThreadLimit limit(flags.threads);
+  const fs::path steps = out.path() / "steps";
   std::vector<VisionResult> results;
+  std::vector<ChainResult> chains;
   {
     ProgressLine line;
     results = study_vision(flags.options, watch(line));
+    chains = study_chain(flags.options, steps, watch(line));
   }
-  const std::vector<VisionTarget> targets = vision_targets(results);
+  fs::remove_all(steps);
+  std::vector<VisionTarget> targets = vision_targets(results);
+  std::ranges::move(chain_targets(chains), std::back_inserter(targets));
   write_csv_table(vision_table(results), out.path() / "vision.csv");
+  write_csv_table(chain_table(chains), out.path() / "chain.csv");
   write_json(targets_json(targets, command), out.path() / "targets.json");
-  write_text(vision_page_html(results, targets, command), out.path() / "report.html");
+  write_text(vision_page_html(results, chains, targets, command), out.path() / "report.html");
   out.publish();
-  fmt::print("\n{}\n{}\n", text_table(short_vision_table(results)),
-             text_table(vision_target_table(targets)));
+  if (!results.empty()) fmt::print("\n{}", text_table(short_vision_table(results)));
+  if (!chains.empty()) fmt::print("\n{}", text_table(short_chain_table(chains)));
+  fmt::print("\n{}\n", text_table(vision_target_table(targets)));
   fmt::print("Report: {}\n", shown_path(out.final_path() / "report.html"));
-  if (std::ranges::none_of(results, [](const VisionResult& one) { return one.reason.empty(); }))
-    throw NoResult("nothing could be measured: " +
-                   (results.empty() ? "no set is there" : results.front().reason));
+  require_measured(results, chains);
   return kExitGood;
 }
 
@@ -84,7 +102,8 @@ void add_vision_study(Verb study) {
   verb.add_option("--stride", &flags->options.stride,
                   "Every so many-th picture of a recording is judged")
       .shows_default();
-  verb.add_option("--seed", &flags->options.seed, "Seed of noise, hands and textures")
+  verb.add_option("--seed", &flags->options.seed,
+                  "Seed of noise, hands, textures and lost pictures")
       .check(check_seed)
       .shows_default();
   verb.add_option("--threads", &flags->threads, "Threads; 0 for as many as the machine has")
@@ -92,8 +111,11 @@ void add_vision_study(Verb study) {
       .shapes_no_result();
   add_out_option(verb, flags->out, kVisionFolder);
   verb.footer(
-      "Example:\n"
-      "  clothfit study vision data --rows stills --rows blur6");
+      "Rows chain_tags, chain_dots and chain_cloth go on to a fit, and take some minutes in all.\n"
+      "\n"
+      "Examples:\n"
+      "  clothfit study vision data --rows stills --rows blur6\n"
+      "  clothfit study vision data --rows chain_tags");
   verb.runs([flags, verb] { return run_vision_study(*flags, verb.command_text()); });
 }
 

@@ -29,7 +29,31 @@ Table results_table(const std::vector<VisionResult>& results, const NumberText& 
   return table;
 }
 
+Table numbers_table(const std::vector<ChainResult>& results, const NumberText& text) {
+  Table table{{"row", "set", "number", "value", "sigma", "over_sigma", "unit", "verdict", "seconds",
+               "reason"},
+              {}};
+  for (const ChainResult& result : results) {
+    const auto add = [&](const ChainNumber& number) {
+      table.rows.push_back({result.row, result.set, number.name, text(number.value),
+                            text(number.sigma), text(number.over_sigma), number.unit,
+                            result.verdict, text(result.seconds), result.reason});
+    };
+    for (const ChainNumber& number : result.numbers) add(number);
+    if (result.numbers.empty()) add({});
+  }
+  return table;
+}
+
 }  // namespace
+
+Table short_chain_table(const std::vector<ChainResult>& results) {
+  return numbers_table(results, [](double value) { return significant(value, 4); });
+}
+
+Table chain_table(const std::vector<ChainResult>& results) {
+  return numbers_table(results, exact_text);
+}
 
 Table short_vision_table(const std::vector<VisionResult>& results) {
   return results_table(results, [](double value) { return significant(value, 4); });
@@ -48,16 +72,22 @@ Table vision_target_table(const std::vector<VisionTarget>& targets) {
 }
 
 std::string vision_page_html(const std::vector<VisionResult>& results,
+                             const std::vector<ChainResult>& chains,
                              const std::vector<VisionTarget>& targets, const std::string& command) {
   std::string body =
       fmt::format("<h1>What is read of spoiled pictures</h1>\n<p class=\"meta\">clothfit {}</p>\n",
                   escape_xml(program_version()));
   body += html_table(vision_target_table(targets), "Targets, recordings together.");
-  body += "<div class=\"wide\">\n" +
-          html_table(short_vision_table(results),
-                     "Accepted corners against the truth. Errors are distances; error over sigma "
-                     "is per coordinate, robust from the median.") +
-          "</div>\n";
+  const auto add_wide = [&](const Table& table, const std::string& caption) {
+    if (!table.rows.empty())
+      body += "<div class=\"wide\">\n" + html_table(table, caption) + "</div>\n";
+  };
+  add_wide(short_vision_table(results),
+           "Accepted corners against the truth. Errors are distances; error over sigma is per "
+           "coordinate, robust from the median.");
+  add_wide(short_chain_table(chains),
+           "From pictures to a fit. Over sigma is the difference from the fit to stills, over the "
+           "standard deviation of that difference.");
   body += fmt::format("<h2>Do it again</h2>\n<pre>{}</pre>\n", escape_xml(command));
   return html_page("clothfit: what is read of spoiled pictures", body);
 }

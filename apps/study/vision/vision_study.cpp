@@ -7,11 +7,13 @@
 #include <chrono>
 #include <cmath>
 #include <functional>
+#include <iterator>
 #include <map>
 #include <memory>
 #include <optional>
 #include <set>
 
+#include "apps/study/vision/chain_rows.h"
 #include "apps/study/vision/dot_rows.h"
 #include "apps/study/vision/judge_texture.h"
 #include "apps/study/vision/photo_sets.h"
@@ -232,6 +234,7 @@ const std::vector<VisionRow>& vision_rows() {
     for (const PhotoRow& one : photo_rows()) all.push_back(one.row);
     for (const DotRow& one : dot_rows()) all.push_back(one.row);
     for (const ClothRow& one : cloth_rows()) all.push_back(one.row);
+    std::ranges::copy(chain_rows(), std::back_inserter(all));
     return all;
   }();
   return rows;

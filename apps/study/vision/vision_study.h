@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "apps/study/vision/tag_score.h"
+#include "apps/study/vision/vision_row.h"
 #include "data/progress.h"
 
 namespace clothfit {
@@ -14,15 +15,11 @@ struct VisionStudyOptions {
   std::filesystem::path data;     ///< folder with recordings/ and vision/ in it
   std::vector<std::string> rows;  ///< names of vision_rows(); empty: all
   int stride = 4;                 ///< >= 1: every so many-th picture of a recording is judged
-  unsigned long long seed = 1;    ///< of noise, hands and textures
+  unsigned long long seed = 1;    ///< of noise, hands, textures and lost pictures
   void validate() const;          ///< throws InputError
 };
 
-/// One line of the study: a way to spoil pictures, or a set of pictures.
-struct VisionRow {
-  std::string name;  ///< for --rows
-  std::string what;
-};
+/// Returns all rows, those that chain_study.h measures at the end.
 const std::vector<VisionRow>& vision_rows();
 
 /// What was measured for one row in one recording or set.
@@ -44,9 +41,10 @@ struct VisionTarget {
   std::string note;
 };
 
-/// Measures the rows, in the order of vision_rows(). Sets that are not below `data` have their
-/// reason. Pictures are worked on in parallel; the result does not depend on the number of threads.
-/// Throws InputError for options that make no sense, Cancelled when `progress` asks to stop.
+/// Measures the rows that read pictures, in the order of vision_rows(). Sets that are not below
+/// `data` have their reason. Pictures are worked on in parallel; the result does not depend on the
+/// number of threads. Throws InputError for options that make no sense, Cancelled when `progress`
+/// asks to stop.
 std::vector<VisionResult> study_vision(const VisionStudyOptions& options,
                                        const ProgressCallback& progress);
 
