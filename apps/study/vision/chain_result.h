@@ -27,7 +27,4 @@ struct ChainResult {
   double seconds = 0;
 };
 
-/// Returns the value of that name; NaN where there is none.
-double value_of(const std::vector<ChainNumber>& numbers, const std::string& name);
-
 }  // namespace clothfit

@@ -1,11 +1,15 @@
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "apps/study/vision/chain_result.h"
 #include "data/fit_result.h"
 
 namespace clothfit {
+
+/// Returns the value of that name; NaN where there is none.
+double value_of(const std::vector<ChainNumber>& numbers, const std::string& name);
 
 /// Returns what a fit found of the cloth: its parameters and those of effects (EFFECT.PARAMETER)
 /// that were fitted, with their sigma.
