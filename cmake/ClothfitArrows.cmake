@@ -19,6 +19,7 @@ set(CLOTHFIT_ARROWS
   "calib/placement      -> data/algebra data calib/camera calib/bundle"
   "calib/boards         -> data calib/camera calib/bundle calib/placement"
   "vision/degrade       -> data"
+  "vision/encode        -> data"
   "vision/ingest        -> data"
   "vision/detect        -> data"
   "vision/texture       -> data calib/camera vision/detect"
@@ -60,14 +61,15 @@ set(CLOTHFIT_ARROWS
                            fit/measurement_effects fit/problem fit/cost fit/refine
                            fit/uncertainty fit"
   "apps/terminal        -> data"
-  "apps/steps           -> data calib/placement calib/boards vision/ingest vision/detect
-                           vision/track vision/look fit/interface fit/observe fit/verdict fit
-                           fit/diagnosis apps/terminal"
+  "apps/steps           -> data calib/placement calib/boards vision/encode vision/ingest
+                           vision/detect vision/track vision/look fit/interface fit/observe
+                           fit/verdict fit fit/diagnosis apps/terminal"
   "apps/report/page     -> apps/terminal"
-  "apps/report/fit      -> data vision/ingest fit/interface apps/terminal apps/report/page"
+  "apps/report/fit      -> data vision/encode vision/ingest fit/interface apps/terminal
+                           apps/report/page"
   "apps/report/diagnosis -> data fit/problem fit/diagnosis apps/terminal apps/report/page
                            apps/report/fit"
-  "apps/study/scene     -> data/algebra data calib/camera vision/track vision/render
+  "apps/study/scene     -> data/algebra data calib/camera vision/encode vision/track vision/render
                            model/topology model/fabric model/cloth model/effects
                            model/integrate fit/jobs fit/measurement_effects fit/problem fit
                            fit/diagnosis"
@@ -87,7 +89,7 @@ set(CLOTHFIT_ARROWS
   "apps/report/study    -> data vision/track apps/terminal apps/report/page apps/report/fit
                            apps/study/trials apps/study/louchet1995 apps/study/recordings
                            apps/study/foreign apps/study/vision"
-  "apps/verbs           -> data vision/detect vision/track vision/look vision/print
+  "apps/verbs           -> data vision/encode vision/detect vision/track vision/look vision/print
                            model/topology model/fabric model/cloth model/effects model/integrate
                            fit/interface fit/jobs fit/measurement_effects
                            fit/problem fit/preflight fit/verdict fit fit/diagnosis apps/terminal

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
-#include <opencv2/imgcodecs.hpp>
 #include <utility>
 
 #include "apps/steps/picture_size.h"
@@ -14,6 +13,7 @@
 #include "data/camera_parameters.h"
 #include "data/input_error.h"
 #include "data/recording_parts.h"
+#include "vision/encode/encode_picture.h"
 #include "vision/ingest/footage.h"
 
 namespace clothfit {
@@ -177,12 +177,8 @@ TrackStepResult track_step(const Recording& recording, const std::vector<std::st
     if (older != step.recording.tracks2d.end()) fs::remove(older->second);
     write_tracks2d(tracks.result.tracks, step.recording.markers, file);
     step.recording.tracks2d[camera.name] = file;
-    if (!tracks.result.overlay.empty()) {
-      const fs::path overlay = folder / fmt::format("overlay_{}.png", camera.name);
-      if (!cv::imwrite(overlay.string(), tracks.result.overlay))
-        throw InputError(overlay.string(), "cannot be written",
-                         "a writable place with room on its disk");
-    }
+    if (!tracks.result.overlay.empty())
+      write_png(tracks.result.overlay, folder / fmt::format("overlay_{}.png", camera.name));
     json["cameras"].push_back(to_json(tracks));
     step.cameras.push_back(std::move(tracks));
   }

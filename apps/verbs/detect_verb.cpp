@@ -6,7 +6,6 @@
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <opencv2/imgcodecs.hpp>
 #include <set>
 
 #include "apps/terminal/csv_table.h"
@@ -19,9 +18,9 @@
 #include "apps/verbs/seen_summary.h"
 #include "apps/verbs/verb.h"
 #include "data/finding_json.h"
-#include "data/input_error.h"
 #include "data/output_folder.h"
 #include "fit/jobs/thread_limit.h"
+#include "vision/encode/encode_picture.h"
 
 namespace clothfit {
 namespace {
@@ -78,12 +77,8 @@ Table detections(const LookResult& result) {
 void write_results(const LookResult& result, const SeenSummary& summary, const fs::path& folder) {
   write_csv_table(detections(result), folder / "detections.csv");
   write_json(to_json(result, summary), folder / "detect.json");
-  for (const Overlay& overlay : result.overlays) {
-    const fs::path file = folder / fmt::format("overlay_{:06}.png", overlay.frame);
-    if (!cv::imwrite(file.string(), overlay.picture))
-      throw InputError(file.string(), "cannot be written",
-                       "a writable place with room on its disk");
-  }
+  for (const Overlay& overlay : result.overlays)
+    write_png(overlay.picture, folder / fmt::format("overlay_{:06}.png", overlay.frame));
 }
 
 int run_detect(const DetectVerbOptions& options) {

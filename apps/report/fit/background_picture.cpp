@@ -2,10 +2,11 @@
 
 #include <algorithm>
 #include <map>
-#include <opencv2/imgcodecs.hpp>
+#include <opencv2/core.hpp>
 #include <optional>
 
 #include "data/input_error.h"
+#include "vision/encode/encode_picture.h"
 #include "vision/ingest/footage.h"
 
 namespace clothfit {
@@ -21,13 +22,11 @@ std::optional<BackgroundPicture> read_picture(const std::string& kind, const Rec
       if (!source.next(grey)) return std::nullopt;
     } while (source.frame() < frame);
     if (source.frame() > frame || !source.damage().empty()) return std::nullopt;
-    std::vector<unsigned char> bytes;
-    if (!cv::imencode(".jpg", grey, bytes, {cv::IMWRITE_JPEG_QUALITY, 80})) return std::nullopt;
     return BackgroundPicture{.kind = kind,
                              .frame = frame,
                              .width = grey.cols,
                              .height = grey.rows,
-                             .jpeg = std::string(bytes.begin(), bytes.end())};
+                             .jpeg = encode_jpeg(grey, 80)};
   } catch (const InputError&) {
     return std::nullopt;
   }

@@ -6,13 +6,13 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <opencv2/imgcodecs.hpp>
 #include <vector>
 
 #include "calib/camera/projection.h"
 #include "data/input_error.h"
 #include "fit/jobs/draws.h"
 #include "model/topology/surface.h"
+#include "vision/encode/encode_picture.h"
 #include "vision/render/render_cloth.h"
 #include "vision/render/true_markers.h"
 #include "vision/track/track.h"
@@ -344,9 +344,7 @@ std::string rendered_picture_png(const SyntheticScene& scene, const PictureOptio
                                  std::uint64_t seed, int camera, int frame) {
   options.validate(scene);
   const Stage stage(scene, options, seed);
-  std::vector<unsigned char> bytes;
-  cv::imencode(".png", stage.picture(stage.rays(camera), camera, frame), bytes);
-  return {bytes.begin(), bytes.end()};
+  return encode_png(stage.picture(stage.rays(camera), camera, frame));
 }
 
 }  // namespace clothfit
