@@ -7,12 +7,12 @@
 #include <filesystem>
 #include <fstream>
 #include <opencv2/core.hpp>
-#include <opencv2/imgcodecs.hpp>
 
 #include "data/camera_parameters.h"
 #include "tests/apps/bundled_recordings.h"
 #include "tests/apps/program_run.h"
 #include "tests/apps/scratch_folder.h"
+#include "vision/encode/encode_picture.h"
 
 namespace clothfit {
 namespace {
@@ -55,7 +55,7 @@ std::string picture_recording(const std::string& camera,
 
 void write_grey_picture(const fs::path& file, int width, int height) {
   fs::create_directories(file.parent_path());
-  ASSERT_TRUE(cv::imwrite(file.string(), cv::Mat(height, width, CV_8UC1, cv::Scalar(128))));
+  write_png(cv::Mat(height, width, CV_8UC1, cv::Scalar(128)), file);
 }
 
 /// A folder to run in, with a recording beside it that a test spoils.

@@ -5,13 +5,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "data/input_error.h"
 #include "tests/data/temporary_folder.h"
 #include "tests/vision/synthetic_tag.h"
 #include "vision/detect/board_search.h"
+#include "vision/encode/encode_picture.h"
+#include "vision/ingest/decode_picture.h"
 #include "vision/look/sheet_match.h"
 #include "vision/print/draw_sheet.h"
 
@@ -55,7 +56,7 @@ cv::Mat board(int columns, int rows, double field_px, cv::Size size) {
 
 void write_pictures(const TemporaryFolder& folder, const std::vector<cv::Mat>& pictures) {
   for (size_t n = 0; n < pictures.size(); ++n)
-    cv::imwrite((folder / (std::to_string(n) + ".png")).string(), pictures[n]);
+    write_png(pictures[n], folder / (std::to_string(n) + ".png"));
 }
 
 TEST(Look, FindsTheFamilyAndTheTagsOfEveryPicture) {
@@ -104,7 +105,7 @@ TEST(Look, FindsABoardWhoseSizeItWasNotTold) {
 cv::Mat drawn_dots(const PrintedSheet& sheet, double pixels_per_metre, int quarter_turns) {
   const TemporaryFolder folder;
   write_sheet_png(sheet, {.dots_per_inch = pixels_per_metre * 0.0254}, folder / "a.png");
-  cv::Mat picture = cv::imread((folder / "a.png").string(), cv::IMREAD_GRAYSCALE);
+  cv::Mat picture = decode_picture(folder / "a.png").grey;
   cv::copyMakeBorder(picture, picture, 30, 30, 30, 30, cv::BORDER_CONSTANT, cv::Scalar(255));
   for (int turn = 0; turn < quarter_turns; ++turn)
     cv::rotate(picture, picture, cv::ROTATE_90_CLOCKWISE);

@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <map>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "data/input_error.h"
@@ -12,6 +11,7 @@
 #include "tests/data/temporary_folder.h"
 #include "vision/detect/board_search.h"
 #include "vision/detect/tag_detector.h"
+#include "vision/ingest/decode_picture.h"
 #include "vision/print/draw_sheet.h"
 #include "vision/track/dot_tracks.h"
 
@@ -26,7 +26,7 @@ constexpr double kPixelsPerMetre = kDotsPerInch / 0.0254;
 cv::Mat printed(const PrintedSheet& sheet, bool mirrored = false) {
   const TemporaryFolder folder;
   write_sheet_png(sheet, {.mirrored = mirrored, .dots_per_inch = kDotsPerInch}, folder / "a.png");
-  cv::Mat picture = cv::imread((folder / "a.png").string(), cv::IMREAD_GRAYSCALE);
+  cv::Mat picture = decode_picture(folder / "a.png").grey;
   cv::GaussianBlur(picture, picture, {}, 1);  // as a lens does
   return picture;
 }

@@ -5,11 +5,11 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <opencv2/imgcodecs.hpp>
 
 #include "data/recording.h"
 #include "tests/data/temporary_folder.h"
 #include "tests/vision/tag_sheet.h"
+#include "vision/encode/encode_picture.h"
 #include "vision/render/render_cloth.h"
 #include "vision/render/true_markers.h"
 #include "vision/track/track.h"
@@ -52,8 +52,8 @@ TEST(RenderedTrack, FindsTheMarkersOfASwingingSheetWithinTheStatedSigma) {
   int seen = 0;
   for (int frame = 0; frame < kFrames; ++frame) {
     const std::vector<std::vector<PlacedSheet>> instants = {{swinging(print, frame)}};
-    cv::imwrite((folder / ("frames/" + std::to_string(100 + frame) + ".png")).string(),
-                render_cloth(rays, instants, options, seed + static_cast<std::uint64_t>(frame)));
+    write_png(render_cloth(rays, instants, options, seed + static_cast<std::uint64_t>(frame)),
+              folder / ("frames/" + std::to_string(100 + frame) + ".png"));
     truth.push_back(true_markers(camera, instants[0], 0, recording.markers.markers));
     for (const TrueMarker& marker : truth.back()) seen += marker.sight == MarkerSight::seen;
   }

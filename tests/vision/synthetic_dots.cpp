@@ -1,11 +1,15 @@
 #include "tests/vision/synthetic_dots.h"
 
+#include <turbojpeg.h>
+
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <opencv2/imgcodecs.hpp>
+#include <memory>
 #include <opencv2/imgproc.hpp>
+
+#include "vision/encode/encode_picture.h"
 
 namespace clothfit {
 namespace {
@@ -63,6 +67,16 @@ cv::Mat blur_motion(const cv::Mat& fine, const Eigen::Vector2d& motion_px) {
   return sum;
 }
 
+cv::Mat through_jpeg(const cv::Mat& grey, int quality) {
+  const std::string bytes = encode_jpeg(grey, quality);
+  cv::Mat decoded(grey.size(), CV_8UC1);
+  const std::unique_ptr<void, int (*)(tjhandle)> decoder(tjInitDecompress(), tjDestroy);
+  tjDecompress2(decoder.get(), reinterpret_cast<const unsigned char*>(bytes.data()),
+                static_cast<unsigned long>(bytes.size()), decoded.data, decoded.cols,
+                static_cast<int>(decoded.step), decoded.rows, TJPF_GRAY, 0);
+  return decoded;
+}
+
 }  // namespace
 
 cv::Mat render(const SyntheticDotPicture& picture, std::mt19937_64& rng) {
@@ -82,12 +96,7 @@ cv::Mat render(const SyntheticDotPicture& picture, std::mt19937_64& rng) {
       grey.at<std::uint8_t>(v, u) =
           static_cast<std::uint8_t>(std::lround(std::clamp(level, 0.0, 255.0)));
     }
-  if (picture.jpeg_quality > 0) {
-    std::vector<std::uint8_t> bytes;
-    cv::imencode(".jpg", grey, bytes, {cv::IMWRITE_JPEG_QUALITY, picture.jpeg_quality});
-    grey = cv::imdecode(bytes, cv::IMREAD_GRAYSCALE);
-  }
-  return grey;
+  return picture.jpeg_quality > 0 ? through_jpeg(grey, picture.jpeg_quality) : grey;
 }
 
 SyntheticDot tilted_dot(const Eigen::Vector2d& centre_px, double radius_px, double tilt,

@@ -144,7 +144,7 @@ TEST(DecodePicture, RefusesTheInksOfAPrint) {
 
 TEST(DecodePicture, SaysThatAFileIsAVideoOrEmpty) {
   const TemporaryFolder folder;
-  folder.write("film.jpg", std::string("\0\0\0\x18", 4) + "ftypmp42 and so on");
+  folder.write("film.jpg", std::string("\0\0\0\030ftypmp42 and so on", 22));
   EXPECT_THAT(decode_picture(folder / "film.jpg").damage, testing::HasSubstr("holds a video"));
   folder.write("none.png", "");
   EXPECT_THAT(decode_picture(folder / "none.png").damage, testing::HasSubstr("empty"));

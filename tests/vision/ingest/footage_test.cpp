@@ -5,11 +5,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <opencv2/imgcodecs.hpp>
-
 #include "data/input_error.h"
 #include "tests/data/temporary_folder.h"
 #include "tests/vision/ingest/written_video.h"
+#include "vision/encode/encode_picture.h"
 
 namespace clothfit {
 namespace {
@@ -35,8 +34,8 @@ class Footages {
   void add_folder(const std::string& name, const std::vector<int>& numbers) {
     std::filesystem::create_directory(folder_ / name);
     for (const int number : numbers)
-      cv::imwrite((folder_ / name / (std::to_string(number) + ".png")).string(),
-                  cv::Mat(32, 48, CV_8UC1, cv::Scalar(40.0 + number)));
+      write_png(cv::Mat(32, 48, CV_8UC1, cv::Scalar(40.0 + number)),
+                folder_ / name / (std::to_string(number) + ".png"));
     add(name, folder_ / name);
   }
   Recording& recording() { return recording_; }

@@ -9,11 +9,11 @@
 
 #include <fstream>
 #include <numeric>
-#include <opencv2/imgcodecs.hpp>
 
 #include "data/input_error.h"
 #include "tests/data/temporary_folder.h"
 #include "tests/vision/drawn_texture.h"
+#include "vision/encode/encode_picture.h"
 #include "vision/track/track.h"
 
 namespace clothfit {
@@ -35,7 +35,7 @@ class TextureRecording : public ::testing::Test {
           },
           1, 40 + static_cast<std::uint64_t>(frame),
           [&](const auto&, double level) { return frame == 2 ? 0 : level; });
-      cv::imwrite((folder_ / fmt::format("frames/{}.png", frame)).string(), picture);
+      write_png(picture, folder_ / fmt::format("frames/{}.png", frame));
     }
     recording_.folder = folder_.path();
     recording_.frame_rate_hz = 60;
@@ -98,7 +98,7 @@ TEST_F(TextureRecording, IsRefusedWithoutAWholePictureOfFrame0) {
 }
 
 TEST_F(TextureRecording, IsRefusedWithoutTexture) {
-  cv::imwrite((folder_ / "frames/0.png").string(), cv::Mat(100, 110, CV_8UC1, cv::Scalar(130)));
+  write_png(cv::Mat(100, 110, CV_8UC1, cv::Scalar(130)), folder_ / "frames/0.png");
   expect_refusal_of("no marker has enough texture around it in the picture of frame 0");
 }
 

@@ -11,7 +11,6 @@
 #include <cmath>
 #include <functional>
 #include <map>
-#include <opencv2/imgcodecs.hpp>
 #include <random>
 #include <set>
 
@@ -21,6 +20,7 @@
 #include "data/input_error.h"
 #include "tests/data/temporary_folder.h"
 #include "tests/vision/synthetic_tag.h"
+#include "vision/encode/encode_picture.h"
 #include "vision/track/rejection.h"
 
 namespace clothfit {
@@ -88,8 +88,7 @@ class DrawnRecording {
   Recording& recording() { return recording_; }
 
   void add(const cv::Mat& picture) {
-    cv::imwrite((folder_ / ("frames/" + std::to_string(100 + count_++) + ".png")).string(),
-                picture);
+    write_png(picture, folder_ / ("frames/" + std::to_string(100 + count_++) + ".png"));
   }
   /// Draws a 40 px tag off the middle by `shift_px`.
   cv::Mat draw(double shift_u_px, double shift_v_px, int id = 7,
