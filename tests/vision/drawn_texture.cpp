@@ -9,22 +9,20 @@ namespace clothfit {
 DrawnTexture::DrawnTexture(std::uint64_t seed) {
   std::mt19937_64 generator(seed);
   std::uniform_real_distribution<double> uniform(0, 1);
-  constexpr int kWaves = 40;
   for (int k = 0; k < kWaves; ++k) {
     const double length_px = 5 * std::pow(5, uniform(generator));
     const double angle = 2 * M_PI * uniform(generator);
-    waves_.push_back(
-        {.per_px = 2 * M_PI / length_px * Eigen::Vector2d(std::cos(angle), std::sin(angle)),
-         .phase = 2 * M_PI * uniform(generator),
-         .levels = 6});
+    const double per_px = 2 * M_PI / length_px;
+    per_px_u_[k] = static_cast<float>(per_px * std::cos(angle));
+    per_px_v_[k] = static_cast<float>(per_px * std::sin(angle));
+    phase_[k] = static_cast<float>(2 * M_PI * uniform(generator));
   }
 }
 
 double DrawnTexture::level(const Eigen::Vector2d& place_px) const {
-  double level = 130;
-  for (const Wave& wave : waves_)
-    level += wave.levels * std::sin(wave.per_px.dot(place_px) + wave.phase);
-  return std::clamp(level, 50.0, 210.0);
+  const Eigen::Vector2f place = place_px.cast<float>();
+  const float sum = (per_px_u_ * place.x() + per_px_v_ * place.y() + phase_).sin().sum();
+  return std::clamp(130 + 6 * static_cast<double>(sum), 50.0, 210.0);
 }
 
 cv::Mat DrawnTexture::draw(
