@@ -147,7 +147,7 @@ TEST(Fit, GivesTheSameBitsForAnyNumberOfThreads) {
 
 TEST(Fit, ForecastsAnotherReleaseWithoutFittingIt) {
   // Given a fit, and another recording of the same cloth with noise of its own
-  const FitReport fitted = fit(synthetic_input({}), quick(), {});
+  const FitReport fitted = fit(synthetic_input({}), {.start = named(SyntheticCloth().fabric)}, {});
   ASSERT_TRUE(fitted.usable());
   FitOptions options;
   options.forecast = fitted.result;

@@ -24,7 +24,10 @@ TEST(ClockOffset, IsFoundWhereItWasPlantedAndMendsTheFit) {
   // Given frames that show the cloth 7 ms after their time, 0.4 of a frame interval
   constexpr double kTrue = 7e-3;
   const FitInput input = synthetic_input({.clock_offset_s = kTrue});
-  FitOptions options{.effects = {"clock_offset"}, .mesh_columns = 9, .mesh_rows = 9};
+  FitOptions options{.effects = {"clock_offset"},
+                     .mesh_columns = 9,
+                     .mesh_rows = 9,
+                     .start = named(SyntheticCloth{}.fabric)};
 
   const FitReport report = fit(input, options, {});
 
@@ -54,7 +57,8 @@ TEST(ClockOffset, IsHeldByAPriorThatSaysMoreThanTheData) {
           {.effects = {"clock_offset"},
            .priors = {{.name = "clock_offset.time", .mean = kMean, .sigma = 1e-7}},
            .mesh_columns = 9,
-           .mesh_rows = 9},
+           .mesh_rows = 9,
+           .start = named(SyntheticCloth{}.fabric)},
           {});
 
   ASSERT_TRUE(report.usable()) << report.message;

@@ -18,8 +18,12 @@ TEST(Scale, IsFoundWhereItWasPlanted) {
   constexpr double kTrue = 1.02;
   const FitInput input = synthetic_input({.scale = kTrue});
 
-  const FitReport report =
-      fit(input, {.effects = {"scale"}, .mesh_columns = 9, .mesh_rows = 9}, {});
+  const FitReport report = fit(input,
+                               {.effects = {"scale"},
+                                .mesh_columns = 9,
+                                .mesh_rows = 9,
+                                .start = named(SyntheticCloth{}.fabric)},
+                               {});
 
   ASSERT_TRUE(report.usable()) << report.message;
   const auto found =
@@ -34,7 +38,8 @@ TEST(Scale, ThatIsDeclaredIsTakenOutAndToldInTheResult) {
   FitInput input = synthetic_input({.scale = 1.02});
   input.recording.declared = {{.name = "scale", .parameters = {{"factor", {1.02}}}}};
 
-  const FitReport report = fit(input, {.mesh_columns = 9, .mesh_rows = 9}, {});
+  const FitReport report =
+      fit(input, {.mesh_columns = 9, .mesh_rows = 9, .start = named(SyntheticCloth{}.fabric)}, {});
 
   ASSERT_TRUE(report.usable()) << report.message;
   EXPECT_NEAR(report.result.errors.front().fitted.rms, 5e-4, 2e-5);
