@@ -206,9 +206,9 @@ TEST(FreeForces, AreNoBetterThanNothingWhereNothingIsHidden) {
 }
 
 TEST(FreeForces, AreFoundWithTheDerivativesOfACoarserMesh) {
-  const SyntheticCloth cloth{.drag_rate_per_s = 0.5, .mesh = 17};
+  const SyntheticCloth cloth{.drag_rate_per_s = 0.5, .mesh = 13};
   const FitInput input = synthetic_input(cloth);
-  const DiagnosisSetup setup = setup_of({&input, 1}, 17), coarse = setup_of({&input, 1}, 9);
+  const DiagnosisSetup setup = setup_of({&input, 1}, 13), coarse = setup_of({&input, 1}, 7);
   const FittedModel model = fitted(setup);
 
   const double fine = with_forces(setup, model).free_forces,

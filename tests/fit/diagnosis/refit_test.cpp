@@ -35,10 +35,10 @@ void expect_optimum(const FittedModel& found, const DiagnosisSetup& setup,
 }
 
 TEST(IdentifiedFromScratch, IsTheOptimumWhateverIsKnown) {
-  const SyntheticCloth cloth{.drag_rate_per_s = 1.2};
+  const SyntheticCloth cloth{.drag_rate_per_s = 1.2, .mesh = 7};
   const FitInput input = synthetic_input(cloth);
   const DiagnosisSetup setup{
-      .inputs = {&input, 1}, .options = kRefitOptions, .columns = 9, .rows = 9};
+      .inputs = {&input, 1}, .options = kRefitOptions, .columns = 7, .rows = 7};
 
   const FittedModel identified = identified_from_scratch(setup, {drag_hypothesis()}, {});
 
@@ -48,11 +48,11 @@ TEST(IdentifiedFromScratch, IsTheOptimumWhateverIsKnown) {
 }
 
 TEST(IdentifiedFromScratch, IsOfAllRecordings) {
-  SyntheticCloth cloth{.drag_rate_per_s = 1.2};
+  SyntheticCloth cloth{.drag_rate_per_s = 1.2, .mesh = 7};
   std::vector<FitInput> inputs{synthetic_input(cloth)};
   cloth.seed = 2;
   inputs.push_back(synthetic_input(cloth));
-  const DiagnosisSetup setup{.inputs = inputs, .options = kRefitOptions, .columns = 9, .rows = 9};
+  const DiagnosisSetup setup{.inputs = inputs, .options = kRefitOptions, .columns = 7, .rows = 7};
 
   const FittedModel identified = identified_from_scratch(setup, {drag_hypothesis()}, {});
 
