@@ -130,9 +130,9 @@ TEST(Recordings, AHiddenWindLeavesAnErrorThatThePlainModelCannotHide) {
                                {.mesh_columns = 9,
                                 .mesh_rows = 9,
                                 .population = 40,
-                                .generations = 10,
+                                .generations = 5,
                                 .refine_best = 1,
-                                .work = 0.1},
+                                .work = 0.03},
                                {});
 
   // Then springs alone, whatever their fit, stay far above the noise
@@ -158,7 +158,7 @@ TEST(Recordings, RealClothOnARobotArmIsFittedWithNumbersWhateverTheyAre) {
                                 .population = 20,
                                 .generations = 5,
                                 .refine_best = 1,
-                                .work = 0.03},
+                                .work = 0.005},
                                {});
 
   // Then the fit ends, everything is finite, and the markers that drive the cloth are not judged
