@@ -63,10 +63,17 @@ function(clothfit_add_room room)
   set_property(GLOBAL APPEND PROPERTY CLOTHFIT_LIBRARIES ${room})
 endfunction()
 
-# clothfit_add_test(ROOM SOURCES a_test.cpp ... [LINK lib ...] [LABELS slow])
-# Builds and registers, so that no test is compiled but never run.
+# clothfit_add_test(ROOM SOURCES a_test.cpp ... [LINK lib ...] [LABELS slow] [COST seconds])
+# Builds and registers, so that no test is compiled but never run. Tests run in the order of their
+# cost, so that no long one is left alone at the end; slow ones cost 5 unless COST says more.
 function(clothfit_add_test room)
-  cmake_parse_arguments(ARG "" "NAME" "SOURCES;LINK;LABELS" ${ARGN})
+  cmake_parse_arguments(ARG "" "NAME;COST" "SOURCES;LINK;LABELS" ${ARGN})
+  if(NOT ARG_COST)
+    set(ARG_COST 0)
+    if("slow" IN_LIST ARG_LABELS)
+      set(ARG_COST 5)
+    endif()
+  endif()
   if(NOT ARG_NAME)
     set(ARG_NAME clothfit_${room}_tests)
   endif()
@@ -79,5 +86,5 @@ function(clothfit_add_test room)
     CLOTHFIT_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
   gtest_discover_tests(${ARG_NAME}
     DISCOVERY_TIMEOUT 60
-    PROPERTIES LABELS "${room};${ARG_LABELS}" TIMEOUT 600)
+    PROPERTIES LABELS "${room};${ARG_LABELS}" TIMEOUT 600 COST ${ARG_COST})
 endfunction()
