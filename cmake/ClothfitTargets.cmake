@@ -79,7 +79,9 @@ function(clothfit_add_test room)
   endif()
   add_executable(${ARG_NAME} ${ARG_SOURCES})
   target_include_directories(${ARG_NAME} PRIVATE ${PROJECT_SOURCE_DIR})
-  target_link_libraries(${ARG_NAME} PRIVATE
+  # Before all others, the C++ library itself: googletest wants some of its templates, of which our
+  # archives hold copies, and each copy brings its object and all that this needs.
+  target_link_libraries(${ARG_NAME} PRIVATE $<$<CXX_COMPILER_ID:GNU>:stdc++>
     clothfit::${room} ${ARG_LINK} GTest::gtest_main GTest::gmock clothfit_warnings)
   target_precompile_headers(${ARG_NAME} REUSE_FROM clothfit_test_headers)
   target_compile_definitions(${ARG_NAME} PRIVATE
