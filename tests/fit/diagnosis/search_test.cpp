@@ -109,10 +109,10 @@ TEST(SearchHypotheses, ChoosesAHypothesisForAGrosslyMisfittingModelOnACoarserMes
 }
 
 TEST(SearchHypotheses, RefinesAGrosslyMisfittingModelOnItsOwnMeshWhereNoHypothesisIsFound) {
-  const SyntheticCloth cloth = in_thick_air(9, 5);
+  const SyntheticCloth cloth = in_thick_air(7, 5);
   const FitInput input = synthetic_input(cloth);
   const FitOptions options = short_search();
-  const DiagnosisSetup setup{.inputs = {&input, 1}, .options = options, .columns = 9, .rows = 9};
+  const DiagnosisSetup setup{.inputs = {&input, 1}, .options = options, .columns = 7, .rows = 7};
   std::vector<NamedValues> elsewhere = found_without_air(setup, cloth);
   elsewhere.front().at("shear") *= 0.7;
   const FittedModel off = grossly_misfitting(setup, elsewhere);
