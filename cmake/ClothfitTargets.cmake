@@ -88,5 +88,15 @@ function(clothfit_add_test room)
     CLOTHFIT_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
   gtest_discover_tests(${ARG_NAME}
     DISCOVERY_TIMEOUT 60
-    PROPERTIES LABELS "${room};${ARG_LABELS}" TIMEOUT 600 COST ${ARG_COST})
+    PROPERTIES LABELS ${room} TIMEOUT 600 COST ${ARG_COST})
+  # Discovery takes no lists: a second label would shift the properties behind it.
+  if(ARG_LABELS)
+    set(labels ${CMAKE_CURRENT_BINARY_DIR}/${ARG_NAME}_labels.cmake)
+    file(CONFIGURE OUTPUT ${labels} @ONLY CONTENT
+"foreach(test IN LISTS @ARG_NAME@_TESTS)
+  set_tests_properties(\${test} PROPERTIES LABELS \"@room@;@ARG_LABELS@\")
+endforeach()
+")
+    set_property(DIRECTORY APPEND PROPERTY TEST_INCLUDE_FILES ${labels})
+  endif()
 endfunction()
