@@ -195,7 +195,7 @@ TagDetector::TagDetector(const std::string& family, int max_corrected_bits)
   const int bits =
       std::min({max_corrected_bits, safe_corrected_bits(kind), affordable_corrected_bits(kind)});
   apriltag_detector_add_family_bits(library_->detector.get(), library_->family.get(), bits);
-  library_->detector->nthreads = 1;  // pictures are what runs in parallel
+  library_->detector->nthreads = 1;  // tags are what runs in parallel
   library_->detector->quad_decimate = 1;
   library_->detector->refine_edges = true;
 }

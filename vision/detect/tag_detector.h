@@ -35,7 +35,7 @@ struct TagDetection {
   Eigen::Vector2d motion_px = Eigen::Vector2d::Zero();  ///< blur of motion; its sign means nothing
   /// The printed cells are there, and so are border and white around them (TagEvidence).
   bool shows_tag = false;
-  /// Share of the pixels around each corner that the pattern explains; about 0.9 is all.
+  /// How well each corner is seen (TagEvidence); 0 also where the tags around contradict it.
   std::array<double, 4> corner_seen{};
   bool predicted = false;  ///< it was looked for where a prediction had it
 };

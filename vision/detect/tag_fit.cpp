@@ -3,7 +3,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <numeric>
 #include <vector>
 
 #include "data/median.h"
@@ -130,7 +130,9 @@ void TagFit::weigh() {
   const float steepest = slope.maxCoeff();
   std::vector<double> flat, rough, inverse_square_slope;
   constexpr Eigen::Index kEnough = 1000;  // samples; medians are then right to some per cent
-  for (Eigen::Index i = 0; i < count; i += std::max<Eigen::Index>(1, count / kEnough)) {
+  Eigen::Index step = std::max<Eigen::Index>(1, count / kEnough);
+  while (std::gcd(step, samples_->width) > 1) ++step;  // so that all columns have their turn
+  for (Eigen::Index i = 0; i < count; i += step) {
     if (slope[i] < 0.1F * steepest) flat.push_back(std::abs(residual[i]));
     if (slope[i] > 0.4F * steepest) {
       rough.push_back(std::abs(residual[i] / slope[i]));

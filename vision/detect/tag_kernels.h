@@ -25,8 +25,8 @@ struct GridShift {
   int columns = 0, rows = 0;  ///< >= 0
   float weight = 0;
 };
-/// Sets each of side x side numbers to the weighted sum of those at the shifts from it in a square
-/// grid of `from_side`.
+/// Sets each of side x side numbers to a weighted sum of those of a square grid of `from_side`: of
+/// those at the shifts from its own place. `side` is 16 or more.
 void sum_of_shifts(const float* from, int from_side, std::span<const GridShift> shifts, int side,
                    float* to);
 

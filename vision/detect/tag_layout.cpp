@@ -15,13 +15,16 @@ struct ReadCorner {
   Eigen::Vector2d place_m, pixel_px;
 };
 
-/// Lists the corners of the refined tags of a sheet but one.
+/// Lists the corners of the refined tags of a sheet that were read once, but one's.
 std::vector<ReadCorner> read_corners(std::span<const TagDetection> tags, const TagLayout& layout,
                                      int but) {
   std::vector<ReadCorner> corners;
+  std::map<int, int> times;
+  for (const TagDetection& tag : tags) ++times[tag.id];
   for (const TagDetection& tag : tags) {
     const auto known = layout.find(tag.id);
-    if (tag.id == but || known == layout.end() || !tag.refined || !tag.shows_tag) continue;
+    if (tag.id == but || times[tag.id] > 1 || known == layout.end()) continue;
+    if (!tag.refined || !tag.shows_tag) continue;
     for (size_t c = 0; c < 4; ++c)
       corners.push_back({.place_m = known->second[c], .pixel_px = tag.corner_px[c]});
   }

@@ -80,23 +80,27 @@ RefinedTag refined_from(TagFit& fit, const TagPattern& pattern,
   return result;
 }
 
-/// Takes lengths to pixels of the picture.
+/// Takes lengths to pixels of the picture, and noise to that of single ones.
 RefinedTag in_picture(RefinedTag tag, const TagWindow& window) {
   for (size_t c = 0; c < 4; ++c) {
     tag.corner_px[c] = window.to_picture(tag.corner_px[c]);
     tag.sigma_px[c] *= window.shrunk_by;
   }
+  tag.noise_levels *= window.shrunk_by;
   tag.roughness_px *= window.shrunk_by;
   tag.lens_px *= window.shrunk_by;
   tag.motion_px *= window.shrunk_by;
   return tag;
 }
 
-/// Takes lengths to pixels of the window.
+/// Takes lengths and noise to pixels of the window.
 RefineHints in_window(RefineHints hints, const TagWindow& window) {
   if (hints.lens_px) *hints.lens_px /= window.shrunk_by;
   if (hints.motion_px) *hints.motion_px /= window.shrunk_by;
-  if (hints.picture) hints.picture->most_roughness_px /= window.shrunk_by;
+  if (hints.picture) {
+    hints.picture->most_noise_levels /= window.shrunk_by;
+    hints.picture->most_roughness_px /= window.shrunk_by;
+  }
   return hints;
 }
 

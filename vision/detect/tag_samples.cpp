@@ -9,6 +9,8 @@
 namespace clothfit {
 namespace {
 
+constexpr double kFar_px = 1e6;  // beyond any picture
+
 Eigen::AlignedBox2d box_of(const Eigen::Matrix3d& pixel_from_tag, double reach) {
   Eigen::AlignedBox2d box;
   for (const double x : {-reach, reach})
@@ -76,8 +78,9 @@ std::optional<TagWindow> tag_window(const cv::Mat& grey, const Eigen::Matrix3d& 
   // Larger sides cost time and tell little more.
   constexpr double kMostSide_px = 80;
   TagWindow window;
-  window.shrunk_by =
-      std::max(1, static_cast<int>(std::ceil(longest_side(pixel_from_tag, reach) / kMostSide_px)));
+  window.shrunk_by = std::max(
+      1, static_cast<int>(
+             std::ceil(std::min(longest_side(pixel_from_tag, reach), kFar_px) / kMostSide_px)));
   const Eigen::Vector2d size(grey.cols, grey.rows);
   const Eigen::Vector2d first = box.min().cwiseMax(0).cwiseMin(size);
   const Eigen::Vector2d past = (box.max().array() + 1).matrix().cwiseMax(0).cwiseMin(size);
@@ -101,9 +104,11 @@ TagSamples tag_samples(const TagWindow& window, const TagPattern& pattern,
                        const Eigen::Matrix3d& pixel_from_tag) {
   const double reach = sample_reach(pattern);
   const Eigen::AlignedBox2d box = box_of(pixel_from_tag, reach);
-  const auto begin = [](double least) { return std::max(0, static_cast<int>(std::ceil(least))); };
+  const auto begin = [](double least) {
+    return static_cast<int>(std::ceil(std::clamp(least, 0.0, kFar_px)));
+  };
   const auto end = [](double most, int size) {
-    return std::min(size - 1, static_cast<int>(std::floor(most)));
+    return static_cast<int>(std::floor(std::clamp(most, -1.0, size - 1.0)));
   };
   const int u_begin = begin(box.min().x()), u_end = end(box.max().x(), window.levels.cols);
   const int v_begin = begin(box.min().y()), v_end = end(box.max().y(), window.levels.rows);

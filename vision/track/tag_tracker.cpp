@@ -2,6 +2,11 @@
 
 #include <Eigen/QR>
 #include <algorithm>
+#include <limits>
+#include <span>
+#include <utility>
+
+#include "data/median.h"
 
 namespace clothfit {
 namespace {
@@ -52,29 +57,44 @@ class MissField {
   Eigen::Matrix<double, kTerms, 2> field_;
 };
 
-/// Returns what a tag says of itself in the next picture.
-ExpectedPicture expected_picture(const TagDetection& tag) {
-  constexpr double kMore = 1.5, kLeast_px = 0.02;  // noise and print differ a little
-  return {.black_levels = tag.black_levels,
-          .contrast_levels = tag.contrast_levels,
-          .most_noise_levels = kMore * tag.noise_levels,
-          .most_roughness_px = kMore * tag.roughness_px + kLeast_px};
+/// Says whether all of a tag is seen: hidden ones spoil what is known of light and noise.
+bool seen_whole(const TagDetection& tag) {
+  constexpr double kAllExplained = 0.88;
+  return tag.explained >= kAllExplained;
 }
 
-/// Moves the tags that lead to the front, some spread evenly over those of the sheet. Returns how
-/// many there are.
+/// Returns how many tags lead: a quarter of a small sheet's, 9 of a large one's.
+size_t lead_count(size_t tags) {
+  return std::min<size_t>(tags, std::clamp<size_t>(tags / 4, 3, 9));
+}
+
+/// Moves the tags that lead to the front, each as far as possible from those before it on the
+/// sheet. Returns how many there are.
 size_t put_leads_first(const TagLayout& layout, std::vector<PredictedTag>& predicted) {
-  constexpr size_t kLeads = 9;
   const auto beside = std::ranges::stable_partition(
       predicted, [&](const PredictedTag& tag) { return layout.contains(tag.id); });
-  const size_t count = predicted.size() - beside.size();
-  const size_t every = std::max<size_t>(1, count / kLeads);
-  std::vector<PredictedTag> leads, others;
-  for (size_t i = 0; i < predicted.size(); ++i)
-    (i < count && i % every == every / 2 ? leads : others).push_back(predicted[i]);
-  predicted = leads;
-  predicted.insert(predicted.end(), others.begin(), others.end());
-  return leads.size();
+  const size_t count = predicted.size() - beside.size(), leads = lead_count(count);
+  std::vector<double> distance(count, std::numeric_limits<double>::infinity());
+  for (size_t lead = 0; lead < leads; ++lead) {
+    const auto farthest =
+        std::max_element(distance.begin() + static_cast<std::ptrdiff_t>(lead), distance.end());
+    const auto which = static_cast<size_t>(farthest - distance.begin());
+    std::swap(predicted[lead], predicted[which]);
+    std::swap(distance[lead], distance[which]);
+    const Eigen::Vector2d place = layout.at(predicted[lead].id)[0];
+    for (size_t i = lead + 1; i < count; ++i)
+      distance[i] = std::min(distance[i], (layout.at(predicted[i].id)[0] - place).norm());
+  }
+  return leads;
+}
+
+std::ptrdiff_t refined_count(const SheetTags& tags) {
+  return std::ranges::count_if(
+      tags.read, [](const TagDetection& tag) { return tag.refined && tag.shows_tag; });
+}
+
+bool holds(const std::vector<TagDetection>& tags, int id) {
+  return std::ranges::find(tags, id, &TagDetection::id) != tags.end();
 }
 
 }  // namespace
@@ -86,39 +106,66 @@ TagTracker::TagTracker(const std::string& family, TagLayout layout, const std::s
 
 SheetTags TagTracker::next(const cv::Mat& grey, int frame) {
   SheetTags tags;
-  bool search = must_search(frame);
-  if (!search) {
+  bool whole = must_search(frame);
+  if (!whole) {
     tags = follow(grey, frame);
-    search = lost_many(tags);
+    whole = lost_many(tags);
   }
   ++since_search_;
-  if (search) {
-    tags = detect_on_sheet(detector_, grey, layout_);
-    since_search_ = 0;
-  }
+  if (whole) tags = search(grey, tags);
   remember(tags, frame);
+  return tags;
+}
+
+/// Searches the whole picture, and keeps what was read of it before.
+SheetTags TagTracker::search(const cv::Mat& grey, const SheetTags& followed) {
+  SheetTags tags = detect_on_sheet(detector_, grey, layout_);
+  for (const TagDetection& tag : followed.read) {
+    if (holds(tags.read, tag.id)) continue;
+    tags.read.push_back(tag);
+    std::erase_if(tags.unread, [&](const PredictedTag& one) { return one.id == tag.id; });
+  }
+  std::ranges::stable_sort(tags.read, {}, &TagDetection::id);
+  since_search_ = 0;
+  read_by_search_ = refined_count(tags);
   return tags;
 }
 
 bool TagTracker::must_search(int frame) const {
   constexpr int kFirst = 2;      // pictures, for the motion
   constexpr int kWidestGap = 3;  // frames
-  constexpr int kPatience = 30;  // pictures
-  if (pictures_ < kFirst || followed_.empty() || frame - frame_ > kWidestGap) return true;
-  return since_search_ + 1 >= kPatience &&
-         std::ranges::any_of(listed_, [&](int id) { return !followed_.contains(id); });
+  constexpr int kEvery = 30;     // pictures
+  const bool any = std::ranges::any_of(
+      followed_, [](const auto& followed) { return followed.second.unread == 0; });
+  if (pictures_ < kFirst || !any || frame - frame_ > kWidestGap) return true;
+  return since_search_ + 1 >= kEvery && std::ranges::any_of(listed_, [&](int id) {
+           const auto found = followed_.find(id);
+           return found == followed_.end() || found->second.unread > 0;
+         });
 }
 
 std::vector<PredictedTag> TagTracker::predictions(int frame) const {
+  // Noise and print differ a little from tag to tag; a half hidden one does not tell its own.
+  constexpr double kMore = 1.5, kLeast_px = 0.02;
+  std::vector<double> noise, roughness;
+  for (const auto& [id, followed] : followed_) {
+    noise.push_back(followed.tag.noise_levels);
+    roughness.push_back(followed.tag.roughness_px);
+  }
+  const double most_noise = kMore * median(std::move(noise));
+  const double most_roughness_px = kMore * median(std::move(roughness)) + kLeast_px;
   std::vector<PredictedTag> predicted;
   for (const auto& [id, followed] : followed_) {
     PredictedTag tag{.id = id,
                      .corner_px = followed.tag.corner_px,
                      .lens_px = followed.tag.lens_px,
                      .motion_px = followed.tag.motion_px,
-                     .picture = expected_picture(followed.tag)};
+                     .picture = ExpectedPicture{.black_levels = followed.black_levels,
+                                                .contrast_levels = followed.contrast_levels,
+                                                .most_noise_levels = most_noise,
+                                                .most_roughness_px = most_roughness_px}};
     for (size_t c = 0; c < 4; ++c) tag.corner_px[c] += (frame - frame_) * followed.motion_px[c];
-    tag.close = followed.moves || !layout_.contains(id);
+    tag.close = followed.unread == 0 && (followed.moves || !layout_.contains(id));
     predicted.push_back(tag);
   }
   return predicted;
@@ -157,10 +204,9 @@ SheetTags TagTracker::follow(const cv::Mat& grey, int frame) {
 }
 
 bool TagTracker::lost_many(const SheetTags& tags) const {
-  constexpr double kMost = 0.3;  // of the tags of the picture before
-  const auto kept = std::ranges::count_if(
-      tags.read, [&](const TagDetection& tag) { return followed_.contains(tag.id); });
-  return static_cast<double>(kept) < (1 - kMost) * static_cast<double>(followed_.size());
+  constexpr double kMost = 0.3;  // of the tags of the last search
+  return static_cast<double>(refined_count(tags)) <
+         (1 - kMost) * static_cast<double>(read_by_search_);
 }
 
 void TagTracker::remember(const SheetTags& tags, int frame) {
@@ -168,17 +214,31 @@ void TagTracker::remember(const SheetTags& tags, int frame) {
   std::set<int> twice;
   for (const TagDetection& tag : tags.read) {
     if (!tag.refined || !tag.shows_tag) continue;
-    Followed followed{.tag = tag};
+    Followed followed{
+        .tag = tag, .black_levels = tag.black_levels, .contrast_levels = tag.contrast_levels};
     followed.motion_px.fill(Eigen::Vector2d::Zero());
     if (const auto before = followed_.find(tag.id); before != followed_.end()) {
-      followed.moves = true;
-      for (size_t c = 0; c < 4; ++c)
-        followed.motion_px[c] =
-            (tag.corner_px[c] - before->second.tag.corner_px[c]) / (frame - frame_);
+      const Followed& then = before->second;
+      followed.moves = then.unread == 0;
+      for (size_t c = 0; c < 4 && followed.moves; ++c)
+        followed.motion_px[c] = (tag.corner_px[c] - then.tag.corner_px[c]) / (frame - frame_);
+      if (!seen_whole(tag)) {
+        followed.black_levels = then.black_levels;
+        followed.contrast_levels = then.contrast_levels;
+      }
     }
     if (!now.emplace(tag.id, followed).second) twice.insert(tag.id);
   }
   for (const int id : twice) now.erase(id);
+  // What no neighbour predicts is sought for some time where it was.
+  constexpr int kPatience = 10;  // pictures
+  for (auto& [id, followed] : followed_) {
+    const bool predicted =
+        std::ranges::find(tags.unread, id, &PredictedTag::id) != tags.unread.end();
+    if (predicted || twice.contains(id) || ++followed.unread > kPatience) continue;
+    followed.motion_px.fill(Eigen::Vector2d::Zero());
+    now.emplace(id, followed);
+  }
   followed_ = std::move(now);
   frame_ = frame;
   ++pictures_;

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <map>
 #include <opencv2/core.hpp>
 #include <set>
@@ -31,16 +33,19 @@ class TagTracker {
   bool searched() const { return since_search_ == 0; }
 
  private:
-  /// A tag of the picture before.
+  /// A tag of the picture before, or of a little earlier where nothing else predicts it.
   struct Followed {
     TagDetection tag;
-    bool moves = false;                          ///< its motion is known
-    std::array<Eigen::Vector2d, 4> motion_px{};  ///< of its corners, per frame
+    bool moves = false;                            ///< its motion is known
+    std::array<Eigen::Vector2d, 4> motion_px{};    ///< of its corners, per frame
+    double black_levels = 0, contrast_levels = 0;  ///< when all of it was seen
+    int unread = 0;                                ///< pictures since it was read
   };
 
   bool must_search(int frame) const;
   SheetTags follow(const cv::Mat& grey, int frame);
   std::vector<PredictedTag> predictions(int frame) const;
+  SheetTags search(const cv::Mat& grey, const SheetTags& followed);
   bool lost_many(const SheetTags& tags) const;
   void remember(const SheetTags& tags, int frame);
 
@@ -50,6 +55,7 @@ class TagTracker {
   std::vector<int> sheet_ids_;
   std::map<int, Followed> followed_;  ///< by id
   int pictures_ = 0, frame_ = 0, since_search_ = 0;
+  std::ptrdiff_t read_by_search_ = 0;  ///< tags read when a picture was searched last
 };
 
 }  // namespace clothfit

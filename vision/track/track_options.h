@@ -7,7 +7,8 @@ struct TrackOptions {
   /// from its place after. Higher values let wrongly read tags through.
   double max_speed_px = 60;
   /// Grey levels, >= 0: weaker readings of a tag's bits are rejected. They are those of a tag whose
-  /// white is 160 above its black or more, and in proportion less on a darker one.
+  /// white is 160 above its black or more, and in proportion less on a darker one. This and
+  /// `min_explained` count where a whole picture was searched; the cells speak for predicted tags.
   double min_decision_margin = 20;
   /// 0 to 1: a tag is rejected if the printed pattern explains less of its pixels. A clean one has
   /// 0.9.

@@ -147,7 +147,7 @@ TagScore score_recording(const JudgedRecording& recording, const Spoil& spoil,
   TagScore all;
   for (size_t i = 0; i < pictures.size(); ++i) {
     const SpoiledPicture& picture = pictures[i];
-    const SheetTags read = tracker.next(picture.grey, static_cast<int>(frames[i]));
+    const SheetTags read = tracker.next(picture.grey, static_cast<int>(i));
     all.add(score_tags(read.read, picture.truth, recording.other_tags, picture.grey.size()));
   }
   return all;

@@ -14,7 +14,7 @@ namespace clothfit {
 struct VisionStudyOptions {
   std::filesystem::path data;     ///< folder with recordings/ and vision/ in it
   std::vector<std::string> rows;  ///< names of vision_rows(); empty: all
-  int stride = 4;                 ///< >= 1: every so many-th picture of a recording is judged
+  int stride = 1;                 ///< >= 1: every so many-th picture of a recording is tracked
   unsigned long long seed = 1;    ///< of noise, hands, textures and lost pictures
   void validate() const;          ///< throws InputError
 };
@@ -42,9 +42,8 @@ struct VisionTarget {
 };
 
 /// Measures the rows that read pictures, in the order of vision_rows(). Sets that are not below
-/// `data` have their reason. Pictures are worked on in parallel; the result does not depend on the
-/// number of threads. Throws InputError for options that make no sense, Cancelled when `progress`
-/// asks to stop.
+/// `data` have their reason. The result does not depend on the number of threads. Throws InputError
+/// for options that make no sense, Cancelled when `progress` asks to stop.
 std::vector<VisionResult> study_vision(const VisionStudyOptions& options,
                                        const ProgressCallback& progress);
 

@@ -1,11 +1,14 @@
 // Checks the loops over a tag's samples against plain arithmetic: derivatives against differences,
-// sums against dense products, and each instruction set against the others.
+// sums against dense products, and the fit's own on each instruction set against the others.
 
 #include "vision/detect/tag_kernels.h"
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <random>
+#include <utility>
+#include <vector>
 
 #include "tests/model/instruction_sets.h"
 #include "vision/detect/blurred_pattern.h"
@@ -36,7 +39,6 @@ struct OddTag {
     model.grid = blurred.grid();
     for (float& one : model.bend_x) one = 0.01F * normal(rng);
     for (float& one : model.bend_y) one = 0.01F * normal(rng);
-    for (float& one : model.blur_slope) one = 0.1F * normal(rng);
     model.offset = {40, 3, -2};
     model.contrast = {150, -4, 5};
     model.by_blur = {{{4e-4F, 1e-4F, 5e-4F}, {2e-4F, 3e-4F, -1e-4F}, {-3e-4F, 2e-4F, 1e-4F}}};
@@ -122,6 +124,53 @@ TEST(TagKernels, ResidualSumsAreSharesOfTheDerivatives) {
   const Eigen::MatrixXd expected =
       share.matrix().cast<double>().asDiagonal() * jacobian(tag) * combination.cast<double>();
   EXPECT_LT((sums.cast<double>() - expected).norm(), 3e-3 * expected.norm());
+}
+
+TEST(TagKernels, PairSumsRunOverAllPairsAtALag) {
+  constexpr int kWidth = 21, kHeight = 13;
+  SampleMaps maps{.stride = 32 + SampleMaps::kReach, .rows = kHeight};
+  const Eigen::Index size = (kHeight + SampleMaps::kReach) * maps.stride + 2 * SampleMaps::kReach;
+  maps.there = maps.residual = maps.gradient_u = maps.gradient_v = Eigen::ArrayXf::Zero(size);
+  std::mt19937_64 rng(8);
+  std::normal_distribution<float> normal;
+  const auto at = [&](int u, int v) { return SampleMaps::kReach + v * maps.stride + u; };
+  for (int v = 0; v < kHeight; ++v)
+    for (int u = 0; u < kWidth; ++u) {
+      maps.there[at(u, v)] = 1;
+      for (Eigen::ArrayXf* map : {&maps.residual, &maps.gradient_u, &maps.gradient_v})
+        (*map)[at(u, v)] = normal(rng);
+    }
+  for (const auto& [across, down] : {std::pair(0, 0), {3, 0}, {-6, 6}, {0, 12}}) {
+    const PairSums sums = pair_sums(maps, across, down);
+    double pairs = 0, mixed = 0;
+    for (int v = 0; v + down < kHeight; ++v)
+      for (int u = std::max(0, -across); u < kWidth && u + across < kWidth; ++u) {
+        const int i = at(u, v), j = at(u + across, v + down);
+        ++pairs;
+        mixed +=
+            maps.residual[i] * maps.residual[j] *
+            (maps.gradient_u[i] * maps.gradient_u[j] + maps.gradient_v[i] * maps.gradient_v[j]);
+      }
+    EXPECT_EQ(sums.pairs, pairs) << across << " " << down;
+    EXPECT_NEAR(sums.mixed, mixed, 1e-4 * pairs) << across << " " << down;
+  }
+}
+
+TEST(TagKernels, ShiftsAddUpWithTheirWeights) {
+  constexpr int kSide = 19, kFrom = 23;
+  const Eigen::ArrayXf from = Eigen::ArrayXf::LinSpaced(kFrom * kFrom, 0, 1).square();
+  const std::vector<GridShift> shifts = {{.columns = 0, .rows = 4, .weight = 0.25F},
+                                         {.columns = 3, .rows = 1, .weight = 0.75F}};
+  Eigen::ArrayXf to = Eigen::ArrayXf::Zero(kSide * kSide);
+
+  sum_of_shifts(from.data(), kFrom, shifts, kSide, to.data());
+
+  for (int row = 0; row < kSide; ++row)
+    for (int column = 0; column < kSide; ++column)
+      EXPECT_NEAR(
+          to[row * kSide + column],
+          0.25F * from[(row + 4) * kFrom + column] + 0.75F * from[(row + 1) * kFrom + column + 3],
+          1e-6);
 }
 
 TEST(TagKernels, GivesTheSameBitsOnEachInstructionSet) {
