@@ -28,20 +28,29 @@ std::array<float, CellGrid::kSteps + 2> own_shares(double half_cell, double spre
   return shares;
 }
 
-/// Returns the mean robust weight along the edge at a corner that is seen worse.
-double edges_seen(const CellRows& rows, size_t corner) {
+/// Returns the mean robust weight along the edge at a corner that is seen worse. Three steep pixels
+/// with the mean over the tag come on top, since a small tag has few of its own there.
+double edges_seen(const TagFit& fit, const CellRows& rows, size_t corner) {
+  constexpr double kOnTop = 3;
+  const double mean = fit.robust().mean();
+  const Eigen::ArrayXf* const slopes[] = {&fit.rows().by_x, &fit.rows().by_y};
   double least = 1;
   for (size_t edge = 0; edge < 2; ++edge) {
     const double slope = rows.slope[corner][edge];
-    least = std::min(least, slope > 0 ? rows.seen[corner][edge] / slope : 0);
+    if (!(slope > 0)) return 0;
+    const double more = kOnTop * slopes[edge]->head(fit.samples().count).abs().maxCoeff();
+    least = std::min(least, (rows.seen[corner][edge] + more * mean) / (slope + more));
   }
   return least;
 }
 
+/// Whether a cell is as printed, as far as the picture tells it.
+enum class Likeness { untold, like, unlike };
+
 /// Returns the share that is as printed of the cells told around a corner: those that touch it, and
 /// the border's next ones along both edges.
-double right_around(size_t corner, const TagPattern& pattern, const std::vector<bool>& told,
-                    const std::vector<signed char>& verdict) {
+double like_print_around(size_t corner, const TagPattern& pattern,
+                         const std::vector<Likeness>& likeness) {
   const int across = pattern.total_cells, before = (across - pattern.border_cells) / 2;
   // Cells are counted from the corner, inwards; negative ones are the white outside.
   const auto cell = [&](int column, int row) {
@@ -50,14 +59,14 @@ double right_around(size_t corner, const TagPattern& pattern, const std::vector<
     return static_cast<size_t>((sign.y() < 0 ? down : across - 1 - down) * across +
                                (sign.x() < 0 ? from : across - 1 - from));
   };
-  int all = 0, right = 0;
+  int like = 0, unlike = 0;
   for (const auto& [column, row] :
        {std::pair(-1, -1), {-1, 0}, {0, -1}, {0, 0}, {1, 0}, {0, 1}, {-1, 1}, {1, -1}}) {
     const size_t k = cell(column, row);
-    all += told[k];
-    right += verdict[k] > 0;
+    like += likeness[k] == Likeness::like;
+    unlike += likeness[k] == Likeness::unlike;
   }
-  return all > 0 ? static_cast<double>(right) / all : 0;
+  return like > 0 ? static_cast<double>(like) / (like + unlike) : 0;
 }
 
 }  // namespace
@@ -92,7 +101,7 @@ TagEvidence tag_evidence(const TagFit& fit, const TagPattern& pattern,
 
   const int reached = std::min(across, pattern.border_cells + 2);
   TagEvidence evidence{.printed_cells = reached * reached, .verdict = {}};
-  for (size_t c = 0; c < 4; ++c) evidence.corner_seen[c] = edges_seen(rows, c);
+  for (size_t c = 0; c < 4; ++c) evidence.corner_seen[c] = edges_seen(fit, rows, c);
   std::vector<CellSums> cells(static_cast<size_t>(across * across));
   for (Eigen::Index i = 0; i < fit.samples().count; ++i) {
     const int k = rows.cell[static_cast<size_t>(i)];
@@ -100,12 +109,12 @@ TagEvidence tag_evidence(const TagFit& fit, const TagPattern& pattern,
     cells[static_cast<size_t>(k)].information += static_cast<double>(rows.information[i]);
     cells[static_cast<size_t>(k)].moment += static_cast<double>(rows.moment[i]);
   }
-  std::vector<bool> told;
+  std::vector<Likeness> likeness;
   for (const CellSums& sums : cells) {
     constexpr double kTold = 9;  // three standard deviations between right and wrong
     evidence.verdict.push_back(0);
-    told.push_back(sums.information >= kTold);
-    if (!told.back()) continue;
+    likeness.push_back(Likeness::untold);
+    if (sums.information < kTold) continue;
     ++evidence.cells;
     const double amplitude = sums.moment / sums.information;
     const double slack = 0.25 + 1 / std::sqrt(sums.information);
@@ -114,10 +123,13 @@ TagEvidence tag_evidence(const TagFit& fit, const TagPattern& pattern,
     evidence.right_cells += right;
     evidence.wrong_cells += wrong;
     evidence.verdict.back() = static_cast<signed char>(right - wrong);
+    // Two sigmas: of small cells one in ten is off by more than one.
+    const bool like = std::abs(amplitude) < 0.25 + 2 / std::sqrt(sums.information);
+    likeness.back() = like ? Likeness::like : Likeness::unlike;
   }
   for (size_t c = 0; c < 4; ++c)
     evidence.corner_seen[c] =
-        std::min(evidence.corner_seen[c], right_around(c, pattern, told, evidence.verdict));
+        std::min(evidence.corner_seen[c], like_print_around(c, pattern, likeness));
   return evidence;
 }
 
