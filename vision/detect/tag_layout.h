@@ -21,6 +21,9 @@ using TagLayout = std::map<int, std::array<Eigen::Vector2d, 4>>;
 std::vector<PredictedTag> predict_from_neighbours(std::span<const TagDetection> found,
                                                   const TagLayout& layout);
 
+/// Says whether all of a refined tag is seen, by the share of its pixels that is explained.
+bool seen_whole(const TagDetection& tag);
+
 /// What a picture shows of the tags of a sheet.
 struct SheetTags {
   std::vector<TagDetection> read;    ///< of the sheet and others, sorted by id

@@ -57,12 +57,6 @@ class MissField {
   Eigen::Matrix<double, kTerms, 2> field_;
 };
 
-/// Says whether all of a tag is seen: hidden ones spoil what is known of light and noise.
-bool seen_whole(const TagDetection& tag) {
-  constexpr double kAllExplained = 0.88;
-  return tag.explained >= kAllExplained;
-}
-
 /// Returns how many tags lead: a quarter of a small sheet's, 9 of a large one's.
 size_t lead_count(size_t tags) {
   return std::min<size_t>(tags, std::clamp<size_t>(tags / 4, 3, 9));
@@ -222,6 +216,7 @@ void TagTracker::remember(const SheetTags& tags, int frame) {
       followed.moves = then.unread == 0;
       for (size_t c = 0; c < 4 && followed.moves; ++c)
         followed.motion_px[c] = (tag.corner_px[c] - then.tag.corner_px[c]) / (frame - frame_);
+      // Something in front spoils what a tag tells of its light.
       if (!seen_whole(tag)) {
         followed.black_levels = then.black_levels;
         followed.contrast_levels = then.contrast_levels;

@@ -15,10 +15,10 @@ namespace clothfit {
 /// Follows the tags of one sheet, and others beside it, through the pictures of one camera, which
 /// come in order.
 ///
-/// The first two pictures are searched whole. Later each tag is read where its motion takes it;
-/// some are read first and tell how far predictions are off this time. Tags that are not read there
+/// The first two pictures are searched whole. Later each tag is read where its motion takes it.
+/// Some are read first and tell how far predictions are off this time. Tags that are not read there
 /// are sought where their neighbours expect them. A picture is searched whole where many of the
-/// tags of the picture before are lost, after a gap, and every now and then while listed tags are
+/// tags of the last search are lost, after a gap, and every now and then while listed tags are
 /// missing. Prediction alone places nothing: the cells of every tag are read in every picture. Tags
 /// are read in parallel; the result does not depend on the number of threads.
 class TagTracker {
