@@ -171,19 +171,25 @@ SheetTags TagTracker::follow(const cv::Mat& grey, int frame) {
   std::map<int, Corners> led;
   for (size_t i = 0; i < leads; ++i) {
     led[predicted[i].id] = predicted[i].corner_px;
-    predicted[i].close = false;
+    predicted[i].close = predicted[i].close && steady_;
   }
   const std::span<PredictedTag> all(predicted), others = all.subspan(leads);
   SheetTags tags;
   tags.read = detector_.read_predicted(grey, all.first(leads), sheet_ids_);
 
   std::vector<Miss> misses;
+  std::vector<double> of_side;
   for (const TagDetection& tag : tags.read)
-    for (size_t c = 0; c < 4; ++c)
+    for (size_t c = 0; c < 4; ++c) {
       misses.push_back(
           {.place_m = layout_.at(tag.id)[c], .off_px = tag.corner_px[c] - led.at(tag.id)[c]});
+      const double side_px = (tag.corner_px[1] - tag.corner_px[0]).norm();
+      of_side.push_back(misses.back().off_px.norm() / side_px);
+    }
   constexpr size_t kFewest = 3 * 4;
   const bool known = misses.size() >= kFewest;
+  constexpr double kSteady = 0.2 / 8;  // a fifth of a cell
+  steady_ = known && median(std::move(of_side)) < kSteady;
   if (known) {
     const MissField field(misses);
     for (PredictedTag& tag : others)
