@@ -7,21 +7,30 @@
 namespace clothfit {
 namespace {
 
-using Weights = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+using Weights = BlurredPattern::Coefficients;
 
-/// The kernel that is left to do on the grid, and the variance along the axes that is not.
+/// Shifts that make up a part of the blur.
+struct Shifts {
+  std::vector<GridShift> list;  ///< from the corner at -reach; none where there is nothing to do
+  int reach = 0;                ///< the largest shift
+};
+
+/// The kernel that is left to do on the grid, one part after the other, and the variance along the
+/// axes that is not.
 struct GridKernel {
-  std::vector<GridShift> shifts;                            ///< from the corner at -reach
-  int reach = 0;                                            ///< the largest shift
+  Shifts diagonal, line;
   Eigen::Vector2d axis_variance = Eigen::Vector2d::Zero();  ///< grid steps^2
+  double left_out = 0;  ///< covariance of the axes that is in neither, grid steps^2
 };
 
 /// Spreads weighted places over the four grid points around each. This widens a kernel along the
 /// axes; `widened` adds that up.
 class ShiftTable {
  public:
-  explicit ShiftTable(int reach)
-      : reach_(reach), weights_(Eigen::ArrayXXf::Zero(2 * reach + 1, 2 * reach + 1)) {}
+  /// Takes places up to `farthest` along both axes.
+  explicit ShiftTable(const Eigen::Vector2d& farthest)
+      : reach_(2 + static_cast<int>(farthest.cwiseAbs().maxCoeff())),
+        weights_(Eigen::ArrayXXf::Zero(2 * reach_ + 1, 2 * reach_ + 1)) {}
 
   void add(const Eigen::Vector2d& place, double weight) {
     const int column = static_cast<int>(std::floor(place.x()));
@@ -35,13 +44,13 @@ class ShiftTable {
   }
 
   const Eigen::Vector2d& widened() const { return widened_; }
-  /// Returns the shifts from the corner at -reach.
-  std::vector<GridShift> shifts() const {
-    std::vector<GridShift> result;
+  Shifts shifts() const {
+    Shifts result{.list = {}, .reach = reach_};
     for (int row = -reach_; row <= reach_; ++row)
       for (int column = -reach_; column <= reach_; ++column)
         if (const float weight = weights_(reach_ + row, reach_ + column); weight > 0)
-          result.push_back({.columns = reach_ + column, .rows = reach_ + row, .weight = weight});
+          result.list.push_back(
+              {.columns = reach_ + column, .rows = reach_ + row, .weight = weight});
     return result;
   }
 
@@ -54,12 +63,20 @@ class ShiftTable {
 /// Takes a blur apart: places along the line of motion, each spread over three along the diagonal
 /// for the correlation of the lens's blur between the axes, and the rest along the axes.
 GridKernel grid_kernel(const Eigen::Matrix2d& grid_by_pixel, const PictureBlur& blur) {
-  const Eigen::Vector2d line = grid_by_pixel * blur.motion_px();
+  // A motion this short, by its variance over the lens's, spreads like more of a lens.
+  constexpr double kShort = 0.3;
+  // A correlation this small is worth no shifts: its square is what the fit's linear term lacks.
+  constexpr double kLittle = 0.1;
+  const Eigen::Matrix2d whole = grid_by_pixel * blur.covariance_px2() * grid_by_pixel.transpose();
+  const bool is_short = blur.motion_px().squaredNorm() / 12 < kShort * blur.lens_variance_px2();
+  if (is_short && std::abs(whole(0, 1)) < kLittle * std::sqrt(whole(0, 0) * whole(1, 1)))
+    return {.axis_variance = whole.diagonal(), .left_out = whole(0, 1)};
+  const Eigen::Vector2d line =
+      is_short ? Eigen::Vector2d::Zero() : Eigen::Vector2d(grid_by_pixel * blur.motion_px());
   const int places = 1 + static_cast<int>(std::ceil(line.cwiseAbs().maxCoeff()));
-  const double missing = 1.0 / (12 * places * places);  // of the line's variance, between places
-  const Eigen::Matrix2d rest =
-      blur.lens_variance_px2() * grid_by_pixel * grid_by_pixel.transpose() +
-      missing * line * line.transpose();
+  // Of the line's variance, that between places is left.
+  const double taken = (1 - 1.0 / (places * places)) / 12;
+  const Eigen::Matrix2d rest = whole - taken * line * line.transpose();
   const Eigen::Vector2d spread = rest.diagonal().cwiseSqrt();
   const double correlation = rest(0, 1) / (spread.x() * spread.y());
   const Eigen::Vector2d diagonal =
@@ -69,19 +86,14 @@ GridKernel grid_kernel(const Eigen::Matrix2d& grid_by_pixel, const PictureBlur& 
   // Weights and places of three-point Gauss-Hermite quadrature.
   const double aside = std::sqrt(3.0);
   constexpr double kAsideWeight = 1.0 / 6;
-  GridKernel kernel;
-  kernel.reach =
-      2 + static_cast<int>((0.5 * line.cwiseAbs() + aside * diagonal.cwiseAbs()).maxCoeff());
-  ShiftTable table(kernel.reach);
-  for (int i = 0; i < places; ++i) {
-    const Eigen::Vector2d place = ((i + 0.5) / places - 0.5) * line;
-    table.add(place, (1 - 2 * kAsideWeight) / places);
-    for (const double side : {-aside, aside})
-      table.add(place + side * diagonal, kAsideWeight / places);
-  }
-  kernel.shifts = table.shifts();
-  kernel.axis_variance = rest.diagonal() * (1 - std::abs(correlation)) - table.widened();
-  return kernel;
+  ShiftTable along_line(0.5 * line), along_diagonal(aside * diagonal);
+  for (int i = 0; i < places; ++i) along_line.add(((i + 0.5) / places - 0.5) * line, 1.0 / places);
+  along_diagonal.add(Eigen::Vector2d::Zero(), 1 - 2 * kAsideWeight);
+  for (const double side : {-aside, aside}) along_diagonal.add(side * diagonal, kAsideWeight);
+  return {.diagonal = along_diagonal.shifts(),
+          .line = is_short ? Shifts{} : along_line.shifts(),
+          .axis_variance = rest.diagonal() * (1 - std::abs(correlation)) - along_line.widened() -
+                           along_diagonal.widened()};
 }
 
 /// Weighs the pattern's cells (columns) at the grid's places (rows) along one axis under a
@@ -114,12 +126,30 @@ Weights cell_weights(int places, int before, int per_cell, int cells, double spr
 
 /// Returns weights * lines, where most weights are 0.
 Weights sparse_product(const Weights& weights, const Weights& lines) {
-  Weights product = Weights::Zero(weights.rows(), lines.cols());
-  for (Eigen::Index row = 0; row < weights.rows(); ++row)
-    for (Eigen::Index cell = 0; cell < weights.cols(); ++cell)
-      if (const float weight = weights(row, cell); weight != 0)
+  Weights product(weights.rows(), lines.cols());
+  for (Eigen::Index row = 0; row < weights.rows(); ++row) {
+    bool begun = false;
+    for (Eigen::Index cell = 0; cell < weights.cols(); ++cell) {
+      const float weight = weights(row, cell);
+      if (weight == 0) continue;
+      if (begun)
         product.row(row) += weight * lines.row(cell);
+      else
+        product.row(row) = weight * lines.row(cell);
+      begun = true;
+    }
+    if (!begun) product.row(row).setZero();
+  }
   return product;
+}
+
+/// Returns a square grid under some shifts, which take their reach off all sides.
+Weights shifted(Weights grid, const Shifts& shifts) {
+  if (shifts.list.empty()) return grid;
+  const auto from = static_cast<int>(grid.rows()), side = from - 2 * shifts.reach;
+  Weights result(side, side);
+  sum_of_shifts(grid.data(), from, shifts.list, side, result.data());
+  return result;
 }
 
 }  // namespace
@@ -128,14 +158,16 @@ BlurredPattern::BlurredPattern(const TagPattern& pattern, const Eigen::Matrix2d&
                                const PictureBlur& blur) {
   const double cell_px = pattern.cell() * pixel_by_tag.colwise().norm().minCoeff();
   // Steps below the lens's blur leave the spline's own blur well within it.
-  constexpr double kFinest_px = 0.2, kWidest_px = 0.45, kOfLens = 0.75;
-  const double step_px =
-      std::clamp(kOfLens * std::sqrt(blur.lens_variance_px2()), kFinest_px, kWidest_px);
+  constexpr double kFinest_px = 0.2, kOfLens = 0.75;
+  const double step_px = std::max(kFinest_px, kOfLens * std::sqrt(blur.lens_variance_px2()));
   constexpr int kFewestPerCell = 2, kMostPerCell = 64;
   const int per_cell = static_cast<int>(
       std::clamp(std::ceil(cell_px / step_px), 1.0 * kFewestPerCell, 1.0 * kMostPerCell));
   step_ = pattern.cell() / per_cell;
-  const GridKernel kernel = grid_kernel(pixel_by_tag.inverse() / step_, blur);
+  const Eigen::Matrix2d pixel_by_grid = pixel_by_tag * step_;
+  const GridKernel kernel = grid_kernel(pixel_by_grid.inverse(), blur);
+  const Eigen::Matrix2d left_out = kernel.left_out * (Eigen::Matrix2d() << 0, 1, 1, 0).finished();
+  covariance_px2_ = blur.covariance_px2() - pixel_by_grid * left_out * pixel_by_grid.transpose();
 
   // The spline adds a third of a squared step. What the axes cannot take away stays as it is.
   constexpr double kSplineVariance = 1.0 / 3, kLeast = 0.1;
@@ -145,16 +177,16 @@ BlurredPattern::BlurredPattern(const TagPattern& pattern, const Eigen::Matrix2d&
   // A margin of one cell, four grid points for the spline, and the kernel's reach around the rest.
   const int margin = per_cell + 2;
   const int side = pattern.total_cells * per_cell + 2 * margin + 1;
-  const int places = side + 2 * kernel.reach;
+  const int reach = kernel.diagonal.reach + kernel.line.reach;
+  const int places = side + 2 * reach;
   const Eigen::Map<const Weights> white(pattern.white.data(), pattern.total_cells,
                                         pattern.total_cells);
   const auto weights = [&](double axis_spread) {
-    return cell_weights(places, margin + kernel.reach, per_cell, pattern.total_cells, axis_spread);
+    return cell_weights(places, margin + reach, per_cell, pattern.total_cells, axis_spread);
   };
   const Weights lines = white * weights(spread.x()).transpose();
-  const Weights along_axes = sparse_product(weights(spread.y()), lines);
-  coefficients_.resize(static_cast<size_t>(side * side));
-  sum_of_shifts(along_axes.data(), places, kernel.shifts, side, coefficients_.data());
+  coefficients_ =
+      shifted(shifted(sparse_product(weights(spread.y()), lines), kernel.diagonal), kernel.line);
   side_ = side;
   first_ = -0.5 * pattern.cell() * pattern.total_cells - margin * step_;
 }

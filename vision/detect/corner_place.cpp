@@ -80,7 +80,7 @@ Effects effects_on(const TagUnknowns::Vector& unknowns,
 /// Returns the weight of each residual in the coordinates of four points that stand for the tag and
 /// in those of the corners, up to its robust weight, which is shared between it and the residual.
 /// The mean over the tag is that over the four points of Gauss's quadrature.
-ResidualSums coordinate_sums(const TagFit& fit, const Effects& on_corners,
+ResidualSums coordinate_sums(const TagFit& fit, const EdgeSamples& edges, const Effects& on_corners,
                              const Eigen::Matrix3d& pixel_from_tag) {
   const double inner = 1 / std::sqrt(3.0);
   const std::array<Eigen::Vector2d, 4> points = {
@@ -88,10 +88,9 @@ ResidualSums coordinate_sums(const TagFit& fit, const Effects& on_corners,
   Eigen::Matrix<double, kUnknowns, 16> effects;
   effects.leftCols<8>() = effects_on(fit.unknowns(), points, pixel_from_tag).transpose();
   effects.rightCols<8>() = on_corners.transpose();
-  const TagRows& rows = fit.rows();
-  const Eigen::Index count = fit.samples().count;
-  const Eigen::ArrayXf share = rows.weight.head(count) / fit.robust().sqrt();
-  return residual_sums(fit.samples(), rows, share, (fit.covariance() * effects).cast<float>());
+  const Eigen::ArrayXf share = edges.rows.weight / edges.rows.robust.sqrt();
+  return residual_sums(edges.samples, edges.rows, share,
+                       (fit.covariance() * effects).cast<float>());
 }
 
 /// Returns the factor that Cauchy's loss brings. An estimate with the influence psi = w r (w:
@@ -112,10 +111,11 @@ ResidualCovariance::Variances coordinate_variances(const TagFit& fit, const Effe
   // Residuals are smaller than errors by what the unknowns take up.
   const auto count = static_cast<double>(fit.samples().count);
   const double taken = kUnknowns - fit.covariance().diagonal().dot(prior);
-  ResidualCovariance covariance(fit);
+  const EdgeSamples edges(fit);
+  ResidualCovariance covariance(edges);
   return by_prior + loss_factor(fit.robust().cast<double>()) * count /
                         std::max(count - taken, 1.0) *
-                        covariance.variance(coordinate_sums(fit, effects, pixel_from_tag));
+                        covariance.variance(coordinate_sums(fit, edges, effects, pixel_from_tag));
 }
 
 }  // namespace

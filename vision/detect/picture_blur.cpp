@@ -1,5 +1,6 @@
 #include "vision/detect/picture_blur.h"
 
+#include <Eigen/LU>
 #include <cmath>
 
 namespace clothfit {
@@ -27,6 +28,14 @@ PictureBlur::Unknowns PictureBlur::unknowns(double lens_px, const Eigen::Vector2
   const double r = 0.5 * std::log(large / small);
   const double twice = 2 * std::atan2(motion_px.y(), motion_px.x());
   return {0.5 * std::log(large * small), r * std::cos(twice), r * std::sin(twice)};
+}
+
+PictureBlur::Unknowns PictureBlur::unknowns(const Eigen::Matrix2d& covariance_px2) {
+  const double scale = std::sqrt(covariance_px2.determinant());
+  const double along = 0.5 * (covariance_px2(0, 0) - covariance_px2(1, 1)) / scale;
+  const double askew = covariance_px2(0, 1) / scale;
+  const double per_unknown = sinh_ratio(std::asinh(std::hypot(along, askew)))[0];
+  return {std::log(scale), along / per_unknown, askew / per_unknown};
 }
 
 PictureBlur::PictureBlur(const Unknowns& unknowns) : unknowns_(unknowns) {

@@ -19,6 +19,9 @@ class PictureBlur {
   /// Returns the unknowns of a lens of that standard deviation (> 0) with motion on top.
   static Unknowns unknowns(double lens_px, const Eigen::Vector2d& motion_px);
 
+  /// Returns the unknowns of a blur of that covariance, which is positive definite.
+  static Unknowns unknowns(const Eigen::Matrix2d& covariance_px2);
+
   explicit PictureBlur(const Unknowns& unknowns);
 
   const Eigen::Matrix2d& covariance_px2() const { return covariance_px2_; }

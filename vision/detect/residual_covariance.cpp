@@ -72,17 +72,11 @@ Eigen::Index map_size(const TagSamples& samples) {
          2 * SampleMaps::kReach;
 }
 
-SampleMaps make_maps(const TagFit& fit) {
-  const TagSamples& samples = fit.samples();
-  const TagRows& rows = fit.rows();
+SampleMaps make_maps(const TagSamples& samples, const TagRows& rows) {
   SampleMaps maps{.stride = map_stride(samples), .rows = samples.height};
   for (Eigen::ArrayXf* map : {&maps.there, &maps.residual, &maps.gradient_u, &maps.gradient_v})
     map->setZero(map_size(samples));
-  // Codecs leave flat places cleaner than edges, which are what places corners.
-  constexpr float kFlat = 0.03F;  // of the steepest slope
-  const float flat = kFlat * rows.slope.head(samples.count).maxCoeff();
   for (Eigen::Index i = 0; i < samples.count; ++i) {
-    if (rows.slope[i] <= flat) continue;
     const Eigen::Index at = map_place(samples, i);
     maps.there[at] = 1;
     maps.residual[at] = rows.residual[i] * std::sqrt(rows.robust[i]);
@@ -94,15 +88,36 @@ SampleMaps make_maps(const TagFit& fit) {
 
 }  // namespace
 
-ResidualCovariance::ResidualCovariance(const TagFit& fit) : fit_(&fit) {
-  const TagSamples& samples = fit.samples();
+EdgeSamples::EdgeSamples(const TagFit& fit) {
+  const TagSamples& all = fit.samples();
+  const float flat = flat_limits(fit.rows()).slope;
+  std::vector<Eigen::Index> steep;
+  for (Eigen::Index i = 0; i < all.count; ++i)
+    if (fit.rows().slope[i] > flat) steep.push_back(i);
+  samples = {.count = static_cast<Eigen::Index>(steep.size()),
+             .x = all.x(steep),
+             .y = all.y(steep),
+             .grey = all.grey(steep),
+             .u = {},
+             .v = {},
+             .width = all.width,
+             .height = all.height};
+  for (const Eigen::Index i : steep) {
+    samples.u.push_back(all.u[static_cast<size_t>(i)]);
+    samples.v.push_back(all.v[static_cast<size_t>(i)]);
+  }
+  rows = fit.rows().at(steep);
+}
+
+ResidualCovariance::ResidualCovariance(const EdgeSamples& edges) : edges_(&edges) {
+  const TagSamples& samples = edges.samples;
   for (Eigen::Index i = 0; i < samples.count; ++i)
     place_.push_back(static_cast<int>(map_place(samples, i)));
   estimate();
 }
 
 void ResidualCovariance::estimate() {
-  const SampleMaps maps = make_maps(*fit_);
+  const SampleMaps maps = make_maps(edges_->samples, edges_->rows);
   const Eigen::Vector2d variances = covariances(pair_sums(maps, 0, 0));
   constexpr double kRounding = 0.3;  // grey levels; what 8 bits leave
   noise_ = std::max(variances[0], kRounding * kRounding);
@@ -119,7 +134,7 @@ void ResidualCovariance::estimate() {
 
 void ResidualCovariance::set_taken_up(double taken_up_px2) {
   const double reach =
-      0.5 * std::min(fit_->samples().width, fit_->samples().height);  // of smooth bending
+      0.5 * std::min(edges_->samples.width, edges_->samples.height);  // of smooth bending
   shift_.clear();
   for (size_t k = 0; k < seen_shift_.size(); ++k) {
     const double distance = k == 0 ? 0 : lag_classes()[k - 1].distance_px;
@@ -144,7 +159,7 @@ double ResidualCovariance::shift_at(double distance_px) const {
 
 ResidualCovariance::AllVariances ResidualCovariance::noise_variances(
     const ResidualSums& weights) const {
-  const TagSamples& samples = fit_->samples();
+  const TagSamples& samples = edges_->samples;
   const AllVariances alone =
       noise_ * weights.cwiseAbs2().colwise().sum().transpose().cast<double>().array();
   if (std::ranges::all_of(noise_lag_, [](double lag) { return lag == 0; })) return alone;
@@ -165,8 +180,8 @@ ResidualCovariance::AllVariances ResidualCovariance::noise_variances(
 
 /// Adds up slopes times weights over blocks of pixels, since the shift is alike within a few.
 void ResidualCovariance::add_blocks(const ResidualSums& weights) {
-  const TagSamples& samples = fit_->samples();
-  const TagRows& rows = fit_->rows();
+  const TagSamples& samples = edges_->samples;
+  const TagRows& rows = edges_->rows;
   constexpr int kLeast_px = 3;
   const int size = std::max(samples.width, samples.height);
   block_px_ = std::max(kLeast_px, (size + kMostAcross - 1) / kMostAcross);

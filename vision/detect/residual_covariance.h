@@ -7,6 +7,15 @@
 
 namespace clothfit {
 
+/// The samples of a fit where the picture is not flat. Others place nothing: their weights in the
+/// corners have 1 % of all squares. Codecs leave flat places cleaner, too.
+struct EdgeSamples {
+  explicit EdgeSamples(const TagFit& fit);
+
+  TagSamples samples;
+  TagRows rows;
+};
+
 /// How the residuals of neighbouring pixels of a tag hang together, estimated from the tag itself:
 ///
 ///   cov(r_i, r_j) = noise(i - j) + g_i . g_j shift(|i - j|),  g: slope of the picture, levels per
@@ -17,7 +26,8 @@ namespace clothfit {
 /// blocks, which move a little as wholes. Both are moments over all pairs of pixels at some lags.
 class ResidualCovariance {
  public:
-  explicit ResidualCovariance(const TagFit& fit);
+  /// Keeps a reference to the samples.
+  explicit ResidualCovariance(const EdgeSamples& edges);
 
   using Variances = Eigen::Array<double, 8, 1>;
   /// Returns the variances of the last 8 of these sums of residuals. The first 8 are the
@@ -37,7 +47,7 @@ class ResidualCovariance {
   void set_taken_up(double taken_up_px2);
   double shift_at(double distance_px) const;
 
-  const TagFit* fit_;
+  const EdgeSamples* edges_;
   double noise_ = 0;               ///< variance, grey levels^2
   std::vector<double> noise_lag_;  ///< covariances, one per lag of the near classes
   // Covariances of the shift, px^2 per coordinate: at the same pixel, then one per class of lags.

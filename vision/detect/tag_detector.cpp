@@ -108,8 +108,9 @@ bool is_read(const RefinedTag& refined, const TagPattern& pattern,
 /// Refines a tag at its predicted place. Nothing is returned where it is not read there, or moves
 /// further than a close prediction is off.
 std::optional<RefinedTag> read_close(const cv::Mat& grey, const TagPattern& pattern,
-                                     const PredictedTag& predicted, const RefineHints& hints,
+                                     const PredictedTag& predicted, RefineHints hints,
                                      std::span<const TagPattern* const> rivals) {
+  hints.quick = true;
   const RefinedTag refined = refine_tag(grey, pattern, homography_to(predicted.corner_px), hints);
   if (!is_read(refined, pattern, rivals) || !agrees(refined, predicted.corner_px)) return {};
   return refined;

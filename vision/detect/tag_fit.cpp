@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "data/median.h"
-#include "vision/detect/blurred_pattern.h"
 
 namespace clothfit {
 namespace {
@@ -18,6 +17,8 @@ double square(double x) {
   return x * x;
 }
 
+/// Mean weight above which the pattern explains the pixels; clean tags have 0.9.
+constexpr double kExplained = 0.8;
 constexpr double kSharp = 0.5;  // px; a sharp lens and a square pixel
 
 }  // namespace
@@ -54,6 +55,7 @@ TagFit::TagFit(const TagPattern& pattern, const Eigen::Matrix2d& pixel_by_tag,
     : pattern_(&pattern),
       samples_(&samples),
       pixel_by_tag_(pixel_by_tag),
+      tag_by_pixel_(pixel_by_tag.inverse()),
       prior_mean_(Unknowns::Zero()),
       prior_(TagUnknowns::prior_precision()) {
   constexpr double kRoughest = 0.1;  // cells; more would pass for another print
@@ -102,15 +104,20 @@ bool TagFit::leaves_cells(const PictureBlur::Unknowns& unknowns) const {
          lens_px > kLeastLens_px;
 }
 
-bool TagFit::converge(int most_steps) {
-  // A step below a third of a standard deviation leaves an error of about its square.
-  constexpr double kStill = 0.3;
+bool TagFit::converge(int most_steps, Ending ending) {
+  // A step this short leaves an error of about its square. Where the pattern explains the pixels,
+  // steps shrink by about the same ratio each time, which tells the next one.
+  constexpr double kStill = 0.3, kNextStill = 0.2;
+  double before = 0;
   for (int i = 0; i < most_steps; ++i) {
     evaluate();
     const double moved = step();
     if (!unknowns_.allFinite() || !leaves_cells(unknowns_.segment<3>(TagUnknowns::kBlur)))
       return false;
-    if (moved < kStill) {
+    const bool fades = ending == Ending::kForeseen && i > 0 && robust().mean() > kExplained &&
+                       moved * moved < kNextStill * before;
+    before = moved;
+    if (moved < kStill || fades) {
       covariance_ = solver_.solve(TagUnknowns::Matrix::Identity());
       return true;
     }
@@ -154,12 +161,30 @@ void TagFit::weigh() {
              *samples_, rows_);
 }
 
+/// Makes the pattern under the blur. One made before serves as long as the blur is nearly the same.
+void TagFit::blur_pattern() {
+  constexpr double kNearly = 0.01;  // of the logarithms; leaves 5e-5 of what the blur does
+  const PictureBlur::Unknowns now = unknowns_.segment<3>(TagUnknowns::kBlur);
+  if (!blurred_ || (now - blurred_for_).cwiseAbs().maxCoeff() > kNearly) {
+    blurred_.emplace(*pattern_, pixel_by_tag_, PictureBlur(now));
+    blurred_for_ = now;
+    blurred_with_ = PictureBlur::unknowns(blurred_->covariance_px2());
+    const std::array<Eigen::Matrix2d, 3> slopes = PictureBlur(blurred_with_).covariance_slopes();
+    for (size_t k = 0; k < 3; ++k) {
+      const Eigen::Matrix2f half =
+          (0.5 * tag_by_pixel_ * slopes[k] * tag_by_pixel_.transpose()).cast<float>();
+      model_.by_blur[k] = {half(0, 0), 2 * half(0, 1), half(1, 1)};
+    }
+  }
+  for (size_t k = 0; k < 3; ++k) {
+    const auto which = static_cast<Eigen::Index>(k);
+    model_.blur_change[k] = static_cast<float>(now[which] - blurred_with_[which]);
+  }
+}
+
 void TagFit::evaluate() {
   using Layout = TagUnknowns;
-  const PictureBlur blur(unknowns_.segment<3>(Layout::kBlur));
-  const BlurredPattern blurred(*pattern_, pixel_by_tag_, blur);
-  const Eigen::Matrix2d tag_by_pixel = pixel_by_tag_.inverse();
-  model_.grid = blurred.grid();
+  blur_pattern();
   const auto copy = [&](int first, auto& to) {
     for (size_t k = 0; k < to.size(); ++k)
       to[k] = static_cast<float>(unknowns_[first + static_cast<int>(k)]);
@@ -169,18 +194,20 @@ void TagFit::evaluate() {
   copy(Layout::kBlurSlope, model_.blur_slope);
   copy(Layout::kLight, model_.offset);
   copy(Layout::kLight + 3, model_.contrast);
-  const std::array<Eigen::Matrix2d, 3> slopes = blur.covariance_slopes();
-  for (size_t k = 0; k < 3; ++k) {
-    const Eigen::Matrix2f half =
-        (0.5 * tag_by_pixel * slopes[k] * tag_by_pixel.transpose()).cast<float>();
-    model_.by_blur[k] = {half(0, 0), 2 * half(0, 1), half(1, 1)};
-  }
   for (size_t k = 0; k < 4; ++k)
     model_.tag_by_pixel[k] = static_cast<float>(
-        tag_by_pixel(static_cast<Eigen::Index>(k / 2), static_cast<Eigen::Index>(k % 2)));
+        tag_by_pixel_(static_cast<Eigen::Index>(k / 2), static_cast<Eigen::Index>(k % 2)));
+  model_.grid = blurred_->grid();
   evaluate_rows(model_, *samples_, rows_);
   model_.grid = {};
   weigh();
+}
+
+/// Returns by how much steps near the solution are too short because robust weights depend on the
+/// residuals: the mean weight over the mean slope of Cauchy's influence.
+double TagFit::stretch() const {
+  const double weight = robust().mean();
+  return weight > kExplained ? weight / (2 * robust().square() - robust()).mean() : 1;
 }
 
 /// Adds one Gauss-Newton step to the unknowns. Returns its length in standard deviations per
@@ -191,8 +218,10 @@ double TagFit::step() {
   const Unknowns gradient = equations.gradient - prior_.cwiseProduct(unknowns_ - prior_mean_);
   solver_.compute(equations.information);
   const Unknowns change = solver_.solve(gradient);
-  unknowns_ += change;
-  return std::sqrt(change.dot(gradient) / TagUnknowns::kCount);
+  const double length = std::sqrt(change.dot(gradient) / TagUnknowns::kCount);
+  constexpr double kNear = 2;  // farther off, the same step overshoots
+  unknowns_ += (length < kNear ? stretch() : 1) * change;
+  return length;
 }
 
 }  // namespace clothfit

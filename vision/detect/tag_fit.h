@@ -3,7 +3,9 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <limits>
+#include <optional>
 
+#include "vision/detect/blurred_pattern.h"
 #include "vision/detect/picture_blur.h"
 #include "vision/detect/tag_kernels.h"
 #include "vision/detect/tag_pattern.h"
@@ -52,9 +54,13 @@ class TagFit {
   /// Bounds what noise and roughness are taken for. Their estimates are medians over the tag, which
   /// are too large once half of it is hidden.
   void bound_noise(double noise_levels, double roughness_px);
-  /// Steps until a step is below 0.3 of a standard deviation; false where that does not happen
-  /// within `most_steps`, or the blur leaves no cells.
-  bool converge(int most_steps);
+  /// When a fit ends: seen, that is after a step below 0.3 of a standard deviation; or foreseen,
+  /// that is too where the next step would be below 0.2. The latter takes one evaluation less. It
+  /// wants a start near the end, since fits that wander may make a short step.
+  enum class Ending { kSeen, kForeseen };
+  /// Steps until the end; false where it is not reached within `most_steps`, or the blur leaves no
+  /// cells.
+  bool converge(int most_steps, Ending ending = Ending::kSeen);
 
   const TagSamples& samples() const { return *samples_; }
   const TagRows& rows() const { return rows_; }
@@ -77,17 +83,22 @@ class TagFit {
  private:
   double cell_px() const;
   bool leaves_cells(const PictureBlur::Unknowns& unknowns) const;
+  void blur_pattern();
   void evaluate();
   void weigh();
+  double stretch() const;
   double step();
 
   const TagPattern* pattern_;
   const TagSamples* samples_;
-  Eigen::Matrix2d pixel_by_tag_;
+  Eigen::Matrix2d pixel_by_tag_, tag_by_pixel_;
   TagUnknowns::Vector unknowns_ = TagUnknowns::Vector::Zero();
   TagUnknowns::Vector prior_mean_, prior_;
   TagUnknowns::Matrix covariance_ = TagUnknowns::Matrix::Zero();
   Eigen::LDLT<TagUnknowns::Matrix> solver_;
+  std::optional<BlurredPattern> blurred_;
+  PictureBlur::Unknowns blurred_for_ = PictureBlur::Unknowns::Zero();   ///< when it was made
+  PictureBlur::Unknowns blurred_with_ = PictureBlur::Unknowns::Zero();  ///< what it has
   TagModel model_;
   TagRows rows_;
   double noise_levels_ = 0, roughness_px_ = 0;

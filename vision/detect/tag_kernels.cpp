@@ -32,6 +32,12 @@ constexpr int pairs_of(int count) {
   return count * (count + 1) / 2;
 }
 
+/// Returns the place of an unordered pair among the pairs of `count`.
+constexpr size_t pair_at(int a, int b, int count) {
+  const int first = std::min(a, b), second = std::max(a, b);
+  return static_cast<size_t>(first * count - first * (first - 1) / 2 + second - first);
+}
+
 /// One sum per lane for each product of factors and polynomial.
 struct LaneSums {
   using Lanes = std::array<float, kSampleLanes>;
@@ -50,6 +56,12 @@ struct CornerSums {
 /// Arrays over a block of samples.
 template <int count>
 using BlockArrays = std::array<std::array<float, kBlock>, static_cast<size_t>(count)>;
+
+/// What the normal equations need of a sample: x, y, its factors but 1, weight and residual.
+constexpr int kInputs = 2 + (kFactors - 1) + 2;
+
+/// Samples that are waiting to be added up. A vector more than a block fits.
+using Waiting = std::array<std::array<float, kBlock + kSampleLanes>, kInputs>;
 
 struct Block {
   BlockArrays<kDegree6> polynomials;
@@ -201,8 +213,8 @@ void evaluate(const TagModel& model, const TagSamples& samples, TagRows& rows) {
           mul_add(set(by[2]), pattern.by_yy,
                   mul_add(set(by[1]), pattern.by_xy, hn::Mul(set(by[0]), pattern.by_xx)));
       store(hn::Mul(contrast, change), rows.by_blur[k], i);
-      const V more =
-          mul_add(set(model.blur_slope[2 * k + 1]), y, hn::Mul(set(model.blur_slope[2 * k]), x));
+      const V more = mul_add(set(model.blur_slope[2 * k + 1]), y,
+                             mul_add(set(model.blur_slope[2 * k]), x, set(model.blur_change[k])));
       white = mul_add(change, more, white);
     }
     store(white, rows.white, i);
@@ -233,16 +245,16 @@ void weigh(const TagWeights& weights, TagRows& rows) {
   });
 }
 
-/// Fills the block's arrays from its samples on.
-HWY_INLINE void fill(const TagSamples& samples, const TagRows& rows, Eigen::Index first,
-                     Block& block) {
+/// Fills the block's arrays from the first samples that wait.
+HWY_INLINE void fill(const Waiting& waiting, Block& block) {
   const Floats d;
   for_vectors(kBlock, [&](Eigen::Index at) HWY_ATTR {
-    const Eigen::Index i = first + at;
     const auto put = [&](auto& arrays, int which, const V& values) HWY_ATTR {
       hn::StoreU(values, d, arrays[static_cast<size_t>(which)].data() + at);
     };
-    const V x = load(samples.x, i), y = load(samples.y, i);
+    const auto get = [&](size_t which)
+                         HWY_ATTR { return hn::LoadU(d, waiting[which].data() + at); };
+    const V x = get(0), y = get(1);
     V terms[kDegree6];
     polynomials(x, y, terms);
     for (int degree = 4, next = kDegree3; degree <= 6; ++degree) {
@@ -253,11 +265,10 @@ HWY_INLINE void fill(const TagSamples& samples, const TagRows& rows, Eigen::Inde
     }
     for (int k = 0; k < kDegree6; ++k) put(block.polynomials, k, terms[k]);
 
-    const V place[kPlaceFactors] = {load(rows.by_x, i), load(rows.by_y, i)};
-    const V other[kOtherFactors] = {load(rows.by_blur[0], i), load(rows.by_blur[1], i),
-                                    load(rows.by_blur[2], i), set(1), load(rows.white, i)};
-    const V weight = load(rows.weight, i);
-    const V pull = hn::Mul(weight, load(rows.residual, i));
+    const V place[kPlaceFactors] = {get(2), get(3)};
+    const V other[kOtherFactors] = {get(4), get(5), get(6), set(1), get(7)};
+    const V weight = get(8);
+    const V pull = hn::Mul(weight, get(9));
     int both = 0, mixed = 0;
     for (int a = 0; a < kPlaceFactors; ++a) {
       const V weighed_place = hn::Mul(weight, place[a]);
@@ -312,16 +323,78 @@ HWY_INLINE void add_products(const std::array<std::array<float, kBlock>, factors
                              count, &sums[static_cast<size_t>(r * count + c)]);
 }
 
-void add_normal_sums(const TagSamples& samples, const TagRows& rows, LaneSums& sums) {
+HWY_INLINE void add_block(const Waiting& waiting, LaneSums& sums) {
   Block block;
-  for (Eigen::Index first = 0; first < samples.x.size(); first += kBlock) {
-    fill(samples, rows, first, block);
-    add_products<3, 4>(block.place_place, block.polynomials, kDegree6, sums.place_place);
-    add_products<2, 5>(block.place_other, block.polynomials, kDegree4, sums.place_other);
-    add_products<3, 3>(block.other_other, block.polynomials, 6, sums.other_other);
-    add_products<2, 5>(block.place_residual, block.polynomials, kDegree3, sums.place_residual);
-    add_products<5, 1>(block.other_residual, block.polynomials, 3, sums.other_residual);
+  fill(waiting, block);
+  add_products<3, 4>(block.place_place, block.polynomials, kDegree6, sums.place_place);
+  add_products<2, 5>(block.place_other, block.polynomials, kDegree4, sums.place_other);
+  add_products<3, 3>(block.other_other, block.polynomials, 6, sums.other_other);
+  add_products<2, 5>(block.place_residual, block.polynomials, kDegree3, sums.place_residual);
+  add_products<5, 1>(block.other_residual, block.polynomials, 3, sums.other_residual);
+}
+
+HWY_INLINE void add_to(const V& value, LaneSums::Lanes& sums, Eigen::Index lane) {
+  const Floats d;
+  hn::StoreU(hn::Add(hn::LoadU(d, sums.data() + lane), value), d, sums.data() + lane);
+}
+
+/// Adds samples that tell nothing but the light.
+HWY_INLINE void add_flat(const TagSamples& samples, const TagRows& rows, Eigen::Index i,
+                         const hn::Mask<Floats>& flat, LaneSums& sums) {
+  constexpr int kOffset = kOtherFactors - 2, kContrast = kOtherFactors - 1;
+  const V x = load(samples.x, i), y = load(samples.y, i), white = load(rows.white, i);
+  const V weight = hn::IfThenElseZero(flat, load(rows.weight, i));
+  const V weighed_white = hn::Mul(weight, white), residual = load(rows.residual, i);
+  const V both[] = {weight, weighed_white, hn::Mul(weighed_white, white)};
+  const size_t pairs[] = {pair_at(kOffset, kOffset, kOtherFactors),
+                          pair_at(kOffset, kContrast, kOtherFactors),
+                          pair_at(kContrast, kContrast, kOtherFactors)};
+  V terms[kDegree3];
+  polynomials(x, y, terms);
+  const Eigen::Index lane = i % kSampleLanes;
+  for (size_t k = 0; k < 6; ++k)
+    for (size_t p = 0; p < 3; ++p)
+      add_to(hn::Mul(both[p], terms[k]), sums.other_other[6 * pairs[p] + k], lane);
+  for (size_t k = 0; k < 3; ++k) {
+    const V of_term = hn::Mul(residual, terms[k]);
+    add_to(hn::Mul(weight, of_term), sums.other_residual[3 * kOffset + k], lane);
+    add_to(hn::Mul(weighed_white, of_term), sums.other_residual[3 * kContrast + k], lane);
   }
+}
+
+/// Appends the samples of a vector that are not flat to those that wait; returns how many wait now.
+HWY_INLINE size_t append(const TagSamples& samples, const TagRows& rows, Eigen::Index i,
+                         const hn::Mask<Floats>& steep, size_t count, Waiting& waiting) {
+  const Eigen::ArrayXf* const inputs[] = {
+      &samples.x,       &samples.y,       &rows.by_x,  &rows.by_y,   &rows.by_blur[0],
+      &rows.by_blur[1], &rows.by_blur[2], &rows.white, &rows.weight, &rows.residual};
+  for (size_t k = 0; k < kInputs; ++k)
+    hn::CompressBlendedStore(load(*inputs[k], i), steep, Floats(), waiting[k].data() + count);
+  return count + hn::CountTrue(Floats(), steep);
+}
+
+void add_normal_sums(const TagSamples& samples, const TagRows& rows, const FlatLimits& limits,
+                     LaneSums& sums) {
+  const V slope = set(limits.slope);
+  Waiting waiting{};
+  size_t count = 0;
+  for (Eigen::Index first = 0; first < samples.x.size(); first += kSampleLanes) {
+    // All lanes come before a block, so that sums do not depend on the size of vectors.
+    for_vectors(kSampleLanes, [&](Eigen::Index lane) HWY_ATTR {
+      const Eigen::Index i = first + lane;
+      auto steep = hn::Gt(load(rows.slope, i), slope);
+      for (size_t k = 0; k < 3; ++k)
+        steep = hn::Or(steep, hn::Gt(hn::Abs(load(rows.by_blur[k], i)), set(limits.by_blur[k])));
+      add_flat(samples, rows, i, hn::Not(steep), sums);
+      count = append(samples, rows, i, steep, count, waiting);
+    });
+    if (count < kBlock) continue;
+    add_block(waiting, sums);
+    count -= kBlock;
+    for (auto& input : waiting) std::copy_n(input.data() + kBlock, count, input.data());
+  }
+  for (auto& input : waiting) std::fill(input.data() + count, input.data() + kBlock, 0.0F);
+  add_block(waiting, sums);
 }
 
 /// Adds `factor` times the combination's rows `from` on, times the polynomials, to `to`.
@@ -549,12 +622,6 @@ constexpr size_t polynomial_at(int i, int j) {
   return static_cast<size_t>((i + j) * (i + j + 1) / 2 + j);
 }
 
-/// Returns the place of an unordered pair among the pairs of `count`.
-constexpr size_t pair_at(int a, int b, int count) {
-  const int first = std::min(a, b), second = std::max(a, b);
-  return static_cast<size_t>(first * count - first * (first - 1) / 2 + second - first);
-}
-
 /// Returns J' W J at one place; `a` does not come after `b`.
 double information_at(const LaneSums& sums, const Derivative& a, const Derivative& b) {
   const size_t term = polynomial_at(a.i + b.i, a.j + b.j);
@@ -583,6 +650,19 @@ void TagRows::resize(Eigen::Index count) {
     one->resize(count);
 }
 
+TagRows TagRows::at(std::span<const Eigen::Index> which) const {
+  return {.by_x = by_x(which),
+          .by_y = by_y(which),
+          .by_blur = {by_blur[0](which), by_blur[1](which), by_blur[2](which)},
+          .white = white(which),
+          .residual = residual(which),
+          .gradient_u = gradient_u(which),
+          .gradient_v = gradient_v(which),
+          .slope = slope(which),
+          .robust = robust(which),
+          .weight = weight(which)};
+}
+
 void evaluate_rows(const TagModel& model, const TagSamples& samples, TagRows& rows) {
   rows.resize(samples.x.size());
   HWY_DYNAMIC_DISPATCH(evaluate)(model, samples, rows);
@@ -595,9 +675,16 @@ void weigh_rows(const TagWeights& weights, const TagSamples& samples, TagRows& r
   rows.weight.tail(none).setZero();
 }
 
+FlatLimits flat_limits(const TagRows& rows) {
+  constexpr float kFlat = 0.03F;
+  FlatLimits limits{.slope = kFlat * rows.slope.maxCoeff(), .by_blur = {}};
+  for (size_t k = 0; k < 3; ++k) limits.by_blur[k] = kFlat * rows.by_blur[k].abs().maxCoeff();
+  return limits;
+}
+
 NormalEquations normal_equations(const TagSamples& samples, const TagRows& rows) {
   LaneSums sums;
-  HWY_DYNAMIC_DISPATCH(add_normal_sums)(samples, rows, sums);
+  HWY_DYNAMIC_DISPATCH(add_normal_sums)(samples, rows, flat_limits(rows), sums);
   static constexpr std::array<Derivative, 35> kAll = derivatives();
   NormalEquations equations;
   for (size_t b = 0; b < kAll.size(); ++b) {

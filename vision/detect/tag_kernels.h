@@ -35,6 +35,7 @@ struct TagModel {
   SplineGrid grid;
   std::array<float, 10> bend_x{}, bend_y{};
   std::array<float, 3> offset{}, contrast{};
+  std::array<float, 3> blur_change{};  ///< of the blur's unknowns since the grid was made
   std::array<float, 6> blur_slope{};
   /// How the pattern changes with each unknown of the blur: these times its second derivatives (xx,
   /// xy, yy).
@@ -55,6 +56,8 @@ struct TagRows {
   Eigen::ArrayXf weight;                  ///< inverse variance times robust weight
 
   void resize(Eigen::Index count);
+  /// Returns the rows at those indices.
+  TagRows at(std::span<const Eigen::Index> which) const;
 };
 
 /// Evaluates the model at each sample; leaves the weights alone.
@@ -67,7 +70,15 @@ struct TagWeights {
 };
 void weigh_rows(const TagWeights& weights, const TagSamples& samples, TagRows& rows);
 
-/// A tag's normal equations, without a prior.
+/// Samples at or below all of these are flat: where they are, and how blurred, changes them by less
+/// than 3 % of what it changes others. They tell nothing but the light.
+struct FlatLimits {
+  float slope = 0;
+  std::array<float, 3> by_blur{};
+};
+FlatLimits flat_limits(const TagRows& rows);
+
+/// A tag's normal equations, without a prior. Flat samples count as if they were wholly so.
 struct NormalEquations {
   Eigen::Matrix<double, 35, 35> information;  ///< J' W J
   Eigen::Matrix<double, 35, 1> gradient;      ///< J' W r

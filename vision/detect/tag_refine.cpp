@@ -17,7 +17,7 @@ namespace {
 
 constexpr double kSharp_px = 0.5;  // blur of a good lens and a pixel
 constexpr Eigen::Index kFewestSamples = 2 * TagUnknowns::kCount;
-constexpr int kMostSteps = 20;
+constexpr int kMostSteps = 20, kQuickSteps = 10;
 
 /// Returns small steps from tag coordinates to pixels at the middle of the tag.
 Eigen::Matrix2d steps_at_middle(const Eigen::Matrix3d& pixel_from_tag) {
@@ -52,12 +52,13 @@ std::vector<PictureBlur::Unknowns> starts(const RefineHints& hints) {
 }
 
 /// Fits from where the fit starts, and notes what it shows, in pixels of the window.
-RefinedTag refined_from(TagFit& fit, const TagPattern& pattern,
+RefinedTag refined_from(TagFit& fit, bool quick, const TagPattern& pattern,
                         const Eigen::Matrix3d& pixel_from_tag,
                         const Eigen::Matrix2d& pixel_by_tag) {
   RefinedTag result;
   result.corner_px.fill(Eigen::Vector2d::Zero());
-  result.usable = fit.converge(kMostSteps);
+  result.usable =
+      quick ? fit.converge(kQuickSteps, TagFit::Ending::kForeseen) : fit.converge(kMostSteps);
   result.usable = result.usable && fit.contrast() > 0;  // white is brighter than black
   if (!fit.unknowns().allFinite()) return RefinedTag{.corner_px = result.corner_px};
   result.noise_levels = fit.noise_levels();
@@ -121,13 +122,14 @@ RefinedTag refine_tag(const cv::Mat& grey, const TagPattern& pattern,
   for (const PictureBlur::Unknowns& start : starts(near)) {
     TagFit fit(pattern, pixel_by_tag, samples, start);
     if (near.picture) expect(*near.picture, fit);
-    const RefinedTag refined = refined_from(fit, pattern, window_from_tag, pixel_by_tag);
+    const RefinedTag refined =
+        refined_from(fit, hints.quick, pattern, window_from_tag, pixel_by_tag);
     const bool shows_tag = refined.usable && refined.evidence.shows_tag();
     // What a start says that led nowhere counts less than what a better one does.
     if (shows_tag || refined.usable > result.usable ||
         (refined.usable == result.usable && refined.explained > result.explained))
       result = refined;
-    if (shows_tag) break;
+    if (shows_tag || hints.quick) break;
   }
   return in_picture(result, *window);
 }

@@ -41,6 +41,8 @@ struct RefineHints {
   std::optional<Eigen::Vector2d>
       motion_px;  ///< while the shutter is open, where tags around it tell it
   std::optional<ExpectedPicture> picture;
+  /// The start is near the end: there is one, with few steps. What fails is sought in another way.
+  bool quick = false;
 };
 
 /// Places a printed tag on a picture by least squares on the grey levels of all its pixels. The map

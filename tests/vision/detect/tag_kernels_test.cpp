@@ -58,11 +58,11 @@ struct OddTag {
   TagModel model;
 };
 
-/// Returns the unknown at a place in the order of TagUnknowns; the blur's own are not in the model.
+/// Returns the unknown at a place in the order of TagUnknowns.
 float* unknown(TagModel& model, int k) {
   if (k < 10) return &model.bend_x[static_cast<size_t>(k)];
   if (k < 20) return &model.bend_y[static_cast<size_t>(k - 10)];
-  if (k < 23) return nullptr;
+  if (k < 23) return &model.blur_change[static_cast<size_t>(k - 20)];
   if (k < 29) return &model.blur_slope[static_cast<size_t>(k - 23)];
   if (k < 32) return &model.offset[static_cast<size_t>(k - 29)];
   return &model.contrast[static_cast<size_t>(k - 32)];
@@ -70,15 +70,9 @@ float* unknown(TagModel& model, int k) {
 
 /// Returns the derivatives of the grey levels by differences.
 Eigen::MatrixXd jacobian(const OddTag& tag) {
-  const TagRows rows = tag.rows(tag.model);
   Eigen::MatrixXd result(tag.samples.count, kUnknowns);
   for (int k = 0; k < kUnknowns; ++k) {
     TagModel up = tag.model, down = tag.model;
-    if (unknown(up, k) == nullptr) {
-      result.col(k) =
-          rows.by_blur[static_cast<size_t>(k - 20)].head(tag.samples.count).cast<double>();
-      continue;
-    }
     const float step = k < 29 ? 2e-3F : 1.0F;
     *unknown(up, k) += step;
     *unknown(down, k) -= step;
@@ -94,7 +88,13 @@ Eigen::MatrixXd jacobian(const OddTag& tag) {
 TEST(TagKernels, NormalEquationsAreThoseOfTheDerivatives) {
   const OddTag tag;
   const TagRows rows = tag.rows(tag.model);
-  const Eigen::MatrixXd by = jacobian(tag);
+  Eigen::MatrixXd by = jacobian(tag);
+  const FlatLimits limits = flat_limits(rows);
+  for (Eigen::Index i = 0; i < tag.samples.count; ++i) {
+    bool flat = rows.slope[i] <= limits.slope;
+    for (size_t k = 0; k < 3; ++k) flat = flat && std::abs(rows.by_blur[k][i]) <= limits.by_blur[k];
+    if (flat) by.row(i).head<29>().setZero();
+  }
   const Eigen::VectorXd weight = rows.weight.head(tag.samples.count).matrix().cast<double>();
   const Eigen::VectorXd residual = rows.residual.head(tag.samples.count).matrix().cast<double>();
 
