@@ -117,6 +117,33 @@ TEST(TagDetector, PlacesTagsThatMoveInAnyDirection) {
   }
 }
 
+TEST(TagDetector, FindsTagsThatTheLensBlursByHalfACell) {
+  // Of these pictures themselves the library reads no tag.
+  const SyntheticCamera camera{.blur_px = 2.2};
+  const std::uint64_t seed = 15;
+  std::mt19937_64 rng(seed);
+  std::uniform_real_distribution<double> unit(0, 1);
+  TagDetector detector("tag36h11");
+  int found_tags = 0;
+  for (int id = 0; id < 40; ++id) {
+    SCOPED_TRACE(testing::Message() << "seed " << seed << ", tag " << id);
+    SyntheticTag tag = place_tag(camera, 30, 2 * M_PI * unit(rng), (unit(rng) - 0.5) * M_PI / 3,
+                                 {unit(rng), unit(rng)});
+    tag.id = id;
+
+    const auto found = detector.detect(render(tag, camera, rng));
+
+    for (const TagDetection& one : found) {
+      EXPECT_EQ(one.id, id);
+      EXPECT_TRUE(one.shows_tag);
+      for (size_t c = 0; c < 4; ++c)
+        EXPECT_LT((one.corner_px[c] - true_corners(tag, camera)[c]).norm(), 0.25) << c;
+      ++found_tags;
+    }
+  }
+  EXPECT_GE(found_tags, 25);
+}
+
 TEST(TagDetector, ReadsAPredictedTagAndInventsNone) {
   const SyntheticCamera camera;
   std::mt19937_64 rng(12);
