@@ -15,11 +15,12 @@ struct Sharpening {
 };
 
 // Chosen on drawn recordings: they find 1.1 times the tags under 6 px of motion blur, 1.3 times
-// under 12 px, and 1.4 times under a lens of 2 px. Size 1/2 alone finds 3 % fewer, 2/3 or 3/4 for
-// 4/5 up to 2 %, and larger copies cost more than the picture.
+// under 12 px, and 1.4 times under a lens of 2 px. Size 1/2 alone finds 2 to 9 % fewer, 2/3 or 3/4
+// for 4/5 up to 7 %, a blur of 3 px for 2 up to 13 %; a copy of full size costs up to as much as
+// the picture.
 constexpr std::array kSharpenings = {Sharpening{.size = 0.8, .blur_px = 2},
                                      Sharpening{.size = 0.5, .blur_px = 1}};
-constexpr double kAmount = 2;     // 1 finds 1 % fewer, more drowns tags of low contrast in noise
+constexpr double kAmount = 2;  // 1 finds up to 6 % fewer, more drowns tags of low contrast in noise
 constexpr int kSmallest_px = 16;  // a copy's side; no tag is read in less
 
 }  // namespace
