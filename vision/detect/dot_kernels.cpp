@@ -116,24 +116,27 @@ HWY_INLINE V exponential(const V& a) {
   return hn::BitCast(Floats(), hn::Add(hn::BitCast(integers, sum), exponent));
 }
 
+/// Numbers per pixel that say whether it is taken: 0, or -1 where it is.
+struct alignas(64) Taken : std::array<std::int32_t, std::tuple_size_v<DotRow::array>> {};
+
+HWY_INLINE void store(const hn::Mask<Floats>& taken, Taken& to, int at) {
+  const Integers integers;
+  hn::StoreU(hn::BitCast(integers, hn::VecFromMask(Floats(), taken)), integers, to.data() + at);
+}
+
 void gather(const PixelBox& box, const DotReach& reach, DotPixels& pixels) {
   const Floats d;
   const V bxx = set(reach.inverse[0]), bxy = set(reach.inverse[1]), byy = set(reach.inverse[2]);
   const V one = set(1), beyond = set(reach.beyond_px), farthest = set(reach.ratio * reach.ratio);
   const V steps = hn::Iota(d, 0), stride = set(static_cast<float>(box.stride));
-  V darkest = set(255), brightest = set(0);
-  DotRow line;
-  int count = 0;
+  Taken taken;
+  DotRow xs;
+  size_t count = 0;
   for (int row = 0; row < box.rows && count < kMostDotPixels; ++row) {
-    const std::uint8_t* from = box.first + row * box.row_bytes;
-    for (int k = 0; k < box.columns; ++k)
-      line[static_cast<size_t>(k)] = static_cast<float>(from[k * box.stride]);
-    const V y = set(box.top + static_cast<float>(row * box.stride));
-    const V dy = hn::Sub(y, set(reach.y));
-    const auto width = static_cast<int>(hn::Lanes(d));
-    for (int k = 0; k < box.columns && count < kMostDotPixels; k += width) {
-      const V step = hn::Add(steps, set(static_cast<float>(k)));
-      const V x = mul_add(step, stride, set(box.left));
+    const float y = box.top + static_cast<float>(row * box.stride);
+    const V dy = set(y - reach.y);
+    for_vectors(box.columns, [&](int k) HWY_ATTR {
+      const V x = mul_add(hn::Add(steps, set(static_cast<float>(k))), stride, set(box.left));
       const V dx = hn::Sub(x, set(reach.x));
       const V qx = mul_add(bxx, dx, hn::Mul(bxy, dy)), qy = mul_add(bxy, dx, hn::Mul(byy, dy));
       const V square = mul_add(qx, qx, hn::Mul(qy, qy));
@@ -141,20 +144,64 @@ void gather(const PixelBox& box, const DotReach& reach, DotPixels& pixels) {
       // (|q| - 1) |q| / |grad| is the distance.
       const V way = hn::Sub(square, hn::Sqrt(square));
       const V most = hn::Mul(beyond, hn::Sqrt(mul_add(gx, gx, hn::Mul(gy, gy))));
-      const auto within =
-          hn::Or(hn::Le(square, one), hn::And(hn::Le(way, most), hn::Le(square, farthest)));
-      const auto taken = hn::And(within, first_of(box.columns - k));
-      const V grey = load(line, k);
-      darkest = hn::IfThenElse(taken, hn::Min(darkest, grey), darkest);
-      brightest = hn::IfThenElse(taken, hn::Max(brightest, grey), brightest);
-      hn::CompressStore(y, taken, d, pixels.y.data() + count);
-      hn::CompressStore(grey, taken, d, pixels.grey.data() + count);
-      count += static_cast<int>(hn::CompressStore(x, taken, d, pixels.x.data() + count));
+      store(x, xs, k);
+      store(hn::Or(hn::Le(square, one), hn::And(hn::Le(way, most), hn::Le(square, farthest))),
+            taken, k);
+    });
+    const std::uint8_t* from = box.first + row * box.row_bytes;
+    // Without a branch: what is not taken is written over.
+    for (int k = 0; k < box.columns && count < kMostDotPixels; ++k) {
+      const auto column = static_cast<size_t>(k);
+      pixels.x[count] = xs[column];
+      pixels.y[count] = y;
+      pixels.grey[count] = static_cast<float>(from[k * box.stride]);
+      count += static_cast<size_t>(-taken[column]);
     }
   }
-  pixels.count = std::min(count, kMostDotPixels);
+  pixels.count = static_cast<int>(count);
+  pixels.darkest = pixels.brightest = 0;
+  if (count == 0) return;
+  V darkest = set(pixels.grey[0]), brightest = darkest;
+  for (DotRow* row : {&pixels.x, &pixels.y, &pixels.grey})
+    std::fill(row->begin() + pixels.count, row->begin() + pixels.padded(), row->front());
+  for_vectors(pixels.padded(), [&](int i) HWY_ATTR {
+    darkest = hn::Min(darkest, load(pixels.grey, i));
+    brightest = hn::Max(brightest, load(pixels.grey, i));
+  });
   pixels.darkest = hn::GetLane(hn::MinOfLanes(d, darkest));
   pixels.brightest = hn::GetLane(hn::MaxOfLanes(d, brightest));
+}
+
+void add_dark(const PixelBox& box, const DotReach& reach, float level, bool bright,
+              std::array<DotLanes, 3>& sums) {
+  const Floats d;
+  const V bxx = set(reach.inverse[0]), bxy = set(reach.inverse[1]), byy = set(reach.inverse[2]);
+  const V farthest = set(reach.ratio * reach.ratio), half = set(level), none = hn::Zero(d);
+  const V sign = set(bright ? -1.0F : 1.0F), steps = hn::Iota(d, 0);
+  for (DotLanes& lanes : sums) lanes.fill(0);
+  DotRow line;
+  for (int row = 0; row < box.rows; ++row) {
+    const std::uint8_t* from = box.first + row * box.row_bytes;
+    for (int k = 0; k < box.columns; ++k)
+      line[static_cast<size_t>(k)] = static_cast<float>(from[k * box.stride]);
+    const V dy = set(box.top + static_cast<float>(row * box.stride) - reach.y);
+    for_vectors(box.columns, [&](int k) HWY_ATTR {
+      const V step = hn::Add(steps, set(static_cast<float>(k)));
+      const V dx = mul_add(step, set(static_cast<float>(box.stride)), set(box.left - reach.x));
+      const V qx = mul_add(bxx, dx, hn::Mul(bxy, dy)), qy = mul_add(bxy, dx, hn::Mul(byy, dy));
+      const auto within =
+          hn::And(first_of(box.columns - k), hn::Le(mul_add(qx, qx, hn::Mul(qy, qy)), farthest));
+      const V dark =
+          hn::IfThenElseZero(within, hn::Max(hn::Mul(sign, hn::Sub(half, load(line, k))), none));
+      const auto add = [&](DotLanes& lanes, const V& more) HWY_ATTR {
+        float* sum = lanes.data() + k % kDotLanes;
+        hn::StoreU(hn::Add(hn::LoadU(d, sum), more), d, sum);
+      };
+      add(sums[0], dark);
+      add(sums[1], hn::Mul(dark, dx));
+      add(sums[2], hn::Mul(dark, dy));
+    });
+  }
 }
 
 /// Where a pixel lies about the dot.
@@ -259,55 +306,58 @@ void evaluate(const DotShape& shape, const DotPixels& pixels, DotRows& rows) {
   rows.steepest = hn::GetLane(hn::MaxOfLanes(Floats(), steepest));
 }
 
-/// Numbers >= 0 in any order.
-struct Heap {
-  DotRow values;
-  int count = 0;
-
-  HWY_INLINE void add(const V& more, const hn::Mask<Floats>& taken) {
-    count += static_cast<int>(hn::CompressStore(more, taken, Floats(), values.data() + count));
+/// Returns the middle one of numbers >= 0, found bit by bit; 0 without any. There must be room for
+/// a vector behind the last.
+HWY_INLINE float median_of(DotRow& values, size_t count) {
+  if (count == 0) return 0;
+  const Integers integers;
+  const auto size = static_cast<int>(count);
+  store(set(std::numeric_limits<float>::infinity()), values, size);
+  int bits = 0;
+  constexpr int kFirst = 30, kLast = 13;  // 2^13 are a thousandth of a float
+  for (int bit = kFirst; bit >= kLast; --bit) {
+    const I limit = hn::Set(integers, bits | 1 << bit);
+    I less = hn::Zero(integers);
+    for_vectors(size, [&](int i) HWY_ATTR {
+      const I value = hn::BitCast(integers, load(values, i));
+      less = hn::Sub(less, hn::VecFromMask(integers, hn::Lt(value, limit)));
+    });
+    if (hn::GetLane(hn::SumOfLanes(integers, less)) <= size / 2) bits |= 1 << bit;
   }
-
-  /// Returns the middle one, found bit by bit.
-  HWY_INLINE float median() {
-    if (count == 0) return 0;
-    store(set(std::numeric_limits<float>::infinity()), values, count);
-    const Integers integers;
-    int bits = 0;
-    constexpr int kFirst = 30, kLast = 13;  // 2^13 are a thousandth of a float
-    for (int bit = kFirst; bit >= kLast; --bit) {
-      const I limit = hn::Set(integers, bits | 1 << bit);
-      size_t less = 0;
-      for_vectors(count, [&](int i) HWY_ATTR {
-        less += hn::CountTrue(integers, hn::Lt(hn::BitCast(integers, load(values, i)), limit));
-      });
-      if (static_cast<int>(less) <= count / 2) bits |= 1 << bit;
-    }
-    bits |= 1 << (kLast - 1);
-    return hn::GetLane(hn::BitCast(Floats(), hn::Set(integers, bits)));
-  }
-};
+  bits |= 1 << (kLast - 1);
+  return hn::GetLane(hn::BitCast(Floats(), hn::Set(integers, bits)));
+}
 
 void add_residuals(const DotPixels& pixels, const DotRows& rows, DotResiduals& sums,
                    DotLanes& square_slopes) {
   const Floats d;
   constexpr float kFlat = 0.1F, kSteep = 0.4F;  // of the steepest slope
   const V flat_most = set(kFlat * rows.steepest), steep_least = set(kSteep * rows.steepest);
-  Heap flat, steep;
-  for_vectors(pixels.count, [&](int i) HWY_ATTR {
-    const auto there = first_of(pixels.count - i);
-    const V slope = load(rows.slope, i), size = hn::Abs(load(rows.residual, i));
-    flat.add(size, hn::And(there, hn::Lt(slope, flat_most)));
-    const auto is_steep = hn::And(there, hn::Gt(slope, steep_least));
-    const V inverse = hn::IfThenElseZero(is_steep, inverse_of(slope));
-    steep.add(hn::Mul(size, inverse), is_steep);
+  Taken is_flat, is_steep;
+  DotRow size, size_px, flat, steep;
+  for_vectors(pixels.padded(), [&](int i) HWY_ATTR {
+    const V slope = load(rows.slope, i), residual = hn::Abs(load(rows.residual, i));
+    const auto steep_here = hn::And(first_of(pixels.count - i), hn::Gt(slope, steep_least));
+    const V inverse = hn::IfThenElseZero(steep_here, inverse_of(slope));
+    store(residual, size, i);
+    store(hn::Mul(residual, inverse), size_px, i);
+    store(hn::Lt(slope, flat_most), is_flat, i);
+    store(steep_here, is_steep, i);
     float* sum = square_slopes.data() + i % kDotLanes;
     hn::StoreU(mul_add(inverse, inverse, hn::LoadU(d, sum)), d, sum);
   });
-  sums.flat = flat.count;
-  sums.steep = steep.count;
-  sums.flat_levels = flat.median();
-  sums.steep_px = steep.median();
+  size_t flats = 0, steeps = 0;
+  // Without a branch: what is not taken is written over.
+  for (size_t i = 0; i < static_cast<size_t>(pixels.count); ++i) {
+    flat[flats] = size[i];
+    flats += static_cast<size_t>(-is_flat[i]);
+    steep[steeps] = size_px[i];
+    steeps += static_cast<size_t>(-is_steep[i]);
+  }
+  sums.flat = static_cast<int>(flats);
+  sums.steep = static_cast<int>(steeps);
+  sums.flat_levels = median_of(flat, flats);
+  sums.steep_px = median_of(steep, steeps);
 }
 
 void weigh(const DotPixels& pixels, const DotWeights& weights, DotRows& rows, DotLaneSums& sums) {
@@ -423,6 +473,7 @@ namespace clothfit {
 namespace {
 
 HWY_EXPORT(gather);
+HWY_EXPORT(add_dark);
 HWY_EXPORT(evaluate);
 HWY_EXPORT(add_residuals);
 HWY_EXPORT(add_equations);
@@ -440,9 +491,12 @@ float total(const DotLanes& lanes) {
 
 void gather_dot(const PixelBox& box, const DotReach& reach, DotPixels& pixels) {
   HWY_DYNAMIC_DISPATCH(gather)(box, reach, pixels);
-  if (pixels.count == 0) return;
-  for (DotRow* row : {&pixels.x, &pixels.y, &pixels.grey})
-    std::fill(row->begin() + pixels.count, row->begin() + pixels.padded(), row->front());
+}
+
+DarkSums dark_sums(const PixelBox& box, const DotReach& reach, float level, bool bright) {
+  std::array<DotLanes, 3> sums;
+  HWY_DYNAMIC_DISPATCH(add_dark)(box, reach, level, bright, sums);
+  return {.weight = total(sums[0]), .x = total(sums[1]), .y = total(sums[2])};
 }
 
 void evaluate_dot(const DotShape& shape, const DotPixels& pixels, DotRows& rows) {

@@ -15,7 +15,9 @@ inline constexpr int kDotUnknowns = 12;
 inline constexpr int kMostDotPixels = 700;
 /// One number per pixel, with room for a vector that goes on behind the last. Vectors that lie in
 /// two lines of the cache take twice as long.
-struct alignas(64) DotRow : std::array<float, kMostDotPixels + 36> {};
+struct alignas(64) DotRow : std::array<float, kMostDotPixels + 36> {
+  using array = std::array<float, kMostDotPixels + 36>;
+};
 
 /// The pixels around a dot. The first is repeated up to a multiple of 16, with no weight.
 struct DotPixels {
@@ -46,6 +48,14 @@ struct DotReach {
 
 /// Gathers the pixels of a box that are within reach, row by row.
 void gather_dot(const PixelBox& box, const DotReach& reach, DotPixels& pixels);
+
+/// How much darker than a level the pixels within an outline are.
+struct DarkSums {
+  float weight = 0;    ///< sum of how much
+  float x = 0, y = 0;  ///< the same times the place from the outline's centre, px
+};
+/// Adds up over the pixels of a box with |B p| <= `ratio`; how much brighter where `bright`.
+DarkSums dark_sums(const PixelBox& box, const DotReach& reach, float level, bool bright);
 
 /// The unknowns of a dot's fit in single precision.
 struct DotShape {

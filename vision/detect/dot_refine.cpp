@@ -8,6 +8,7 @@
 
 #include "data/median.h"
 #include "vision/detect/dot_kernels.h"
+#include "vision/detect/small_system.h"
 
 namespace clothfit {
 namespace {
@@ -78,6 +79,30 @@ std::array<float, 3> upper_of(const Eigen::Matrix2d& symmetric) {
           static_cast<float>(symmetric(1, 1))};
 }
 
+/// A box of pixels, both ends included, cut by the picture's border.
+struct PictureBox {
+  int left = 0, right = -1, top = 0, bottom = -1;
+
+  PictureBox(const cv::Mat& grey, const Eigen::Vector2d& low, const Eigen::Vector2d& high)
+      : left(std::max(static_cast<int>(std::ceil(low.x())), 0)),
+        right(std::min(static_cast<int>(std::floor(high.x())), grey.cols - 1)),
+        top(std::max(static_cast<int>(std::ceil(low.y())), 0)),
+        bottom(std::min(static_cast<int>(std::floor(high.y())), grey.rows - 1)) {}
+
+  bool empty() const { return left > right || top > bottom; }
+
+  /// Every `stride`-th pixel; places count from `origin_px`.
+  PixelBox pixels(const cv::Mat& grey, int stride, const Eigen::Vector2d& origin_px) const {
+    return {.first = grey.ptr<std::uint8_t>(top) + left,
+            .row_bytes = stride * static_cast<std::ptrdiff_t>(grey.step[0]),
+            .stride = stride,
+            .columns = std::min((right - left) / stride + 1, kMostDotPixels),
+            .rows = (bottom - top) / stride + 1,
+            .left = static_cast<float>(left - origin_px.x()),
+            .top = static_cast<float>(top - origin_px.y())};
+  }
+};
+
 /// Gathers the pixels within `beyond_px` of the outline, and no further out than `kReach` times it:
 /// what lies beyond is other print, or the sheet's edge.
 void gather_pixels(const cv::Mat& grey, const DotOutline& outline, double blur_px,
@@ -89,27 +114,18 @@ void gather_pixels(const cv::Mat& grey, const DotOutline& outline, double blur_p
   const Eigen::Vector2d half = radii + Eigen::Vector2d::Constant(beyond_px);
   window.origin_px = centre.array().round().matrix();
   const Eigen::Vector2d low = centre - half, high = centre + half;
-  const double box = (std::floor(high.x()) - std::ceil(low.x()) + 1) *
-                     (std::floor(high.y()) - std::ceil(low.y()) + 1);
-  const int stride = std::max(1, static_cast<int>(std::ceil(std::sqrt(box / kMostDotPixels))));
-  const int left = std::max(static_cast<int>(std::ceil(low.x())), 0);
-  const int right = std::min(static_cast<int>(std::floor(high.x())), grey.cols - 1);
-  const int top = std::max(static_cast<int>(std::ceil(low.y())), 0);
-  const int bottom = std::min(static_cast<int>(std::floor(high.y())), grey.rows - 1);
   const Eigen::Vector2d edge = radii + Eigen::Vector2d::Constant(0.5);
   window.cut_by_border = centre.x() - edge.x() < 0 || centre.y() - edge.y() < 0 ||
                          centre.x() + edge.x() > grey.cols - 1 ||
                          centre.y() + edge.y() > grey.rows - 1;
   window.pixels.count = 0;
-  if (left > right || top > bottom) return;
+  const PictureBox box(grey, low, high);
+  if (box.empty()) return;
+  const double whole = (std::floor(high.x()) - std::ceil(low.x()) + 1) *
+                       (std::floor(high.y()) - std::ceil(low.y()) + 1);
+  const int stride = std::max(1, static_cast<int>(std::ceil(std::sqrt(whole / kMostDotPixels))));
   const Eigen::Vector2d from_origin = centre - window.origin_px;
-  gather_dot({.first = grey.ptr<std::uint8_t>(top) + left,
-              .row_bytes = stride * static_cast<std::ptrdiff_t>(grey.step[0]),
-              .stride = stride,
-              .columns = std::min((right - left) / stride + 1, kMostDotPixels),
-              .rows = (bottom - top) / stride + 1,
-              .left = static_cast<float>(left - window.origin_px.x()),
-              .top = static_cast<float>(top - window.origin_px.y())},
+  gather_dot(box.pixels(grey, stride, window.origin_px),
              {.x = static_cast<float>(from_origin.x()),
               .y = static_cast<float>(from_origin.y()),
               .inverse = upper_of(inverse_root(outline.shape_px2)),
@@ -199,29 +215,19 @@ struct DotSolution {
 /// Solves normal equations by Cholesky's method. The two unit vectors of the centre go along with
 /// the gradient: with L L' = information, the covariance of the centre is that of their L^-1.
 DotSolution solve(const DotEquations& equations) {
-  constexpr size_t kRight = kDotUnknowns, kWidth = kDotUnknowns + 4;  // two columns stay empty
-  // Rows of L' and of L^-1 times the right sides; what stands left of the diagonal is not used.
-  std::array<std::array<double, kWidth>, kDotUnknowns> upper{};
+  SmallSystem<kDotUnknowns, 4> system;  // the last side stays empty: an even number is faster
   for (size_t a = 0; a < kDotUnknowns; ++a) {
-    for (size_t b = 0; b <= a; ++b) upper[b][a] = equations.information[a][b];
-    upper[a][kRight] = equations.gradient[a];
-    if (a < 2) upper[a][kRight + 1 + a] = 1;
+    for (size_t b = 0; b <= a; ++b) system.rows[b][a] = equations.information[a][b];
+    system.right(a, 0) = equations.gradient[a];
   }
+  system.right(0, 1) = system.right(1, 2) = 1;
+  system.eliminate();
+  system.substitute(0);
   DotSolution solution;
   for (size_t k = 0; k < kDotUnknowns; ++k) {
-    const double inverse = 1 / std::sqrt(upper[k][k]);
-    for (double& one : upper[k]) one *= inverse;
-    for (size_t row = k + 1; row < kDotUnknowns; ++row) {
-      const double factor = upper[k][row];
-      for (size_t j = 0; j < kWidth; ++j) upper[row][j] -= factor * upper[k][j];
-    }
-    const Eigen::Vector2d end(upper[k][kRight + 1], upper[k][kRight + 2]);
+    const Eigen::Vector2d end(system.right(k, 1), system.right(k, 2));
     solution.centre_covariance += end * end.transpose();
-  }
-  for (size_t k = kDotUnknowns; k-- > 0;) {
-    const double value = upper[k][kRight] / upper[k][k];
-    solution.change[static_cast<Eigen::Index>(k)] = value;
-    for (size_t row = 0; row < k; ++row) upper[row][kRight] -= upper[row][k] * value;
+    solution.change[static_cast<Eigen::Index>(k)] = system.right(k, 0);
   }
   return solution;
 }
@@ -373,6 +379,34 @@ double DotOutline::area_px2() const {
 
 double Dot::sigma_px() const {
   return std::sqrt(covariance_px2.trace() / 2);
+}
+
+void centre_on_dark(const cv::Mat& grey, double half_level, bool bright, DotOutline& outline) {
+  constexpr double kReach = 1.5;  // radii; what is further away is something else
+  const Eigen::Vector2d reach =
+      kReach * outline.shape_px2.diagonal().cwiseSqrt() + Eigen::Vector2d::Ones();
+  const Eigen::Matrix2d inverse = inverse_root(outline.shape_px2);
+  const Eigen::Vector2d start = outline.centre_px;
+  constexpr int kMostMoves = 5;
+  constexpr double kStill_px = 0.3;
+  for (int move = 0; move < kMostMoves; ++move) {
+    const Eigen::Vector2d& centre = outline.centre_px;
+    const PictureBox box(grey, centre - reach, centre + reach);
+    if (box.empty()) return;
+    const DarkSums sums =
+        dark_sums(box.pixels(grey, 1, centre),
+                  {.inverse = upper_of(inverse), .ratio = static_cast<float>(kReach)},
+                  static_cast<float>(half_level), bright);
+    if (sums.weight <= 0) return;
+    const Eigen::Vector2d moved =
+        Eigen::Vector2d(sums.x, sums.y) / static_cast<double>(sums.weight);
+    outline.centre_px += moved;
+    if ((inverse * (outline.centre_px - start)).norm() > kReach) {
+      outline.centre_px = start;
+      return;
+    }
+    if (moved.norm() < kStill_px) return;
+  }
 }
 
 Dot refine_dot(const cv::Mat& grey, const DotStart& start) {

@@ -78,4 +78,8 @@ struct DotStart {
 /// map from cloth to picture bends within the dot (vision/track/dot_bend.h).
 Dot refine_dot(const cv::Mat& grey, const DotStart& start);
 
+/// Moves an outline to the middle of what is darker (brighter) than half way around it. It stays
+/// where it is if that lies 1.5 radii away.
+void centre_on_dark(const cv::Mat& grey, double half_level, bool bright, DotOutline& outline);
+
 }  // namespace clothfit

@@ -19,42 +19,6 @@
 namespace clothfit {
 namespace {
 
-/// Moves an outline to the middle of what is darker (brighter) than half way around it.
-void centre_on_dark(const cv::Mat& grey, double half_level, bool bright, DotOutline& outline) {
-  const Eigen::Vector2d reach =
-      1.5 * outline.shape_px2.diagonal().cwiseSqrt() + Eigen::Vector2d::Ones();
-  const Eigen::Matrix2d metric = outline.shape_px2.inverse() / (1.5 * 1.5);
-  const Eigen::Vector2d start = outline.centre_px;
-  constexpr int kMostMoves = 5;
-  for (int move = 0; move < kMostMoves; ++move) {
-    const Eigen::Vector2d low = outline.centre_px - reach, high = outline.centre_px + reach;
-    double weight = 0, su = 0, sv = 0;
-    for (int v = std::max(0, static_cast<int>(std::ceil(low.y())));
-         v <= std::min(grey.rows - 1, static_cast<int>(std::floor(high.y()))); ++v) {
-      const std::uint8_t* row = grey.ptr<std::uint8_t>(v);
-      for (int u = std::max(0, static_cast<int>(std::ceil(low.x())));
-           u <= std::min(grey.cols - 1, static_cast<int>(std::floor(high.x()))); ++u) {
-        const double dark = bright ? row[u] - half_level : half_level - row[u];
-        const Eigen::Vector2d from = Eigen::Vector2d(u, v) - outline.centre_px;
-        if (dark <= 0 || from.dot(metric * from) > 1) continue;
-        weight += dark;
-        su += dark * u;
-        sv += dark * v;
-      }
-    }
-    if (weight <= 0) return;
-    const Eigen::Vector2d centre(su / weight, sv / weight);
-    const double moved = (centre - outline.centre_px).norm();
-    outline.centre_px = centre;
-    const Eigen::Vector2d off = centre - start;
-    if (off.dot(metric * off) > 1) {  // 1.5 radii away is something else
-      outline.centre_px = start;
-      return;
-    }
-    if (moved < 0.3) return;
-  }
-}
-
 double half_level(const Dot& dot) {
   return dot.paper_levels * (1 - 0.5 * dot.contrast);
 }
@@ -361,7 +325,6 @@ std::vector<bool> DotTracker::Follower::anchored_sites(const Working& working) c
 /// Leaves out groups of dots that are linked with nothing that names them, as those beyond a fold.
 /// What their neighbours across the fold expect of them is a guess.
 void DotTracker::Follower::leave_out_unanchored(Working& working) const {
-  working.scale = measure(working);
   if (!working.scale.radius) return;
   std::vector<int> doubtful;
   const std::vector<bool> right =
@@ -547,6 +510,8 @@ DotFrame DotTracker::Follower::next(const cv::Mat& grey) {
     search = 2 * working.placed.count() < seen_before_ || is_search_due(working);
   }
   if (search) search_whole(grey, working);
+  // Otherwise `pattern_agrees` measured the same dots.
+  if (search || !pattern_) working.scale = measure(working);
   since_search_ = search ? 0 : since_search_ + 1;
   leave_out_unanchored(working);
   leave_out_cut(working);
