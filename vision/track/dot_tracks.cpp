@@ -73,7 +73,10 @@ class DotTracker::Follower {
 
   void search_whole(const cv::Mat& grey, Working& working);
   Working follow(const cv::Mat& grey);
+  std::optional<PredictedTag> predicted_anchor(int tag, const SitePlaces& places) const;
   void find_tags_nearby(const cv::Mat& grey, Working& working);
+  void search_around(const cv::Mat& grey, const PredictedTag& anchor,
+                     std::vector<TagDetection>& tags);
   void place_tag_corners(Working& working) const;
   bool tags_agree(const Working& working) const;
   bool pattern_agrees(Working& working) const;
@@ -98,9 +101,10 @@ class DotTracker::Follower {
   std::optional<DotPattern> pattern_;
   std::optional<DotPatternIndex> index_;
   std::vector<SiteHistory> history_;
-  DotScale scale_;        ///< of the picture before
-  int seen_before_ = 0;   ///< dots in the picture before
-  int since_search_ = 0;  ///< pictures since the whole one was searched
+  DotScale scale_;                         ///< of the picture before
+  std::vector<TagDetection> tags_before_;  ///< refined ones in the picture before
+  int seen_before_ = 0;                    ///< dots in the picture before
+  int since_search_ = 0;                   ///< pictures since the whole one was searched
 };
 
 DotTracker::Follower::Follower(const MarkerSet& markers, const std::string& file,
@@ -178,31 +182,66 @@ DotTracker::Follower::Working DotTracker::Follower::follow(const cv::Mat& grey) 
   return working;
 }
 
-/// Reads each anchor in a window around the place where the dots expect it.
+/// Says where the dots around an anchor expect its corners; nothing where too few tell.
+std::optional<PredictedTag> DotTracker::Follower::predicted_anchor(int tag,
+                                                                   const SitePlaces& places) const {
+  PredictedTag predicted{.id = tag, .close = true};
+  for (size_t c = 0; c < 4; ++c) {
+    const int corner = layout_.corner_sites_by_tag.at(tag)[c];
+    const LocalMap map = fit_local_map(layout_, corner, places, false);
+    constexpr double kSure = 0.5, kClose = 0.1;  // spacings
+    if (map.neighbours < 3 || map.sigma >= kSure) return std::nullopt;
+    predicted.close = predicted.close && map.sigma < kClose;
+    predicted.corner_px[c] = map.place_px;
+  }
+  const auto before = std::ranges::find(tags_before_, tag, &TagDetection::id);
+  if (before != tags_before_.end()) {
+    predicted.lens_px = before->lens_px;
+    predicted.motion_px = before->motion_px;
+  }
+  return predicted;
+}
+
+/// Reads each anchor around the place where the dots expect it: those that are seen whole right
+/// there, others by a search of a window.
 void DotTracker::Follower::find_tags_nearby(const cv::Mat& grey, Working& working) {
+  std::vector<PredictedTag> predicted;
+  std::vector<int> ids;
   for (const auto& [tag, corners] : layout_.corner_sites_by_tag) {
-    cv::Point2d low(1e9, 1e9), high(-1e9, -1e9);
-    bool known = true;
-    for (const int corner : corners) {
-      const LocalMap map = fit_local_map(layout_, corner, working.placed.places, false);
-      constexpr double kSure = 0.5;
-      known = known && map.neighbours >= 3 && map.sigma < kSure;
-      low = {std::min(low.x, map.place_px.x()), std::min(low.y, map.place_px.y())};
-      high = {std::max(high.x, map.place_px.x()), std::max(high.y, map.place_px.y())};
-    }
-    if (!known) continue;
-    const double margin = 0.4 * std::max(high.x - low.x, high.y - low.y) + 3;
-    const cv::Rect window =
-        cv::Rect(cv::Point(static_cast<int>(low.x - margin), static_cast<int>(low.y - margin)),
-                 cv::Point(static_cast<int>(high.x + margin) + 1,
-                           static_cast<int>(high.y + margin) + 1)) &
-        cv::Rect(0, 0, grey.cols, grey.rows);
-    constexpr int kFewest = 12;  // px; no tag is read in less
-    if (window.width < kFewest || window.height < kFewest) continue;
-    for (TagDetection found : tag_detector_->detect(grey(window))) {
-      for (Eigen::Vector2d& corner : found.corner_px) corner += Eigen::Vector2d(window.x, window.y);
-      if (found.id == tag) working.tags.push_back(found);
-    }
+    ids.push_back(tag);
+    if (const auto anchor = predicted_anchor(tag, working.placed.places))
+      predicted.push_back(*anchor);
+  }
+  std::vector<PredictedTag> known;
+  for (const PredictedTag& anchor : predicted)
+    if (anchor.lens_px) known.push_back(anchor);
+  constexpr double kWhole = 0.8;  // share of its pixels that are explained
+  for (const TagDetection& tag : tag_detector_->read_predicted(grey, known, ids))
+    if (tag.refined && tag.explained > kWhole) working.tags.push_back(tag);
+  for (const PredictedTag& anchor : predicted)
+    if (std::ranges::find(working.tags, anchor.id, &TagDetection::id) == working.tags.end())
+      search_around(grey, anchor, working.tags);
+}
+
+/// Searches a window around an anchor.
+void DotTracker::Follower::search_around(const cv::Mat& grey, const PredictedTag& anchor,
+                                         std::vector<TagDetection>& tags) {
+  Eigen::Vector2d low = anchor.corner_px[0], high = low;
+  for (const Eigen::Vector2d& corner : anchor.corner_px) {
+    low = low.cwiseMin(corner);
+    high = high.cwiseMax(corner);
+  }
+  const double margin = 0.4 * (high - low).maxCoeff() + 3;
+  const cv::Rect window =
+      cv::Rect(cv::Point(static_cast<int>(low.x() - margin), static_cast<int>(low.y() - margin)),
+               cv::Point(static_cast<int>(high.x() + margin) + 1,
+                         static_cast<int>(high.y() + margin) + 1)) &
+      cv::Rect(0, 0, grey.cols, grey.rows);
+  constexpr int kFewest = 12;  // px; no tag is read in less
+  if (window.width < kFewest || window.height < kFewest) return;
+  for (TagDetection found : tag_detector_->detect(grey(window))) {
+    for (Eigen::Vector2d& corner : found.corner_px) corner += Eigen::Vector2d(window.x, window.y);
+    if (found.id == anchor.id) tags.push_back(found);
   }
 }
 
@@ -480,6 +519,8 @@ DotFrame DotTracker::Follower::report(const Working& working) const {
 void DotTracker::Follower::remember(const Working& working) {
   seen_before_ = working.placed.count();
   scale_ = working.scale;
+  tags_before_.clear();
+  std::ranges::copy_if(working.tags, std::back_inserter(tags_before_), &TagDetection::refined);
   for (size_t site = 0; site < size(); ++site) {
     SiteHistory& history = history_[site];
     std::optional<Eigen::Vector2d> before;
