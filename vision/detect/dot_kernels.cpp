@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
 
 // This source is compiled once for each instruction set, in a namespace of its own.
@@ -116,54 +117,85 @@ HWY_INLINE V exponential(const V& a) {
   return hn::BitCast(Floats(), hn::Add(hn::BitCast(integers, sum), exponent));
 }
 
-/// Numbers per pixel that say whether it is taken: 0, or -1 where it is.
-struct alignas(64) Taken : std::array<std::int32_t, std::tuple_size_v<DotRow::array>> {};
-
-HWY_INLINE void store(const hn::Mask<Floats>& taken, Taken& to, int at) {
-  const Integers integers;
-  hn::StoreU(hn::BitCast(integers, hn::VecFromMask(Floats(), taken)), integers, to.data() + at);
+/// Turns a row of a picture into numbers.
+HWY_INLINE void read_row(const PixelBox& box, int row, DotRow& line) {
+  const hn::Rebind<std::uint8_t, Floats> bytes;
+  const hn::RebindToSigned<Floats> integers;
+  // A copy: no vector may read past the picture's end.
+  std::array<std::uint8_t, kRowPixels> copy;
+  const std::uint8_t* from = box.first + row * box.row_bytes;
+  const auto columns = static_cast<size_t>(box.columns);
+  if (box.stride == 1)
+    std::memcpy(copy.data(), from, columns);
+  else
+    for (size_t k = 0; k < columns; ++k) copy[k] = from[k * static_cast<size_t>(box.stride)];
+  for_vectors(box.columns, [&](int k) HWY_ATTR {
+    const I levels = hn::PromoteTo(integers, hn::LoadU(bytes, copy.data() + k));
+    store(hn::ConvertTo(Floats(), levels), line, k);
+  });
 }
 
-void gather(const PixelBox& box, const DotReach& reach, DotPixels& pixels) {
+/// The columns of a row that are taken: from `first` to `last`.
+struct TakenColumns {
+  int first = 0, last = -1;
+};
+
+/// An outline gives one run of pixels in each row.
+HWY_INLINE TakenColumns columns_within(const PixelBox& box, const DotReach& reach, int row) {
   const Floats d;
   const V bxx = set(reach.inverse[0]), bxy = set(reach.inverse[1]), byy = set(reach.inverse[2]);
   const V one = set(1), beyond = set(reach.beyond_px), farthest = set(reach.ratio * reach.ratio);
   const V steps = hn::Iota(d, 0), stride = set(static_cast<float>(box.stride));
-  Taken taken;
-  DotRow xs;
-  size_t count = 0;
+  const V left = set(box.left - reach.x);
+  const V dy = set(box.top + static_cast<float>(row * box.stride) - reach.y);
+  const V none = set(kMostDotPixels);
+  V first = none, last = set(-1);
+  for_vectors(box.columns, [&](int k) HWY_ATTR {
+    const V column = hn::Add(steps, set(static_cast<float>(k)));
+    const V dx = mul_add(column, stride, left);
+    const V qx = mul_add(bxx, dx, hn::Mul(bxy, dy)), qy = mul_add(bxy, dx, hn::Mul(byy, dy));
+    const V square = hn::Max(mul_add(qx, qx, hn::Mul(qy, qy)), set(1e-8F));
+    const V gx = mul_add(bxx, qx, hn::Mul(bxy, qy)), gy = mul_add(bxy, qx, hn::Mul(byy, qy));
+    // The distance is (|q| - 1) / slope, with slope = |B q| / |q|.
+    const V square_gradient = hn::Max(mul_add(gx, gx, hn::Mul(gy, gy)), set(1e-16F));
+    const V slope = hn::Mul(square_gradient, inverse_root(hn::Mul(square_gradient, square)));
+    const V most = square_of(mul_add(beyond, slope, one));
+    const auto taken =
+        hn::And(first_of(box.columns - k),
+                hn::Or(hn::Le(square, one), hn::Le(square, hn::Min(most, farthest))));
+    first = hn::Min(first, hn::IfThenElse(taken, column, none));
+    last = hn::Max(last, hn::IfThenElse(taken, column, set(-1)));
+  });
+  return {.first = static_cast<int>(hn::GetLane(hn::MinOfLanes(d, first))),
+          .last = static_cast<int>(hn::GetLane(hn::MaxOfLanes(d, last)))};
+}
+
+void gather(const PixelBox& box, const DotReach& reach, DotPixels& pixels) {
+  const Floats d;
+  const V steps = hn::Iota(d, 0), stride = set(static_cast<float>(box.stride));
+  DotRow line;
+  int count = 0;
   for (int row = 0; row < box.rows && count < kMostDotPixels; ++row) {
-    const float y = box.top + static_cast<float>(row * box.stride);
-    const V dy = set(y - reach.y);
-    for_vectors(box.columns, [&](int k) HWY_ATTR {
-      const V x = mul_add(hn::Add(steps, set(static_cast<float>(k))), stride, set(box.left));
-      const V dx = hn::Sub(x, set(reach.x));
-      const V qx = mul_add(bxx, dx, hn::Mul(bxy, dy)), qy = mul_add(bxy, dx, hn::Mul(byy, dy));
-      const V square = mul_add(qx, qx, hn::Mul(qy, qy));
-      const V gx = mul_add(bxx, qx, hn::Mul(bxy, qy)), gy = mul_add(bxy, qx, hn::Mul(byy, qy));
-      // (|q| - 1) |q| / |grad| is the distance.
-      const V way = hn::Sub(square, hn::Sqrt(square));
-      const V most = hn::Mul(beyond, hn::Sqrt(mul_add(gx, gx, hn::Mul(gy, gy))));
-      store(x, xs, k);
-      store(hn::Or(hn::Le(square, one), hn::And(hn::Le(way, most), hn::Le(square, farthest))),
-            taken, k);
+    const TakenColumns taken = columns_within(box, reach, row);
+    if (taken.last < taken.first) continue;
+    read_row(box, row, line);
+    const V y = set(box.top + static_cast<float>(row * box.stride));
+    const V left = set(box.left);
+    const int more = std::min(taken.last - taken.first + 1, kMostDotPixels - count);
+    for_vectors(more, [&](int k) HWY_ATTR {
+      const V column = hn::Add(steps, set(static_cast<float>(taken.first + k)));
+      hn::StoreU(mul_add(column, stride, left), d, pixels.x.data() + count + k);
+      hn::StoreU(y, d, pixels.y.data() + count + k);
+      hn::StoreU(hn::LoadU(d, line.data() + taken.first + k), d, pixels.grey.data() + count + k);
     });
-    const std::uint8_t* from = box.first + row * box.row_bytes;
-    // Without a branch: what is not taken is written over.
-    for (int k = 0; k < box.columns && count < kMostDotPixels; ++k) {
-      const auto column = static_cast<size_t>(k);
-      pixels.x[count] = xs[column];
-      pixels.y[count] = y;
-      pixels.grey[count] = static_cast<float>(from[k * box.stride]);
-      count += static_cast<size_t>(-taken[column]);
-    }
+    count += more;
   }
-  pixels.count = static_cast<int>(count);
+  pixels.count = count;
   pixels.darkest = pixels.brightest = 0;
   if (count == 0) return;
+  for (DotRow* values : {&pixels.x, &pixels.y, &pixels.grey})
+    std::fill(values->begin() + count, values->begin() + pixels.padded(), values->front());
   V darkest = set(pixels.grey[0]), brightest = darkest;
-  for (DotRow* row : {&pixels.x, &pixels.y, &pixels.grey})
-    std::fill(row->begin() + pixels.count, row->begin() + pixels.padded(), row->front());
   for_vectors(pixels.padded(), [&](int i) HWY_ATTR {
     darkest = hn::Min(darkest, load(pixels.grey, i));
     brightest = hn::Max(brightest, load(pixels.grey, i));
@@ -178,16 +210,15 @@ void add_dark(const PixelBox& box, const DotReach& reach, float level, bool brig
   const V bxx = set(reach.inverse[0]), bxy = set(reach.inverse[1]), byy = set(reach.inverse[2]);
   const V farthest = set(reach.ratio * reach.ratio), half = set(level), none = hn::Zero(d);
   const V sign = set(bright ? -1.0F : 1.0F), steps = hn::Iota(d, 0);
-  for (DotLanes& lanes : sums) lanes.fill(0);
+  const V stride = set(static_cast<float>(box.stride)), left = set(box.left - reach.x);
+  std::array<DotLanes, 3> local;
+  for (DotLanes& lanes : local) lanes.fill(0);
   DotRow line;
   for (int row = 0; row < box.rows; ++row) {
-    const std::uint8_t* from = box.first + row * box.row_bytes;
-    for (int k = 0; k < box.columns; ++k)
-      line[static_cast<size_t>(k)] = static_cast<float>(from[k * box.stride]);
+    read_row(box, row, line);
     const V dy = set(box.top + static_cast<float>(row * box.stride) - reach.y);
     for_vectors(box.columns, [&](int k) HWY_ATTR {
-      const V step = hn::Add(steps, set(static_cast<float>(k)));
-      const V dx = mul_add(step, set(static_cast<float>(box.stride)), set(box.left - reach.x));
+      const V dx = mul_add(hn::Add(steps, set(static_cast<float>(k))), stride, left);
       const V qx = mul_add(bxx, dx, hn::Mul(bxy, dy)), qy = mul_add(bxy, dx, hn::Mul(byy, dy));
       const auto within =
           hn::And(first_of(box.columns - k), hn::Le(mul_add(qx, qx, hn::Mul(qy, qy)), farthest));
@@ -197,11 +228,12 @@ void add_dark(const PixelBox& box, const DotReach& reach, float level, bool brig
         float* sum = lanes.data() + k % kDotLanes;
         hn::StoreU(hn::Add(hn::LoadU(d, sum), more), d, sum);
       };
-      add(sums[0], dark);
-      add(sums[1], hn::Mul(dark, dx));
-      add(sums[2], hn::Mul(dark, dy));
+      add(local[0], dark);
+      add(local[1], hn::Mul(dark, dx));
+      add(local[2], hn::Mul(dark, dy));
     });
   }
+  sums = local;
 }
 
 /// Where a pixel lies about the dot.
@@ -298,7 +330,8 @@ HWY_INLINE V evaluate_at(const DotShape& shape, const DotPixels& pixels, DotRows
   return slope;
 }
 
-void evaluate(const DotShape& shape, const DotPixels& pixels, DotRows& rows) {
+void evaluate(const DotShape& given, const DotPixels& pixels, DotRows& rows) {
+  const DotShape shape = given;  // a copy of its own, which no store to `rows` can change
   V steepest = hn::Zero(Floats());
   for_vectors(pixels.padded(), [&](int i) HWY_ATTR {
     steepest = hn::Max(steepest, evaluate_at(shape, pixels, rows, i));
@@ -306,27 +339,49 @@ void evaluate(const DotShape& shape, const DotPixels& pixels, DotRows& rows) {
   rows.steepest = hn::GetLane(hn::MaxOfLanes(Floats(), steepest));
 }
 
-/// Returns the middle one of numbers >= 0, found bit by bit; 0 without any. There must be room for
-/// a vector behind the last.
-HWY_INLINE float median_of(DotRow& values, size_t count) {
-  if (count == 0) return 0;
+/// Numbers per pixel that say whether it is taken: 0, or -1 where it is.
+struct alignas(64) Taken : std::array<std::int32_t, kRowPixels> {};
+
+HWY_INLINE void store(const hn::Mask<Floats>& taken, Taken& to, int at) {
   const Integers integers;
-  const auto size = static_cast<int>(count);
-  store(set(std::numeric_limits<float>::infinity()), values, size);
+  hn::StoreU(hn::BitCast(integers, hn::VecFromMask(Floats(), taken)), integers, to.data() + at);
+}
+
+/// Numbers >= 0 of which the middle one is sought bit by bit.
+struct Median {
+  static constexpr int kFirstBit = 30, kLastBit = 14;  // the last is 0.2 % of a float
+  DotRow values;                                       ///< with room for a vector behind the last
+  int count = 0;
   int bits = 0;
-  constexpr int kFirst = 30, kLast = 13;  // 2^13 are a thousandth of a float
-  for (int bit = kFirst; bit >= kLast; --bit) {
-    const I limit = hn::Set(integers, bits | 1 << bit);
+
+  HWY_INLINE void take(const DotRow& all, const Taken& taken, int size) {
+    int next = 0;
+    // Without a branch: what is not taken is written over.
+    for (int i = 0; i < size; ++i) {
+      values[static_cast<size_t>(next)] = all[static_cast<size_t>(i)];
+      next -= taken[static_cast<size_t>(i)];
+    }
+    store(set(std::numeric_limits<float>::infinity()), values, next);
+    count = next;
+  }
+
+  HWY_INLINE void settle(int bit) {
+    const Integers integers;
+    const I limit = hn::Set(integers, bits | bit);
     I less = hn::Zero(integers);
-    for_vectors(size, [&](int i) HWY_ATTR {
+    for_vectors(count, [&](int i) HWY_ATTR {
       const I value = hn::BitCast(integers, load(values, i));
       less = hn::Sub(less, hn::VecFromMask(integers, hn::Lt(value, limit)));
     });
-    if (hn::GetLane(hn::SumOfLanes(integers, less)) <= size / 2) bits |= 1 << bit;
+    const int below = hn::GetLane(hn::SumOfLanes(integers, less));
+    bits |= below <= count / 2 ? bit : 0;
   }
-  bits |= 1 << (kLast - 1);
-  return hn::GetLane(hn::BitCast(Floats(), hn::Set(integers, bits)));
-}
+
+  HWY_INLINE float value() const {
+    const I middle = hn::Set(Integers(), bits | 1 << (kLastBit - 1));
+    return count == 0 ? 0 : hn::GetLane(hn::BitCast(Floats(), middle));
+  }
+};
 
 void add_residuals(const DotPixels& pixels, const DotRows& rows, DotResiduals& sums,
                    DotLanes& square_slopes) {
@@ -334,7 +389,7 @@ void add_residuals(const DotPixels& pixels, const DotRows& rows, DotResiduals& s
   constexpr float kFlat = 0.1F, kSteep = 0.4F;  // of the steepest slope
   const V flat_most = set(kFlat * rows.steepest), steep_least = set(kSteep * rows.steepest);
   Taken is_flat, is_steep;
-  DotRow size, size_px, flat, steep;
+  DotRow size, size_px;
   for_vectors(pixels.padded(), [&](int i) HWY_ATTR {
     const V slope = load(rows.slope, i), residual = hn::Abs(load(rows.residual, i));
     const auto steep_here = hn::And(first_of(pixels.count - i), hn::Gt(slope, steep_least));
@@ -346,18 +401,18 @@ void add_residuals(const DotPixels& pixels, const DotRows& rows, DotResiduals& s
     float* sum = square_slopes.data() + i % kDotLanes;
     hn::StoreU(mul_add(inverse, inverse, hn::LoadU(d, sum)), d, sum);
   });
-  size_t flats = 0, steeps = 0;
-  // Without a branch: what is not taken is written over.
-  for (size_t i = 0; i < static_cast<size_t>(pixels.count); ++i) {
-    flat[flats] = size[i];
-    flats += static_cast<size_t>(-is_flat[i]);
-    steep[steeps] = size_px[i];
-    steeps += static_cast<size_t>(-is_steep[i]);
+  Median flat, steep;
+  flat.take(size, is_flat, pixels.count);
+  steep.take(size_px, is_steep, pixels.count);
+  // Both in turn, so that one goes on while the other waits.
+  for (int bit = 1 << Median::kFirstBit; bit >= 1 << Median::kLastBit; bit >>= 1) {
+    flat.settle(bit);
+    steep.settle(bit);
   }
-  sums.flat = static_cast<int>(flats);
-  sums.steep = static_cast<int>(steeps);
-  sums.flat_levels = median_of(flat, flats);
-  sums.steep_px = median_of(steep, steeps);
+  sums = {.flat = flat.count,
+          .steep = steep.count,
+          .flat_levels = flat.value(),
+          .steep_px = steep.value()};
 }
 
 void weigh(const DotPixels& pixels, const DotWeights& weights, DotRows& rows, DotLaneSums& sums) {

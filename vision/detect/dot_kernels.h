@@ -15,9 +15,8 @@ inline constexpr int kDotUnknowns = 12;
 inline constexpr int kMostDotPixels = 700;
 /// One number per pixel, with room for a vector that goes on behind the last. Vectors that lie in
 /// two lines of the cache take twice as long.
-struct alignas(64) DotRow : std::array<float, kMostDotPixels + 36> {
-  using array = std::array<float, kMostDotPixels + 36>;
-};
+inline constexpr std::size_t kRowPixels = kMostDotPixels + 36;
+struct alignas(64) DotRow : std::array<float, kRowPixels> {};
 
 /// The pixels around a dot. The first is repeated up to a multiple of 16, with no weight.
 struct DotPixels {
@@ -46,7 +45,7 @@ struct DotReach {
   float ratio = 0;                 ///< largest |B p|
 };
 
-/// Gathers the pixels of a box that are within reach, row by row.
+/// Gathers the pixels of a box that are within reach, row by row from the first to the last.
 void gather_dot(const PixelBox& box, const DotReach& reach, DotPixels& pixels);
 
 /// How much darker than a level the pixels within an outline are.

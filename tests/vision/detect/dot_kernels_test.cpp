@@ -168,8 +168,9 @@ TEST(DotKernels, MediansAreRightToAThousandth) {
   std::ranges::sort(steep);
   ASSERT_EQ(residuals.flat, static_cast<int>(flat.size()));
   ASSERT_EQ(residuals.steep, static_cast<int>(steep.size()));
-  EXPECT_NEAR(residuals.flat_levels, flat[flat.size() / 2], 1e-3 * flat[flat.size() / 2]);
-  EXPECT_NEAR(residuals.steep_px, steep[steep.size() / 2], 1e-3 * steep[steep.size() / 2]);
+  const float middle_levels = flat[flat.size() / 2], middle_px = steep[steep.size() / 2];
+  EXPECT_NEAR(residuals.flat_levels, middle_levels, 1e-3F * middle_levels);
+  EXPECT_NEAR(residuals.steep_px, middle_px, 1e-3F * middle_px);
 }
 
 TEST(DotKernels, GivesTheSameBitsOnEachInstructionSet) {
