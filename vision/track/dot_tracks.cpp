@@ -38,6 +38,13 @@ double usual(const PlacedDots& placed, double least, Quantity quantity) {
   return values.empty() ? least : std::max(median(std::move(values)), least);
 }
 
+/// Returns the width of a quadrilateral across its longer diagonal.
+double thickness_px(const std::array<Eigen::Vector2d, 4>& corners) {
+  const Eigen::Vector2d one = corners[2] - corners[0], other = corners[3] - corners[1];
+  return 0.5 * std::abs(one.x() * other.y() - one.y() * other.x()) /
+         std::max({one.norm(), other.norm(), 1.0});
+}
+
 }  // namespace
 
 /// The state between pictures.
@@ -213,8 +220,10 @@ void DotTracker::Follower::find_tags_nearby(const cv::Mat& grey, Working& workin
       predicted.push_back(*anchor);
   }
   std::vector<PredictedTag> known;
+  // Edge on, the corners of what is read at a predicted place are often off by half a pixel.
+  constexpr double kThinnest_px = 8;
   for (const PredictedTag& anchor : predicted)
-    if (anchor.lens_px) known.push_back(anchor);
+    if (anchor.lens_px && thickness_px(anchor.corner_px) > kThinnest_px) known.push_back(anchor);
   constexpr double kWhole = 0.8;  // share of its pixels that are explained
   for (const TagDetection& tag : tag_detector_->read_predicted(grey, known, ids))
     if (tag.refined && tag.explained > kWhole) working.tags.push_back(tag);
