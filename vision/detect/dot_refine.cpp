@@ -1,5 +1,6 @@
 #include "vision/detect/dot_refine.h"
 
+#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cassert>
@@ -8,7 +9,6 @@
 
 #include "data/median.h"
 #include "vision/detect/dot_kernels.h"
-#include "vision/detect/small_system.h"
 
 namespace clothfit {
 namespace {
@@ -212,24 +212,17 @@ struct DotSolution {
   Eigen::Matrix2d centre_covariance = Eigen::Matrix2d::Zero();
 };
 
-/// Solves normal equations by Cholesky's method. The two unit vectors of the centre go along with
-/// the gradient: with L L' = information, the covariance of the centre is that of their L^-1.
+/// Solves normal equations. With L L' = information, the covariance of the centre is that of the
+/// columns of L^-1 that belong to it.
 DotSolution solve(const DotEquations& equations) {
-  SmallSystem<kDotUnknowns, 4> system;  // the last side stays empty: an even number is faster
-  for (size_t a = 0; a < kDotUnknowns; ++a) {
-    for (size_t b = 0; b <= a; ++b) system.rows[b][a] = equations.information[a][b];
-    system.right(a, 0) = equations.gradient[a];
-  }
-  system.right(0, 1) = system.right(1, 2) = 1;
-  system.eliminate();
-  system.substitute(0);
-  DotSolution solution;
-  for (size_t k = 0; k < kDotUnknowns; ++k) {
-    const Eigen::Vector2d end(system.right(k, 1), system.right(k, 2));
-    solution.centre_covariance += end * end.transpose();
-    solution.change[static_cast<Eigen::Index>(k)] = system.right(k, 0);
-  }
-  return solution;
+  using Information = Eigen::Matrix<double, kDotUnknowns, kDotUnknowns, Eigen::RowMajor>;
+  const Eigen::LLT<Information> solver(
+      Eigen::Map<const Information>(equations.information.front().data()));
+  Eigen::Matrix<double, kDotUnknowns, 2> centre =
+      Eigen::Matrix<double, kDotUnknowns, 2>::Identity();
+  solver.matrixL().solveInPlace(centre);
+  return {.change = solver.solve(Eigen::Map<const DotUnknowns>(equations.gradient.data())),
+          .centre_covariance = centre.transpose() * centre};
 }
 
 /// Weighs the residuals as vision/detect/tag_refine.cpp does: variance = noise^2 + (roughness *

@@ -114,7 +114,7 @@ bool TagFit::converge(int most_steps, Ending ending) {
     const double moved = step();
     if (!unknowns_.allFinite() || !leaves_cells(unknowns_.segment<3>(TagUnknowns::kBlur)))
       return false;
-    const bool fades = ending == Ending::kForeseen && i > 0 && robust().mean() > kExplained &&
+    const bool fades = ending == Ending::kPredicted && i > 0 && robust().mean() > kExplained &&
                        moved * moved < kNextStill * before;
     before = moved;
     if (moved < kStill || fades) {

@@ -54,10 +54,10 @@ class TagFit {
   /// Bounds what noise and roughness are taken for. Their estimates are medians over the tag, which
   /// are too large once half of it is hidden.
   void bound_noise(double noise_levels, double roughness_px);
-  /// When a fit ends: seen, that is after a step below 0.3 of a standard deviation; or foreseen,
+  /// When a fit ends: seen, that is after a step below 0.3 of a standard deviation; or predicted,
   /// that is too where the next step would be below 0.2. The latter takes one evaluation less. It
   /// wants a start near the end, since fits that wander may make a short step.
-  enum class Ending { kSeen, kForeseen };
+  enum class Ending { kSeen, kPredicted };
   /// Steps until the end; false where it is not reached within `most_steps`, or the blur leaves no
   /// cells.
   bool converge(int most_steps, Ending ending = Ending::kSeen);

@@ -58,7 +58,7 @@ RefinedTag refined_from(TagFit& fit, bool quick, const TagPattern& pattern,
   RefinedTag result;
   result.corner_px.fill(Eigen::Vector2d::Zero());
   result.usable =
-      quick ? fit.converge(kQuickSteps, TagFit::Ending::kForeseen) : fit.converge(kMostSteps);
+      quick ? fit.converge(kQuickSteps, TagFit::Ending::kPredicted) : fit.converge(kMostSteps);
   result.usable = result.usable && fit.contrast() > 0;  // white is brighter than black
   if (!fit.unknowns().allFinite()) return RefinedTag{.corner_px = result.corner_px};
   result.noise_levels = fit.noise_levels();

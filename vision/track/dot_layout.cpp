@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -9,7 +10,6 @@
 
 #include "data/input_error.h"
 #include "data/median.h"
-#include "vision/detect/small_system.h"
 
 namespace clothfit {
 namespace {
@@ -64,12 +64,13 @@ void recognise_grid(DotLayout& layout) {
 }
 
 /// Number of the polynomials to second order: value, first and second derivatives.
-constexpr size_t kQuadratic = 6;
+constexpr Eigen::Index kQuadratic = 6;
 
-/// The normal equations of a site's map; both coordinates share the matrix. The third right side is
-/// for the variance of the place.
+/// The normal equations of a site's map; both coordinates share the matrix.
 struct MapEquations {
-  SmallSystem<kQuadratic, 4> system;  // the last side stays empty: an even number is faster
+  Eigen::Matrix<double, kQuadratic, kQuadratic> information =
+      Eigen::Matrix<double, kQuadratic, kQuadratic>::Zero();
+  Eigen::Matrix<double, kQuadratic, 2> sums = Eigen::Matrix<double, kQuadratic, 2>::Zero();
   int count = 0;
 
   void add(const Eigen::Vector2d& from_site, const Eigen::Vector2d& place_px) {
@@ -78,12 +79,9 @@ struct MapEquations {
     const double square = from_site.squaredNorm();
     const double weight = 1 / (kNear * kNear + kThird * kThird * square * square * square);
     const double x = from_site.x(), y = from_site.y();
-    const std::array<double, kQuadratic + 2> terms = {
-        1, x, y, 0.5 * x * x, x * y, 0.5 * y * y, place_px.x(), place_px.y()};
-    for (size_t a = 0; a < kQuadratic; ++a) {
-      const double weighed = weight * terms[a];
-      for (size_t b = 0; b < terms.size(); ++b) system.rows[a][b] += weighed * terms[b];
-    }
+    const Eigen::Matrix<double, kQuadratic, 1> terms({1, x, y, 0.5 * x * x, x * y, 0.5 * y * y});
+    information += (weight * terms) * terms.transpose();
+    sums += (weight * terms) * place_px.transpose();
     ++count;
   }
 };
@@ -155,22 +153,16 @@ LocalMap fit_local_map(const DotLayout& layout, int site, const SitePlaces& plac
   if (equations.count < kFewest) return map;
   // Everything but the bending is nearly free.
   constexpr double kFree = 3, kBend = 0.4;  // spacings
-  const std::array<double, kQuadratic> prior_sd = {0, kFree, kFree, kBend, kBend, kBend};
-  auto& system = equations.system;
-  for (size_t k = 1; k < kQuadratic; ++k) system.rows[k][k] += 1 / (prior_sd[k] * prior_sd[k]);
-  system.right(0, 2) = 1;
-  system.eliminate();
-  double variance = 0;
-  for (size_t k = 0; k < kQuadratic; ++k) variance += system.right(k, 2) * system.right(k, 2);
-  map.sigma = std::sqrt(variance);
-  for (size_t c = 0; c < 2; ++c) {
-    system.substitute(c);
-    const auto row = static_cast<Eigen::Index>(c);
-    map.place_px[row] = origin_px[row] + system.right(0, c);
-    map.jacobian_px.row(row) << system.right(1, c), system.right(2, c);
-    map.bend_px[c] << system.right(3, c), system.right(4, c), system.right(4, c),
-        system.right(5, c);
-  }
+  const Eigen::Array<double, kQuadratic - 1, 1> prior_sd = {kFree, kFree, kBend, kBend, kBend};
+  equations.information.diagonal().tail<kQuadratic - 1>() += prior_sd.square().inverse().matrix();
+  const Eigen::LLT<Eigen::Matrix<double, kQuadratic, kQuadratic>> solver(equations.information);
+  const Eigen::Matrix<double, kQuadratic, 2> solution = solver.solve(equations.sums);
+  map.sigma = std::sqrt(solver.solve(Eigen::Matrix<double, kQuadratic, 1>::Unit(0))[0]);
+  map.place_px = origin_px + solution.row(0).transpose();
+  map.jacobian_px = solution.middleRows<2>(1).transpose();
+  for (Eigen::Index c = 0; c < 2; ++c)
+    map.bend_px[static_cast<size_t>(c)] << solution(3, c), solution(4, c), solution(4, c),
+        solution(5, c);
   // The larger singular value, in closed form.
   const Eigen::Matrix2d& j = map.jacobian_px;
   const double sum = j.squaredNorm(), product = std::abs(j(0, 0) * j(1, 1) - j(0, 1) * j(1, 0));
