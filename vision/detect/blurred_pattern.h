@@ -10,12 +10,12 @@ namespace clothfit {
 
 /// A printed pattern under a blur, as a smooth function of tag coordinates: 0 black, 1 white.
 ///
-/// It is a cubic B-spline on a grid finer than the lens's blur. Its coefficients are the pattern under
-/// that part of the blur that the spline itself does not add: cells under a Gaussian along the
-/// tag's axes in closed form, then a sum over the shifts that make up the motion and what of the
-/// lens is not along the axes. Second moments of the whole are `covariance_px2`, and the kernel is
-/// symmetric, so that no edge moves. That covariance is the blur's, but for a correlation between
-/// the axes that is too small to be worth its shifts.
+/// It is a cubic B-spline on a grid finer than the lens's blur. Its coefficients are the pattern
+/// under that part of the blur that the spline itself does not add: cells under a Gaussian along
+/// the tag's axes in closed form, then a sum over the shifts that make up the motion and what of
+/// the lens is not along the axes. Second moments of the whole are `covariance_px2`, and the kernel
+/// is symmetric, so that no edge moves. That covariance is the blur's, but for a correlation
+/// between the axes that is too small to be worth its shifts.
 class BlurredPattern {
  public:
   using Coefficients = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
