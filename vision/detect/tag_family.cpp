@@ -70,6 +70,14 @@ TagFamily make_tag_family(const std::string& name) {
   return {found->create(), found->destroy};
 }
 
+void require_tags(const std::string& family, const std::set<int>& ids, const std::string& where) {
+  const int count = static_cast<int>(make_tag_family(family)->ncodes);
+  for (const int id : ids)
+    if (id < 0 || id >= count)
+      throw InputError(where, fmt::format("there is no tag {} in {}", id, family),
+                       fmt::format("0 to {}", count - 1), "name the family that was printed");
+}
+
 TagPattern printed_tag(apriltag_family& family, int id) {
   if (id < 0 || static_cast<uint32_t>(id) >= family.ncodes)
     throw InputError("markers", fmt::format("there is no tag {} in {}", id, family.name),

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -19,6 +20,9 @@ using TagFamily = std::unique_ptr<apriltag_family, void (*)(apriltag_family*)>;
 
 /// Makes the family of that name. Throws InputError for an unknown one and lists the known ones.
 TagFamily make_tag_family(const std::string& name);
+
+/// Throws InputError, which names `where` the tags are listed, for one that the family lacks.
+void require_tags(const std::string& family, const std::set<int>& ids, const std::string& where);
 
 /// Returns tag `id` of a family as it is printed, the white around it included. Throws InputError
 /// when the family has no such tag.

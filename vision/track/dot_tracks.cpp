@@ -8,9 +8,11 @@
 #include <cassert>
 #include <cmath>
 #include <optional>
+#include <set>
 
 #include "data/input_error.h"
 #include "data/median.h"
+#include "vision/detect/tag_family.h"
 #include "vision/track/dot_bend.h"
 #include "vision/track/dot_identity.h"
 #include "vision/track/dot_lattice.h"
@@ -119,6 +121,9 @@ DotTracker::Follower::Follower(const MarkerSet& markers, const std::string& file
     : options_(options), layout_(make_dot_layout(markers.markers, file)), history_(size()) {
   options.validate();
   if (!layout_.corner_sites_by_tag.empty()) {
+    std::set<int> anchors;
+    for (const auto& [tag, corners] : layout_.corner_sites_by_tag) anchors.insert(tag);
+    require_tags(markers.family, anchors, file);
     tag_detector_.emplace(markers.family);
     return;
   }

@@ -9,6 +9,7 @@
 #include <set>
 
 #include "data/input_error.h"
+#include "vision/detect/tag_family.h"
 #include "vision/detect/tag_layout.h"
 #include "vision/ingest/footage.h"
 #include "vision/ingest/frame_list.h"
@@ -268,8 +269,11 @@ TrackResult track(const Recording& recording, ImageSource& pictures, const std::
   if (markers.empty())
     throw InputError(recording.markers_file.string(), "no marker is a corner of a tag",
                      "markers with `tag` and `corner`", "tracking finds AprilTags");
+  require_tags(recording.markers.family, listed_tags(markers, {}), recording.markers_file.string());
   const PointsByTag reference =
       points_by_tag(recording.reference, recording.reference_file.value_or("reference").string());
+  require_tags(recording.markers.family, listed_tags(reference, {}),
+               recording.reference_file.value_or("reference").string());
 
   Readings readings = read_all(pictures, where, recording.markers, markers, reference, progress);
 

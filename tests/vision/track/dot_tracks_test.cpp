@@ -202,6 +202,13 @@ TEST(DotTracker, RefusesDotsThatNothingNames) {
   EXPECT_THROW(DotTracker(dot_markers(2, 2, kSpacing_m, kMargin_m), "markers.csv"), InputError);
 }
 
+TEST(DotTracker, RefusesAnchorsThatTheFamilyLacks) {
+  MarkerSet markers = anchored_scene().markers();
+  for (Marker& marker : markers.markers)
+    if (marker.tag) *marker.tag += 587;  // tag36h11 ends at 586
+  EXPECT_THROW(DotTracker(markers, "markers.csv"), InputError);
+}
+
 TEST(DotBend, IsTheShiftOfABentDotsOutline) {
   std::mt19937_64 rng(3);
   const auto unit = [&] { return std::uniform_real_distribution<double>(-1, 1)(rng); };

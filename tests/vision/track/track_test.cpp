@@ -408,6 +408,10 @@ TEST(Track, RefusesWhatItCannotTrack) {
 
   drawn.recording().markers.family = "tag99";
   expect_error("unknown tag family 'tag99'", [&] { drawn.track_it(); });
+  drawn.recording().markers.family = "tag16h5";  // has 30
+  for (Marker& marker : drawn.recording().markers.markers) *marker.tag += 30;
+  expect_error("there is no tag 37 in tag16h5", [&] { drawn.track_it(); });
+  for (Marker& marker : drawn.recording().markers.markers) *marker.tag -= 30;
   drawn.recording().markers.family = "tag36h11";
   drawn.recording().markers.markers[1].corner = 0;
   expect_error("are the same corner 0 of tag 7", [&] { drawn.track_it(); });
