@@ -33,8 +33,9 @@ struct PixelBox {
   const std::uint8_t* first = nullptr;  ///< its top left pixel
   std::ptrdiff_t row_bytes = 0;         ///< from one pixel to the one `stride` rows below
   int stride = 1;
-  int columns = 0, rows = 0;  ///< <= kMostDotPixels; of pixels that are looked at
-  float left = 0, top = 0;    ///< of its top left pixel, px from the window's origin
+  int columns = 0;  ///< of pixels that are looked at, <= kMostDotPixels
+  int rows = 0;
+  float left = 0, top = 0;  ///< of its top left pixel, px from the window's origin
 };
 
 /// An outline, and how far from it pixels are looked at.

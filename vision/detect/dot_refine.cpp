@@ -90,13 +90,15 @@ struct PictureBox {
         bottom(std::min(static_cast<int>(std::floor(high.y())), grey.rows - 1)) {}
 
   bool empty() const { return left > right || top > bottom; }
+  /// The stride at which a row has kMostDotPixels at most.
+  int least_stride() const { return 1 + (right - left) / kMostDotPixels; }
 
   /// Every `stride`-th pixel; places count from `origin_px`.
   PixelBox pixels(const cv::Mat& grey, int stride, const Eigen::Vector2d& origin_px) const {
     return {.first = grey.ptr<std::uint8_t>(top) + left,
             .row_bytes = stride * static_cast<std::ptrdiff_t>(grey.step[0]),
             .stride = stride,
-            .columns = std::min((right - left) / stride + 1, kMostDotPixels),
+            .columns = (right - left) / stride + 1,
             .rows = (bottom - top) / stride + 1,
             .left = static_cast<float>(left - origin_px.x()),
             .top = static_cast<float>(top - origin_px.y())};
@@ -123,7 +125,8 @@ void gather_pixels(const cv::Mat& grey, const DotOutline& outline, double blur_p
   if (box.empty()) return;
   const double whole = (std::floor(high.x()) - std::ceil(low.x()) + 1) *
                        (std::floor(high.y()) - std::ceil(low.y()) + 1);
-  const int stride = std::max(1, static_cast<int>(std::ceil(std::sqrt(whole / kMostDotPixels))));
+  const int stride =
+      std::max(box.least_stride(), static_cast<int>(std::ceil(std::sqrt(whole / kMostDotPixels))));
   const Eigen::Vector2d from_origin = centre - window.origin_px;
   gather_dot(box.pixels(grey, stride, window.origin_px),
              {.x = static_cast<float>(from_origin.x()),
@@ -387,7 +390,7 @@ void centre_on_dark(const cv::Mat& grey, double half_level, bool bright, DotOutl
     const PictureBox box(grey, centre - reach, centre + reach);
     if (box.empty()) return;
     const DarkSums sums =
-        dark_sums(box.pixels(grey, 1, centre),
+        dark_sums(box.pixels(grey, box.least_stride(), centre),
                   {.inverse = upper_of(inverse), .ratio = static_cast<float>(kReach)},
                   static_cast<float>(half_level), bright);
     if (sums.weight <= 0) return;

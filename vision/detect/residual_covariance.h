@@ -7,8 +7,8 @@
 
 namespace clothfit {
 
-/// The samples of a fit where the picture is not flat. Others place nothing: their weights in the
-/// corners have 1 % of all squares. Codecs leave flat places cleaner, too.
+/// The samples of a fit where the picture has a slope. Others place next to nothing: their weights
+/// in the corners have 1 % of all squares. Codecs leave flat places cleaner, too.
 struct EdgeSamples {
   explicit EdgeSamples(const TagFit& fit);
 

@@ -19,6 +19,8 @@ double square(double x) {
 
 /// Mean weight above which the pattern explains the pixels; clean tags have 0.9.
 constexpr double kExplained = 0.8;
+/// Length of steps, in standard deviations per unknown, from which on the solution is near.
+constexpr double kNearSolution = 2;
 constexpr double kSharp = 0.5;  // px; a sharp lens and a square pixel
 
 }  // namespace
@@ -115,7 +117,7 @@ bool TagFit::converge(int most_steps, Ending ending) {
     if (!unknowns_.allFinite() || !leaves_cells(unknowns_.segment<3>(TagUnknowns::kBlur)))
       return false;
     const bool fades = ending == Ending::kPredicted && i > 0 && robust().mean() > kExplained &&
-                       moved * moved < kNextStill * before;
+                       moved < kNearSolution && moved * moved < kNextStill * before;
     before = moved;
     if (moved < kStill || fades) {
       covariance_ = solver_.solve(TagUnknowns::Matrix::Identity());
@@ -203,8 +205,9 @@ void TagFit::evaluate() {
   weigh();
 }
 
-/// Returns by how much steps near the solution are too short because robust weights depend on the
-/// residuals: the mean weight over the mean slope of Cauchy's influence.
+/// Returns by how much steps near the solution are too short (farther off they are not) because
+/// robust weights depend on the residuals: the mean weight over the mean slope of Cauchy's
+/// influence.
 double TagFit::stretch() const {
   const double weight = robust().mean();
   return weight > kExplained ? weight / (2 * robust().square() - robust()).mean() : 1;
@@ -219,8 +222,7 @@ double TagFit::step() {
   solver_.compute(equations.information);
   const Unknowns change = solver_.solve(gradient);
   const double length = std::sqrt(change.dot(gradient) / TagUnknowns::kCount);
-  constexpr double kNear = 2;  // farther off, the same step overshoots
-  unknowns_ += (length < kNear ? stretch() : 1) * change;
+  unknowns_ += (length < kNearSolution ? stretch() : 1) * change;
   return length;
 }
 

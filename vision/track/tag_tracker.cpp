@@ -106,7 +106,10 @@ SheetTags TagTracker::next(const cv::Mat& grey, int frame) {
     whole = lost_many(tags);
   }
   ++since_search_;
-  if (whole) tags = search(grey, tags);
+  if (whole) {
+    steady_ = false;
+    tags = search(grey, tags);
+  }
   remember(tags, frame);
   return tags;
 }
