@@ -55,7 +55,7 @@ class TagTracker {
   std::vector<int> sheet_ids_;
   std::map<int, Followed> followed_;  ///< by id
   int pictures_ = 0, frame_ = 0, since_search_ = 0;
-  bool steady_ = false;  ///< the motion predicted the picture read last
+  bool steady_ = false;                ///< the motion predicted the picture read last
   std::ptrdiff_t read_by_search_ = 0;  ///< tags read when a picture was searched last
 };
 
