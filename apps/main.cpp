@@ -1,9 +1,14 @@
 #include <glog/logging.h>
+#include <spdlog/pattern_formatter.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
 #include <exception>
+#include <filesystem>
+#include <memory>
+#include <new>
 #include <string>
+#include <utility>
 
 #include "apps/terminal/command_line.h"
 #include "apps/terminal/exit_code.h"
@@ -12,8 +17,23 @@
 #include "apps/terminal/version.h"
 #include "apps/verbs/verb.h"
 #include "data/input_error.h"
+#include "data/shown_text.h"
 
 namespace {
+
+/// A message without what a terminal takes for commands, which the user's names may hold.
+class ShownMessage : public spdlog::custom_flag_formatter {
+ public:
+  void format(const spdlog::details::log_msg& message, const std::tm&,
+              spdlog::memory_buf_t& to) override {
+    const std::string text(message.payload.data(), message.payload.size());
+    const std::string shown = clothfit::without_controls(text, true);
+    to.append(shown.data(), shown.data() + shown.size());
+  }
+  std::unique_ptr<spdlog::custom_flag_formatter> clone() const override {
+    return std::make_unique<ShownMessage>();
+  }
+};
 
 /// Parses the command line, runs the verb, and turns exceptions into messages and exit codes.
 int run(int argc, char** argv) {
@@ -51,6 +71,15 @@ int run(int argc, char** argv) {
   } catch (const clothfit::Cancelled& error) {
     spdlog::warn("{}", error.what());
     return clothfit::kExitCancelled;
+  } catch (const std::bad_alloc&) {
+    spdlog::error(
+        "memory: there is not enough for this; a smaller mesh, recording or number of trials; "
+        "docs/formats.md lists the limits");
+    return clothfit::kExitBadInput;
+  } catch (const std::filesystem::filesystem_error& error) {
+    spdlog::error("{}: {}; a file or folder that can be read or written", error.path1().string(),
+                  error.code().message());
+    return clothfit::kExitBadInput;
   }
 }
 
@@ -58,7 +87,9 @@ int run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   spdlog::set_default_logger(spdlog::stderr_color_mt("clothfit"));
-  spdlog::set_pattern("%n: %^%l%$: %v");
+  auto formatter = std::make_unique<spdlog::pattern_formatter>();
+  formatter->add_flag<ShownMessage>('*').set_pattern("%n: %^%l%$: %*");
+  spdlog::set_formatter(std::move(formatter));
   // Ceres logs what its results say too.
   FLAGS_minloglevel = google::GLOG_FATAL;
   try {

@@ -2,9 +2,12 @@
 
 #include <charconv>
 #include <string>
+#include <vector>
 
-#include "data/csv_table.h"
+#include "data/csv_reader.h"
+#include "data/folder_entries.h"
 #include "data/input_error.h"
+#include "data/number_limits.h"
 
 namespace clothfit {
 namespace {
@@ -27,18 +30,19 @@ bool is_table(const fs::path& file, int& frame) {
 
 PointClouds read_point_clouds(const fs::path& folder) {
   PointClouds clouds;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
-    const std::string file = entry.path().string();
+  for (const fs::path& path : folder_entries(folder)) {
+    const std::string file = path.string();
     int frame = -1;
-    if (!is_table(entry.path(), frame)) continue;
+    if (!is_table(path, frame)) continue;
     if (frame < 0)
       throw InputError(file, "is named by no frame", "the number of its frame, such as 000012.csv");
-    const CsvTable table(entry.path(), {{"x"}, {"y"}, {"z"}});
+    CsvReader table(path, {{"x"}, {"y"}, {"z"}});
+    std::vector<Eigen::Vector3d> points_m;
+    while (table.next()) points_m.push_back(table.vector_within<3>(0, kFarthest_m, "metres"));
     table.require_rows("points");
-    Eigen::Matrix3Xd points_m(3, table.rows());
-    for (int row = 0; row < table.rows(); ++row)
-      for (int axis = 0; axis < 3; ++axis) points_m(axis, row) = table.number(row, axis);
-    if (!clouds.try_emplace(frame, std::move(points_m)).second)
+    const Eigen::Map<const Eigen::Matrix3Xd> cloud(points_m.front().data(), 3,
+                                                   static_cast<Eigen::Index>(points_m.size()));
+    if (!clouds.try_emplace(frame, cloud).second)
       throw InputError(file, "is a second cloud of its frame", "one file per frame");
   }
   return clouds;

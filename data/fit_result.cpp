@@ -7,9 +7,14 @@
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <tuple>
+#include <utility>
 
 #include "data/finding_json.h"
 #include "data/input_error.h"
+#include "data/number_limits.h"
+#include "data/read_json.h"
+#include "data/recording.h"
 #include "data/text_file.h"
 
 namespace clothfit {
@@ -99,7 +104,7 @@ Json to_json(const Basin& basin) {
 /// A value of a JSON file that knows its place, such as /parameters/2/value.
 class JsonValue {
  public:
-  JsonValue(const Json& json, const std::string& file, std::string place)
+  JsonValue(const nlohmann::json& json, const std::string& file, std::string place)
       : json_(json), file_(file), place_(std::move(place)) {}
 
   bool has(const std::string& key) const { return json_.is_object() && json_.contains(key); }
@@ -113,7 +118,7 @@ class JsonValue {
   std::vector<JsonValue> items() const {
     if (!json_.is_array()) refuse("is not a list", "a list");
     std::vector<JsonValue> items;
-    for (const Json& item : json_)
+    for (const nlohmann::json& item : json_)
       items.emplace_back(item, file_, fmt::format("{}/{}", place_, items.size()));
     return items;
   }
@@ -138,6 +143,13 @@ class JsonValue {
     if (!json_.is_number()) refuse("is not a number", "a number");
     return json_.get<double>();
   }
+  /// Bounds catch slips in an exponent, which would otherwise be simulated.
+  double number_from(double least, double most) const {
+    const double value = number();
+    if (value < least || value > most)
+      refuse(fmt::format("is {}", value), fmt::format("a number from {:g} to {:g}", least, most));
+    return value;
+  }
   double number_or_nan() const {
     return json_.is_null() ? std::numeric_limits<double>::quiet_NaN() : number();
   }
@@ -148,6 +160,12 @@ class JsonValue {
     if (!fits) refuse("is not a count", "a whole number, 0 or more");
     return json_.get<int>();
   }
+  int count_from(int least, int most) const {
+    const int value = count();
+    if (value < least || value > most)
+      refuse(fmt::format("is {}", value), fmt::format("a whole number, {} to {}", least, most));
+    return value;
+  }
   unsigned long long seed() const {
     if (!json_.is_number_unsigned()) refuse("is not a seed", "a whole number, 0 or more");
     return json_.get<unsigned long long>();
@@ -157,10 +175,23 @@ class JsonValue {
   }
 
  private:
-  const Json& json_;
+  const nlohmann::json& json_;
   const std::string& file_;
   std::string place_;
 };
+
+/// Numbers of a fit beyond these are damaged, or slips in an exponent.
+constexpr double kLargestNumber = 1e15;
+constexpr int kMostSubsteps = 10'000'000;
+constexpr double kLongestStep_s = 1e6;
+
+std::pair<int, int> read_json_mesh(const JsonValue& json) {
+  const int columns = json.at("columns").count(), rows = json.at("rows").count();
+  if (!is_possible_mesh(columns, rows))
+    json.refuse(fmt::format("is {} x {}", columns, rows),
+                fmt::format("2 x 2 vertices at least, {} in all at most", kMostMeshVertices));
+  return {columns, rows};
+}
 
 /// Reads an interval; nothing where there is no such key.
 std::optional<Interval> read_interval(const JsonValue& json, const std::string& key) {
@@ -168,15 +199,17 @@ std::optional<Interval> read_interval(const JsonValue& json, const std::string& 
   const JsonValue list = json.at(key);
   const std::vector<JsonValue> ends = list.items();
   if (ends.size() != 2) list.refuse("is no interval", "two numbers");
-  return Interval{.lower = ends[0].number(), .upper = ends[1].number()};
+  const Interval interval{.lower = ends[0].number(), .upper = ends[1].number()};
+  if (interval.lower > interval.upper) list.refuse("is no interval", "the lower end first");
+  return interval;
 }
 
 ParameterEstimate read_parameter(const JsonValue& json) {
   ParameterEstimate parameter;
   parameter.name = json.at("name").text();
   parameter.unit = json.at("unit").text();
-  parameter.value = json.at("value").number();
-  parameter.sigma = json.at("sigma").number();
+  parameter.value = json.at("value").number_from(-kLargestNumber, kLargestNumber);
+  parameter.sigma = json.at("sigma").number_from(0, kLargestNumber);
   const JsonValue state = json.at("state");
   const std::string word = state.text();
   const std::vector<ParameterState> states = {ParameterState::fitted, ParameterState::fixed,
@@ -193,7 +226,8 @@ ParameterEstimate read_parameter(const JsonValue& json) {
   parameter.interval_by_profile =
       json.has("interval_by_profile") && json.at("interval_by_profile").truth();
   parameter.bootstrap_90 = read_interval(json, "bootstrap_90");
-  if (json.has("mesh_shift")) parameter.mesh_shift = json.at("mesh_shift").number();
+  if (json.has("mesh_shift"))
+    parameter.mesh_shift = json.at("mesh_shift").number_from(-kLargestNumber, kLargestNumber);
   return parameter;
 }
 
@@ -204,7 +238,8 @@ std::vector<ParameterEstimate> read_parameters(const JsonValue& json) {
 }
 
 ErrorSummary read_error(const JsonValue& json) {
-  return {json.at("rms").number(), json.at("rms_distance").number(), json.at("count").count()};
+  return {json.at("rms").number_from(0, kLargestNumber),
+          json.at("rms_distance").number_from(0, kLargestNumber), json.at("count").count()};
 }
 
 ObservationErrors read_errors(const JsonValue& json) {
@@ -213,10 +248,11 @@ ObservationErrors read_errors(const JsonValue& json) {
   errors.unit = json.at("unit").text();
   errors.fitted = read_error(json.at("fitted"));
   errors.held_out = read_error(json.at("held_out"));
-  errors.noise = json.at("noise").number();
-  if (json.has("discretisation")) errors.discretisation = json.at("discretisation").number();
+  errors.noise = json.at("noise").number_from(0, kLargestNumber);
+  if (json.has("discretisation"))
+    errors.discretisation = json.at("discretisation").number_from(0, kLargestNumber);
   if (json.has("discretisation_found"))
-    errors.discretisation_found = json.at("discretisation_found").number();
+    errors.discretisation_found = json.at("discretisation_found").number_from(0, kLargestNumber);
   if (json.has("outliers")) errors.outliers = json.at("outliers").count();
   if (json.has("fitted_without")) errors.fitted_without = read_error(json.at("fitted_without"));
   if (json.has("held_out_without"))
@@ -229,13 +265,18 @@ ObservationErrors read_errors(const JsonValue& json) {
 }
 
 CloudErrors::Summary read_cloud_errors(const JsonValue& json) {
-  return {.chamfer_m2 = json.at("chamfer_m2").number(), .frames = json.at("frames").count()};
+  return {.chamfer_m2 = json.at("chamfer_m2").number_from(0, kLargestNumber),
+          .frames = json.at("frames").count()};
 }
 
 Eigen::Vector3d read_vector(const JsonValue& json) {
   const std::vector<JsonValue> numbers = json.items();
   if (numbers.size() != 3) json.refuse("is no vector", "three numbers");
-  return {numbers[0].number(), numbers[1].number(), numbers[2].number()};
+  Eigen::Vector3d vector_m;
+  for (size_t axis = 0; axis < 3; ++axis)
+    vector_m[static_cast<Eigen::Index>(axis)] =
+        numbers[axis].number_from(-kFarthest_m, kFarthest_m);
+  return vector_m;
 }
 
 Basin read_basin(const JsonValue& json) {
@@ -274,19 +315,6 @@ Finding read_warning(const JsonValue& json) {
           .where = json.text_or_empty("where"),
           .expected = json.text_or_empty("expected"),
           .remedy = json.text_or_empty("remedy")};
-}
-
-Json parse(const std::filesystem::path& file) {
-  const std::string text = read_text(file);
-  try {
-    return Json::parse(text);
-  } catch (const Json::parse_error& error) {
-    const auto stopped_at = static_cast<std::ptrdiff_t>(std::min(error.byte, text.size()));
-    const auto line = 1 + std::count(text.begin(), text.begin() + stopped_at, '\n');
-    throw InputError(file.string(), static_cast<int>(line), "not JSON", kExpectedFile, kRemedy);
-  } catch (const Json::exception&) {  // a number too large for any type
-    throw InputError(file.string(), "holds a number too large", kExpectedFile, kRemedy);
-  }
 }
 
 }  // namespace
@@ -423,7 +451,7 @@ void write_fit_result(const FitResult& result, const std::filesystem::path& file
 }
 
 FitResult read_fit_result(const std::filesystem::path& file) {
-  const Json parsed = parse(file);
+  const nlohmann::json parsed = read_json(file, kExpectedFile, kRemedy);
   const std::string name = file.string();
   const JsonValue json(parsed, name, "");
   const JsonValue format = json.at("format");
@@ -435,14 +463,14 @@ FitResult read_fit_result(const std::filesystem::path& file) {
   result.version = json.at("version").text();
   result.command = json.at("command").text();
   result.seed = json.at("seed").seed();
-  result.seconds = json.at("seconds").number();
+  result.seconds = json.at("seconds").number_from(0, kLargestNumber);
   const JsonValue model = json.at("model");
-  result.mesh_columns = model.at("mesh").at("columns").count();
-  result.mesh_rows = model.at("mesh").at("rows").count();
+  std::tie(result.mesh_columns, result.mesh_rows) = read_json_mesh(model.at("mesh"));
   result.parameter_set = model.at("parameter_set").text();
   result.integrator = model.at("integrator").text();
-  result.substeps = model.at("substeps").count();
-  if (model.has("time_step_s")) result.time_step_s = model.at("time_step_s").number();
+  result.substeps = model.at("substeps").count_from(0, kMostSubsteps);
+  if (model.has("time_step_s"))
+    result.time_step_s = model.at("time_step_s").number_from(0, kLongestStep_s);
   result.start = model.at("start").text();
   result.parameters = read_parameters(json.at("parameters"));
   for (const JsonValue& effect : json.at("effects").items())
@@ -450,7 +478,7 @@ FitResult read_fit_result(const std::filesystem::path& file) {
   if (json.has("nuisance")) result.nuisance = read_parameters(json.at("nuisance"));
   if (json.has("marker_offsets")) {
     const JsonValue offsets = json.at("marker_offsets");
-    result.marker_offset_sigma_m = offsets.at("sigma_m").number();
+    result.marker_offset_sigma_m = offsets.at("sigma_m").number_from(0, kLargestNumber);
     const JsonValue by_marker = offsets.at("offset_m");
     for (const std::string& marker : by_marker.keys())
       result.marker_offsets.push_back({marker, read_vector(by_marker.at(marker))});

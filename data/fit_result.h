@@ -189,7 +189,8 @@ FitResult at_density(FitResult result, std::optional<double> areal_density);
 /// Writes fit.json; numbers that are not finite are a programming error.
 void write_fit_result(const FitResult& result, const std::filesystem::path& file);
 
-/// Reads fit.json; unknown keys are ignored, missing ones are an InputError.
+/// Reads fit.json; unknown keys are ignored, missing ones and impossible numbers are an InputError.
+/// Offsets of markers and parameters of basins come in the order of their names.
 FitResult read_fit_result(const std::filesystem::path& file);
 
 }  // namespace clothfit

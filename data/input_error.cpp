@@ -1,5 +1,9 @@
 #include "data/input_error.h"
 
+#include <utility>
+
+#include "data/shown_text.h"
+
 namespace clothfit {
 namespace {
 
@@ -8,7 +12,8 @@ std::string sentence(const std::string& where, const std::string& problem,
   std::string text = where + ": " + problem;
   if (!expected.empty()) text += "; " + expected;
   if (!remedy.empty()) text += "; " + remedy;
-  return text;
+  // A path of the user's may hold what a terminal takes for commands.
+  return without_controls(std::move(text));
 }
 
 }  // namespace

@@ -101,7 +101,8 @@ std::optional<std::vector<double>> frame_times(double frame_rate_hz, double dura
 
 /// Reads a model file and the tables and the surface that it names. Throws InputError, with file
 /// and line.
-ModelDescription read_model(const std::filesystem::path& file);
+ModelDescription read_model(const std::filesystem::path& file,
+                            OutsideFiles outside = OutsideFiles::refused);
 
 /// Writes `folder`/model.yaml, which read_model reads back to the last bit. Beside it stand
 /// held/NUMBER.csv for the paths of held points, obstacle.obj for the obstacle, start.csv for a

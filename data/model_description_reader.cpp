@@ -6,10 +6,11 @@
 #include <string_view>
 #include <tuple>
 
-#include "data/csv_table.h"
+#include "data/csv_reader.h"
 #include "data/input_error.h"
 #include "data/model_description.h"
 #include "data/model_words.h"
+#include "data/number_limits.h"
 #include "data/recording_parts.h"
 #include "data/unit_quaternion.h"
 #include "data/yaml_value.h"
@@ -122,24 +123,24 @@ SheetPose read_sheet(const YamlMap& start) {
 /// Reads position and velocity of every vertex.
 ModelStartState read_start_state(const std::filesystem::path& file, int columns, int rows) {
   enum Column { kRow, kColumn, kX, kY, kZ, kVx, kVy, kVz };
-  const CsvTable table(file, {{"row"}, {"column"}, {"x"}, {"y"}, {"z"}, {"vx"}, {"vy"}, {"vz"}});
+  CsvReader table(file, {{"row"}, {"column"}, {"x"}, {"y"}, {"z"}, {"vx"}, {"vy"}, {"vz"}});
   const std::string expected =
       fmt::format("one row for each of the mesh's {} x {} vertices", columns, rows);
   constexpr double kUnset = std::numeric_limits<double>::quiet_NaN();
   ModelStartState state;
   state.position_m.setConstant(3, columns * rows, kUnset);
   state.velocity_m_per_s = state.position_m;
-  for (int n = 0; n < table.rows(); ++n) {
-    const int row = table.whole_number(n, kRow, 0), column = table.whole_number(n, kColumn, 0);
+  while (table.next()) {
+    const int row = table.whole_number(kRow, 0), column = table.whole_number(kColumn, 0);
     if (row >= rows || column >= columns)
-      table.refuse(n, fmt::format("there is no vertex [{}, {}]", row, column), expected,
+      table.refuse(fmt::format("there is no vertex [{}, {}]", row, column), expected,
                    "count rows and columns from 0");
     const int vertex = row * columns + column;
     if (!std::isnan(state.position_m(0, vertex)))
-      table.refuse(n, fmt::format("vertex [{}, {}] comes twice", row, column), expected);
-    state.position_m.col(vertex) << table.number(n, kX), table.number(n, kY), table.number(n, kZ);
-    state.velocity_m_per_s.col(vertex) << table.number(n, kVx), table.number(n, kVy),
-        table.number(n, kVz);
+      table.refuse(fmt::format("vertex [{}, {}] comes twice", row, column), expected);
+    state.position_m.col(vertex) = table.vector_within<3>(kX, kFarthest_m, "metres");
+    state.velocity_m_per_s.col(vertex) =
+        table.vector_within<3>(kVx, kFastest_m_per_s, "metres per second");
   }
   if (table.rows() != columns * rows)
     throw InputError(file.string(), fmt::format("has {} rows", table.rows()), expected);
@@ -195,8 +196,8 @@ void read_model_time(const YamlValue& value, const RecordingFiles& files, ModelD
 
 }  // namespace
 
-ModelDescription read_model(const std::filesystem::path& file) {
-  const RecordingFiles files(file.has_parent_path() ? file.parent_path() : ".");
+ModelDescription read_model(const std::filesystem::path& file, OutsideFiles outside) {
+  const RecordingFiles files(file.has_parent_path() ? file.parent_path() : ".", outside);
   const YamlMap map =
       read_yaml(file).map({"format", "name", "cloth", "mesh", "fabric", "springs", "strain_limit",
                            "gravity", "obstacle", "held", "effects", "start", "time", "time_step"});

@@ -10,15 +10,13 @@
 #include <vector>
 
 #include "data/input_error.h"
+#include "data/number_limits.h"
 #include "data/number_text.h"
 #include "data/shown_text.h"
 #include "data/text_file.h"
 
 namespace clothfit {
 namespace {
-
-/// A coordinate beyond this is a slip in the unit or the exponent.
-constexpr double kFarthest_m = 1e6;
 
 /// Takes the next word off the beginning of `rest`; empty at the end.
 std::string_view next_word(std::string_view& rest) {
@@ -39,15 +37,17 @@ bool has_area(const SurfaceMesh& mesh) {
 }  // namespace
 
 SurfaceMesh read_obj(const std::filesystem::path& file) {
-  const std::string content = read_text(file);
+  TextLines lines(file);
   std::vector<double> coordinates;
   std::vector<int> corners;
-  std::string_view rest = content;
-  for (int line = 1; !rest.empty(); ++line) {
-    std::string_view text = rest.substr(0, rest.find('\n'));
-    rest.remove_prefix(std::min(text.size() + 1, rest.size()));
-    text = text.substr(0, text.find('#'));
+  while (lines.next()) {
+    const int line = lines.line();
+    std::string_view text = lines.text().substr(0, lines.text().find('#'));
     const std::string_view kind = next_word(text);
+    if (std::max(coordinates.size(), corners.size()) > 3 * kMostObjElements)
+      throw InputError(file.string(), line,
+                       fmt::format("more than {} vertices or triangles", kMostObjElements),
+                       "a coarser surface", "an obstacle needs no finer mesh than the cloth");
     if (kind == "v") {
       for (int axis = 0; axis < 3; ++axis) {
         const std::string_view word = next_word(text);

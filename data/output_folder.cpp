@@ -2,19 +2,16 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <signal.h>
 #include <stdio.h>
 #include <unistd.h>
 
 #include <cassert>
 #include <cerrno>
 #include <cstring>
-#include <optional>
 #include <string>
-#include <vector>
 
 #include "data/input_error.h"
-#include "data/number_text.h"
+#include "data/partial_path.h"
 #include "data/sync_to_disk.h"
 #include "data/text_file.h"
 
@@ -24,10 +21,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kPublishedMark = ".clothfit";
-
-std::string partial_prefix(const fs::path& final_path) {
-  return fmt::format(".{}.partial-", final_path.filename().string());
-}
 
 /// Follows a link: the folder that it points to is replaced, never the link.
 fs::path resolved(const fs::path& given) {
@@ -51,24 +44,20 @@ void require_replaceable(const fs::path& final_path) {
                      "name another folder, or move that folder away");
 }
 
-/// Removes the folders that killed runs left beside `final_path`. A folder that cannot be removed
-/// does no harm.
-void remove_stale(const fs::path& final_path) {
-  const std::string prefix = partial_prefix(final_path);
+/// Refuses to replace a folder in which an input lies, through links or not.
+void require_holds_no_input(const fs::path& final_path, const std::vector<fs::path>& inputs) {
   std::error_code error;
-  std::vector<fs::path> stale;
-  for (fs::directory_iterator entry(final_path.parent_path(), error), end; !error && entry != end;
-       entry.increment(error)) {
-    const std::string name = entry->path().filename().string();
-    if (!name.starts_with(prefix)) continue;
-    const std::optional<int> owner =
-        parse_whole_number(std::string_view(name).substr(prefix.size()));
-    // A folder with our own process number is left from an earlier process of that number.
-    if (!owner || *owner <= 0) continue;
-    const bool is_dead = kill(*owner, 0) != 0 && errno == ESRCH;
-    if (is_dead || *owner == getpid()) stale.push_back(entry->path());
+  if (!fs::exists(final_path, error)) return;
+  for (const fs::path& input : inputs) {
+    if (input.empty()) continue;
+    for (const fs::path& path : {resolved(input), fs::absolute(input).lexically_normal()}) {
+      const fs::path inside = path.lexically_relative(final_path);
+      if (inside.empty() || *inside.begin() == "..") continue;
+      throw InputError(final_path.string(), "holds " + path.string() + ", which this run reads",
+                       "a folder for the results that holds no input",
+                       "name another folder with --out");
+    }
   }
-  for (const fs::path& folder : stale) fs::remove_all(folder, error);
 }
 
 [[noreturn]] void refuse(const fs::path& path, const std::string& what, int error_number) {
@@ -113,7 +102,7 @@ bool move_to_free(const fs::path& from, const fs::path& to) {
 
 }  // namespace
 
-OutputFolder::OutputFolder(fs::path final_path) {
+OutputFolder::OutputFolder(const fs::path& final_path, const std::vector<fs::path>& inputs) {
   if (final_path.empty())
     throw InputError("folder for the results", "the name is empty", "the name of a folder");
   final_path_ = resolved(final_path);
@@ -124,8 +113,9 @@ OutputFolder::OutputFolder(fs::path final_path) {
                      "an existing folder to write into",
                      "create it: mkdir -p '" + parent.string() + "'");
   require_replaceable(final_path_);
-  remove_stale(final_path_);
-  work_path_ = parent / fmt::format("{}{}", partial_prefix(final_path_), getpid());
+  require_holds_no_input(final_path_, inputs);
+  remove_stale_partials(final_path_);
+  work_path_ = partial_path(final_path_);
   if (!fs::create_directory(work_path_, error))
     refuse(work_path_, "cannot be created", error ? error.value() : EEXIST);
 }

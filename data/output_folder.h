@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <vector>
 
 namespace clothfit {
 
@@ -9,10 +10,12 @@ namespace clothfit {
 /// written and leaves an older result as it was.
 class OutputFolder {
  public:
+  /// `inputs` are the files and folders that this run reads, and files that it keeps elsewhere.
   /// Throws InputError when the parent does not exist or cannot be written. Throws it also when
   /// `final_path` exists but no earlier run of this program published it, which a file named
-  /// `.clothfit` shows: nothing of the user's is ever replaced.
-  explicit OutputFolder(std::filesystem::path final_path);
+  /// `.clothfit` shows, and when it holds an input: nothing of the user's is ever replaced.
+  OutputFolder(const std::filesystem::path& final_path,
+               const std::vector<std::filesystem::path>& inputs);
   ~OutputFolder();
   OutputFolder(const OutputFolder&) = delete;
   OutputFolder& operator=(const OutputFolder&) = delete;

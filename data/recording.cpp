@@ -31,4 +31,26 @@ const CameraEntry* Recording::find_camera(const std::string& camera_name) const 
   return found == cameras.end() ? nullptr : &*found;
 }
 
+std::vector<std::filesystem::path> input_paths(const Recording& recording) {
+  std::vector<std::filesystem::path> paths{recording.folder, recording.markers_file};
+  const auto add = [&paths](const std::optional<std::filesystem::path>& path) {
+    if (path) paths.push_back(*path);
+  };
+  add(recording.times_file);
+  add(recording.reference_file);
+  add(recording.obstacle_file);
+  add(recording.tracks3d);
+  for (const auto& [camera, file] : recording.tracks2d) paths.push_back(file);
+  for (const CameraEntry& camera : recording.cameras) {
+    add(camera.file);
+    add(camera.images);
+    if (camera.calibration) paths.push_back(camera.calibration->images);
+  }
+  for (const RigidBody& body : recording.bodies) paths.push_back(body.file);
+  if (recording.clouds) paths.push_back(recording.clouds->folder);
+  for (const HeldPoint& held : recording.held) add(held.file);
+  std::erase_if(paths, [](const std::filesystem::path& path) { return path.empty(); });
+  return paths;
+}
+
 }  // namespace clothfit

@@ -12,6 +12,12 @@
 
 namespace clothfit {
 
+/// Whether a recording or a model may name tables, cameras, held paths and obstacles that lie
+/// outside its folder. They are copied into results, so that a recording from elsewhere could bring
+/// out any file of its reader's. Pictures, videos, clouds and body logs may lie anywhere: they are
+/// never copied.
+enum class OutsideFiles { refused, allowed };
+
 /// `by_area`: an edge vertex weighs half, a corner a quarter. `equal`: as in the founding paper.
 enum class MassDistribution { by_area, equal };
 
@@ -136,7 +142,12 @@ struct Recording {
 };
 
 /// Reads `folder`/recording.yaml and the small tables and the surface it names. Throws InputError.
-Recording read_recording(const std::filesystem::path& folder);
+Recording read_recording(const std::filesystem::path& folder,
+                         OutsideFiles outside = OutsideFiles::refused);
+
+/// Returns every file and folder that a recording consists of, its own folder first. Results must
+/// replace none of them.
+std::vector<std::filesystem::path> input_paths(const Recording& recording);
 
 /// Writes `folder`/recording.yaml and copies no file. All files are named relative to `folder`,
 /// those outside it too ("../..."), so that pictures are used where they lie.

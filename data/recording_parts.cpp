@@ -5,7 +5,7 @@
 #include <array>
 #include <tuple>
 
-#include "data/csv_table.h"
+#include "data/csv_reader.h"
 #include "data/file_name.h"
 #include "data/number_text.h"
 #include "data/recording_words.h"
@@ -18,6 +18,9 @@ namespace {
 /// Bounds an interval, because a fit has to simulate all of it.
 constexpr double kLongestInterval_s = 1000;
 
+/// Each held point is a path of its own; as many as this no person types.
+constexpr size_t kMostHeldPoints = 1000;
+
 void require(const YamlValue& value, bool found, const std::string& expected) {
   if (found) return;
   value.refuse(fmt::format("{} = {}: there is no such {}", value.name(), shown_text(value.text()),
@@ -28,11 +31,26 @@ void require(const YamlValue& value, bool found, const std::string& expected) {
 
 }  // namespace
 
-RecordingFiles::RecordingFiles(std::filesystem::path given_folder)
+RecordingFiles::RecordingFiles(std::filesystem::path given_folder, OutsideFiles outside)
     : given_folder_(std::move(given_folder)),
-      folder_(std::filesystem::weakly_canonical(std::filesystem::absolute(given_folder_))) {}
+      folder_(std::filesystem::weakly_canonical(std::filesystem::absolute(given_folder_))),
+      outside_(outside) {}
 
 std::filesystem::path RecordingFiles::file(const YamlValue& value) const {
+  const std::filesystem::path file = file_anywhere(value);
+  std::error_code error;
+  // A link inside may lead outside.
+  const std::filesystem::path target = std::filesystem::canonical(file, error);
+  const std::filesystem::path inside = target.lexically_relative(folder_);
+  if (outside_ == OutsideFiles::refused && (inside.empty() || *inside.begin() == ".."))
+    value.refuse(
+        fmt::format("{} = {} lies outside the folder", value.name(), shown_text(value.text())),
+        "a file inside the folder of the file that names it",
+        "copy it there, or allow it with --allow-outside");
+  return file;
+}
+
+std::filesystem::path RecordingFiles::file_anywhere(const YamlValue& value) const {
   require(value, std::filesystem::is_regular_file(status(value)), "a file");
   return absolute(value);
 }
@@ -109,21 +127,22 @@ double read_frame_rate(const YamlValue& value) {
 
 std::vector<double> read_times(const std::filesystem::path& file) {
   enum Column { kFrame, kTime };
-  const CsvTable table(file, {{"frame"}, {"time"}});
-  table.require_rows("times");
+  CsvReader table(file, {{"frame"}, {"time"}});
   std::vector<double> times_s;
-  for (int row = 0; row < table.rows(); ++row) {
-    const int frame = table.whole_number(row, kFrame, 0);
-    if (frame != row)
-      table.refuse(row, fmt::format("frame {} where frame {} was due", frame, row),
+  while (table.next()) {
+    const int frame = table.whole_number(kFrame, 0);
+    const int due = table.rows() - 1;
+    if (frame != due)
+      table.refuse(fmt::format("frame {} where frame {} was due", frame, due),
                    "every frame from 0 on, in order");
-    times_s.push_back(table.rising_number(row, kTime));
-    const double interval_s = row > 0 ? times_s.back() - times_s[times_s.size() - 2] : 0;
+    times_s.push_back(table.rising_time(kTime));
+    const double interval_s = due > 0 ? times_s.back() - times_s[times_s.size() - 2] : 0;
     if (interval_s > kLongestInterval_s)
-      table.refuse(row, fmt::format("{} seconds after the frame before", interval_s),
+      table.refuse(fmt::format("{} seconds after the frame before", interval_s),
                    fmt::format("{} seconds at most", kLongestInterval_s),
                    "correct the time (seconds), or make two recordings of it");
   }
+  table.require_rows("times");
   return times_s;
 }
 
@@ -145,7 +164,12 @@ Eigen::Vector2d read_place(const YamlValue& value, const ClothDescription& cloth
 std::vector<HeldPoint> read_held(const YamlValue& value, const RecordingFiles& files,
                                  const ClothDescription& cloth, const Words<HeldMotion>& motions) {
   std::vector<HeldPoint> held;
-  for (const YamlValue& item : value.items()) {
+  const std::vector<YamlValue> items = value.items();
+  if (items.size() > kMostHeldPoints)
+    value.refuse(fmt::format("{} has {} entries", value.name(), items.size()),
+                 fmt::format("{} at most", kMostHeldPoints),
+                 "name an edge where all of its points are held");
+  for (const YamlValue& item : items) {
     const YamlMap map = item.map({"at", "edge", "motion", "file"});
     const YamlValue* at = map.find("at");
     const YamlValue* edge = map.find("edge");

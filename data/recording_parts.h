@@ -22,12 +22,14 @@ inline constexpr double kLargest_m = 1e3;
 /// gave them.
 class RecordingFiles {
  public:
-  explicit RecordingFiles(std::filesystem::path given_folder);
+  RecordingFiles(std::filesystem::path given_folder, OutsideFiles outside);
 
   const std::filesystem::path& root() const { return folder_; }
   std::filesystem::path shown(const YamlValue& value) const { return given_folder_ / value.text(); }
 
+  /// Returns a file inside the folder, unless `outside` allows others.
   std::filesystem::path file(const YamlValue& value) const;
+  std::filesystem::path file_anywhere(const YamlValue& value) const;
   std::filesystem::path folder(const YamlValue& value) const;
   std::filesystem::path file_or_folder(const YamlValue& value) const;
 
@@ -37,6 +39,7 @@ class RecordingFiles {
 
   std::filesystem::path given_folder_;
   std::filesystem::path folder_;
+  OutsideFiles outside_;
 };
 
 /// Names files relative to the folder that a YAML file is written to.

@@ -2,10 +2,11 @@
 
 #include <algorithm>
 
-#include "data/csv_table.h"
+#include "data/csv_reader.h"
 #include "data/file_name.h"
 #include "data/input_error.h"
 #include "data/nearest_name.h"
+#include "data/number_limits.h"
 #include "data/recording.h"
 #include "data/recording_parts.h"
 #include "data/recording_words.h"
@@ -128,7 +129,7 @@ std::vector<RigidBody> read_bodies(const YamlValue& value, const RecordingFiles&
         map.at("name").refuse("a second body `" + body.name + "`",
                               "a name of its own for every body");
     }
-    body.file = files.file(map.at("file"));
+    body.file = files.file_anywhere(map.at("file"));
     if (const YamlValue* offset = map.find("clock_offset")) {
       if (offset->is_number())
         body.clock_offset_s = offset->number();
@@ -159,9 +160,9 @@ std::filesystem::path find_recording_file(const std::filesystem::path& given) {
 
 }  // namespace
 
-Recording read_recording(const std::filesystem::path& folder) {
+Recording read_recording(const std::filesystem::path& folder, OutsideFiles outside) {
   const std::filesystem::path file = find_recording_file(folder);
-  const RecordingFiles files(file.has_parent_path() ? file.parent_path() : ".");
+  const RecordingFiles files(file.has_parent_path() ? file.parent_path() : ".", outside);
   const YamlMap map = read_yaml(file).map(
       {"format", "name", "origin", "cloth", "markers", "time", "gravity", "cameras", "observations",
        "reference", "bodies", "clouds", "obstacle", "held", "start", "declared", "held_out"});
@@ -209,14 +210,13 @@ Recording read_recording(const std::filesystem::path& folder) {
 
 HeldPath read_held_path(const std::filesystem::path& file) {
   enum Column { kTime, kX, kY, kZ };
-  const CsvTable table(file, {{"time"}, {"x"}, {"y"}, {"z"}});
-  table.require_rows("positions");
+  CsvReader table(file, {{"time"}, {"x"}, {"y"}, {"z"}});
   HeldPath path;
-  for (int row = 0; row < table.rows(); ++row) {
-    path.time_s.push_back(table.rising_number(row, kTime));
-    path.position_m.emplace_back(table.number(row, kX), table.number(row, kY),
-                                 table.number(row, kZ));
+  while (table.next()) {
+    path.time_s.push_back(table.rising_time(kTime));
+    path.position_m.push_back(table.vector_within<3>(kX, kFarthest_m, "metres"));
   }
+  table.require_rows("positions");
   return path;
 }
 

@@ -1,69 +1,22 @@
 #include "data/text_file.h"
 
-#include <zlib.h>
+#include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
-#include <cerrno>
 #include <cstring>
-#include <fstream>
-#include <memory>
 
+#include "data/file_bytes.h"
 #include "data/input_error.h"
+#include "data/text_writer.h"
 
 namespace clothfit {
 namespace {
 
-bool is_compressed_name(const std::filesystem::path& file) {
-  return file.extension() == ".gz";
-}
+constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
 
-std::string error_text(int error_number) {
-  return std::strerror(error_number);
-}
-
-int lines_in(const std::string& text) {
-  return 1 + static_cast<int>(std::count(text.begin(), text.end(), '\n'));
-}
-
-std::string read_compressed(const std::filesystem::path& file) {
-  const std::unique_ptr<gzFile_s, decltype(&gzclose_r)> in(gzopen(file.c_str(), "rb"), &gzclose_r);
-  if (!in)
-    throw InputError(file.string(), "cannot be opened: " + error_text(errno), "a readable file");
-  std::string text;
-  std::array<char, 1 << 16> block;
-  for (;;) {
-    const int count = gzread(in.get(), block.data(), static_cast<unsigned>(block.size()));
-    if (count > 0) text.append(block.data(), static_cast<size_t>(count));
-    int status = Z_OK;
-    gzerror(in.get(), &status);
-    if (count < 0 || status == Z_BUF_ERROR) {
-      const bool cut_short = status == Z_BUF_ERROR;
-      throw InputError(
-          file.string(), lines_in(text),
-          cut_short ? "the compressed data end too early" : "the compressed data are damaged",
-          "a whole gzip file", "copy or compress the file again");
-    }
-    if (count == 0) break;
-  }
-  if (gzdirect(in.get()) != 0 && !text.empty())
-    throw InputError(file.string(), "the content is not gzip-compressed",
-                     "gzip data behind a name that ends in .gz", "compress it, or drop the .gz");
-  return text;
-}
-
-std::string read_plain(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  if (!in)
-    throw InputError(file.string(), "cannot be opened: " + error_text(errno), "a readable file");
-  std::string text((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
-  if (in.bad())
-    throw InputError(file.string(), "cannot be read: " + error_text(errno), "a readable file");
-  if (text.starts_with("\x1f\x8b"))
-    throw InputError(file.string(), "the content is gzip-compressed",
-                     "plain text behind a name that does not end in .gz",
-                     "add .gz to its name, also where recording.yaml names it");
-  return text;
+[[noreturn]] void refuse_nul(const std::string& file, int line) {
+  throw InputError(file, line, "a NUL byte, which no text holds", "text in UTF-8",
+                   "save it as UTF-8, or name the file that holds the text");
 }
 
 void unify_line_ends(std::string& text) {
@@ -83,37 +36,73 @@ void unify_line_ends(std::string& text) {
 
 }  // namespace
 
-std::string read_text(const std::filesystem::path& file) {
-  std::error_code error;
-  const std::filesystem::file_status status = std::filesystem::status(file, error);
-  if (!std::filesystem::exists(status))
-    throw InputError(file.string(), "there is no such file", "a file", "check the path");
-  if (std::filesystem::is_directory(status))
-    throw InputError(file.string(), "is a folder", "a file", "name the file inside it");
-  std::string text = is_compressed_name(file) ? read_compressed(file) : read_plain(file);
-  constexpr const char* kByteOrderMark = "\xef\xbb\xbf";
-  if (text.starts_with(kByteOrderMark)) text.erase(0, std::strlen(kByteOrderMark));
+TextLines::TextLines(const std::filesystem::path& file)
+    // Room for the longest line, its end, and the block in which it ends.
+    : file_(file.string()), bytes_(file), buffer_(4 * kMostLineBytes, '\0') {
+  while (end_ < kByteOrderMark.size() && read_on()) continue;
+  if (std::string_view(buffer_.data(), end_).starts_with(kByteOrderMark))
+    begin_ = kByteOrderMark.size();
+}
+
+bool TextLines::read_on() {
+  std::memmove(buffer_.data(), buffer_.data() + begin_, end_ - begin_);
+  end_ -= begin_;
+  begin_ = 0;
+  const size_t count = bytes_.read(buffer_.data() + end_, buffer_.size() - end_);
+  end_ += count;
+  return count > 0;
+}
+
+bool TextLines::next() {
+  ++line_;
+  size_t searched = 0;
+  for (bool more = true;;) {
+    const std::string_view rest(buffer_.data() + begin_, end_ - begin_);
+    // `\r` as the last byte read may be the first half of `\r\n`.
+    const size_t found = rest.find_first_of(std::string_view("\r\n\0", 3), searched);
+    const bool ends_here = found != std::string_view::npos &&
+                           (rest[found] != '\r' || found + 1 < rest.size() || !more);
+    const size_t length = found == std::string_view::npos ? rest.size() : found;
+    if (length > kMostLineBytes)
+      throw InputError(file_, line_, fmt::format("a line of more than {} bytes", kMostLineBytes),
+                       "text in short lines", "look at what the file holds");
+    if (ends_here || !more) {
+      if (!ends_here && rest.empty()) return false;
+      text_ = rest.substr(0, length);
+      if (ends_here && rest[found] == '\0') refuse_nul(file_, line_);
+      begin_ += length;
+      if (ends_here) begin_ += rest.substr(found).starts_with("\r\n") ? 2 : 1;
+      return true;
+    }
+    searched = length;
+    more = read_on();
+  }
+}
+
+std::string read_text(const std::filesystem::path& file, std::uintmax_t most_bytes) {
+  UnpackedBytes bytes(file);
+  std::string text;
+  for (;;) {
+    constexpr size_t kBlockBytes = 1 << 16;
+    const size_t filled = text.size();
+    text.resize(filled + kBlockBytes);
+    const size_t count = bytes.read(text.data() + filled, kBlockBytes);
+    text.resize(filled + count);
+    if (count == 0) break;
+    if (text.size() > most_bytes) refuse_file_size(file, most_bytes);
+  }
+  if (text.starts_with(kByteOrderMark)) text.erase(0, kByteOrderMark.size());
   unify_line_ends(text);
+  if (const size_t nul = text.find('\0'); nul != std::string::npos)
+    refuse_nul(file.string(),
+               1 + static_cast<int>(std::count(text.begin(), text.begin() + nul, '\n')));
   return text;
 }
 
-void write_text(const std::string& text, const std::filesystem::path& file) {
-  const auto refuse = [&file] {
-    throw InputError(file.string(), "cannot be written: " + error_text(errno),
-                     "a writable place with room on its disk");
-  };
-  if (is_compressed_name(file)) {
-    const gzFile out = gzopen(file.c_str(), "wb9");
-    if (out == nullptr) refuse();
-    const bool written = gzfwrite(text.data(), 1, text.size(), out) == text.size();
-    const bool closed = gzclose_w(out) == Z_OK;
-    if (!written || !closed) refuse();
-    return;
-  }
-  std::ofstream out(file, std::ios::binary | std::ios::trunc);
-  out.write(text.data(), static_cast<std::streamsize>(text.size()));
+void write_text(std::string_view text, const std::filesystem::path& file) {
+  TextWriter out(file);
+  out.append(text);
   out.close();
-  if (!out) refuse();
 }
 
 }  // namespace clothfit

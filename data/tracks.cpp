@@ -6,19 +6,20 @@
 #include <cassert>
 #include <numeric>
 
-#include "data/csv_table.h"
+#include "data/csv_reader.h"
 #include "data/nearest_name.h"
+#include "data/number_limits.h"
 #include "data/number_text.h"
-#include "data/text_file.h"
+#include "data/text_writer.h"
 
 namespace clothfit {
 namespace {
 
-int read_marker(const CsvTable& table, int row, int column, const MarkerSet& markers) {
-  const std::string name = table.name(row, column);
+int read_marker(const CsvReader& table, int column, const MarkerSet& markers) {
+  const std::string name = table.name(column);
   const auto found = markers.index.find(name);
   if (found == markers.index.end())
-    table.refuse(row, fmt::format("unknown marker `{}`", name), "a marker that markers.csv names",
+    table.refuse(fmt::format("unknown marker `{}`", name), "a marker that markers.csv names",
                  "add it there, or remove its rows here");
   return found->second;
 }
@@ -28,11 +29,11 @@ constexpr double kSmallestSigma = 1e-9;
 constexpr double kLargestSigma = 1e6;
 
 /// Reads a sigma; 0 where the file does not say.
-double read_sigma(const CsvTable& table, int row, int column, const std::string& unit) {
-  if (table.empty(row, column)) return 0;
-  const double sigma = table.number(row, column);
+double read_sigma(const CsvReader& table, int column, const std::string& unit) {
+  if (table.empty(column)) return 0;
+  const double sigma = table.number(column);
   if (sigma < kSmallestSigma || sigma > kLargestSigma)
-    table.refuse(row, fmt::format("sigma = {}", sigma),
+    table.refuse(fmt::format("sigma = {}", sigma),
                  fmt::format("one standard deviation per coordinate ({}), {} to {}", unit,
                              kSmallestSigma, kLargestSigma),
                  "leave the field empty where it is not known");
@@ -40,53 +41,61 @@ double read_sigma(const CsvTable& table, int row, int column, const std::string&
 }
 
 /// Returns the reason of `rejected:REASON`; empty for `ok`.
-std::string read_status(const CsvTable& table, int row, int column) {
-  const std::string_view status = table.text(row, column);
+std::string read_status(const CsvReader& table, int column) {
+  const std::string_view status = table.text(column);
   if (status.empty() || status == "ok") return "";
   constexpr std::string_view kRejected = "rejected:";
   if (!status.starts_with(kRejected) || status.size() == kRejected.size())
-    table.refuse(row, fmt::format("status = `{}`", table.name(row, column)),
-                 "`ok` or `rejected:REASON`");
-  return table.name(row, column).substr(kRejected.size());
+    table.refuse(fmt::format("status = `{}`", table.name(column)), "`ok` or `rejected:REASON`");
+  return table.name(column).substr(kRejected.size());
 }
 
 /// A longer gap without any row is a mistyped frame number, not a pause. It is refused because a
 /// fit has to simulate all of its frames.
 constexpr int kLongestGap = 10'000;
 
-/// Sorts rows (given in the table's order) by frame, then marker. Refuses a pair that comes twice
-/// and a frame far beyond the one before.
+/// Refuses a row like the one before it in order, and a frame far beyond.
 template <class Position>
-std::vector<Position> sorted(const CsvTable& table, std::vector<Position> rows,
-                             const MarkerSet& markers) {
-  std::vector<int> order(rows.size());
-  std::iota(order.begin(), order.end(), 0);
-  const auto at = [&rows](int row) -> const Position& { return rows[static_cast<size_t>(row)]; };
-  std::stable_sort(order.begin(), order.end(), [&at](int a, int b) {
-    return std::pair(at(a).frame, at(a).marker) < std::pair(at(b).frame, at(b).marker);
-  });
-  std::vector<Position> result;
-  result.reserve(rows.size());
-  int previous = -1;
-  for (const int row : order) {
-    if (previous >= 0 && at(row).frame == at(previous).frame &&
-        at(row).marker == at(previous).marker) {
-      table.refuse(row,
-                   fmt::format("marker `{}` in frame {} stands on line {} already",
-                               markers.markers[static_cast<size_t>(at(row).marker)].name,
-                               at(row).frame, table.line(previous)),
-                   "one row per frame and marker", "remove one of the two rows");
-    }
-    const int frame_before = previous >= 0 ? at(previous).frame : 0;
-    if (at(row).frame - frame_before > kLongestGap)
-      table.refuse(row,
-                   fmt::format("frame {} comes next after frame {}", at(row).frame, frame_before),
-                   fmt::format("{} frames without any row at most", kLongestGap),
-                   "correct the number, or make two recordings of it");
-    result.push_back(at(row));
-    previous = row;
+void check_order(const CsvReader& table, const Position& row, int line, const Position* before,
+                 int line_before, const MarkerSet& markers) {
+  if (before != nullptr && row.frame == before->frame && row.marker == before->marker)
+    table.refuse_line(
+        line,
+        fmt::format("marker `{}` in frame {} stands on line {} already",
+                    markers.markers[static_cast<size_t>(row.marker)].name, row.frame, line_before),
+        "one row per frame and marker", "remove one of the two rows");
+  const int frame_before = before != nullptr ? before->frame : 0;
+  if (row.frame - frame_before > kLongestGap)
+    table.refuse_line(line,
+                      fmt::format("frame {} comes next after frame {}", row.frame, frame_before),
+                      fmt::format("{} frames without any row at most", kLongestGap),
+                      "correct the number, or make two recordings of it");
+}
+
+/// Sorts rows by frame, then marker; `lines` are theirs. Those in order already, as long tables
+/// are, take no further memory.
+template <class Position>
+void sort_rows(const CsvReader& table, const std::vector<int>& lines, const MarkerSet& markers,
+               std::vector<Position>& rows) {
+  const auto place = [](const Position& row) { return std::pair(row.frame, row.marker); };
+  const bool in_order = std::ranges::is_sorted(rows, {}, place);
+  std::vector<size_t> order;
+  if (!in_order) {
+    order.resize(rows.size());
+    std::iota(order.begin(), order.end(), size_t{0});
+    std::ranges::stable_sort(order, {}, [&](size_t row) { return place(rows[row]); });
   }
-  return result;
+  const auto nth = [&](size_t n) { return in_order ? n : order[n]; };
+  for (size_t n = 0; n < rows.size(); ++n) {
+    const size_t row = nth(n), before = nth(n > 0 ? n - 1 : 0);
+    check_order(table, rows[row], lines[row], n > 0 ? &rows[before] : nullptr, lines[before],
+                markers);
+  }
+  if (in_order) return;
+  std::vector<Position> sorted;
+  sorted.reserve(rows.size());
+  for (const size_t row : order) sorted.push_back(std::move(rows[row]));
+  rows = std::move(sorted);
 }
 
 const std::string& marker_name(const MarkerSet& markers, int marker) {
@@ -102,48 +111,52 @@ std::string sigma_field(double sigma) {
 
 Tracks3d read_tracks3d(const std::filesystem::path& file, const MarkerSet& markers) {
   enum Column { kFrame, kMarker, kX, kY, kZ, kSigma };
-  const CsvTable table(file, {{"frame"}, {"marker"}, {"x"}, {"y"}, {"z"}, {"sigma", false}});
+  CsvReader table(file, {{"frame"}, {"marker"}, {"x"}, {"y"}, {"z"}, {"sigma", false}});
   Tracks3d tracks;
-  tracks.reserve(static_cast<size_t>(table.rows()));
-  for (int row = 0; row < table.rows(); ++row) {
+  std::vector<int> lines;
+  while (table.next()) {
     Position3d position;
-    position.frame = table.whole_number(row, kFrame, 0);
-    position.marker = read_marker(table, row, kMarker, markers);
-    position.position_m = {table.number(row, kX), table.number(row, kY), table.number(row, kZ)};
-    position.sigma_m = read_sigma(table, row, kSigma, "metres");
+    position.frame = table.whole_number(kFrame, 0);
+    position.marker = read_marker(table, kMarker, markers);
+    position.position_m = table.vector_within<3>(kX, kFarthest_m, "metres");
+    position.sigma_m = read_sigma(table, kSigma, "metres");
     tracks.push_back(position);
+    lines.push_back(table.line());
   }
-  return sorted(table, std::move(tracks), markers);
+  sort_rows(table, lines, markers, tracks);
+  return tracks;
 }
 
 Tracks2d read_tracks2d(const std::filesystem::path& file, const MarkerSet& markers) {
   enum Column { kFrame, kMarker, kU, kV, kSigma, kStatus };
-  const CsvTable table(file,
-                       {{"frame"}, {"marker"}, {"u"}, {"v"}, {"sigma", false}, {"status", false}});
+  CsvReader table(file, {{"frame"}, {"marker"}, {"u"}, {"v"}, {"sigma", false}, {"status", false}});
   Tracks2d tracks;
-  tracks.reserve(static_cast<size_t>(table.rows()));
-  for (int row = 0; row < table.rows(); ++row) {
+  std::vector<int> lines;
+  while (table.next()) {
     Position2d position;
-    position.frame = table.whole_number(row, kFrame, 0);
-    position.marker = read_marker(table, row, kMarker, markers);
-    position.position_px = {table.number(row, kU), table.number(row, kV)};
-    position.sigma_px = read_sigma(table, row, kSigma, "pixels");
-    position.rejected = read_status(table, row, kStatus);
+    position.frame = table.whole_number(kFrame, 0);
+    position.marker = read_marker(table, kMarker, markers);
+    position.position_px = table.vector_within<2>(kU, kFarthest_px, "pixels");
+    position.sigma_px = read_sigma(table, kSigma, "pixels");
+    position.rejected = read_status(table, kStatus);
     tracks.push_back(std::move(position));
+    lines.push_back(table.line());
   }
-  return sorted(table, std::move(tracks), markers);
+  sort_rows(table, lines, markers, tracks);
+  return tracks;
 }
 
 void write_tracks3d(const Tracks3d& tracks, const MarkerSet& markers,
                     const std::filesystem::path& file) {
   const bool sigma =
       std::any_of(tracks.begin(), tracks.end(), [](const Position3d& p) { return p.sigma_m > 0; });
-  std::string text = sigma ? "frame,marker,x,y,z,sigma\n" : "frame,marker,x,y,z\n";
+  TextWriter out(file);
+  out.append(sigma ? "frame,marker,x,y,z,sigma\n" : "frame,marker,x,y,z\n");
   for (const Position3d& p : tracks)
-    text += fmt::format("{},{},{},{},{}{}\n", p.frame, marker_name(markers, p.marker),
-                        number_text(p.position_m.x()), number_text(p.position_m.y()),
-                        number_text(p.position_m.z()), sigma ? sigma_field(p.sigma_m) : "");
-  write_text(text, file);
+    out.append(fmt::format("{},{},{},{},{}{}\n", p.frame, csv_name(marker_name(markers, p.marker)),
+                           number_text(p.position_m.x()), number_text(p.position_m.y()),
+                           number_text(p.position_m.z()), sigma ? sigma_field(p.sigma_m) : ""));
+  out.close();
 }
 
 void write_tracks2d(const Tracks2d& tracks, const MarkerSet& markers,
@@ -152,18 +165,19 @@ void write_tracks2d(const Tracks2d& tracks, const MarkerSet& markers,
                                   [](const Position2d& p) { return !p.rejected.empty(); });
   const bool sigma = status || std::any_of(tracks.begin(), tracks.end(),
                                            [](const Position2d& p) { return p.sigma_px > 0; });
+  TextWriter out(file);
   std::string text = "frame,marker,u,v";
   if (sigma) text += ",sigma";
   if (status) text += ",status";
-  text += "\n";
+  out.append(text + "\n");
   for (const Position2d& p : tracks) {
-    text += fmt::format("{},{},{},{}", p.frame, marker_name(markers, p.marker),
-                        number_text(p.position_px.x()), number_text(p.position_px.y()));
+    text = fmt::format("{},{},{},{}", p.frame, csv_name(marker_name(markers, p.marker)),
+                       number_text(p.position_px.x()), number_text(p.position_px.y()));
     if (sigma) text += sigma_field(p.sigma_px);
     if (status) text += p.rejected.empty() ? ",ok" : fmt::format(",rejected:{}", p.rejected);
-    text += "\n";
+    out.append(text + "\n");
   }
-  write_text(text, file);
+  out.close();
 }
 
 }  // namespace clothfit

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <sstream>
+#include <unordered_map>
 
 #include "data/input_error.h"
 #include "data/nearest_name.h"
@@ -149,18 +150,18 @@ std::vector<YamlValue> YamlValue::items() const {
 std::vector<std::pair<std::string, YamlValue>> YamlValue::entries() const {
   if (!node_.IsMap()) refuse(shown(), "a map, `key: value`");
   std::vector<std::pair<std::string, YamlValue>> entries;
+  std::unordered_map<std::string, int> line_of_key;
   for (const auto& entry : node_) {
     const int line = line_of(entry.first.Mark(), line_);
     if (!entry.first.IsScalar())
       throw InputError(*file_, line, "a key is " + kind_of(entry.first), "a word before the colon");
     const std::string& key = entry.first.Scalar();
-    for (const auto& [earlier_key, earlier] : entries) {
-      if (earlier_key == key)
-        throw InputError(
-            *file_, line,
-            fmt::format("`{}` stands on line {} already", shown_text(key), earlier.line()),
-            "every key once", "remove one of the two");
-    }
+    const auto [earlier, is_new] = line_of_key.emplace(key, line);
+    if (!is_new)
+      throw InputError(
+          *file_, line,
+          fmt::format("`{}` stands on line {} already", shown_text(key), earlier->second),
+          "every key once", "remove one of the two");
     // An empty value has no useful place of its own, so the key's line serves.
     entries.emplace_back(
         key, YamlValue(entry.second, file_, name_.empty() ? key : name_ + "." + key, line));
@@ -207,7 +208,7 @@ const YamlValue& YamlMap::at(const std::string& key) const {
 
 YamlValue read_yaml(const std::filesystem::path& file) {
   const auto name = std::make_shared<const std::string>(file.string());
-  const std::string text = read_text(file);
+  const std::string text = read_text(file, kMostYamlBytes);
   try {
     // YAML::LoadAll hangs on some damaged files (yaml-cpp 0.7 at a stray comma). YAML::Load
     // silently drops whatever follows the first document.

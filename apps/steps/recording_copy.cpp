@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <map>
+#include <string>
 #include <system_error>
 
 #include "data/input_error.h"
@@ -11,53 +13,87 @@ namespace {
 
 namespace fs = std::filesystem;
 
-fs::path place_copy(const fs::path& file, const fs::path& target) {
-  std::error_code error;
-  fs::create_directories(target.parent_path(), error);
-  if (!error) fs::copy_file(file, target, fs::copy_options::overwrite_existing, error);
-  if (error)
-    throw InputError(file.string(), "cannot be copied: " + error.message(),
-                     "a file of the recording that can be read, and room for its copy");
-  return target;
-}
+/// Allots a place of its own to every file that is copied into a result.
+class CopyPlaces {
+ public:
+  CopyPlaces(const Recording& recording, const fs::path& folder)
+      : recording_folder_(recording.folder), folder_(folder) {
+    // What the steps write themselves comes first.
+    for (const char* name : {"recording.yaml", "tracks.json", "calibration.json", "calibration.csv",
+                             "report.html", ".clothfit"})
+      owner_.emplace(name, kResult);
+    for (const CameraEntry& camera : recording.cameras) {
+      owner_.emplace(camera_place(camera), camera.name);
+      owner_.emplace(tracks_place(camera.name), camera.name);
+    }
+  }
 
-/// Copies one file to the place it has in the recording. When it lies elsewhere, it goes to
-/// `folder`/`subfolder`. A name already taken by another file gets a number in front.
-fs::path copy_file_into(const fs::path& folder, const fs::path& recording_folder,
-                        const fs::path& file, const fs::path& subfolder) {
-  const fs::path inside = file.lexically_relative(recording_folder);
-  const bool lies_inside = !inside.empty() && *inside.begin() != "..";
-  if (lies_inside) return place_copy(file, folder / inside);
+  /// Copies a file to the place it has in the recording, or to `subfolder` when it lies elsewhere.
+  /// At a place that another `owner` has, it gets a number in front.
+  void move_in(fs::path& file, const fs::path& subfolder, const std::string& owner = "") {
+    fs::path place = file.lexically_relative(recording_folder_);
+    if (place.empty() || *place.begin() == "..") place = subfolder / file.filename();
+    file = copy_to(file, free_place(place.lexically_normal(), owner));
+  }
+  /// Cameras may share a file of intrinsics, but each needs its own for its place in the world.
+  void move_in_camera(CameraEntry& camera) {
+    if (camera.file) camera.file = copy_to(*camera.file, camera_place(camera));
+  }
 
-  fs::path target = folder / subfolder / file.filename();
-  for (int number = 2; fs::exists(target); ++number)
-    target = folder / subfolder / fmt::format("{}_{}", number, file.filename().string());
-  return place_copy(file, target);
-}
+ private:
+  static constexpr const char* kResult = "/";  // no camera has this name
+
+  static fs::path camera_place(const CameraEntry& camera) {
+    const bool packed = camera.file && camera.file->extension() == ".gz";
+    return fs::path("cameras") / (camera.name + (packed ? ".yaml.gz" : ".yaml"));
+  }
+  static fs::path tracks_place(const std::string& camera) {
+    return fs::path("tracks2d") / (camera + ".csv");
+  }
+
+  fs::path free_place(const fs::path& wanted, const std::string& owner) {
+    fs::path place = wanted;
+    for (int number = 2;; ++number) {
+      const auto [at, is_free] = owner_.emplace(place, kResult);
+      if (is_free) return place;
+      if (at->second == owner && place == wanted) {
+        at->second = kResult;
+        return place;
+      }
+      place = wanted.parent_path() / fmt::format("{}_{}", number, wanted.filename().string());
+    }
+  }
+
+  fs::path copy_to(const fs::path& file, const fs::path& place) const {
+    const fs::path target = folder_ / place;
+    std::error_code error;
+    fs::create_directories(target.parent_path(), error);
+    if (!error) fs::copy_file(file, target, error);
+    if (error)
+      throw InputError(file.string(), "cannot be copied: " + error.message(),
+                       "a file of the recording that can be read, and room for its copy");
+    return target;
+  }
+
+  fs::path recording_folder_, folder_;
+  std::map<fs::path, std::string> owner_;  ///< place in the result -> camera, or kResult
+};
 
 }  // namespace
 
 Recording copy_recording(const Recording& recording, const std::filesystem::path& folder) {
   Recording copy = recording;
   copy.folder = folder;
-  const auto move_in = [&](fs::path& file, const fs::path& subfolder) {
-    file = copy_file_into(folder, recording.folder, file, subfolder);
-  };
-
-  if (!copy.markers_file.empty()) move_in(copy.markers_file, "");
-  if (copy.times_file) move_in(*copy.times_file, "");
-  if (copy.reference_file) move_in(*copy.reference_file, "");
-  if (copy.obstacle_file) move_in(*copy.obstacle_file, "");
-  if (copy.tracks3d) move_in(*copy.tracks3d, "");
-  for (auto& [camera, file] : copy.tracks2d) move_in(file, "tracks2d");
-  for (CameraEntry& camera : copy.cameras) {
-    if (!camera.file) continue;
-    // Cameras may share a file of intrinsics, but each needs its own for its place in the world.
-    const char* ending = camera.file->extension() == ".gz" ? ".yaml.gz" : ".yaml";
-    camera.file = place_copy(*camera.file, folder / "cameras" / (camera.name + ending));
-  }
+  CopyPlaces places(recording, folder);
+  if (!copy.markers_file.empty()) places.move_in(copy.markers_file, "");
+  if (copy.times_file) places.move_in(*copy.times_file, "");
+  if (copy.reference_file) places.move_in(*copy.reference_file, "");
+  if (copy.obstacle_file) places.move_in(*copy.obstacle_file, "");
+  if (copy.tracks3d) places.move_in(*copy.tracks3d, "");
+  for (auto& [camera, file] : copy.tracks2d) places.move_in(file, "tracks2d", camera);
+  for (CameraEntry& camera : copy.cameras) places.move_in_camera(camera);
   for (HeldPoint& held : copy.held)
-    if (held.file) move_in(*held.file, "held");
+    if (held.file) places.move_in(*held.file, "held");
   return copy;
 }
 

@@ -10,6 +10,7 @@
 #include "apps/terminal/grid_size.h"
 #include "apps/terminal/number_text.h"
 #include "apps/terminal/progress_line.h"
+#include "apps/terminal/say.h"
 #include "apps/terminal/text_table.h"
 #include "apps/verbs/verb.h"
 #include "data/file_name.h"
@@ -29,6 +30,7 @@ struct CalibrateVerbOptions {
   std::string model = "brown_conrady";
   int distortion_count = CalibrateOptions{}.distortion_count;
   fs::path out;
+  bool allow_outside = false;
 };
 
 /// Reads "chessboard:9x6:0.025": inner corners along and across, side of a square in metres.
@@ -72,15 +74,15 @@ CalibrateOptions library_options(const CalibrateVerbOptions& options) {
 
 void print_calibration(const StillsCalibration& calibration) {
   const CalibrateResult& result = calibration.result;
-  fmt::print("\nCamera {}: {} of {} stills used, {} corners, {} px rms per coordinate\n{}\n\n",
-             calibration.camera, result.views.size(), calibration.stills, result.corners_used,
-             significant(result.rms_px, 3), result.message);
+  say("\nCamera {}: {} of {} stills used, {} corners, {} px rms per coordinate\n{}\n\n",
+      calibration.camera, result.views.size(), calibration.stills, result.corners_used,
+      significant(result.rms_px, 3), result.message);
   std::vector<std::vector<std::string>> rows;
   for (const NamedSigma& parameter : result.intrinsics) {
     rows.push_back({parameter.name, value_text(parameter.value, parameter.sigma),
                     significant(parameter.sigma, 2)});
   }
-  fmt::print("{}", text_table({{"parameter", "value", "sigma"}, rows}));
+  say("{}", text_table({{"parameter", "value", "sigma"}, rows}));
   for (const std::string& still : calibration.board_not_found)
     spdlog::warn("{}: the whole board was not found", still);
 }
@@ -94,7 +96,7 @@ int run_calibrate(const CalibrateVerbOptions& options) {
     if (!options.board.empty())
       throw InputError("--board", "is given beside a recording", "one place that says the board",
                        "write it under `calibration` in recording.yaml");
-    const Recording recording = read_recording(folder);
+    const Recording recording = read_recording(folder, outside_files(options.allow_outside));
     std::vector<std::string> cameras = cameras_to_calibrate(recording, true);
     if (!options.name.empty()) std::erase_if(cameras, [&](auto& c) { return c != options.name; });
     if (cameras.empty())
@@ -103,7 +105,8 @@ int run_calibrate(const CalibrateVerbOptions& options) {
                            ? "no camera has stills to calibrate from"
                            : "camera '" + options.name + "' has no stills to calibrate from",
                        "`calibration: {images: FOLDER, board: ...}` in a camera's entry");
-    OutputFolder out(out_folder(options.out, recording.name + ".calibration"));
+    OutputFolder out(out_folder(options.out, recording.name + ".calibration"),
+                     input_paths(recording));
     {
       ProgressLine line;
       calibrations = calibrate_step(recording, cameras, calibrate_options, out.path(), watch(line))
@@ -111,7 +114,7 @@ int run_calibrate(const CalibrateVerbOptions& options) {
     }
     out.publish();
     for (const StillsCalibration& calibration : calibrations) print_calibration(calibration);
-    fmt::print("\nRecording with cameras: {}\n", shown_path(out.final_path()));
+    say("\nRecording with cameras: {}\n", shown_path(out.final_path()));
     return kExitGood;
   }
 
@@ -120,7 +123,7 @@ int run_calibrate(const CalibrateVerbOptions& options) {
                      "--board with them", "for example --board chessboard:9x6:0.025");
   const CalibrationStills stills{.images = options.input, .board = *parse_board(options.board)};
   const std::string name = options.name.empty() ? "camera" : options.name;
-  OutputFolder out(out_folder(options.out, name + ".calibration"));
+  OutputFolder out(out_folder(options.out, name + ".calibration"), {options.input});
   {
     ProgressLine line;
     calibrations.push_back(calibrate_from_stills(name, stills, calibrate_options, watch(line)));
@@ -128,7 +131,7 @@ int run_calibrate(const CalibrateVerbOptions& options) {
   write_calibrations(calibrations, out.path());
   out.publish();
   print_calibration(calibrations.front());
-  fmt::print("\nCamera file: {}\n", shown_path(out.final_path() / "cameras" / (name + ".yaml")));
+  say("\nCamera file: {}\n", shown_path(out.final_path() / "cameras" / (name + ".yaml")));
   return kExitGood;
 }
 
@@ -153,6 +156,7 @@ void add_calibrate_verb(Verb program) {
       .one_of({"4", "5", "8"})
       .shows_default();
   add_out_option(verb, options->out, "NAME.calibration");
+  add_outside_option(verb, options->allow_outside);
   verb.footer("Example:\n  clothfit calibrate stills/ --board chessboard:9x6:0.025 --name front");
   verb.runs([options] { return run_calibrate(*options); });
 }

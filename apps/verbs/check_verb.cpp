@@ -7,6 +7,7 @@
 #include "apps/terminal/exit_code.h"
 #include "apps/terminal/option_flags.h"
 #include "apps/terminal/progress_line.h"
+#include "apps/terminal/say.h"
 #include "apps/verbs/checked_input.h"
 #include "apps/verbs/verb.h"
 #include "data/input_error.h"
@@ -19,6 +20,7 @@ namespace fs = std::filesystem;
 struct CheckVerbOptions {
   fs::path recording;
   std::string observations = "automatic";
+  bool allow_outside = false;
 };
 
 /// A folder that pictures are tracked into, which goes when this is over. Where the user works, a
@@ -60,19 +62,17 @@ const char* verdict(FindingState state) {
 
 void print_findings(const Findings& findings) {
   for (const Finding& finding : findings) {
-    fmt::print("{:<8} {:<12} {}\n", verdict(finding.state), finding.check,
-               with_flags(finding.found));
+    say("{:<8} {:<12} {}\n", verdict(finding.state), finding.check, with_flags(finding.found));
     constexpr const char* kFurther = "                      ";
-    if (!finding.expected.empty())
-      fmt::print("{}expected: {}\n", kFurther, with_flags(finding.expected));
-    if (!finding.remedy.empty()) fmt::print("{}remedy: {}\n", kFurther, with_flags(finding.remedy));
-    if (!finding.where.empty()) fmt::print("{}in {}\n", kFurther, finding.where);
+    if (!finding.expected.empty()) say("{}expected: {}\n", kFurther, with_flags(finding.expected));
+    if (!finding.remedy.empty()) say("{}remedy: {}\n", kFurther, with_flags(finding.remedy));
+    if (!finding.where.empty()) say("{}in {}\n", kFurther, finding.where);
   }
 }
 
 int run_check(const CheckVerbOptions& options) {
   const ObservationKind kind = parse_observations(options.observations);
-  const Recording given = read_recording(recording_folder(options.recording));
+  const Recording given = typed_recording(options.recording, options.allow_outside);
   Findings findings;
   {
     const ScratchFolder scratch;
@@ -83,11 +83,11 @@ int run_check(const CheckVerbOptions& options) {
   const auto wrong = with_state(findings, FindingState::refused).size(),
              warned = with_state(findings, FindingState::warning).size();
   if (wrong > 0)
-    fmt::print("\nNot to be fitted as it stands: {} wrong, {} to look at.\n", wrong, warned);
+    say("\nNot to be fitted as it stands: {} wrong, {} to look at.\n", wrong, warned);
   else if (warned > 0)
-    fmt::print("\nCan be fitted, with {} to look at.\n", warned);
+    say("\nCan be fitted, with {} to look at.\n", warned);
   else
-    fmt::print("\nNothing contradicts what the recording declares.\n");
+    say("\nNothing contradicts what the recording declares.\n");
   return wrong > 0 ? kExitBadInput : kExitGood;
 }
 
@@ -104,6 +104,7 @@ void add_check_verb(Verb program) {
                   "What to look at: 3D tracks where there are any, unless told otherwise")
       .one_of({"automatic", "tracks3d", "tracks2d"})
       .shows_default();
+  add_outside_option(verb, options->allow_outside);
   verb.footer("Example:\n  clothfit check data/recordings/swing_plain");
   verb.runs([options] { return run_check(*options); });
 }

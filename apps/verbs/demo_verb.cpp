@@ -19,7 +19,7 @@ void add_demo_verb(Verb program) {
     if (options->out.empty()) options->out = "demo.fit";
     options->command = "clothfit demo";
     options->diagnose_command = "clothfit diagnose " + shown_path(options->recording);
-    fmt::print("Fitting the bundled recording in {}\n", shown_path(options->recording));
+    say("Fitting the bundled recording in {}\n", shown_path(options->recording));
     return run_fit(*options);
   });
 }

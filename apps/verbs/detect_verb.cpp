@@ -14,6 +14,7 @@
 #include "apps/terminal/number_text.h"
 #include "apps/terminal/option_flags.h"
 #include "apps/terminal/progress_line.h"
+#include "apps/terminal/say.h"
 #include "apps/terminal/text_table.h"
 #include "apps/verbs/seen_summary.h"
 #include "apps/verbs/verb.h"
@@ -87,7 +88,7 @@ int run_detect(const DetectVerbOptions& options) {
   const ThreadLimit limit(options.threads);
   const fs::path images = fs::absolute(options.images).lexically_normal();
   const fs::path named = images.has_filename() ? images : images.parent_path();
-  OutputFolder out(out_folder(options.out, named.filename().string() + ".detections"));
+  OutputFolder out(out_folder(options.out, named.filename().string() + ".detections"), {images});
   LookResult result;
   {
     ProgressLine line;
@@ -104,10 +105,10 @@ int run_detect(const DetectVerbOptions& options) {
   write_results(result, summary, out.path());
   out.publish();
 
-  fmt::print("\n{}\n\n{}", footage_text(result), text_table(summary_table(summary)));
+  say("\n{}\n\n{}", footage_text(result), text_table(summary_table(summary)));
   for (const Finding& note : with_state(result.footage, FindingState::passed))
-    fmt::print("\n{}\n", note.found);
-  fmt::print("\nDetections: {}\n", shown_path(out.final_path() / "detections.csv"));
+    say("\n{}\n", note.found);
+  say("\nDetections: {}\n", shown_path(out.final_path() / "detections.csv"));
   return kExitGood;
 }
 

@@ -21,6 +21,7 @@
 #include "apps/terminal/grid_size.h"
 #include "apps/terminal/interrupt.h"
 #include "apps/terminal/progress_line.h"
+#include "apps/terminal/say.h"
 #include "apps/terminal/text_table.h"
 #include "apps/terminal/version.h"
 #include "apps/verbs/checked_input.h"
@@ -47,6 +48,7 @@ struct DiagnoseFlags {
   std::vector<std::string> priors;
   std::string plant = "10";
   DiagnoseOptions options;
+  bool allow_outside = false;
 };
 
 /// Reads how many modes are planted.
@@ -69,7 +71,7 @@ std::vector<Recording> read_recordings(const DiagnoseFlags& flags) {
       if (!seen.insert(fs::weakly_canonical(folder)).second)
         throw InputError(typed.string(), "is named twice",
                          "each recording once, to be fitted or held out");
-      recordings.push_back(read_recording(folder));
+      recordings.push_back(read_recording(folder, outside_files(flags.allow_outside)));
       if (flags.whole && folders == &flags.recordings)
         recordings.back().held_out_from_frame.reset();
     }
@@ -113,37 +115,37 @@ void write_results(const Diagnosis& diagnosis, std::span<const Recording> record
 }
 
 void print_result(const Diagnosis& diagnosis, const fs::path& folder) {
-  const auto print = [](const Table& table) { fmt::print("{}\n", text_table(table)); };
-  fmt::print("\n");
+  const auto print = [](const Table& table) { say("{}\n", text_table(table)); };
+  say("\n");
   for (const DiagnosedRecording& recording : diagnosis.recordings)
-    fmt::print("{}", warnings_text(recording.after.result.warnings));
-  fmt::print("{}\n\n", diagnosis_sentence(diagnosis));
-  if (!diagnosis.complete) fmt::print("{}\n\n", incomplete_text(diagnosis));
+    say("{}", warnings_text(recording.after.result.warnings));
+  say("{}\n\n", diagnosis_sentence(diagnosis));
+  if (!diagnosis.complete) say("{}\n\n", incomplete_text(diagnosis));
   if (diagnosis.seen_elsewhere)
-    fmt::print("Markers seen elsewhere: {}\n", seen_elsewhere_text(*diagnosis.seen_elsewhere));
+    say("Markers seen elsewhere: {}\n", seen_elsewhere_text(*diagnosis.seen_elsewhere));
   for (size_t n = 0; n < diagnosis.accepted.size(); ++n) {
     const Hypothesis& term = diagnosis.accepted[n].trial.hypothesis;
-    fmt::print("{}\n", accepted_text(term, diagnosis.found()));
-    if (const std::string remedy = remedy_text(term); !remedy.empty()) fmt::print("  {}\n", remedy);
+    say("{}\n", accepted_text(term, diagnosis.found()));
+    if (const std::string remedy = remedy_text(term); !remedy.empty()) say("  {}\n", remedy);
     if (!diagnosis.separation_of(n).empty())
-      fmt::print("  {}\n", separation_text(term, diagnosis.separation_of(n)));
+      say("  {}\n", separation_text(term, diagnosis.separation_of(n)));
   }
   for (const Hypothesis& trace : traces(diagnosis))
-    fmt::print("A trace, little beside the noise or what was found: {}\n", trace.title());
-  if (diagnosis.changed()) fmt::print("\n");
+    say("A trace, little beside the noise or what was found: {}\n", trace.title());
+  if (diagnosis.changed()) say("\n");
   print(before_after_table(diagnosis));
-  fmt::print("Parameters of the model found:\n\n");
+  say("Parameters of the model found:\n\n");
   print(short_parameter_table(diagnosis.found().result));
   if (diagnosis.law.found()) {
-    fmt::print("A law for what remains:\n{}\n\n", diagnosis.law.formula);
+    say("A law for what remains:\n{}\n\n", diagnosis.law.formula);
     print(law_error_table(diagnosis));
   }
   print(short_candidate_table(diagnosis));
   if (!diagnosis.plants.empty()) {
-    fmt::print("Planted on twins of the recording:\n");
+    say("Planted on twins of the recording:\n");
     print(plant_table(diagnosis));
   }
-  fmt::print("Report: {}\n", shown_path(folder / "report.html"));
+  say("Report: {}\n", shown_path(folder / "report.html"));
 }
 
 int run_diagnose(DiagnoseFlags flags, const std::string& command) {
@@ -164,7 +166,10 @@ int run_diagnose(DiagnoseFlags flags, const std::string& command) {
                      "name some, or leave --whole out");
   std::vector<Recording> recordings = read_recordings(flags);
 
-  OutputFolder out(out_folder(flags.out, recordings.front().name + ".diagnosis"));
+  std::vector<fs::path> read;
+  for (const Recording& recording : recordings)
+    std::ranges::copy(input_paths(recording), std::back_inserter(read));
+  OutputFolder out(out_folder(flags.out, recordings.front().name + ".diagnosis"), read);
   Diagnosis diagnosis;
   std::vector<Findings> warnings;
   {
@@ -275,6 +280,7 @@ void add_diagnose_verb(Verb program) {
       .shows_default()
       .shapes_no_result();
   add_out_option(verb, flags->out, "NAME.diagnosis");
+  add_outside_option(verb, flags->allow_outside);
   verb.footer(
       "Examples:\n"
       "  clothfit diagnose data/recordings/swing_breeze\n"

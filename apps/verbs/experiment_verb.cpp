@@ -10,6 +10,7 @@
 #include "apps/terminal/csv_table.h"
 #include "apps/terminal/exit_code.h"
 #include "apps/terminal/progress_line.h"
+#include "apps/terminal/say.h"
 #include "apps/terminal/text_table.h"
 #include "apps/terminal/version.h"
 #include "apps/verbs/identification_experiment.h"
@@ -48,7 +49,7 @@ void print_targets(const Louchet1995Study& study) {
   for (std::vector<std::string>& row : table.rows)
     for (std::string& cell : row)
       if (cell.starts_with(mark)) cell.erase(0, mark.size());
-  fmt::print("\n{}\n", text_table(table));
+  say("\n{}\n", text_table(table));
 }
 
 int run_louchet1995(const ExperimentVerbOptions& options) {

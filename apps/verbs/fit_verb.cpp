@@ -21,6 +21,7 @@
 #include "apps/terminal/grid_size.h"
 #include "apps/terminal/interrupt.h"
 #include "apps/terminal/progress_line.h"
+#include "apps/terminal/say.h"
 #include "apps/terminal/text_table.h"
 #include "apps/terminal/version.h"
 #include "apps/verbs/checked_input.h"
@@ -108,17 +109,17 @@ void write_results(const FitReport& report, const Recording& recording, const fs
 
 void print_result(const FitReport& report, const fs::path& folder) {
   const FitSummary summary = summarise(report);
-  fmt::print("\n{}{}.\n", warnings_text(report.result.warnings), summary.verdict);
+  say("\n{}{}.\n", warnings_text(report.result.warnings), summary.verdict);
   if (!report.result.next_command.empty())
-    fmt::print("To ask what is missing: {}\n", report.result.next_command);
-  if (!summary.contradicting.empty()) fmt::print("{}\n", summary.contradicting);
+    say("To ask what is missing: {}\n", report.result.next_command);
+  if (!summary.contradicting.empty()) say("{}\n", summary.contradicting);
   const Table parameters = short_parameter_table(report.result);
   const Table errors = short_error_table(report.result);
-  fmt::print("\n{}\n", text_table(parameters));
-  fmt::print("Errors (rms per coordinate):\n\n{}\n", text_table(errors));
+  say("\n{}\n", text_table(parameters));
+  say("Errors (rms per coordinate):\n\n{}\n", text_table(errors));
   const Table clouds = cloud_table(report.result);
-  if (!clouds.rows.empty()) fmt::print("{}\n", text_table(clouds));
-  fmt::print("Report: {}\n", shown_path(folder / "report.html"));
+  if (!clouds.rows.empty()) say("{}\n", text_table(clouds));
+  say("Report: {}\n", shown_path(folder / "report.html"));
 }
 
 /// Mass per area, where the cloth was weighed.
@@ -135,11 +136,13 @@ int run_fit(const FitVerbOptions& given_options) {
   const auto begin = std::chrono::steady_clock::now();
   options.fit.validate();
   require_new_checkpoint(options.fit);
-  const Recording given = read_recording(recording_folder(options.recording));
+  const Recording given = typed_recording(options.recording, options.allow_outside);
 
   if (options.fit.forecast)
     options.fit.forecast = at_density(std::move(*options.fit.forecast), areal_density(given));
-  OutputFolder out(out_folder(options.out, given.name + ".fit"));
+  std::vector<fs::path> inputs = input_paths(given);
+  inputs.insert(inputs.end(), {options.fit.checkpoint, options.earlier_fit});
+  OutputFolder out(out_folder(options.out, given.name + ".fit"), inputs);
   CheckedInput checked;
   FitReport report;
   {
@@ -273,6 +276,7 @@ void add_fit_verb(Verb program) {
       .shows_default()
       .shapes_no_result();
   add_out_option(verb, options->out, "NAME.fit");
+  add_outside_option(verb, options->allow_outside);
   verb.footer(
       "Examples:\n"
       "  clothfit fit data/recordings/tags_onecam\n"
@@ -289,6 +293,7 @@ void add_fit_verb(Verb program) {
     const fs::path& file = starts ? flags->start : flags->forecast;
     std::optional<FitResult> earlier;
     if (!file.empty()) earlier = read_fit_result(file);
+    options->earlier_fit = file;
     options->fit.spring_set = chosen_springs(flags->springs, starts ? "--start" : "--forecast",
                                              earlier ? &*earlier : nullptr);
     if (starts) options->fit.start = known_values(*earlier);

@@ -12,8 +12,10 @@ namespace clothfit {
 struct FitVerbOptions {
   std::filesystem::path recording;
   FitOptions fit;
-  bool keep = false;          ///< write the result also where it is not to be used
-  std::filesystem::path out;  ///< empty: NAME.fit
+  bool keep = false;                  ///< write the result also where it is not to be used
+  std::filesystem::path out;          ///< empty: NAME.fit
+  std::filesystem::path earlier_fit;  ///< the file that --start or --forecast names; may be empty
+  bool allow_outside = false;         ///< as in typed_recording
   /// Verb and options as fit.json keeps them, without those that change no result (--out,
   /// --threads).
   std::string command;

@@ -13,6 +13,7 @@
 #include "apps/terminal/exit_code.h"
 #include "apps/terminal/number_text.h"
 #include "apps/terminal/progress_line.h"
+#include "apps/terminal/say.h"
 #include "apps/terminal/text_table.h"
 #include "apps/verbs/resumable_run.h"
 #include "data/text_file.h"
@@ -87,7 +88,7 @@ std::string page_html(const Table& targets, const TargetsResult& result) {
 
 int run_identification(const IdentificationOptions& options) {
   options.targets.validate();
-  ResumableRun run(options.out, kIdentificationFolder, options.journals, ".journals");
+  ResumableRun run(options.out, kIdentificationFolder, options.journals, {}, ".journals");
   fs::create_directories(run.journal());
   TargetsResult result;
   {
@@ -110,11 +111,10 @@ int run_identification(const IdentificationOptions& options) {
   write_text(page_html(targets, result), run.folder() / "report.html");
   run.publish();
   for (const TargetRow& row : result.rows)
-    fmt::print("{}\n    {}: {}\n    {}\n", row.target, state_text(row.state), row.measured,
-               row.command);
+    say("{}\n    {}: {}\n    {}\n", row.target, state_text(row.state), row.measured, row.command);
   if (!planted.rows.empty())
-    fmt::print("\nIntervals that hold the pseudo-true value, and the true one:\n\n{}\n",
-               text_table(planted));
+    say("\nIntervals that hold the pseudo-true value, and the true one:\n\n{}\n",
+        text_table(planted));
   run.print_report_path();
   return kExitGood;
 }

@@ -8,6 +8,7 @@
 #include "apps/terminal/exit_code.h"
 #include "apps/terminal/number_text.h"
 #include "apps/terminal/progress_line.h"
+#include "apps/terminal/say.h"
 #include "apps/verbs/verb.h"
 #include "data/input_error.h"
 #include "data/number_text.h"
@@ -105,8 +106,8 @@ DraftInput look_at_all(const InitVerbOptions& options, const std::optional<doubl
 
 void print_list(const char* title, const std::vector<std::string>& lines) {
   if (lines.empty()) return;
-  fmt::print("\n{}\n", title);
-  for (const std::string& text : lines) fmt::print("  - {}\n", text);
+  say("\n{}\n", title);
+  for (const std::string& text : lines) say("  - {}\n", text);
 }
 
 /// Returns a path without a separator at its end, which would hide its name.
@@ -133,7 +134,9 @@ int run_init(InitVerbOptions options) {
   for (fs::path& images : options.images) images = trimmed(images);
   const std::string usual = options.images.front().stem().string() + ".recording";
   const fs::path folder = new_folder(options, usual);
-  OutputFolder out(folder);
+  std::vector<fs::path> inputs = options.images;
+  inputs.push_back(options.sheet);
+  OutputFolder out(folder, inputs);
   if (options.sheet.empty())
     refuse_without_sheet(
         {options.images.front(), look_over(options.images.front(), {.boards = false})});
@@ -149,10 +152,10 @@ int run_init(InitVerbOptions options) {
   out.publish();
   fs::remove(folder / ".clothfit");  // what is in it is the user's from now on
 
-  fmt::print("\n{}\n", shown_path(folder / "recording.yaml"));
+  say("\n{}\n", shown_path(folder / "recording.yaml"));
   print_list("Assumed, to be looked at:", draft.assumed);
   print_list("Still needed:", draft.needed);
-  fmt::print("\nNext: clothfit track {}\n", shown_path(folder));
+  say("\nNext: clothfit track {}\n", shown_path(folder));
   return kExitGood;
 }
 

@@ -7,6 +7,7 @@
 #include "apps/terminal/csv_table.h"
 #include "apps/terminal/exit_code.h"
 #include "apps/terminal/progress_line.h"
+#include "apps/terminal/say.h"
 #include "apps/terminal/text_table.h"
 #include "apps/verbs/resumable_run.h"
 #include "apps/verbs/verb.h"
@@ -129,7 +130,7 @@ int run_undeclared(const UndeclaredFlags& flags, const UndeclaredRun& asked) {
   run.publish();
   for (const Table& table :
        {short_undeclared_trials_table(result), confusion, short_undeclared_effects_table(result)})
-    fmt::print("{}\n", text_table(table));
+    say("{}\n", text_table(table));
   run.print_report_path();
   return kExitGood;
 }

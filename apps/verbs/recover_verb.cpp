@@ -10,6 +10,7 @@
 #include "apps/terminal/exit_code.h"
 #include "apps/terminal/grid_size.h"
 #include "apps/terminal/progress_line.h"
+#include "apps/terminal/say.h"
 #include "apps/terminal/text_table.h"
 #include "apps/verbs/recover_undeclared.h"
 #include "apps/verbs/resumable_run.h"
@@ -112,12 +113,12 @@ int run_recover(const RecoverFlags& flags, const std::string& command) {
   write_text(recover_page_html(options, result, command, picture_png),
              run.folder() / "report.html");
   run.publish();
-  fmt::print("{}\n{}\n", text_table(counts), text_table(parameters));
+  say("{}\n{}\n", text_table(counts), text_table(parameters));
   if (result.tracker) {
     const Table tracker = tracker_table(*result.tracker);
     const Table rejections = tracker_rejections(*result.tracker);
-    fmt::print("{}\n", text_table(tracker));
-    if (!rejections.rows.empty()) fmt::print("{}\n", text_table(rejections));
+    say("{}\n", text_table(tracker));
+    if (!rejections.rows.empty()) say("{}\n", text_table(rejections));
   }
   run.print_report_path();
   return kExitGood;

@@ -210,7 +210,7 @@ InputError other_mesh() {
 
 ModelDescription model_of_recording(const ModelRequest& request, const fs::path& steps,
                                     const ProgressCallback& progress) {
-  const Recording given = read_recording(recording_folder(request.input));
+  const Recording given = typed_recording(request.input, request.allow_outside);
   FitOptions options;
   options.forecast = complete_parameters(given, given_parameters(request));
   options.spring_set = spring_set_named(options.forecast->parameter_set).value();
@@ -307,7 +307,8 @@ std::string requested_name(const ModelRequest& request) {
                      "a recording, a model file, or --fit", "see clothfit simulate --help");
   if (request.input.empty()) return model_of_fit(request.fit).name;
   const std::optional<fs::path> file = model_file(request.input);
-  return file ? read_model(*file).name : read_recording(recording_folder(request.input)).name;
+  return file ? read_model(*file, outside_files(request.allow_outside)).name
+              : typed_recording(request.input, request.allow_outside).name;
 }
 
 ModelDescription requested_model(const ModelRequest& request, const fs::path& steps,
@@ -317,7 +318,8 @@ ModelDescription requested_model(const ModelRequest& request, const fs::path& st
   if (!request.input.empty() && !file) {
     model = model_of_recording(request, steps, progress);
   } else {
-    model = file ? read_model(*file) : model_of_fit(request.fit);
+    model =
+        file ? read_model(*file, outside_files(request.allow_outside)) : model_of_fit(request.fit);
     GivenParameters own{SpringSet::fabric, model.fabric, model.effects};
     if (model.springs) {
       own.set.reset();

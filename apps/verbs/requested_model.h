@@ -20,6 +20,7 @@ struct ModelRequest {
   std::optional<GridSize> mesh;
   std::optional<double> duration_s;
   std::optional<double> frame_rate_hz;
+  bool allow_outside = false;  ///< as in typed_recording
 };
 
 /// Returns NAME and NUMBER of an assignment; nothing where the text is none.

@@ -4,15 +4,26 @@
 
 #include "apps/terminal/exit_code.h"
 #include "apps/terminal/interrupt.h"
+#include "apps/terminal/say.h"
 #include "apps/verbs/verb.h"
 
 namespace clothfit {
 
 namespace fs = std::filesystem;
 
+namespace {
+
+std::vector<fs::path> with_path(std::vector<fs::path> paths, const fs::path& path) {
+  paths.push_back(path);
+  return paths;
+}
+
+}  // namespace
+
 ResumableRun::ResumableRun(const fs::path& out, const std::string& default_out,
-                           const fs::path& journal, const std::string& ending)
-    : out_(out_folder(out, default_out)),
+                           const fs::path& journal, std::vector<fs::path> inputs,
+                           const std::string& ending)
+    : out_(out_folder(out, default_out), with_path(std::move(inputs), journal)),
       own_journal_(journal.empty()),
       journal_(own_journal_ ? fs::path(out_.final_path().string() + ending) : journal) {}
 
@@ -28,7 +39,7 @@ void ResumableRun::publish() {
 }
 
 void ResumableRun::print_report_path() const {
-  fmt::print("Report: {}\n", shown_path(out_.final_path() / "report.html"));
+  say("Report: {}\n", shown_path(out_.final_path() / "report.html"));
 }
 
 }  // namespace clothfit

@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "data/output_folder.h"
 
@@ -13,8 +14,10 @@ class ResumableRun {
  public:
   /// `out` and `journal` are as asked for, or empty. A journal of its own has the name of the
   /// results with `ending`. Throws InputError as OutputFolder does.
+  /// `inputs` are what the study reads.
   ResumableRun(const std::filesystem::path& out, const std::string& default_out,
-               const std::filesystem::path& journal, const std::string& ending = ".journal");
+               const std::filesystem::path& journal, std::vector<std::filesystem::path> inputs = {},
+               const std::string& ending = ".journal");
 
   const std::filesystem::path& journal() const { return journal_; }
   /// Returns the folder that results are written to.

@@ -9,6 +9,7 @@
 #include "apps/terminal/exit_code.h"
 #include "apps/terminal/grid_size.h"
 #include "apps/terminal/number_text.h"
+#include "apps/terminal/say.h"
 #include "apps/verbs/verb.h"
 #include "data/input_error.h"
 #include "data/number_text.h"
@@ -139,26 +140,24 @@ int run_sheet(const SheetVerbOptions& options) {
   if (fs::exists(folder))
     throw InputError(folder.string(), "is there already", "a folder that does not exist yet",
                      "give another one with --out");
-  OutputFolder out(folder);
+  OutputFolder out(folder, {});
   write_sheet_pdf(sheet, options.draw, out.path() / "sheet.pdf");
   write_sheet_svg(sheet, options.draw, out.path() / "sheet.svg");
   write_sheet_png(sheet, options.draw, out.path() / "sheet.png");
   if (!sheet.markers.markers.empty()) write_recording_start(sheet, out.path());
   out.publish();
   fs::remove(folder / ".clothfit");  // what is in it is the user's from now on
-  fmt::print(
-      "\n{}: {} x {} mm\n\nPrint {} at 100 % (no \"fit to page\"), and measure the ruler: it is "
+  say("\n{}: {} x {} mm\n\nPrint {} at 100 % (no \"fit to page\"), and measure the ruler: it is "
       "100 "
       "mm long.\n",
       sheet.name, significant(1e3 * sheet.width_m, 6), significant(1e3 * sheet.height_m, 6),
       shown_path(out.final_path() / "sheet.pdf"));
   if (const double dpi = png_dots_per_inch(sheet, options.draw); dpi < options.draw.dots_per_inch)
-    fmt::print("sheet.png has {} dots per inch, which so large a sheet allows.\n",
-               significant(dpi, 3));
+    say("sheet.png has {} dots per inch, which so large a sheet allows.\n", significant(dpi, 3));
   warn_of(sheet, options);
   if (!sheet.markers.markers.empty())
-    fmt::print("Markers and the start of a recording: {}\n",
-               shown_path(out.final_path() / "recording.yaml"));
+    say("Markers and the start of a recording: {}\n",
+        shown_path(out.final_path() / "recording.yaml"));
   return kExitGood;
 }
 

@@ -13,6 +13,7 @@
 #include "apps/terminal/json_file.h"
 #include "apps/terminal/number_text.h"
 #include "apps/terminal/progress_line.h"
+#include "apps/terminal/say.h"
 #include "apps/terminal/text_table.h"
 #include "apps/terminal/version.h"
 #include "apps/verbs/requested_model.h"
@@ -336,7 +337,7 @@ int run_simulate(const SimulateVerbOptions& options) {
     const fs::path name = options.out.empty()
                               ? fs::path(requested_name(options.request) + ".simulation")
                               : options.out;
-    out.emplace(name);
+    out.emplace(name, std::vector<fs::path>{options.request.input, options.request.fit});
     model = requested_model(options.request, out->path() / "steps", progress);
     const Simulation simulation = make_simulation(model);
     check_before(model, simulation);
@@ -370,7 +371,7 @@ int run_simulate(const SimulateVerbOptions& options) {
   }
   if (interrupted()) throw Cancelled();
   out->publish();
-  fmt::print("{}Results: {}\n", said, shown_path(out->final_path()));
+  say("{}Results: {}\n", said, shown_path(out->final_path()));
   return kExitGood;
 }
 
@@ -452,6 +453,7 @@ void add_simulate_verb(Verb program) {
       .check(check_formats)
       .shows_default();
   add_out_option(verb, options->out, "NAME.simulation");
+  add_outside_option(verb, options->request.allow_outside);
   verb.footer(
       "Examples:\n"
       "  clothfit simulate --fit swing_plain.fit\n"

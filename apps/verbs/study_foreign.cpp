@@ -10,6 +10,7 @@
 #include "apps/terminal/csv_table.h"
 #include "apps/terminal/exit_code.h"
 #include "apps/terminal/progress_line.h"
+#include "apps/terminal/say.h"
 #include "apps/terminal/text_table.h"
 #include "apps/verbs/resumable_run.h"
 #include "apps/verbs/verb.h"
@@ -33,7 +34,7 @@ int run_foreign_study(const ForeignFlags& flags, const std::string& command) {
   options.recordings = find_foreign_recordings(flags.folder, flags.only);
   options.validate();
 
-  ResumableRun run(flags.out, "foreign.study", flags.journal);
+  ResumableRun run(flags.out, "foreign.study", flags.journal, {flags.folder});
   const fs::path steps = run.folder() / "steps";
   std::vector<ForeignRow> rows;
   {
@@ -53,7 +54,7 @@ int run_foreign_study(const ForeignFlags& flags, const std::string& command) {
   run.publish();
 
   const Table table = short_foreign_table(rows), summary = foreign_summary(rows);
-  fmt::print("\n{}\n{}\n{}\n", text_table(table), text_table(summary), longest_text(rows));
+  say("\n{}\n{}\n{}\n", text_table(table), text_table(summary), longest_text(rows));
   run.print_report_path();
   if (std::ranges::none_of(rows, &ForeignRow::judged))
     throw NoResult("no recording could be diagnosed: " + rows.front().diagnosis.reason);

@@ -13,6 +13,7 @@
 #include "apps/terminal/grid_size.h"
 #include "apps/terminal/json_file.h"
 #include "apps/terminal/progress_line.h"
+#include "apps/terminal/say.h"
 #include "apps/terminal/text_table.h"
 #include "apps/terminal/version.h"
 #include "apps/verbs/resumable_run.h"
@@ -102,7 +103,7 @@ int run_recordings_study(const StudyFlags& flags, const std::string& command) {
 
   options.validate();
 
-  ResumableRun run(flags.out, "recordings.study", flags.journal);
+  ResumableRun run(flags.out, "recordings.study", flags.journal, options.recordings);
   std::vector<StudyRow> rows;
   {
     Journal journal(run.journal(), options.key(),
@@ -118,10 +119,10 @@ int run_recordings_study(const StudyFlags& flags, const std::string& command) {
   run.publish();
 
   const Table table = short_study_table(rows), summary = study_summary(rows);
-  fmt::print("\n{}\n", text_table(table));
-  fmt::print("Root mean square of the distance. Medians:\n\n{}\n", text_table(summary));
+  say("\n{}\n", text_table(table));
+  say("Root mean square of the distance. Medians:\n\n{}\n", text_table(summary));
   if (const Table contest = study_contest(rows); !contest.rows.empty())
-    fmt::print("Weighted error over all frames, recordings:\n\n{}\n", text_table(contest));
+    say("Weighted error over all frames, recordings:\n\n{}\n", text_table(contest));
   run.print_report_path();
   if (std::ranges::none_of(rows, &StudyRow::fitted))
     throw NoResult("no recording could be fitted: " + rows.front().reason);

@@ -14,6 +14,7 @@
 #include "apps/terminal/exit_code.h"
 #include "apps/terminal/json_file.h"
 #include "apps/terminal/progress_line.h"
+#include "apps/terminal/say.h"
 #include "apps/terminal/text_table.h"
 #include "apps/verbs/verb.h"
 #include "data/output_folder.h"
@@ -60,7 +61,7 @@ void require_measured(const std::vector<VisionResult>& results,
 
 int run_vision_study(const VisionFlags& flags, const std::string& command) {
   flags.options.validate();
-  OutputFolder out(out_folder(flags.out, kVisionFolder));
+  OutputFolder out(out_folder(flags.out, kVisionFolder), {flags.options.data});
   const ThreadLimit limit(flags.threads);
   const fs::path steps = out.path() / "steps";
   std::vector<VisionResult> results;
@@ -78,10 +79,10 @@ int run_vision_study(const VisionFlags& flags, const std::string& command) {
   write_json(targets_json(targets, command), out.path() / "targets.json");
   write_text(vision_page_html(results, chains, targets, command), out.path() / "report.html");
   out.publish();
-  if (!results.empty()) fmt::print("\n{}", text_table(short_vision_table(results)));
-  if (!chains.empty()) fmt::print("\n{}", text_table(short_chain_table(chains)));
-  fmt::print("\n{}\n", text_table(vision_target_table(targets)));
-  fmt::print("Report: {}\n", shown_path(out.final_path() / "report.html"));
+  if (!results.empty()) say("\n{}", text_table(short_vision_table(results)));
+  if (!chains.empty()) say("\n{}", text_table(short_chain_table(chains)));
+  say("\n{}\n", text_table(vision_target_table(targets)));
+  say("Report: {}\n", shown_path(out.final_path() / "report.html"));
   require_measured(results, chains);
   return kExitGood;
 }

@@ -14,6 +14,7 @@
 #include "apps/terminal/number_text.h"
 #include "apps/terminal/option_flags.h"
 #include "apps/terminal/progress_line.h"
+#include "apps/terminal/say.h"
 #include "apps/terminal/text_table.h"
 #include "apps/verbs/checked_input.h"
 #include "apps/verbs/verb.h"
@@ -34,13 +35,14 @@ struct TrackVerbOptions {
   TrackOptions track;
   int threads = 0;
   fs::path out;
+  bool allow_outside = false;
 };
 
 void print_counts(const char* title, const std::map<std::string, int>& counts) {
   if (counts.empty()) return;
   std::vector<std::vector<std::string>> rows;
   for (const auto& [reason, count] : counts) rows.push_back({reason, std::to_string(count)});
-  fmt::print("\n{}", text_table({{title, "count"}, rows}));
+  say("\n{}", text_table({{title, "count"}, rows}));
 }
 
 void print_tracks(const CameraTracks& tracks, const Recording& recording) {
@@ -49,12 +51,12 @@ void print_tracks(const CameraTracks& tracks, const Recording& recording) {
                                   [](const Position2d& row) { return row.rejected.empty(); });
   const double possible =
       static_cast<double>(result.frames) * static_cast<double>(recording.markers.markers.size());
-  fmt::print("\nCamera {}: {} of {:.0f} marker places in {} frames ({}%)\n{}\n", tracks.camera,
-             good, possible, result.frames,
-             significant(100 * static_cast<double>(good) / possible, 3), result.message);
+  say("\nCamera {}: {} of {:.0f} marker places in {} frames ({}%)\n{}\n", tracks.camera, good,
+      possible, result.frames, significant(100 * static_cast<double>(good) / possible, 3),
+      result.message);
   print_counts("rejected because", result.rejected);
   print_counts("not found because", result.missing);
-  if (tracks.placement) fmt::print("\n{}\n", tracks.placement->message);
+  if (tracks.placement) say("\n{}\n", tracks.placement->message);
 }
 
 /// Holds the tracks against what the recording declares; nothing where a camera has no place. What
@@ -86,7 +88,7 @@ int run_track(const TrackVerbOptions& options) {
   options.track.validate();
   require_threads(options.threads);
   const ThreadLimit limit(options.threads);
-  const Recording given = read_recording(recording_folder(options.recording));
+  const Recording given = typed_recording(options.recording, options.allow_outside);
   refuse_wrong(check_declarations(given));
   Recording recording = given;
   const std::vector<std::string> cameras = cameras_to_track(recording, true);
@@ -95,7 +97,7 @@ int run_track(const TrackVerbOptions& options) {
                      "`images: FOLDER or VIDEO` in a camera's entry");
 
   require_footage(given, cameras);
-  OutputFolder out(out_folder(options.out, recording.name + ".tracks"));
+  OutputFolder out(out_folder(options.out, recording.name + ".tracks"), input_paths(given));
   TrackStepResult step;
   {
     ProgressLine line;
@@ -120,8 +122,8 @@ int run_track(const TrackVerbOptions& options) {
                    tracks.not_placed);
   }
   for (const Finding& note : with_state(step.footage, FindingState::passed))
-    fmt::print("\n{}\n", note.found);
-  fmt::print("\nRecording with tracks: {}\n", shown_path(out.final_path()));
+    say("\n{}\n", note.found);
+  say("\nRecording with tracks: {}\n", shown_path(out.final_path()));
   for (const Finding& warning : with_state(findings, FindingState::warning))
     spdlog::warn("{}", with_flags(sentence(warning)));
   // The tracks are what the pictures show and stay. What is declared beside them is to be
@@ -149,6 +151,7 @@ void add_track_verb(Verb program) {
       .shows_default()
       .shapes_no_result();
   add_out_option(verb, options->out, "NAME.tracks");
+  add_outside_option(verb, options->allow_outside);
   verb.footer("Example:\n  clothfit track data/recordings/tags_onecam");
   verb.runs([options] { return run_track(*options); });
 }

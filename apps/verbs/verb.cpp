@@ -14,6 +14,21 @@ void add_out_option(Verb verb, std::filesystem::path& out, const std::string& de
       .shapes_no_result();
 }
 
+void add_outside_option(Verb verb, bool& allow_outside) {
+  verb.add_flag("--allow-outside", allow_outside,
+                "Let the recording name tables, cameras, held paths and obstacles outside its "
+                "folder, which results hold copies of")
+      .shapes_no_result();
+}
+
+OutsideFiles outside_files(bool allow_outside) {
+  return allow_outside ? OutsideFiles::allowed : OutsideFiles::refused;
+}
+
+Recording typed_recording(const fs::path& typed, bool allow_outside) {
+  return read_recording(recording_folder(typed), outside_files(allow_outside));
+}
+
 void add_prior_option(Verb verb, std::vector<std::string>& priors) {
   verb.add_option("--prior", &priors,
                   "What is known of a parameter from elsewhere, its mean and standard deviation in "

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "apps/terminal/command_line.h"
+#include "data/recording.h"
 
 namespace clothfit {
 
@@ -38,6 +39,13 @@ ObservationKind parse_observations(const std::string& text);
 
 /// Binds --out, whose default is `default_name` in the current directory.
 void add_out_option(Verb verb, std::filesystem::path& out, const std::string& default_name);
+
+/// Binds --allow-outside.
+void add_outside_option(Verb verb, bool& allow_outside);
+OutsideFiles outside_files(bool allow_outside);
+
+/// Reads the recording that was typed: its folder, or its recording.yaml. Throws InputError.
+Recording typed_recording(const std::filesystem::path& typed, bool allow_outside);
 
 /// Binds --prior; each text is for parse_prior.
 void add_prior_option(Verb verb, std::vector<std::string>& priors);

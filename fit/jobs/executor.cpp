@@ -11,8 +11,11 @@
 #include <cassert>
 #include <exception>
 #include <mutex>
+#include <new>
 #include <optional>
 
+#include "data/input_error.h"
+#include "data/shown_text.h"
 #include "fit/jobs/draws.h"
 
 namespace clothfit {
@@ -27,7 +30,7 @@ class Run {
     payloads_.resize(static_cast<size_t>(count));
     for (int index = 0; index < count; ++index)
       if (journal_ != nullptr && journal_->finished().contains(index))
-        payload(index) = journal_->finished().at(index);
+        resume(index);
       else
         left_.push_back(index);
     tell_progress();
@@ -69,6 +72,11 @@ class Run {
 
  private:
   std::string& payload(int index) { return payloads_[static_cast<size_t>(index)]; }
+
+  void resume(int index) {
+    if (options_.accept) accept_record(*journal_, index, options_.accept);
+    payload(index) = journal_->finished().at(index);
+  }
 
   void do_piece(int index) {
     try {
@@ -113,6 +121,20 @@ class Run {
 };
 
 }  // namespace
+
+void accept_record(const Journal& journal, int index,
+                   const std::function<void(const std::string& payload)>& accept) {
+  try {
+    accept(journal.finished().at(index));
+  } catch (const std::bad_alloc&) {
+    throw;
+  } catch (const std::exception& error) {
+    throw InputError(journal.file().string(),
+                     fmt::format("its record of piece {} is no result of this run ({})", index,
+                                 shown_text(error.what())),
+                     "a journal that this run wrote", "remove it and start from scratch");
+  }
+}
 
 ExecuteResult execute(int count, const Work& work, const ExecuteOptions& options, Journal* journal,
                       const ProgressCallback& progress) {

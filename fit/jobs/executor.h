@@ -19,6 +19,9 @@ struct ExecuteOptions {
   int threads = 0;              ///< >= 0; 0: as many as the machine has
   unsigned long long seed = 1;  ///< seed of the run
   std::string unit = "trials";  ///< name of the pieces in progress reports
+  /// Throws for a payload that this run cannot have made. Those of a journal are asked before any
+  /// piece is done.
+  std::function<void(const std::string& payload)> accept = {};
 };
 
 enum class ExecuteStop { not_run, finished, cancelled };
@@ -33,6 +36,11 @@ struct ExecuteResult {
   int performed = 0;  ///< pieces done by this call
   bool usable() const { return stop == ExecuteStop::finished; }
 };
+
+/// Asks `accept` for the payload that a journal holds of a piece. Throws InputError, with the
+/// journal's name, where it throws.
+void accept_record(const Journal& journal, int index,
+                   const std::function<void(const std::string& payload)>& accept);
 
 /// Does the pieces 0 ... count - 1. The payloads are the same bytes for any number of threads, and
 /// whether or not a journal held some of them.

@@ -129,6 +129,7 @@ TEST(DamagedCamera, IsReadOrRefused) {
 TEST(DamagedFitJson, IsReadOrRefused) {
   const TemporaryFolder folder;
   FitResult result;
+  result.mesh_columns = result.mesh_rows = 5;
   result.parameters = {{"tension_warp", "N/m", 41.2, 0.6, ParameterState::fitted, ""}};
   result.errors = {{"front", "px", {0.3, 0.42, 1000}, {0.5, 0.7, 400}, 0.29, {21, 30, 25}}};
   result.observations_rejected = {{"blurred", 3}};

@@ -119,9 +119,10 @@ void expect_same(const FitResult& a, const FitResult& b) {
   }
   EXPECT_EQ(a.marker_offset_sigma_m, b.marker_offset_sigma_m);
   ASSERT_EQ(a.marker_offsets.size(), b.marker_offsets.size());
-  for (size_t i = 0; i < a.marker_offsets.size(); ++i) {
-    EXPECT_EQ(a.marker_offsets[i].marker, b.marker_offsets[i].marker);
-    EXPECT_EQ(a.marker_offsets[i].offset_m, b.marker_offsets[i].offset_m);
+  for (const MarkerOffset& offset : a.marker_offsets) {
+    const auto same = std::ranges::find(b.marker_offsets, offset.marker, &MarkerOffset::marker);
+    ASSERT_NE(same, b.marker_offsets.end());
+    EXPECT_EQ(same->offset_m, offset.offset_m);
   }
   ASSERT_EQ(a.basins.size(), b.basins.size());
   for (size_t i = 0; i < a.basins.size(); ++i) {

@@ -27,7 +27,7 @@ std::vector<std::string> names_in(const fs::path& folder) {
 
 /// Publishes a folder that holds one file.
 void publish(const fs::path& final_path, const std::string& text) {
-  OutputFolder out(final_path);
+  OutputFolder out(final_path, {});
   write_text(text, out.path() / "fit.json");
   out.publish();
 }
@@ -42,7 +42,7 @@ pid_t dead_process() {
 
 TEST(OutputFolder, AppearsOnlyWhenItIsPublished) {
   const TemporaryFolder folder;
-  OutputFolder out(folder / "a.fit");
+  OutputFolder out(folder / "a.fit", {});
 
   write_text("{}", out.path() / "fit.json");
   fs::create_directories(out.path() / "steps" / "deep");
@@ -62,7 +62,7 @@ TEST(OutputFolder, AppearsOnlyWhenItIsPublished) {
 TEST(OutputFolder, ThatFailsMidwayLeavesNothing) {
   const TemporaryFolder folder;
   try {
-    OutputFolder out(folder / "a.fit");
+    OutputFolder out(folder / "a.fit", {});
     write_text("half", out.path() / "fit.json");
     throw std::runtime_error("midway");
   } catch (const std::runtime_error&) {
@@ -74,7 +74,7 @@ TEST(OutputFolder, ThatFailsMidwayLeavesTheOlderResultIntact) {
   const TemporaryFolder folder;
   publish(folder / "a.fit", "old");
   try {
-    OutputFolder out(folder / "a.fit");
+    OutputFolder out(folder / "a.fit", {});
     write_text("half", out.path() / "fit.json");
     throw std::runtime_error("midway");
   } catch (const std::runtime_error&) {
@@ -102,11 +102,11 @@ TEST(OutputFolder, NeverReplacesWhatTheProgramDidNotWrite) {
   folder.write("file", "mine");
 
   expect_refused(folder, "photos: exists and was not written by clothfit",
-                 [&] { OutputFolder(folder / "photos"); });
+                 [&] { OutputFolder(folder / "photos", {}); });
   expect_refused(folder, "empty: exists and was not written by clothfit",
-                 [&] { OutputFolder(folder / "empty"); });
+                 [&] { OutputFolder(folder / "empty", {}); });
   expect_refused(folder, "file: exists and is not a folder",
-                 [&] { OutputFolder(folder / "file"); });
+                 [&] { OutputFolder(folder / "file", {}); });
 
   EXPECT_EQ(names_in(folder.path()), (std::vector<std::string>{"empty", "file", "photos"}));
   EXPECT_EQ(read_text(folder / "photos/mine.jpg"), "mine");
@@ -114,7 +114,7 @@ TEST(OutputFolder, NeverReplacesWhatTheProgramDidNotWrite) {
 
 TEST(OutputFolder, NeverReplacesWhatAppearedMeanwhile) {
   const TemporaryFolder folder;
-  OutputFolder out(folder / "a.fit");
+  OutputFolder out(folder / "a.fit", {});
   folder.write("a.fit/mine", "mine");
 
   expect_refused(folder, "a.fit: exists and was not written by clothfit", [&] { out.publish(); });
@@ -122,14 +122,34 @@ TEST(OutputFolder, NeverReplacesWhatAppearedMeanwhile) {
   EXPECT_EQ(read_text(folder / "a.fit/mine"), "mine");
 }
 
+TEST(OutputFolder, NeverReplacesAFolderThatHoldsAnInput) {
+  const TemporaryFolder folder;
+  publish(folder / "old.fit", "old");
+  folder.write("old.fit/steps/tracked/recording.yaml", "an input");
+  fs::create_directory_symlink("old.fit/steps", folder / "link");
+
+  const std::string refusal = "old.fit: holds " + (folder / "old.fit/steps/tracked").string();
+  for (const fs::path& input : {folder / "old.fit/steps/tracked", folder / "link/tracked"})
+    expect_refused(folder, refusal, [&] { OutputFolder(folder / "old.fit", {input}); });
+  expect_refused(folder, "old.fit: holds " + (folder / "old.fit").string(), [&] {
+    OutputFolder(folder / "old.fit", {"/elsewhere", folder / "old.fit"});
+  });
+  EXPECT_EQ(read_text(folder / "old.fit/steps/tracked/recording.yaml"), "an input");
+
+  EXPECT_NO_THROW(OutputFolder(folder / "old.fit", {folder / "old.fitted", folder.path()}));
+  EXPECT_NO_THROW(OutputFolder(folder / "new.fit", {folder / "new.fit/not/there"}));
+}
+
 TEST(OutputFolder, NeedsAFolderToStandIn) {
   const TemporaryFolder folder;
   folder.write("file", "");
 
-  expect_refused(folder, "none/a.fit: the folder ", [&] { OutputFolder(folder / "none/a.fit"); });
-  expect_refused(folder, "file/a.fit: the folder ", [&] { OutputFolder(folder / "file/a.fit"); });
+  expect_refused(folder, "none/a.fit: the folder ",
+                 [&] { OutputFolder(folder / "none/a.fit", {}); });
+  expect_refused(folder, "file/a.fit: the folder ",
+                 [&] { OutputFolder(folder / "file/a.fit", {}); });
   expect_refused(folder, "folder for the results: the name is empty",
-                 [&] { OutputFolder(fs::path()); });
+                 [&] { OutputFolder(fs::path(), {}); });
 }
 
 TEST(OutputFolder, MayBeNamedRelativeToTheCurrentFolderOrWithASlashBehind) {
@@ -176,7 +196,7 @@ TEST(OutputFolder, OfAKilledRunNeverShows) {
   publish(folder / "a.fit", "old");
   const pid_t child = fork();
   if (child == 0) {
-    OutputFolder out(folder / "a.fit");
+    OutputFolder out(folder / "a.fit", {});
     write_text("half", out.path() / "fit.json");
     raise(SIGKILL);
   }

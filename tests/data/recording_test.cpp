@@ -219,7 +219,7 @@ TEST(Recording, WrittenElsewhereNamesTheSameFiles) {
 
   write_recording(recording, folder / "results/a.tracks");
 
-  expect_same(read_recording(folder / "results/a.tracks"), recording);
+  expect_same(read_recording(folder / "results/a.tracks", OutsideFiles::allowed), recording);
   EXPECT_THAT(read_text(folder / "results/a.tracks/recording.yaml"),
               testing::HasSubstr("images: ../../frames/front"));
 }
@@ -274,9 +274,10 @@ TEST(Recording, HasNoTimeForAFrameBeyondItsTimes) {
 TEST(Recording, RefusesAPauseOfHours) {
   const TemporaryFolder folder;
   write_full_recording(folder);
-  folder.write("times.csv", "frame,time\n0,0\n1,0.1\n2,1e300\n");
+  folder.write("times.csv", "frame,time\n0,0\n1,0.1\n2,1e9\n");
 
-  expect_refused(folder, "times.csv:4: 1e+300 seconds after the frame before; 1000 seconds at most",
+  expect_refused(folder,
+                 "times.csv:4: 999999999.9 seconds after the frame before; 1000 seconds at most",
                  [&] { read_recording(folder.path()); });
 }
 
@@ -392,7 +393,7 @@ TEST(Recording, IsRefusedWhereATableItNamesIsWrong) {
       {"markers.csv", "marker,s,t\na,0.41,0\n", "markers.csv:2: marker `a` at (s, t)"},
       {"times.csv", "frame,time\n0,0\n2,1\n", "times.csv:3: frame 2 where frame 1 was due"},
       {"times.csv", "frame,time\n1,0\n", "times.csv:2: frame 1 where frame 0 was due"},
-      {"times.csv", "frame,time\n0,1\n1,1\n", "times.csv:3: time = `1` after `1`; numbers that"},
+      {"times.csv", "frame,time\n0,1\n1,1\n", "times.csv:3: time = `1` after `1`; times that"},
       {"times.csv", "frame,time\n", "times.csv: the table holds no times"},
       {"reference.csv", "point,x,y\n", "reference.csv:1: column `z` is missing"},
       {"scene/table.obj", "", "scene/table.obj: no faces; a surface of triangles"},

@@ -2,6 +2,8 @@
 
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
+
 
 namespace clothfit {
 namespace {
@@ -14,6 +16,12 @@ Json number_json(double value) {
 
 double number_of(const Json& json) {
   return json.is_null() ? std::numeric_limits<double>::quiet_NaN() : json.get<double>();
+}
+
+DiagnosisVerdict verdict_of(int number) {
+  if (number < 0 || number > static_cast<int>(DiagnosisVerdict::not_reached))
+    throw std::out_of_range("no such verdict");
+  return static_cast<DiagnosisVerdict>(number);
 }
 
 }  // namespace
@@ -43,7 +51,7 @@ ForeignDiagnosis foreign_diagnosis_of(const std::string& payload) {
   const Json json = Json::parse(payload);
   ForeignDiagnosis diagnosis{
       .reason = json.at("reason"),
-      .verdict = static_cast<DiagnosisVerdict>(json.at("verdict").get<int>()),
+      .verdict = verdict_of(json.at("verdict").get<int>()),
       .complete = json.at("complete"),
       .named = {},
       .unit = json.at("unit"),

@@ -15,6 +15,7 @@
 #include "data/input_error.h"
 #include "data/text_file.h"
 #include "fit/diagnosis/diagnose.h"
+#include "fit/jobs/executor.h"
 #include "fit/jobs/journal_key.h"
 
 namespace clothfit {
@@ -141,7 +142,9 @@ std::vector<ForeignRow> study_foreign(const ForeignStudyOptions& options, const 
       continue;
     }
     if (journal != nullptr && journal->finished().contains(index)) {
-      row.diagnosis = foreign_diagnosis_of(journal->finished().at(index));
+      accept_record(*journal, index, [&](const std::string& payload) {
+        row.diagnosis = foreign_diagnosis_of(payload);
+      });
     } else {
       if (interrupted()) throw Cancelled();
       row.diagnosis = diagnose_one(folder, options, steps / row.recording,

@@ -2,23 +2,22 @@
 
 #include <algorithm>
 
-#include "data/csv_table.h"
+#include "data/csv_reader.h"
 #include "data/input_error.h"
 
 namespace clothfit {
 
 MarkerWeights read_marker_weights(const std::filesystem::path& file) {
-  const CsvTable table(file, {{.name = "marker"}, {.name = "weight"}});
-  table.require_rows("weights");
+  CsvReader table(file, {{.name = "marker"}, {.name = "weight"}});
   MarkerWeights weights;
-  for (int row = 0; row < table.rows(); ++row) {
-    const double weight = table.number(row, 1);
-    if (weight < 0)
-      table.refuse(row, "weight = " + std::string(table.text(row, 1)), "a number of 0 or more");
-    const std::string name = table.name(row, 0);
+  while (table.next()) {
+    const double weight = table.number(1);
+    if (weight < 0) table.refuse("weight = " + std::string(table.text(1)), "a number of 0 or more");
+    const std::string name = table.name(0);
     if (!weights.emplace(name, weight).second)
-      table.refuse(row, "marker " + name + " stands here again", "one row per marker");
+      table.refuse("marker " + name + " stands here again", "one row per marker");
   }
+  table.require_rows("weights");
   if (std::ranges::all_of(weights, [](const auto& named) { return named.second == 0; }))
     throw InputError(file.string(), "all weights are 0", "at least one marker that counts");
   return weights;

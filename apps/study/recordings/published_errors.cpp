@@ -1,22 +1,21 @@
 #include "apps/study/recordings/published_errors.h"
 
-#include "data/csv_table.h"
+#include "data/csv_reader.h"
 
 namespace clothfit {
 
 PublishedErrors read_published_errors(const std::filesystem::path& file) {
-  const CsvTable table(file, {{.name = "recording"}, {.name = "weighted_rms_m"}});
-  table.require_rows("published errors");
+  CsvReader table(file, {{.name = "recording"}, {.name = "weighted_rms_m"}});
   PublishedErrors errors;
-  for (int row = 0; row < table.rows(); ++row) {
-    const double error_m = table.number(row, 1);
+  while (table.next()) {
+    const double error_m = table.number(1);
     if (!(error_m > 0))
-      table.refuse(row, "weighted_rms_m = " + std::string(table.text(row, 1)),
-                   "metres, more than 0");
-    const std::string name = table.name(row, 0);
+      table.refuse("weighted_rms_m = " + std::string(table.text(1)), "metres, more than 0");
+    const std::string name = table.name(0);
     if (!errors.emplace(name, error_m).second)
-      table.refuse(row, "recording " + name + " stands here again", "one row per recording");
+      table.refuse("recording " + name + " stands here again", "one row per recording");
   }
+  table.require_rows("published errors");
   return errors;
 }
 

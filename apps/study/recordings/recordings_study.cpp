@@ -264,9 +264,13 @@ std::vector<StudyRow> study_recordings(const RecordingsStudyOptions& options, Jo
     const StudiedModel& model = options.models[static_cast<size_t>(index % models)];
     return rows_to_text(fit_one(folder, model, options));
   };
-  const ExecuteResult result = execute(
-      models * static_cast<int>(options.recordings.size()), work,
-      {.threads = options.threads, .seed = options.fit.seed, .unit = "fits"}, journal, progress);
+  const ExecuteResult result =
+      execute(models * static_cast<int>(options.recordings.size()), work,
+              {.threads = options.threads,
+               .seed = options.fit.seed,
+               .unit = "fits",
+               .accept = [](const std::string& payload) { rows_from_text(payload); }},
+              journal, progress);
   if (!result.usable()) throw Cancelled();
   std::vector<StudyRow> rows;
   for (const std::string& payload : result.payloads)

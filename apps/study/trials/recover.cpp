@@ -69,7 +69,7 @@ std::string payload_of(const RecoverTrial& trial) {
 
 RecoverTrial trial_of(const std::string& payload) {
   const Json json = Json::parse(payload);
-  RecoverTrial trial{.stop = static_cast<FitStop>(json.at("stop").get<int>()),
+  RecoverTrial trial{.stop = choice_of_json(json.at("stop"), FitStop::diverged),
                      .message = json.at("message"),
                      .parameters = {},
                      .rejected = json.at("rejected"),
@@ -77,18 +77,18 @@ RecoverTrial trial_of(const std::string& payload) {
                      .seconds = json.at("seconds")};
   if (json.contains("tracker")) trial.tracker = tracker_errors_of(json.at("tracker"));
   for (const Json& p : json.at("parameters"))
-    trial.parameters.push_back({.name = p[0],
-                                .truth = number_of_json(p[1]),
-                                .estimate = number_of_json(p[2]),
-                                .sigma = number_of_json(p[3]),
-                                .noise_sigma = number_of_json(p[4]),
-                                .robust_sigma = number_of_json(p[5]),
-                                .degrees_of_freedom = p[8].is_null()
+    trial.parameters.push_back({.name = p.at(0),
+                                .truth = number_of_json(p.at(1)),
+                                .estimate = number_of_json(p.at(2)),
+                                .sigma = number_of_json(p.at(3)),
+                                .noise_sigma = number_of_json(p.at(4)),
+                                .robust_sigma = number_of_json(p.at(5)),
+                                .degrees_of_freedom = p.at(8).is_null()
                                                           ? std::numeric_limits<double>::infinity()
-                                                          : p[8].get<double>(),
-                                .interval_90 = {number_of_json(p[9]), number_of_json(p[10])},
-                                .bound_sigma = number_of_json(p[6]),
-                                .undetermined = p[7]});
+                                                          : p.at(8).get<double>(),
+                                .interval_90 = {number_of_json(p.at(9)), number_of_json(p.at(10))},
+                                .bound_sigma = number_of_json(p.at(6)),
+                                .undetermined = p.at(7)});
   return trial;
 }
 
@@ -312,8 +312,12 @@ RecoverResult recover(const RecoverOptions& options, Journal* journal,
   const Work work = [&](int index, std::uint64_t seed) {
     return payload_of(recover_once(options, index, seed));
   };
-  const ExecuteResult executed = execute(
-      options.trials, work, {.threads = options.threads, .seed = options.seed}, journal, progress);
+  const ExecuteResult executed =
+      execute(options.trials, work,
+              {.threads = options.threads,
+               .seed = options.seed,
+               .accept = [](const std::string& payload) { trial_of(payload); }},
+              journal, progress);
   RecoverResult result{.stop = executed.stop, .message = executed.message};
   for (const std::string& payload : executed.payloads) result.trials.push_back(trial_of(payload));
   summarise_trials(result);

@@ -383,8 +383,12 @@ UndeclaredResult recover_undeclared(const UndeclaredOptions& options, Journal* j
   const Work work = [&](int index, std::uint64_t seed) {
     return payload_of(undeclared_once(options, index, seed, releases));
   };
-  const ExecuteResult executed = execute(
-      options.count(), work, {.threads = options.threads, .seed = options.seed}, journal, progress);
+  const ExecuteResult executed =
+      execute(options.count(), work,
+              {.threads = options.threads,
+               .seed = options.seed,
+               .accept = [](const std::string& payload) { undeclared_trial_of(payload); }},
+              journal, progress);
   UndeclaredResult result{.stop = executed.stop, .message = executed.message, .trials = {}};
   for (const std::string& payload : executed.payloads)
     result.trials.push_back(undeclared_trial_of(payload));

@@ -31,10 +31,10 @@ HiddenInTrial hidden_of(const Json& json) {
                        .found = {},
                        .amplitude_ratio = number_of_json(json.at("ratio"))};
   for (const Json& found : json.at("found"))
-    hidden.found.push_back({.name = found[0],
-                            .truth = number_of_json(found[1]),
-                            .estimate = number_of_json(found[2]),
-                            .sigma = number_of_json(found[3])});
+    hidden.found.push_back({.name = found.at(0),
+                            .truth = number_of_json(found.at(1)),
+                            .estimate = number_of_json(found.at(2)),
+                            .sigma = number_of_json(found.at(3))});
   return hidden;
 }
 
@@ -64,20 +64,20 @@ UndeclaredTrial undeclared_trial_of(const std::string& payload) {
       .refused = json.at("refused"),
       .hidden = {},
       .mimicked = number_of_json(json.at("mimicked")),
-      .stop = static_cast<FitStop>(json.at("stop").get<int>()),
+      .stop = choice_of_json(json.at("stop"), FitStop::diverged),
       .message = json.at("message"),
-      .verdict = static_cast<DiagnosisVerdict>(json.at("verdict").get<int>()),
+      .verdict = choice_of_json(json.at("verdict"), DiagnosisVerdict::not_reached),
       .accepted = json.at("accepted").get<std::vector<std::string>>(),
       .accepted_effects = json.at("accepted_effects").get<std::vector<std::string>>(),
-      .before = number_of_json(errors[0]),
-      .after = number_of_json(errors[1]),
-      .with_truth = number_of_json(errors[2]),
-      .noise = number_of_json(errors[3]),
-      .with_law = number_of_json(errors[6]),
-      .before_fitted = number_of_json(errors[4]),
-      .after_fitted = number_of_json(errors[5]),
-      .drawing_seconds = json.at("seconds")[0],
-      .seconds = json.at("seconds")[1]};
+      .before = number_of_json(errors.at(0)),
+      .after = number_of_json(errors.at(1)),
+      .with_truth = number_of_json(errors.at(2)),
+      .noise = number_of_json(errors.at(3)),
+      .with_law = number_of_json(errors.at(6)),
+      .before_fitted = number_of_json(errors.at(4)),
+      .after_fitted = number_of_json(errors.at(5)),
+      .drawing_seconds = json.at("seconds").at(0),
+      .seconds = json.at("seconds").at(1)};
   for (const Json& hidden : json.at("hidden")) trial.hidden.push_back(hidden_of(hidden));
   return trial;
 }

@@ -11,8 +11,9 @@
 #include "apps/terminal/exit_code.h"
 #include "data/camera_parameters.h"
 #include "data/clouds.h"
-#include "data/csv_table.h"
+#include "data/csv_reader.h"
 #include "data/input_error.h"
+#include "data/number_limits.h"
 #include "data/recording.h"
 #include "data/text_file.h"
 #include "data/tracks.h"
@@ -56,12 +57,12 @@ ClothSetup read_setup(const fs::path& file) {
 }
 
 std::vector<Marker> read_points(const fs::path& file) {
-  const CsvTable table(file, {{"point"}, {"a_m"}, {"b_m"}, {"fb_error_px", false}});
+  CsvReader table(file, {{"point"}, {"a_m"}, {"b_m"}, {"fb_error_px", false}});
   std::vector<Marker> markers;
-  for (int row = 0; row < table.rows(); ++row)
-    markers.push_back({.name = table.name(row, 0),
-                       .s_m = table.number(row, 1),
-                       .t_m = table.number(row, 2),
+  while (table.next())
+    markers.push_back({.name = table.name(0),
+                       .s_m = table.number(1),
+                       .t_m = table.number(2),
                        .tag = {},
                        .corner = {}});
   return markers;
@@ -69,20 +70,19 @@ std::vector<Marker> read_points(const fs::path& file) {
 
 /// Reads tracks in pixels of the whole picture; the result is in those of the cut one.
 Tracks2d read_given(const fs::path& file, const MarkerSet& markers, const Eigen::Vector2d& cut_px) {
-  const CsvTable table(
+  CsvReader table(
       file,
       {{"point"}, {"frame"}, {"u_px"}, {"v_px"}, {"X_m", false}, {"Y_m", false}, {"Z_m", false}});
   Tracks2d tracks;
-  for (int row = 0; row < table.rows(); ++row) {
-    const auto marker = markers.index.find(table.name(row, 0));
+  while (table.next()) {
+    const auto marker = markers.index.find(table.name(0));
     if (marker == markers.index.end())
-      table.refuse(row, "names an unknown point", "points of track_points.csv");
-    tracks.push_back(
-        {.frame = table.whole_number(row, 1, 0),
-         .marker = marker->second,
-         .position_px = Eigen::Vector2d(table.number(row, 2), table.number(row, 3)) - cut_px,
-         .sigma_px = 0,
-         .rejected = {}});
+      table.refuse("names an unknown point", "points of track_points.csv");
+    tracks.push_back({.frame = table.whole_number(1, 0),
+                      .marker = marker->second,
+                      .position_px = Eigen::Vector2d(table.number(2), table.number(3)) - cut_px,
+                      .sigma_px = 0,
+                      .rejected = {}});
   }
   table.require_rows("tracks");
   std::ranges::sort(tracks, {}, [](const auto& row) { return std::pair(row.frame, row.marker); });
@@ -90,11 +90,11 @@ Tracks2d read_given(const fs::path& file, const MarkerSet& markers, const Eigen:
 }
 
 PointClouds read_clouds(const fs::path& file) {
-  const CsvTable table(file, {{"frame"}, {"X_mm"}, {"Y_mm"}, {"Z_mm"}});
+  CsvReader table(file, {{"frame"}, {"X_mm"}, {"Y_mm"}, {"Z_mm"}});
   std::map<int, std::vector<Eigen::Vector3d>> points_m;
-  for (int row = 0; row < table.rows(); ++row)
-    points_m[table.whole_number(row, 0, 0)].emplace_back(
-        1e-3 * table.number(row, 1), 1e-3 * table.number(row, 2), 1e-3 * table.number(row, 3));
+  while (table.next())
+    points_m[table.whole_number(0, 0)].emplace_back(1e-3 * table.number(1), 1e-3 * table.number(2),
+                                                    1e-3 * table.number(3));
   PointClouds clouds;
   for (const auto& [frame, points] : points_m) {
     Eigen::Matrix3Xd& cloud = clouds[frame];
@@ -134,22 +134,28 @@ Recording write_as_recording(const fs::path& set, const ClothSetup& setup, const
 
 /// Reads the grid of vertices; those at both ends of the upper edge are held.
 TemplateSheet read_template(const fs::path& file, const ClothSetup& setup) {
-  const CsvTable table(
+  CsvReader table(
       file,
       {{"vertex"}, {"a"}, {"b"}, {"X_m"}, {"Y_m"}, {"Z_m"}, {"u0_px", false}, {"v0_px", false}});
-  table.require_rows("vertices");
+  struct Vertex {
+    int column = 0, row = 0;
+    Eigen::Vector3d position_m;
+  };
+  std::vector<Vertex> vertices;
   Mesh mesh{0, 0, setup.width_m, setup.height_m};
-  for (int row = 0; row < table.rows(); ++row) {
-    mesh.columns = std::max(mesh.columns, table.whole_number(row, 1, 0) + 1);
-    mesh.rows = std::max(mesh.rows, table.whole_number(row, 2, 0) + 1);
+  while (table.next()) {
+    vertices.push_back({.column = table.whole_number(1, 0),
+                        .row = table.whole_number(2, 0),
+                        .position_m = table.vector_within<3>(3, kFarthest_m, "metres")});
+    mesh.columns = std::max(mesh.columns, vertices.back().column + 1);
+    mesh.rows = std::max(mesh.rows, vertices.back().row + 1);
   }
-  if (mesh.columns < 2 || mesh.rows < 2 || table.rows() != mesh.vertex_count())
-    table.refuse(table.rows() - 1, "ends no full grid", "a vertex for each a and b");
+  table.require_rows("vertices");
+  if (!is_possible_mesh(mesh.columns, mesh.rows) || table.rows() != mesh.vertex_count())
+    table.refuse("ends no full grid", "a vertex for each a and b");
   Eigen::Matrix3Xd position_m(3, mesh.vertex_count());
-  for (int row = 0; row < table.rows(); ++row)
-    position_m.col(mesh.vertex(table.whole_number(row, 2, 0), table.whole_number(row, 1, 0)))
-        << table.number(row, 3),
-        table.number(row, 4), table.number(row, 5);
+  for (const Vertex& vertex : vertices)
+    position_m.col(mesh.vertex(vertex.row, vertex.column)) = vertex.position_m;
   return {.mesh = mesh, .position_m = position_m, .fixed = {0, mesh.columns - 1}};
 }
 

@@ -5,7 +5,7 @@
 #include <map>
 #include <utility>
 
-#include "data/csv_table.h"
+#include "data/csv_reader.h"
 #include "data/median.h"
 
 namespace clothfit {
@@ -17,18 +17,18 @@ constexpr double kFalse_px = 3;  // a row further away is another dot's
 
 std::vector<TrueSighting> read_true_sightings(const std::filesystem::path& file,
                                               const MarkerSet& markers) {
-  const CsvTable table(
+  CsvReader table(
       file,
       {{.name = "frame"}, {.name = "marker"}, {.name = "u"}, {.name = "v"}, {.name = "visible"}});
   std::vector<TrueSighting> truth;
-  for (int row = 0; row < table.rows(); ++row) {
-    const std::string name = table.name(row, 1);
+  while (table.next()) {
+    const std::string name = table.name(1);
     const auto marker = markers.index.find(name);
-    if (marker == markers.index.end()) table.refuse(row, "'" + name + "'", "a known marker");
-    truth.push_back({.frame = table.whole_number(row, 0, 0),
+    if (marker == markers.index.end()) table.refuse("'" + name + "'", "a known marker");
+    truth.push_back({.frame = table.whole_number(0, 0),
                      .marker = marker->second,
-                     .pixel_px = {table.number(row, 2), table.number(row, 3)},
-                     .visible = table.whole_number(row, 4, 0) == 1});
+                     .pixel_px = {table.number(2), table.number(3)},
+                     .visible = table.whole_number(4, 0) == 1});
   }
   return truth;
 }

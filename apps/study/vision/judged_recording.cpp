@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <opencv2/imgcodecs.hpp>
 
-#include "data/csv_table.h"
+#include "data/csv_reader.h"
 #include "data/input_error.h"
 #include "data/recording.h"
 
@@ -16,21 +16,21 @@ namespace fs = std::filesystem;
 
 std::vector<TrueCorners> read_truth(const fs::path& file, const MarkerSet& markers,
                                     size_t pictures) {
-  const CsvTable table(file, {{"frame"}, {"marker"}, {"u"}, {"v"}, {"visible"}});
+  CsvReader table(file, {{"frame"}, {"marker"}, {"u"}, {"v"}, {"visible"}});
   std::vector<TrueCorners> truth(pictures);
-  for (int row = 0; row < table.rows(); ++row) {
-    const auto frame = static_cast<size_t>(table.whole_number(row, 0, 0));
-    const auto known = markers.index.find(table.name(row, 1));
+  while (table.next()) {
+    const auto frame = static_cast<size_t>(table.whole_number(0, 0));
+    const auto known = markers.index.find(table.name(1));
     if (known == markers.index.end() || frame >= pictures)
-      table.refuse(row, "names a marker or a frame that is not there",
+      table.refuse("names a marker or a frame that is not there",
                    fmt::format("markers of the recording in frames 0 to {}", pictures - 1));
     const Marker& marker = markers.markers[static_cast<size_t>(known->second)];
     if (!marker.tag || !marker.corner) continue;
     truth[frame][{*marker.tag, *marker.corner}] = {
         .tag = *marker.tag,
         .corner = *marker.corner,
-        .pixel_px = Eigen::Vector2d(table.number(row, 2), table.number(row, 3)),
-        .visible = table.whole_number(row, 4, 0) != 0};
+        .pixel_px = Eigen::Vector2d(table.number(2), table.number(3)),
+        .visible = table.whole_number(4, 0) != 0};
   }
   return truth;
 }

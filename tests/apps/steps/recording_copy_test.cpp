@@ -75,5 +75,52 @@ TEST(CopyRecording, GivesCamerasThatShareAFileOneEach) {
             read_camera(*original.cameras[0].file).focal_px);
 }
 
+TEST(CopyRecording, GivesEveryFileAPlaceOfItsOwn) {
+  const test::ScratchFolder elsewhere("copy_names_from"), first("copy_names"), second("copy_again");
+  Recording original = read_recording(kBundled / "swing_plain");
+  const auto write = [&](const std::string& name, const std::string& text) {
+    fs::create_directories((elsewhere.path() / name).parent_path());
+    std::ofstream(elsewhere.path() / name) << text;
+    return elsewhere.path() / name;
+  };
+  // All but the markers are called t.csv, and one has the name of what the steps write.
+  original.frame_rate_hz.reset();
+  original.times_file = write("times/t.csv", "frame,time\n0,0\n1,0.5\n");
+  original.reference_file = write("reference/t.csv", "point,x,y,z\nnail,1,2,3\n");
+  original.held.push_back({.at_m = {0.1, 0.1},
+                           .motion = HeldMotion::path,
+                           .file = write("held/t.csv", "time,x,y,z\n0,4,5,6\n")});
+  original.tracks2d["front"] = write("tracks/front.csv", "frame,marker,u,v\n");
+  original.folder = elsewhere.path();
+  original.obstacle_file = write("calibration.json", "v 0 0 0.7\nv 1 0 0.7\nv 1 1 0.7\nf 1 2 3\n");
+
+  write_recording(copy_recording(original, first.path()), first.path());
+  const Recording once = read_recording(first.path());
+  write_recording(copy_recording(once, second.path()), second.path());
+  const Recording twice = read_recording(second.path());
+
+  for (const Recording* copy : {&once, &twice}) {
+    EXPECT_EQ(copy->times_s, (std::vector<double>{0, 0.5}));
+    ASSERT_EQ(copy->reference.size(), 1u);
+    EXPECT_EQ(copy->reference[0].name, "nail");
+    EXPECT_EQ(read_held_path(*copy->held.back().file).position_m[0], Eigen::Vector3d(4, 5, 6));
+    EXPECT_EQ(copy->markers.markers.size(), original.markers.markers.size());
+    EXPECT_EQ(copy->obstacle->vertex_m.cols(), 3);
+    EXPECT_NE(copy->obstacle_file->filename(), "calibration.json");
+  }
+}
+
+TEST(CopyRecording, CopiesAFileThatTwoPartsNameForEach) {
+  const test::ScratchFolder scratch("copy_shared_table");
+  Recording original = read_recording(kBundled / "swing_plain");
+  original.tracks2d["front"] = original.markers_file;
+
+  const Recording copied = copy_recording(original, scratch.path());
+
+  EXPECT_NE(copied.tracks2d.at("front"), copied.markers_file);
+  fs::remove(copied.tracks2d.at("front"));  // as tracking anew does
+  EXPECT_TRUE(fs::exists(copied.markers_file));
+}
+
 }  // namespace
 }  // namespace clothfit

@@ -3,8 +3,11 @@
 
 #include "fit/search/search_checkpoint.h"
 
+#include <sys/resource.h>
+
 #include <bit>
 #include <cmath>
+#include <csignal>
 #include <limits>
 
 #include "tests/data/expect_refused.h"
@@ -329,23 +332,30 @@ TEST(SearchCheckpoint, NamesTheLineWhereAFileWasCutSwappedOrGoesOn) {
 }
 
 TEST(SearchCheckpoint, LeavesTheOlderOneWhenItCannotBeWritten) {
-  // Given that something occupies the place of the file that is written beside it,
+  // Given a system that lets files grow to 100 bytes,
   const TemporaryFolder folder;
   const CmaState start = start_cma(ranges(), {});
   save_checkpoint(folder / "search", kProblem, ranges(), CmaOptions{}, start);
   const std::string before = read_text(folder / "search");
-  std::filesystem::create_directory(folder / ".partial.search");
+  const auto earlier_handler = std::signal(SIGXFSZ, SIG_IGN);
+  rlimit whole{};
+  ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &whole), 0);
+  rlimit little = whole;
+  little.rlim_cur = 100;
+  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &little), 0);
 
   CmaState later = start;
   later.evaluations = 99;
   EXPECT_THROW(save_checkpoint(folder / "search", kProblem, ranges(), CmaOptions{}, later),
                InputError);
 
+  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &whole), 0);
+  std::signal(SIGXFSZ, earlier_handler);
   EXPECT_EQ(read_text(folder / "search"), before);
-  std::filesystem::remove(folder / ".partial.search");
   save_checkpoint(folder / "search", kProblem, ranges(), CmaOptions{}, later);
   EXPECT_EQ(load_cma_checkpoint(folder / "search", kProblem, ranges(), {}).evaluations, 99);
-  EXPECT_FALSE(std::filesystem::exists(folder / ".partial.search"));
+  for (const auto& entry : std::filesystem::directory_iterator(folder.path()))
+    EXPECT_EQ(entry.path().filename(), "search");
 }
 
 }  // namespace

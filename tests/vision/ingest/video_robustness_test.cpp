@@ -11,7 +11,7 @@
 #include <opencv2/imgproc.hpp>
 #include <set>
 
-#include "data/csv_table.h"
+#include "data/csv_reader.h"
 #include "data/input_error.h"
 #include "vision/ingest/open_images.h"
 
@@ -34,12 +34,12 @@ struct TruePicture {
 /// Returns what other software decoded of each file, in the order shown.
 std::map<std::string, std::vector<TruePicture>> true_pictures() {
   enum Column { kFile, kIndex, kTime, kId, kKind };
-  const CsvTable table(set_folder() / "frames.csv",
-                       {{"file"}, {"index"}, {"pts_s"}, {"burnt_in_id"}, {"pict_type"}});
+  CsvReader table(set_folder() / "frames.csv",
+                  {{"file"}, {"index"}, {"pts_s"}, {"burnt_in_id"}, {"pict_type"}});
   std::map<std::string, std::vector<TruePicture>> pictures;
-  for (int row = 0; row < table.rows(); ++row)
-    pictures[std::string(table.text(row, kFile))].push_back(
-        {table.number(row, kTime), table.whole_number(row, kId, 0)});
+  while (table.next())
+    pictures[std::string(table.text(kFile))].push_back(
+        {table.number(kTime), table.whole_number(kId, 0)});
   return pictures;
 }
 

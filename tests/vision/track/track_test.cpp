@@ -16,7 +16,7 @@
 
 #include "calib/camera/projection.h"
 #include "data/camera_parameters.h"
-#include "data/csv_table.h"
+#include "data/csv_reader.h"
 #include "data/input_error.h"
 #include "tests/data/temporary_folder.h"
 #include "tests/vision/synthetic_tag.h"
@@ -59,12 +59,12 @@ struct TruePixel {
 };
 
 std::map<std::pair<int, std::string>, TruePixel> true_pixels() {
-  const CsvTable table(kTruth / "truth_tracks2d_front.csv.gz",
-                       {{"frame"}, {"marker"}, {"u"}, {"v"}, {"visible"}});
+  CsvReader table(kTruth / "truth_tracks2d_front.csv.gz",
+                  {{"frame"}, {"marker"}, {"u"}, {"v"}, {"visible"}});
   std::map<std::pair<int, std::string>, TruePixel> truth;
-  for (int row = 0; row < table.rows(); ++row) {
-    truth[{table.whole_number(row, 0, 0), table.name(row, 1)}] = {
-        {table.number(row, 2), table.number(row, 3)}, table.whole_number(row, 4, 0) == 1};
+  while (table.next()) {
+    truth[{table.whole_number(0, 0), table.name(1)}] = {{table.number(2), table.number(3)},
+                                                        table.whole_number(4, 0) == 1};
   }
   return truth;
 }
