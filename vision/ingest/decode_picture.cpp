@@ -6,52 +6,24 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
-#include <cerrno>
+#include <cstdint>
 #include <cstring>
-#include <fstream>
-#include <iterator>
 #include <memory>
 #include <sstream>
+#include <string_view>
 #include <vector>
 
+#include "data/file_bytes.h"
 #include "data/input_error.h"
 #include "vision/ingest/libav.h"
+#include "vision/ingest/picture_content.h"
+#include "vision/ingest/picture_limits.h"
+#include "vision/ingest/stated_size.h"
 
 namespace clothfit {
 namespace {
 
 namespace fs = std::filesystem;
-
-struct PictureKind {
-  const char* extension;
-  AVCodecID codec;
-};
-
-constexpr std::array kKinds = {
-    PictureKind{".jpg", AV_CODEC_ID_MJPEG}, PictureKind{".jpeg", AV_CODEC_ID_MJPEG},
-    PictureKind{".png", AV_CODEC_ID_PNG},   PictureKind{".tif", AV_CODEC_ID_TIFF},
-    PictureKind{".tiff", AV_CODEC_ID_TIFF}, PictureKind{".bmp", AV_CODEC_ID_BMP},
-    PictureKind{".pgm", AV_CODEC_ID_PGM},   PictureKind{".webp", AV_CODEC_ID_WEBP},
-};
-
-const PictureKind* kind_of(const fs::path& file) {
-  std::string extension = file.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  const auto found = std::find_if(kKinds.begin(), kKinds.end(), [&](const PictureKind& kind) {
-    return extension == kind.extension;
-  });
-  return found == kKinds.end() ? nullptr : &*found;
-}
-
-std::string read_bytes(const fs::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  if (!in)
-    throw InputError(file.string(), fmt::format("cannot be opened: {}", std::strerror(errno)),
-                     "a readable file");
-  return {std::istreambuf_iterator<char>(in), {}};
-}
 
 /// Notes the turn that EXIF's orientation asks a viewer for.
 void read_turn(const std::string& bytes, DecodedPicture& picture) {
@@ -85,13 +57,34 @@ bool is_harmless(const std::string& message, const std::string& bytes, cv::Mat& 
   return std::string(tjGetErrorStr2(decoder.get())).find(kBeforeTheEnd) != std::string::npos;
 }
 
-/// Returns what a file holds that is no picture, by its first bytes; empty where that is not known.
-std::string other_content(const std::string& bytes) {
-  if (bytes.empty()) return "it is empty";
-  const bool video = bytes.compare(4, 4, "ftyp") == 0 || bytes.compare(4, 4, "moov") == 0 ||
-                     bytes.starts_with("\x1a\x45\xdf\xa3") ||
-                     (bytes.starts_with("RIFF") && bytes.compare(8, 4, "AVI ") == 0);
-  return video ? "it holds a video, whatever its name says: rename it, to .mp4 for one" : "";
+/// Says what a file holds that is no picture.
+std::string no_picture(PictureContent::Kind kind) {
+  if (kind == PictureContent::Kind::empty) return "it is empty";
+  if (kind == PictureContent::Kind::video)
+    return "it holds a video, whatever its name says: rename it, to .mp4 for one";
+  return fmt::format("it is no {}", kReadFormats);
+}
+
+/// Leaves those chunks of a PNG that make its pixels. Compressed texts among the others may unfold
+/// to any size.
+void leave_pixels(std::string& bytes) {
+  constexpr size_t kSignature = 8, kAround = 12;  // bytes; a chunk's length, type and checksum
+  size_t from = kSignature, to = kSignature;
+  while (bytes.size() - from >= kAround) {
+    std::uint32_t length = 0;
+    for (size_t i = 0; i < 4; ++i)
+      length = length << 8 | static_cast<std::uint8_t>(bytes[from + i]);
+    const std::string_view type = std::string_view(bytes).substr(from + 4, 4);
+    const bool kept =
+        type == "IHDR" || type == "PLTE" || type == "tRNS" || type == "IDAT" || type == "IEND";
+    const size_t whole = std::min(kAround + size_t{length}, bytes.size() - from);
+    if (kept) {
+      std::memmove(bytes.data() + to, bytes.data() + from, whole);
+      to += whole;
+    }
+    from += whole;
+  }
+  bytes.resize(to);
 }
 
 /// Says whether a PGM states a white level of its own, which its decoder then brings to 16 bits.
@@ -121,16 +114,14 @@ DecodedPicture decode_jpeg(const std::string& bytes, const std::string& file) {
     picture.damage = tjGetErrorStr2(decoder.get());
     return picture;
   }
-  if (std::int64_t{width} * height > libav::kMostPixels) {
-    picture.damage = fmt::format("it states a size of {} x {}", width, height);
-    return picture;
-  }
+  require_possible_size(file, width, height);
   if (colours == TJCS_CMYK || colours == TJCS_YCCK)
     throw InputError(file, "the JPEG holds the inks of a print (CMYK)", "a grey or RGB picture",
                      "convert the pictures to sRGB");
   picture.grey.create(height, width, CV_8UC1);
   if (tjDecompress2(decoder.get(), data, size, picture.grey.data, width,
-                    static_cast<int>(picture.grey.step), height, TJPF_GRAY, 0) != 0) {
+                    static_cast<int>(picture.grey.step), height, TJPF_GRAY,
+                    TJFLAG_LIMITSCANS) != 0) {
     picture.damage = tjGetErrorStr2(decoder.get());
     if (tjGetErrorCode(decoder.get()) == TJERR_FATAL) {
       picture.grey.release();
@@ -143,30 +134,62 @@ DecodedPicture decode_jpeg(const std::string& bytes, const std::string& file) {
   return picture;
 }
 
-}  // namespace
-
-bool is_picture(const fs::path& file) {
-  return kind_of(file) != nullptr;
+AVCodecID codec_of(PictureFormat format) {
+  switch (format) {
+    case PictureFormat::jpeg:
+      return AV_CODEC_ID_MJPEG;
+    case PictureFormat::png:
+      return AV_CODEC_ID_PNG;
+    case PictureFormat::tiff:
+      return AV_CODEC_ID_TIFF;
+    case PictureFormat::bmp:
+      return AV_CODEC_ID_BMP;
+    case PictureFormat::pgm:
+      return AV_CODEC_ID_PGM;
+    case PictureFormat::webp:
+      return AV_CODEC_ID_WEBP;
+  }
+  return AV_CODEC_ID_NONE;
 }
 
-DecodedPicture decode_picture(const fs::path& file) {
-  const std::string bytes = read_bytes(file);
-  const bool jpeg = bytes.starts_with("\xff\xd8");  // whatever the name says
-  if (jpeg) return decode_jpeg(bytes, file.string());
-  const PictureKind* kind = kind_of(file);
+/// Decodes a picture that is no JPEG, once its header is known to state a possible size.
+DecodedPicture decode_other(PictureFormat format, std::string& bytes, const fs::path& file) {
   DecodedPicture picture;
-  picture.damage = other_content(bytes);
+  const StatedSize stated = stated_size(format, bytes);
+  if (*stated.foreign != '\0') refuse_foreign_picture(file, stated.foreign);
+  picture.damage = stated.damage;
   if (!picture.damage.empty()) return picture;
-  if (kind == nullptr || kind->codec == AV_CODEC_ID_MJPEG) {
-    picture.damage = "it is no JPEG";
+  require_possible_size(file.string(), stated.width, stated.height);
+  const bool pgm = format == PictureFormat::pgm;
+  const bool white_stated = pgm && states_white(bytes);
+  if (format == PictureFormat::png) leave_pixels(bytes);
+  const libav::GreyLevels grey =
+      libav::decode_still(bytes, codec_of(format), file.string(), picture.damage);
+  if (!grey.levels.empty() &&
+      (grey.levels.cols != stated.width || grey.levels.rows != stated.height)) {
+    picture.damage = fmt::format("its header states {} x {} px, its data {} x {}", stated.width,
+                                 stated.height, grey.levels.cols, grey.levels.rows);
     return picture;
   }
-  const libav::GreyLevels grey =
-      libav::decode_still(bytes, kind->codec, file.string(), picture.damage);
   picture.grey = grey.levels;
   picture.bits = grey.bits;
-  picture.white_stated = kind->codec == AV_CODEC_ID_PGM && grey.bits == 16 && states_white(bytes);
+  picture.white_stated = white_stated && grey.bits == 16;
   return picture;
+}
+
+}  // namespace
+
+DecodedPicture decode_picture(const fs::path& file) {
+  std::string bytes = read_file_bytes(file, kMostPictureBytes);
+  const PictureContent content = content_of_bytes(bytes);
+  if (content.kind == PictureContent::Kind::foreign) refuse_foreign_picture(file, content.name);
+  DecodedPicture picture;
+  if (content.kind != PictureContent::Kind::picture) {
+    picture.damage = no_picture(content.kind);
+    return picture;
+  }
+  if (content.format == PictureFormat::jpeg) return decode_jpeg(bytes, file.string());
+  return decode_other(content.format, bytes, file);
 }
 
 }  // namespace clothfit

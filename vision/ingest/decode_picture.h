@@ -16,12 +16,10 @@ struct DecodedPicture {
   std::string damage;         ///< what is wrong with the file; `grey` may then be empty
 };
 
-/// Says by its extension whether a file can be decoded here.
-bool is_picture(const std::filesystem::path& file);
-
-/// Decodes a JPEG, PNG, TIFF, BMP, PGM or WebP file. Luma of a colour picture is its grey. Throws
-/// InputError for a kind that has no grey of its own: CMYK, or partly transparent. Nothing is
-/// printed.
+/// Decodes a JPEG, PNG, TIFF, BMP, PGM or WebP file, told by its content. Luma of a colour picture
+/// is its grey. Throws InputError for a file that cannot be read, for other formats (HEIC), for a
+/// size beyond picture_limits.h, and for a kind that has no grey of its own: CMYK, or partly
+/// transparent. Nothing is printed.
 DecodedPicture decode_picture(const std::filesystem::path& file);
 
 }  // namespace clothfit

@@ -15,8 +15,11 @@ extern "C" {
 #include <cstdio>
 #include <cstring>
 #include <opencv2/imgproc.hpp>
+#include <vector>
 
+#include "data/file_bytes.h"
 #include "data/input_error.h"
+#include "vision/ingest/picture_limits.h"
 
 namespace clothfit::libav {
 namespace {
@@ -28,10 +31,14 @@ void count_errors(void* /*context*/, int level, const char* /*format*/, va_list 
   if (level <= AV_LOG_ERROR) ++errors;
 }
 
-/// Keeps libav's own messages off the terminal, from the first use on.
-void silence() {
+/// Keeps libav's own messages off the terminal, from the first use on, and bounds every single
+/// piece of memory that it takes: by the largest picture in four colours of 16 bits, with its
+/// margins.
+void prepare() {
   static const bool done = [] {
     av_log_set_callback(count_errors);
+    constexpr size_t kMargins = size_t{1} << 26;
+    av_max_alloc(8 * size_t{kMostPixels} + kMargins);
     return true;
   }();
   static_cast<void>(done);
@@ -46,8 +53,19 @@ int open_nothing(AVFormatContext* /*format*/, AVIOContext** /*io*/, const char* 
 /// Containers that cameras and video programs write. Playlists are left out, and raw streams, whose
 /// times libav would invent.
 constexpr const char* kContainers =
-    "mov,mp4,m4a,3gp,3g2,mj2,matroska,webm,avi,mpegts,mpeg,ogg,flv,asf,ivf,gif,yuv4mpegpipe,mxf,"
-    "dv,nut";
+    "mov,mp4,m4a,3gp,3g2,mj2,matroska,webm,avi,mpegts,mpeg,ogg,flv,asf,ivf,yuv4mpegpipe,mxf,dv,nut";
+
+/// Looks into the streams of a container. Their own decoders, which this opens, are bounded as
+/// well.
+int find_streams(AVFormatContext& format) {
+  std::vector<AVDictionary*> options(format.nb_streams, nullptr);
+  for (AVDictionary*& of_stream : options)
+    av_dict_set_int(&of_stream, "max_pixels", kMostPixels, 0);
+  const size_t count = options.size();
+  const int found = avformat_find_stream_info(&format, count > 0 ? options.data() : nullptr);
+  for (AVDictionary*& of_stream : options) av_dict_free(&of_stream);
+  return found;
+}
 
 /// Converts a frame into another pixel format of the same size.
 cv::Mat converted(const AVFrame& frame, AVPixelFormat format, int type) {
@@ -132,7 +150,7 @@ std::string error_text(int code) {
 /// Hands libav the bytes of one file.
 struct Container::Bytes {
   explicit Bytes(const std::filesystem::path& path)
-      : file(std::fopen(path.c_str(), "rb"), std::fclose) {
+      : file(fdopen(open_regular_file(path), "rb"), std::fclose) {
     if (!file)
       throw InputError(path.string(), fmt::format("cannot be opened: {}", std::strerror(errno)),
                        "a readable file");
@@ -169,7 +187,7 @@ struct Container::Bytes {
 };
 
 Container::Container(const std::filesystem::path& file) : bytes_(std::make_unique<Bytes>(file)) {
-  silence();
+  prepare();
   format_ = avformat_alloc_context();
   format_->pb = bytes_->io;
   format_->flags |= AVFMT_FLAG_CUSTOM_IO;
@@ -177,9 +195,11 @@ Container::Container(const std::filesystem::path& file) : bytes_(std::make_uniqu
   AVDictionary* options = nullptr;
   av_dict_set(&options, "format_whitelist", kContainers, 0);
   av_dict_set(&options, "protocol_whitelist", "none", 0);
+  for (const char* references : {"enable_drefs", "use_absolute_path"})  // of a QuickTime film
+    av_dict_set(&options, references, "0", 0);
   const int opened = avformat_open_input(&format_, nullptr, nullptr, &options);
   av_dict_free(&options);
-  const int found = opened < 0 ? opened : avformat_find_stream_info(format_, nullptr);
+  const int found = opened < 0 ? opened : find_streams(*format_);
   if (found >= 0) return;
   close();
   throw InputError(file.string(),
@@ -217,7 +237,7 @@ GreyLevels grey_levels(const AVFrame& frame, const std::string& where) {
 
 GreyLevels decode_still(const std::string& bytes, AVCodecID codec, const std::string& where,
                         std::string& damage) {
-  silence();
+  prepare();
   const AVCodec* decoder = avcodec_find_decoder(codec);
   const Codec context(avcodec_alloc_context3(decoder));
   // Of a TIFF's many optional tags the decoder knows some, and would take others for errors.

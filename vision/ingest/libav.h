@@ -28,9 +28,6 @@ std::string error_text(int code);
 /// Returns how many errors libav has logged in this process. It logs some that it returns nowhere.
 long errors_logged();
 
-/// The most pixels of a picture; larger ones are taken for damaged headers.
-inline constexpr std::int64_t kMostPixels = std::int64_t{1} << 28;
-
 /// A demuxer that reads one file and opens nothing else, whatever the file asks for: no playlist,
 /// no reference to other media, no network.
 class Container {

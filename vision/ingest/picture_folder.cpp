@@ -3,11 +3,15 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <iterator>
+#include <set>
 #include <utility>
 
 #include "data/input_error.h"
 #include "vision/ingest/decode_picture.h"
+#include "vision/ingest/folder_entries.h"
 #include "vision/ingest/frame_list.h"
+#include "vision/ingest/picture_content.h"
 #include "vision/ingest/picture_names.h"
 
 namespace clothfit {
@@ -15,19 +19,39 @@ namespace {
 
 namespace fs = std::filesystem;
 
-NumberedPictures pictures_in(const fs::path& folder) {
-  std::vector<fs::path> files;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
-    // Names that begin with a dot are companions that systems lay beside files.
-    const bool hidden = entry.path().filename().string().starts_with(".");
-    if (!hidden && entry.is_regular_file() && is_picture(entry.path()))
-      files.push_back(entry.path());
+/// Leaves out pictures that lie beside others of their names in formats that are read: raw ones
+/// that a camera writes along.
+void leave_out_companions(std::vector<fs::path>& files) {
+  std::set<std::string> read;
+  for (const fs::path& file : files)
+    if (has_picture_name(file)) read.insert(file.stem().string());
+  std::erase_if(files, [&](const fs::path& file) {
+    return has_foreign_picture_name(file) && read.contains(file.stem().string());
+  });
+}
+
+/// Names tell the pictures of a folder; where none does, the content of the files. What is named as
+/// a picture, or leads to no file at all, is never passed over: the frames after it would shift.
+std::vector<fs::path> pictures_in(const fs::path& folder) {
+  std::vector<fs::path> named, others;
+  for (const FolderEntry& entry : list_folder(folder)) {
+    const bool picture = has_picture_name(entry.path) || has_foreign_picture_name(entry.path);
+    const bool file = entry.kind == FolderEntry::Kind::file;
+    if (entry.kind == FolderEntry::Kind::other || (picture && !file))
+      refuse_entry(entry, "a picture file");
+    if (file) (picture ? named : others).push_back(entry.path);
   }
-  if (files.empty())
+  if (named.empty())
+    std::ranges::copy_if(others, std::back_inserter(named), [](const fs::path& file) {
+      const PictureContent::Kind kind = content_of_file(file).kind;
+      return kind == PictureContent::Kind::picture || kind == PictureContent::Kind::foreign;
+    });
+  if (named.empty())
     throw InputError(folder.string(), "the folder holds no picture",
-                     ".jpg, .png, .tif, .bmp, .pgm or .webp files",
+                     fmt::format("{} files", kReadFormats),
                      "name the folder that holds the frames themselves");
-  return number_pictures(std::move(files));
+  leave_out_companions(named);
+  return named;
 }
 
 /// Returns the brightest level of a picture.
@@ -155,7 +179,7 @@ class PictureFolder : public ImageSource {
 }  // namespace
 
 std::unique_ptr<ImageSource> open_picture_folder(const fs::path& folder) {
-  return std::make_unique<PictureFolder>(folder, pictures_in(folder));
+  return std::make_unique<PictureFolder>(folder, number_pictures(pictures_in(folder)));
 }
 
 std::unique_ptr<ImageSource> open_picture(const fs::path& file) {

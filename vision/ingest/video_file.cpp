@@ -13,6 +13,7 @@ extern "C" {
 #include "data/input_error.h"
 #include "vision/ingest/frame_list.h"
 #include "vision/ingest/libav.h"
+#include "vision/ingest/picture_limits.h"
 
 namespace clothfit {
 namespace {
@@ -136,6 +137,8 @@ VideoTable read_table(const fs::path& file) {
                      "name the file that holds the pictures");
   AVStream& stream = *container->streams[table.stream];
   refuse_interlaced(stream.codecpar->field_order, file.string());
+  if (stream.codecpar->width > 0 || stream.codecpar->height > 0)
+    require_possible_size(file.string(), stream.codecpar->width, stream.codecpar->height);
   table.tick_s = av_q2d(stream.time_base);
   table.stated = static_cast<int>(std::clamp<std::int64_t>(stream.nb_frames, 0, 1'000'000'000));
   table.turn_deg = turn_of(stream);
@@ -162,7 +165,7 @@ libav::Codec open_decoder(const AVStream& stream, const std::string& file) {
   int code = decoder == nullptr ? AVERROR_DECODER_NOT_FOUND
                                 : avcodec_parameters_to_context(context.get(), stream.codecpar);
   context->err_recognition = AV_EF_CRCCHECK | AV_EF_EXPLODE;
-  context->max_pixels = libav::kMostPixels;
+  context->max_pixels = kMostPixels;
   context->pkt_timebase = stream.time_base;
   // Threads over pictures tell of damage late, and differently from run to run.
   context->thread_count = 0;
@@ -220,6 +223,8 @@ class VideoFile : public ImageSource {
     }
     if (frame_->interlaced_frame != 0)
       refuse_interlaced(frame_->top_field_first != 0 ? AV_FIELD_TT : AV_FIELD_BB, file_);
+    require_possible_size(fmt::format("{}, {}", file_, current_name()), frame_->width,
+                          frame_->height);
     const libav::GreyLevels levels = libav::grey_levels(*frame_, file_);
     if (levels.levels.empty())
       throw InputError(file_, "its pixel format has no grey", "grey or colour pictures",

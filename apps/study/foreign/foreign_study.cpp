@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <system_error>
 
 #include "apps/steps/steps.h"
 #include "apps/study/recordings/recordings_checksum.h"
@@ -17,6 +18,7 @@
 #include "fit/diagnosis/diagnose.h"
 #include "fit/jobs/executor.h"
 #include "fit/jobs/journal_key.h"
+#include "vision/ingest/folder_entries.h"
 
 namespace clothfit {
 namespace {
@@ -92,13 +94,14 @@ ProgressCallback of_recording(const std::string& name, const ProgressCallback& p
 
 std::vector<fs::path> find_foreign_recordings(const fs::path& folder,
                                               const std::vector<std::string>& only) {
-  if (!fs::is_directory(folder))
+  std::error_code error;
+  if (!fs::is_directory(folder, error))
     throw InputError(folder.string(), "is not a folder", "a folder with recordings in it");
   std::vector<fs::path> found;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder))
-    if (fs::exists(entry.path() / kRecordingFile) && fs::exists(entry.path() / kTruthFile))
-      found.push_back(entry.path());
-  std::ranges::sort(found);
+  for (const FolderEntry& entry : list_whole_folder(folder))
+    if (fs::exists(entry.path / kRecordingFile, error) &&
+        fs::exists(entry.path / kTruthFile, error))
+      found.push_back(entry.path);
   for (const std::string& name : only)
     if (std::ranges::none_of(found, [&](const fs::path& one) { return one.filename() == name; }))
       throw InputError(

@@ -2,13 +2,32 @@
 
 #include <set>
 #include <string_view>
+#include <system_error>
 
 #include "data/text_file.h"
 #include "fit/jobs/checksum.h"
+#include "vision/ingest/folder_entries.h"
 
 namespace clothfit {
 
 namespace fs = std::filesystem;
+
+namespace {
+
+/// Adds the files below a folder, each folder that links lead to once. A link that leads
+/// nowhere is the fit's to refuse, where it is needed.
+void add_files_below(const fs::path& folder, std::set<fs::path>& walked,
+                     std::set<fs::path>& files) {
+  std::error_code error;
+  const fs::path itself = fs::canonical(folder, error);
+  if (!error && !walked.insert(itself).second) return;
+  for (const FolderEntry& entry : list_folder(folder)) {
+    if (entry.kind == FolderEntry::Kind::file) files.insert(entry.path);
+    if (entry.kind == FolderEntry::Kind::folder) add_files_below(entry.path, walked, files);
+  }
+}
+
+}  // namespace
 
 std::uint64_t checksum_of_text(const std::string& text, std::uint64_t before) {
   return checksum(std::string_view("\0", 1), checksum(text, before));
@@ -19,12 +38,12 @@ std::uint64_t recordings_checksum(const std::vector<fs::path>& recordings) {
   const auto add = [&](const std::string& text) { sum = checksum_of_text(text, sum); };
   for (const fs::path& folder : recordings) {
     add(folder.generic_string());
-    std::set<fs::path> files;
-    for (const auto& entry : fs::recursive_directory_iterator(folder))
-      if (entry.is_regular_file()) files.insert(entry.path());
+    std::set<fs::path> walked, files;
+    add_files_below(folder, walked, files);
     for (const fs::path& file : files) {
       add(file.lexically_relative(folder).generic_string());
-      add(std::to_string(fs::file_size(file)));
+      std::error_code error;
+      add(std::to_string(fs::file_size(file, error)));
     }
     add(read_text(folder / kRecordingFile));
   }

@@ -8,6 +8,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <system_error>
 
 #include "apps/report/fit/fit_tables.h"
 #include "apps/steps/steps.h"
@@ -23,6 +24,7 @@
 #include "fit/observe/marker_error.h"
 #include "fit/observe/trivial_predictors.h"
 #include "fit/problem/drive.h"
+#include "vision/ingest/folder_entries.h"
 
 namespace clothfit {
 namespace {
@@ -33,13 +35,18 @@ constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 using Tracks = std::vector<Eigen::MatrixXd>;
 
-void add_recordings_below(const fs::path& folder, std::set<fs::path>& found) {
-  if (fs::exists(folder / kRecordingFile)) {
+/// Follows links to folders, each folder once, so that a link upwards leads to no endless walk.
+void add_recordings_below(const fs::path& folder, std::set<fs::path>& walked,
+                          std::set<fs::path>& found) {
+  std::error_code error;
+  const fs::path itself = fs::canonical(folder, error);
+  if (!error && !walked.insert(itself).second) return;
+  if (fs::exists(folder / kRecordingFile, error)) {
     found.insert(folder);
     return;
   }
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder))
-    if (entry.is_directory()) add_recordings_below(entry.path(), found);
+  for (const FolderEntry& entry : list_whole_folder(folder))
+    if (entry.kind == FolderEntry::Kind::folder) add_recordings_below(entry.path, walked, found);
 }
 
 /// Observed and predicted places of the markers in all frames.
@@ -208,10 +215,12 @@ std::vector<fs::path> find_recordings(const std::vector<fs::path>& folders) {
   std::set<fs::path> found;
   for (const fs::path& folder : folders) {
     const size_t before = found.size();
-    if (!fs::is_directory(folder))
+    std::error_code error;
+    if (!fs::is_directory(folder, error))
       throw InputError(folder.string(), "is not a folder", "a folder with recordings in it");
     const fs::path clean = (folder.lexically_normal() / "").parent_path();
-    add_recordings_below(clean, found);
+    std::set<fs::path> walked;
+    add_recordings_below(clean, walked, found);
     if (found.size() == before)
       throw InputError(folder.string(), "holds no recording that was not named before",
                        std::string("a folder with a ") + kRecordingFile + " in it or below");

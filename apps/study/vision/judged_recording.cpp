@@ -2,12 +2,14 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <opencv2/imgcodecs.hpp>
+#include <cstdint>
 
 #include "data/csv_reader.h"
 #include "data/input_error.h"
 #include "data/recording.h"
+#include "vision/ingest/decode_picture.h"
+#include "vision/ingest/folder_entries.h"
+#include "vision/ingest/picture_content.h"
 
 namespace clothfit {
 namespace {
@@ -38,25 +40,27 @@ std::vector<TrueCorners> read_truth(const fs::path& file, const MarkerSet& marke
 }  // namespace
 
 std::vector<fs::path> picture_files(const fs::path& folder) {
-  if (!fs::is_directory(folder))
-    throw InputError(folder.string(), "is not a folder", "a folder with pictures in it");
   std::vector<fs::path> files;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
-    std::string ending = entry.path().extension().string();
-    std::ranges::transform(ending, ending.begin(),
-                           [](unsigned char letter) { return std::tolower(letter); });
-    if (ending == ".jpg" || ending == ".png") files.push_back(entry.path());
-  }
+  for (const FolderEntry& entry : list_whole_folder(folder))
+    if (entry.kind == FolderEntry::Kind::file && has_picture_name(entry.path))
+      files.push_back(entry.path);
   if (files.empty())
-    throw InputError(folder.string(), "holds no picture", "pictures named .jpg or .png");
-  std::ranges::sort(files);
+    throw InputError(folder.string(), "holds no picture", fmt::format("{} files", kReadFormats));
   return files;
 }
 
 cv::Mat read_grey(const fs::path& file) {
-  cv::Mat picture = cv::imread(file.string(), cv::IMREAD_GRAYSCALE | cv::IMREAD_IGNORE_ORIENTATION);
-  if (picture.empty()) throw InputError(file.string(), "cannot be decoded", "a picture");
-  return picture;
+  const DecodedPicture picture = decode_picture(file);
+  if (!picture.damage.empty())
+    throw InputError(file.string(), fmt::format("cannot be decoded ({})", picture.damage),
+                     "a whole picture", "copy it again");
+  if (picture.grey.depth() == CV_8U) return picture.grey;
+  cv::Mat upper(picture.grey.size(), CV_8UC1);
+  for (int y = 0; y < upper.rows; ++y)
+    for (int x = 0; x < upper.cols; ++x)
+      upper.at<std::uint8_t>(y, x) =
+          static_cast<std::uint8_t>(picture.grey.at<std::uint16_t>(y, x) >> (picture.bits - 8));
+  return upper;
 }
 
 JudgedRecording read_judged_recording(const fs::path& folder) {

@@ -12,6 +12,7 @@
 #include <memory>
 #include <optional>
 #include <set>
+#include <system_error>
 
 #include "apps/study/vision/chain_rows.h"
 #include "apps/study/vision/dot_rows.h"
@@ -22,6 +23,7 @@
 #include "apps/terminal/interrupt.h"
 #include "data/input_error.h"
 #include "data/recording.h"
+#include "vision/ingest/folder_entries.h"
 #include "vision/track/tag_tracker.h"
 
 namespace clothfit {
@@ -117,14 +119,16 @@ struct JudgedCamera {
 std::vector<JudgedCamera> judged_cameras(const fs::path& data, MarkerKind kind, bool all) {
   std::vector<JudgedCamera> found;
   const fs::path folder = data / "recordings";
-  if (!fs::is_directory(folder)) return found;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
-    if (!fs::exists(entry.path() / "recording.yaml")) continue;
-    const Recording recording = read_recording(entry.path());
+  std::error_code error;
+  if (!fs::is_directory(folder, error)) return found;
+  for (const FolderEntry& entry : list_whole_folder(folder)) {
+    if (!fs::exists(entry.path / "recording.yaml", error)) continue;
+    const Recording recording = read_recording(entry.path);
     if (recording.markers.kind != kind) continue;
     for (const CameraEntry& camera : recording.cameras) {
-      if (camera.images && fs::exists(entry.path() / ("truth_tracks2d_" + camera.name + ".csv.gz")))
-        found.push_back({.folder = entry.path(), .camera = camera.name});
+      const fs::path truth = entry.path / ("truth_tracks2d_" + camera.name + ".csv.gz");
+      if (camera.images && fs::exists(truth, error))
+        found.push_back({.folder = entry.path, .camera = camera.name});
       if (!all) break;
     }
   }

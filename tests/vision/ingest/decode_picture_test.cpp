@@ -152,7 +152,10 @@ TEST(DecodePicture, SaysThatAFileIsAVideoOrEmpty) {
 
 TEST(DecodePicture, TakesTheWhiteLevelThatAPgmStates) {
   const TemporaryFolder folder;
-  folder.write("a.pgm", std::string("P5 2 1 4095\n\x0f\xff\x00\x00", 16));
+  std::string levels(size_t{2} * 64 * 32, '\0');
+  levels[0] = '\x0f';
+  levels[1] = '\xff';
+  folder.write("a.pgm", "P5 64 32 4095\n" + levels);
   const DecodedPicture picture = decode_picture(folder / "a.pgm");
   ASSERT_EQ(picture.damage, "");
   EXPECT_TRUE(picture.white_stated);
@@ -161,7 +164,7 @@ TEST(DecodePicture, TakesTheWhiteLevelThatAPgmStates) {
 
 TEST(DecodePicture, PassesBytesThatAJpegHasBeforeItsEnd) {
   const TemporaryFolder folder;
-  const cv::Mat grey(16, 16, CV_8UC1, cv::Scalar(90));
+  const cv::Mat grey(32, 32, CV_8UC1, cv::Scalar(90));
   std::vector<uchar> bytes;
   cv::imencode(".jpg", grey, bytes);
   bytes.insert(bytes.end() - 2, 3, 0x11);

@@ -5,7 +5,12 @@
 #include <fmt/core.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+#include <unistd.h>
 
+#include <functional>
 #include <opencv2/imgcodecs.hpp>
 
 #include "data/input_error.h"
@@ -15,6 +20,8 @@
 
 namespace clothfit {
 namespace {
+
+namespace fs = std::filesystem;
 
 /// Makes a picture whose grey level tells which it is.
 cv::Mat plain_picture(int level, cv::Size size = {64, 48}) {
@@ -115,6 +122,121 @@ TEST(ImageSource, PassesOverCompanionsOfOtherSystems) {
   cv::imwrite((folder / "0.png").string(), plain_picture(60));
   folder.write("._0.png", std::string(4096, '\0'));
   EXPECT_EQ(open_images(folder.path())->count(), 1);
+}
+
+/// What a name in a folder may lead to in place of a picture.
+struct NoPicture {
+  const char* said;
+  std::function<void(const fs::path&)> make;
+};
+
+void make_socket(const fs::path& path) {
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  path.string().copy(address.sun_path, sizeof address.sun_path - 1);
+  const int descriptor = socket(AF_UNIX, SOCK_STREAM, 0);
+  ASSERT_EQ(bind(descriptor, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+  close(descriptor);
+}
+
+const std::vector<NoPicture>& no_pictures() {
+  static const std::vector<NoPicture> all = {
+      {"is a link that leads nowhere",
+       [](const fs::path& path) { fs::create_symlink("/nonexistent", path); }},
+      {"cannot be looked at", [](const fs::path& path) { fs::create_symlink(path, path); }},
+      {"is a named pipe", [](const fs::path& path) { ASSERT_EQ(mkfifo(path.c_str(), 0600), 0); }},
+      {"is a socket", make_socket},
+      {"is a device", [](const fs::path& path) { fs::create_symlink("/dev/zero", path); }},
+      {"is a folder", [](const fs::path& path) { fs::create_directory(path); }}};
+  return all;
+}
+
+TEST(ImageSource, RefusesWhatStandsInThePlaceOfAPicture) {
+  for (const NoPicture& other : no_pictures()) {
+    const TemporaryFolder folder;
+    cv::imwrite((folder / "1.png").string(), plain_picture(60));
+    other.make(folder / "0.png");
+    expect_refused(folder, std::string("0.png: ") + other.said,
+                   [&] { open_images(folder.path()); });
+    if (std::string(other.said) != "is a folder") {
+      EXPECT_THROW(open_images(folder / "0.png"), InputError) << other.said;
+    }
+  }
+}
+
+/// Gives up the rights of root while it lives: root reads what nobody else may.
+class Nobody {
+ public:
+  Nobody() : root_(geteuid() == 0) {
+    constexpr uid_t kNobody = 65534;
+    EXPECT_EQ(root_ ? seteuid(kNobody) : 0, 0);
+  }
+  ~Nobody() { EXPECT_EQ(root_ ? seteuid(0) : 0, 0); }
+  Nobody(const Nobody&) = delete;
+  Nobody& operator=(const Nobody&) = delete;
+
+ private:
+  bool root_;
+};
+
+TEST(ImageSource, SaysWhatMayNotBeRead) {
+  const TemporaryFolder folder;
+  fs::permissions(folder.path(), fs::perms(0755));
+  fs::create_directories(folder / "closed" / "inner");
+  fs::create_directory(folder / "open");
+  for (const char* name : {"open/0.png", "open/1.png"})
+    cv::imwrite((folder / name).string(), plain_picture(60));
+  fs::permissions(folder / "open/1.png", fs::perms::none);
+  fs::permissions(folder / "closed", fs::perms::none);
+  {
+    const Nobody nobody;
+    expect_refused(folder, "closed: the folder cannot be listed: Permission denied",
+                   [&] { open_images(folder / "closed"); });
+    expect_refused(folder, "closed/inner: cannot be looked at: Permission denied",
+                   [&] { open_images(folder / "closed" / "inner"); });
+    expect_refused(folder, "open/1.png: cannot be opened: Permission denied",
+                   [&] { levels(*open_images(folder / "open")); });
+  }
+  fs::permissions(folder / "closed", fs::perms::owner_all);
+}
+
+TEST(ImageSource, RefusesAForeignPictureAmongOthersInsteadOfPassingItOver) {
+  const TemporaryFolder folder;
+  cv::imwrite((folder / "0.jpg").string(), plain_picture(60));
+  cv::imwrite((folder / "2.jpg").string(), plain_picture(60));
+  folder.write("1.HEIC", std::string("\0\0\0\x18"
+                                     "ftypheic\0\0\0\0mif1heic",
+                                     24));
+  expect_refused(folder, "1.HEIC: it is a HEIC picture",
+                 [&] { levels(*open_images(folder.path())); });
+}
+
+TEST(ImageSource, PassesOverTheRawPictureBesideEachJpeg) {
+  const TemporaryFolder folder;
+  for (const std::string name : {"0", "1"}) {
+    cv::imwrite((folder / (name + ".JPG")).string(), plain_picture(60));
+    folder.write(name + ".NEF", "a raw picture");
+  }
+  EXPECT_EQ(levels(*open_images(folder.path())).size(), 2U);
+}
+
+TEST(ImageSource, ReadsPicturesWhoseNamesSayNothing) {
+  const TemporaryFolder folder;
+  cv::imwrite((folder / "0.png").string(), plain_picture(60));
+  for (const char* name : {"frame_000", "frame_001", "frame_002"})
+    fs::copy_file(folder / "0.png", folder / name);
+  fs::remove(folder / "0.png");
+  folder.write("BMs of the day.txt", "BMs: none. P5 as well");
+  EXPECT_EQ(open_images(folder.path())->count(), 3);
+}
+
+TEST(ImageSource, TakesAVideoForOneUnderThePicturesName) {
+  const TemporaryFolder folder;
+  folder.write("film.jpg", std::string("\0\0\0\x10"
+                                       "ftypisom",
+                                       12));
+  expect_refused(folder, "film.jpg: no picture can be read",
+                 [&] { open_images(folder / "film.jpg"); });
 }
 
 TEST(ImageSource, StretchesLevelsOfTwelveBitsToTheFullRange) {

@@ -5,6 +5,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cmath>
 #include <fstream>
@@ -86,6 +87,46 @@ TEST_F(RecordingsStudy, FindsRecordingsAtAnyDepthInTheOrderOfTheirPaths) {
   EXPECT_THAT(find_recordings({folder_ / "a" / ""}), ElementsAre(folder_ / "a"));
   EXPECT_THAT([&] { find_recordings({folder_ / "empty"}); },
               ThrowsMessage<InputError>(HasSubstr("holds no recording")));
+}
+
+TEST_F(RecordingsStudy, FollowsLinksToEachRecordingOnce) {
+  copy("swing_plain", "a");
+  copy("swing_plain", "elsewhere/b");
+  fs::create_directories(folder_ / "chosen" / "deeper");
+  fs::create_directory_symlink(folder_ / "a", folder_ / "chosen" / "first");
+  fs::create_directory_symlink(folder_ / "a", folder_ / "chosen" / "again");
+  fs::create_directory_symlink(folder_ / "chosen", folder_ / "chosen" / "deeper" / "round");
+  fs::create_directory_symlink(folder_ / "elsewhere", folder_ / "chosen" / "second");
+  fs::create_directory_symlink(folder_, folder_ / "a" / "upwards");
+
+  const std::vector<fs::path> found = find_recordings({folder_ / "chosen"});
+
+  EXPECT_THAT(found,
+              ElementsAre(folder_ / "chosen" / "again", folder_ / "chosen" / "second" / "b"));
+  RecordingsStudyOptions options = quick();
+  options.recordings = found;
+  EXPECT_FALSE(options.key().empty()) << "it walks through the recordings as well";
+}
+
+TEST_F(RecordingsStudy, RefusesLinksThatLeadNowhere) {
+  copy("swing_plain", "a");
+  fs::create_symlink("/nonexistent", folder_ / "b");
+  EXPECT_THAT([&] { find_recordings({folder_}); },
+              ThrowsMessage<InputError>(HasSubstr("b: is a link that leads nowhere")));
+  fs::remove(folder_ / "b");
+  fs::create_symlink(folder_ / "b", folder_ / "b");
+  EXPECT_THAT([&] { find_recordings({folder_}); },
+              ThrowsMessage<InputError>(HasSubstr("b: cannot be looked at")));
+}
+
+TEST_F(RecordingsStudy, SaysWhichFolderMayNotBeRead) {
+  if (geteuid() == 0) GTEST_SKIP() << "root may read all";
+  copy("swing_plain", "a");
+  fs::create_directories(folder_ / "closed");
+  fs::permissions(folder_ / "closed", fs::perms::none);
+  EXPECT_THAT([&] { find_recordings({folder_}); },
+              ThrowsMessage<InputError>(HasSubstr("closed: the folder cannot be listed")));
+  fs::permissions(folder_ / "closed", fs::perms::owner_all);
 }
 
 TEST_F(RecordingsStudy, SaysWhatTheSingleFitSays) {
