@@ -11,6 +11,7 @@
 #include <memory>
 #include <sstream>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "data/file_bytes.h"
@@ -153,7 +154,7 @@ AVCodecID codec_of(PictureFormat format) {
 }
 
 /// Decodes a picture that is no JPEG, once its header is known to state a possible size.
-DecodedPicture decode_other(PictureFormat format, std::string& bytes, const fs::path& file) {
+DecodedPicture decode_other(PictureFormat format, std::string bytes, const fs::path& file) {
   DecodedPicture picture;
   const StatedSize stated = stated_size(format, bytes);
   if (*stated.foreign != '\0') refuse_foreign_picture(file, stated.foreign);
@@ -164,7 +165,7 @@ DecodedPicture decode_other(PictureFormat format, std::string& bytes, const fs::
   const bool white_stated = pgm && states_white(bytes);
   if (format == PictureFormat::png) leave_pixels(bytes);
   const libav::GreyLevels grey =
-      libav::decode_still(bytes, codec_of(format), file.string(), picture.damage);
+      libav::decode_still(std::move(bytes), codec_of(format), file.string(), picture.damage);
   if (!grey.levels.empty() &&
       (grey.levels.cols != stated.width || grey.levels.rows != stated.height)) {
     picture.damage = fmt::format("its header states {} x {} px, its data {} x {}", stated.width,
@@ -189,7 +190,7 @@ DecodedPicture decode_picture(const fs::path& file) {
     return picture;
   }
   if (content.format == PictureFormat::jpeg) return decode_jpeg(bytes, file.string());
-  return decode_other(content.format, bytes, file);
+  return decode_other(content.format, std::move(bytes), file);
 }
 
 }  // namespace clothfit

@@ -235,7 +235,7 @@ GreyLevels grey_levels(const AVFrame& frame, const std::string& where) {
   return grey;
 }
 
-GreyLevels decode_still(const std::string& bytes, AVCodecID codec, const std::string& where,
+GreyLevels decode_still(std::string bytes, AVCodecID codec, const std::string& where,
                         std::string& damage) {
   prepare();
   const AVCodec* decoder = avcodec_find_decoder(codec);
@@ -249,13 +249,14 @@ GreyLevels decode_still(const std::string& bytes, AVCodecID codec, const std::st
   const Frame frame(av_frame_alloc());
   int code = decoder == nullptr ? AVERROR_DECODER_NOT_FOUND
                                 : avcodec_open2(context.get(), decoder, nullptr);
-  // The packet's own copy ends in the padding that decoders read ahead into.
-  if (code >= 0) code = av_new_packet(packet.get(), static_cast<int>(bytes.size()));
+  // Decoders read ahead into the padding. A copy would double the memory of a large file.
+  packet->size = static_cast<int>(bytes.size());
+  bytes.append(AV_INPUT_BUFFER_PADDING_SIZE, '\0');
+  packet->data = reinterpret_cast<uint8_t*>(bytes.data());
+  packet->buf = av_buffer_create(
+      packet->data, bytes.size(), [](void*, uint8_t*) {}, nullptr, AV_BUFFER_FLAG_READONLY);
   const long before = errors_logged();
-  if (code >= 0) {
-    std::memcpy(packet->data, bytes.data(), bytes.size());
-    code = avcodec_send_packet(context.get(), packet.get());
-  }
+  if (code >= 0) code = avcodec_send_packet(context.get(), packet.get());
   if (code >= 0) code = avcodec_send_packet(context.get(), nullptr);
   if (code >= 0) code = avcodec_receive_frame(context.get(), frame.get());
   if (code < 0) {

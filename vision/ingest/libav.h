@@ -59,7 +59,7 @@ struct GreyLevels {
 GreyLevels grey_levels(const AVFrame& frame, const std::string& where);
 
 /// Decodes a still of that codec. Sets `damage` to what is wrong with it, if anything is.
-GreyLevels decode_still(const std::string& bytes, AVCodecID codec, const std::string& where,
+GreyLevels decode_still(std::string bytes, AVCodecID codec, const std::string& where,
                         std::string& damage);
 
 }  // namespace clothfit::libav

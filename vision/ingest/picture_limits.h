@@ -20,8 +20,9 @@ inline constexpr int kLongestSide_px = 16384;
 inline constexpr std::int64_t kMostPixels = std::int64_t{1} << 26;
 
 /// The most bytes of a picture file: those of the largest picture in colours of 8 bits that are not
-/// compressed.
-inline constexpr std::uintmax_t kMostPictureBytes = 3 * std::uintmax_t{kMostPixels};
+/// compressed, and as many for headers as cameras write.
+inline constexpr std::uintmax_t kMostPictureBytes =
+    3 * std::uintmax_t{kMostPixels} + (std::uintmax_t{1} << 20);
 
 /// Throws InputError where a picture is too small or too large. To be asked with what its header
 /// states, before any memory is taken for its pixels.

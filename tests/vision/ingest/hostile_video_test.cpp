@@ -120,8 +120,7 @@ std::string refer_to(const std::string& boxes, const std::string& path) {
     if (type == "moov" || type == "trak" || type == "mdia" || type == "minf" || type == "dinf")
       content = refer_to(content, path);
     if (type == "dref") {
-      std::string alias(150, '\0');  // names of volume and file, which stay empty
-      alias[131] = alias[133] = 1;   // levels up and down to the file
+      std::string alias(150, '\0');  // names of volume and file, and levels to it: none
       const std::string padded = path + std::string(path.size() % 2, '\0');
       const std::string length_of_path{static_cast<char>(padded.size() >> 8),
                                        static_cast<char>(padded.size())};
