@@ -158,7 +158,7 @@ bool has_foreign_picture_name(const fs::path& file) {
 }
 
 void refuse_foreign_picture(const fs::path& file, const char* format) {
-  throw InputError(file.string(), fmt::format("it is a {} picture, which is not read", format),
+  throw InputError(file.string(), fmt::format("it holds {} data, which are not read", format),
                    kReadFormats, "convert the pictures to PNG or JPEG, all of them alike");
 }
 

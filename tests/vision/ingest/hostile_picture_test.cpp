@@ -147,7 +147,7 @@ TEST(HostilePicture, OfAnotherFormatIsRefusedByThatUnderAnyName) {
         cv::Mat grey;
         open_images(folder / name)->next(grey);
       };
-      expect_refused(folder, std::string(name) + ": it is a " + other.format, read);
+      expect_refused(folder, std::string(name) + ": it holds " + other.format, read);
       EXPECT_THAT(refusal(folder / name), HasSubstr("convert the pictures to PNG or JPEG"));
       fs::remove(folder / name);
     }

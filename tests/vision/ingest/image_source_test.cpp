@@ -207,7 +207,7 @@ TEST(ImageSource, RefusesAForeignPictureAmongOthersInsteadOfPassingItOver) {
   folder.write("1.HEIC", std::string("\0\0\0\x18"
                                      "ftypheic\0\0\0\0mif1heic",
                                      24));
-  expect_refused(folder, "1.HEIC: it is a HEIC picture",
+  expect_refused(folder, "1.HEIC: it holds HEIC data",
                  [&] { levels(*open_images(folder.path())); });
 }
 
