@@ -79,9 +79,9 @@ set(CLOTHFIT_ARROWS
                            apps/study/scene"
   "apps/study/louchet1995 -> data/algebra data model/fabric model/effects fit/jobs fit/problem
                              fit/cost fit/search fit/refine"
-  "apps/study/recordings -> data vision/ingest fit/jobs fit/observe fit/problem fit apps/terminal
-                            apps/steps apps/report/fit"
-  "apps/study/foreign   -> data vision/ingest fit/jobs fit/diagnosis apps/terminal apps/steps
+  "apps/study/recordings -> data fit/jobs fit/observe fit/problem fit apps/terminal apps/steps
+                            apps/report/fit"
+  "apps/study/foreign   -> data fit/jobs fit/diagnosis apps/terminal apps/steps
                            apps/study/recordings"
   "apps/study/vision    -> data calib/camera vision/degrade vision/ingest vision/detect vision/track
                            vision/render model/topology fit/interface fit/jobs fit/observe

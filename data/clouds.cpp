@@ -30,7 +30,8 @@ bool is_table(const fs::path& file, int& frame) {
 
 PointClouds read_point_clouds(const fs::path& folder) {
   PointClouds clouds;
-  for (const fs::path& path : folder_entries(folder)) {
+  for (const FolderEntry& entry : list_folder(folder)) {
+    const fs::path& path = entry.path;
     const std::string file = path.string();
     int frame = -1;
     if (!is_table(path, frame)) continue;

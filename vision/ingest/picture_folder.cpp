@@ -7,9 +7,9 @@
 #include <set>
 #include <utility>
 
+#include "data/folder_entries.h"
 #include "data/input_error.h"
 #include "vision/ingest/decode_picture.h"
-#include "vision/ingest/folder_entries.h"
 #include "vision/ingest/frame_list.h"
 #include "vision/ingest/picture_content.h"
 #include "vision/ingest/picture_names.h"

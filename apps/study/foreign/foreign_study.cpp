@@ -13,12 +13,12 @@
 #include "apps/terminal/interrupt.h"
 #include "apps/terminal/option_flags.h"
 #include "apps/terminal/version.h"
+#include "data/folder_entries.h"
 #include "data/input_error.h"
 #include "data/text_file.h"
 #include "fit/diagnosis/diagnose.h"
 #include "fit/jobs/executor.h"
 #include "fit/jobs/journal_key.h"
-#include "vision/ingest/folder_entries.h"
 
 namespace clothfit {
 namespace {

@@ -4,9 +4,9 @@
 #include <string_view>
 #include <system_error>
 
+#include "data/folder_entries.h"
 #include "data/text_file.h"
 #include "fit/jobs/checksum.h"
-#include "vision/ingest/folder_entries.h"
 
 namespace clothfit {
 

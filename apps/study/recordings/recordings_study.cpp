@@ -18,13 +18,13 @@
 #include "apps/terminal/interrupt.h"
 #include "apps/terminal/option_flags.h"
 #include "apps/terminal/version.h"
+#include "data/folder_entries.h"
 #include "data/input_error.h"
 #include "fit/jobs/executor.h"
 #include "fit/jobs/journal_key.h"
 #include "fit/observe/marker_error.h"
 #include "fit/observe/trivial_predictors.h"
 #include "fit/problem/drive.h"
-#include "vision/ingest/folder_entries.h"
 
 namespace clothfit {
 namespace {

@@ -5,10 +5,10 @@
 #include <cstdint>
 
 #include "data/csv_reader.h"
+#include "data/folder_entries.h"
 #include "data/input_error.h"
 #include "data/recording.h"
 #include "vision/ingest/decode_picture.h"
-#include "vision/ingest/folder_entries.h"
 #include "vision/ingest/picture_content.h"
 
 namespace clothfit {

@@ -21,9 +21,9 @@
 #include "apps/study/vision/spoiled_pictures.h"
 #include "apps/terminal/exit_code.h"
 #include "apps/terminal/interrupt.h"
+#include "data/folder_entries.h"
 #include "data/input_error.h"
 #include "data/recording.h"
-#include "vision/ingest/folder_entries.h"
 #include "vision/track/tag_tracker.h"
 
 namespace clothfit {
