@@ -15,7 +15,7 @@ set(CLOTHFIT_ARROWS
   "data/algebra         ->"
   "data                 -> data/algebra"
   "calib/camera         -> data"
-  "calib/bundle         -> data calib/camera"
+  "calib/bundle         -> data/algebra data calib/camera"
   "calib/placement      -> data/algebra data calib/camera calib/bundle"
   "calib/boards         -> data calib/camera calib/bundle calib/placement"
   "vision/degrade       -> data"

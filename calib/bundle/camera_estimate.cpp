@@ -5,9 +5,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <utility>
+#include <memory>
 
 #include "calib/bundle/robust_scale.h"
+#include "data/algebra/dense_factors.h"
 
 namespace clothfit {
 namespace {
@@ -89,6 +90,35 @@ void build_problem(const BoardObservations& observations, double cauchy_scale_px
                              nullptr, estimate.intrinsics.data());
 }
 
+/// Returns the order in which unknowns are eliminated. Within a group Ceres goes by addresses, and
+/// the poses lie in memory in the order of the views.
+std::shared_ptr<ceres::ParameterBlockOrdering> poses_first(const ceres::Problem& problem,
+                                                           CameraEstimate& estimate) {
+  auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
+  for (PoseBlock& pose : estimate.camera_from_board)
+    if (problem.HasParameterBlock(pose.data())) ordering->AddElementToGroup(pose.data(), 0);
+  double* const intrinsics = estimate.intrinsics.data();
+  if (problem.HasParameterBlock(intrinsics)) ordering->AddElementToGroup(intrinsics, 1);
+  return ordering;
+}
+
+constexpr Eigen::Index kPoseTangent = 6;
+
+/// Returns a part of a sparse matrix.
+Eigen::MatrixXd dense(const ceres::CRSMatrix& sparse, Eigen::Index row, Eigen::Index rows,
+                      Eigen::Index column, Eigen::Index columns) {
+  Eigen::MatrixXd part = Eigen::MatrixXd::Zero(rows, columns);
+  for (Eigen::Index r = 0; r < rows; ++r) {
+    const auto begin = static_cast<size_t>(sparse.rows[static_cast<size_t>(row + r)]);
+    const auto end = static_cast<size_t>(sparse.rows[static_cast<size_t>(row + r) + 1]);
+    for (size_t at = begin; at < end; ++at) {
+      const Eigen::Index c = sparse.cols[at] - column;
+      if (c >= 0 && c < columns) part(r, c) = sparse.values[at];
+    }
+  }
+  return part;
+}
+
 }  // namespace
 
 bool CameraEstimate::is_active(size_t view) const {
@@ -101,6 +131,7 @@ bool refine_camera(const BoardObservations& observations, double cauchy_scale_px
   build_problem(observations, cauchy_scale_px, estimate, problem);
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::DENSE_SCHUR;
+  options.linear_solver_ordering = poses_first(problem, estimate);
   options.max_num_iterations = 200;
   // Without an upper bound the damping vanishes in the flat basins of long distortion series. The
   // normal equations then become singular to rounding.
@@ -161,16 +192,38 @@ std::optional<Eigen::VectorXd> intrinsic_sigmas(const BoardObservations& observa
                                                 double variance_px2, CameraEstimate& estimate) {
   ceres::Problem problem;
   build_problem(observations, 0, estimate, problem);
-  ceres::Covariance covariance({});
-  const double* block = estimate.intrinsics.data();
-  const std::vector<std::pair<const double*, const double*>> wanted{{block, block}};
-  if (!covariance.Compute(wanted, &problem)) return std::nullopt;
-  const int n = estimate.intrinsics_count();
-  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> matrix(n, n);
-  if (!covariance.GetCovarianceBlock(block, block, matrix.data())) return std::nullopt;
-  const Eigen::VectorXd variance = variance_px2 * matrix.diagonal();
-  if (!variance.allFinite() || variance.minCoeff() < 0) return std::nullopt;
-  return Eigen::VectorXd(variance.cwiseSqrt());
+  const Eigen::Index n = estimate.intrinsics_count();
+  ceres::Problem::EvaluateOptions evaluate;
+  evaluate.parameter_blocks = {estimate.intrinsics.data()};
+  for (size_t view = 0; view < observations.seen.size(); ++view)
+    if (estimate.is_active(view))
+      evaluate.parameter_blocks.push_back(estimate.camera_from_board[view].data());
+  ceres::CRSMatrix sparse;
+  if (!problem.Evaluate(evaluate, nullptr, nullptr, nullptr, &sparse)) return std::nullopt;
+
+  Eigen::MatrixXd by_intrinsics = dense(sparse, 0, sparse.num_rows, 0, n);
+  Eigen::Index row = 0, column = n;
+  for (size_t view = 0; view < observations.seen.size(); ++view) {
+    if (!estimate.is_active(view)) continue;
+    const auto rows = static_cast<Eigen::Index>(2 * std::ranges::count(estimate.used[view], 1));
+    if (rows < kPoseTangent) return std::nullopt;
+    const PivotedQr pose(dense(sparse, row, rows, column, kPoseTangent));
+    if (pose.rank() < kPoseTangent) return std::nullopt;
+    const Eigen::MatrixXd q = pose.first_of_q(kPoseTangent);
+    const Eigen::MatrixXd along = q.transpose() * by_intrinsics.middleRows(row, rows);
+    by_intrinsics.middleRows(row, rows) -= q * along;
+    row += rows;
+    column += kPoseTangent;
+  }
+  // Columns are scaled to length 1: pixels and coefficients stay comparable.
+  const Eigen::VectorXd scale = by_intrinsics.colwise().norm().cwiseInverse();
+  if (by_intrinsics.rows() < n || !scale.allFinite()) return std::nullopt;
+  const PivotedQr qr(by_intrinsics * scale.asDiagonal());
+  if (qr.rank() < n) return std::nullopt;
+  const Eigen::MatrixXd root = scale.asDiagonal() * qr.inverse_r();
+  const Eigen::VectorXd sigmas = std::sqrt(variance_px2) * root.rowwise().norm();
+  if (!sigmas.allFinite()) return std::nullopt;
+  return sigmas;
 }
 
 }  // namespace clothfit

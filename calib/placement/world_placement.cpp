@@ -114,6 +114,18 @@ struct WorldSolve {
   Eigen::Matrix<double, 6, 6> covariance;
 };
 
+/// Lists all unknowns, the camera's pose first, so that its tangent holds the first six columns.
+/// Ceres would list them in the order of their addresses, in which sums round differently from run
+/// to run.
+std::vector<double*> blocks_in_order(WorldUnknowns& unknowns) {
+  std::vector<double*> blocks{unknowns.camera_from_world.data()};
+  for (PoseBlock& square : unknowns.world_from_square) blocks.push_back(square.data());
+  for (TagSquare& square : unknowns.squares) blocks.push_back(&square.side_m);
+  for (double& side_m : unknowns.common_sides_m) blocks.push_back(&side_m);
+  for (std::array<double, 3>& place_m : unknowns.place_m) blocks.push_back(place_m.data());
+  return blocks;
+}
+
 WorldSolve solve_world(const FixedCamera& camera, const std::vector<PlacedPixel>& reference,
                        const Spread& spread, WorldUnknowns& unknowns) {
   ceres::Problem problem;
@@ -157,15 +169,11 @@ WorldSolve solve_world(const FixedCamera& camera, const std::vector<PlacedPixel>
   ceres::Solve(solver_options(), &problem, &summary);
   if (!summary.IsSolutionUsable()) return result;
 
-  // The camera's pose was added first, so its tangent holds the first six columns.
   ceres::Problem::EvaluateOptions evaluate;
   evaluate.residual_blocks = square_pixels;
   evaluate.residual_blocks.insert(evaluate.residual_blocks.end(), others.begin(), others.end());
   evaluate.residual_blocks.insert(evaluate.residual_blocks.end(), surveys.begin(), surveys.end());
-  problem.GetParameterBlocks(&evaluate.parameter_blocks);
-  const auto first =
-      std::find(evaluate.parameter_blocks.begin(), evaluate.parameter_blocks.end(), pose);
-  std::iter_swap(evaluate.parameter_blocks.begin(), first);
+  evaluate.parameter_blocks = blocks_in_order(unknowns);
   std::vector<double> residuals;
   ceres::CRSMatrix sparse;
   if (!problem.Evaluate(evaluate, nullptr, &residuals, nullptr, &sparse)) return result;

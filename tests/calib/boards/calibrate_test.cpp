@@ -17,6 +17,7 @@
 
 #include "calib/camera/projection.h"
 #include "data/input_error.h"
+#include "tests/calib/scattered_heap.h"
 
 namespace clothfit {
 namespace {
@@ -220,6 +221,24 @@ TEST(Calibrate, ReportsErrorsPerView) {
   EXPECT_NEAR(result.views.front().rms_px, 0.05, 0.01);
   const Rigid3 error = result.views.back().camera_from_board * inverse(camera_from_board);
   EXPECT_LT(rotation_vector(error.rotation).norm(), 5e-3);
+}
+
+TEST(Calibrate, GivesTheSameBitsWhereverTheHeapPutsItsNumbers) {
+  std::mt19937_64 rng(7);
+  const auto views = synthetic_views(true_camera(), 0.1, rng, kCoarseBoard);
+  const auto numbers = [&] {
+    std::vector<double> all;
+    for (const auto& one : calibrate(kCoarseBoard, views, 960, 720, four_coefficients()).intrinsics)
+      all.insert(all.end(), {one.value, one.sigma});
+    return all;
+  };
+  const std::vector<double> here = numbers();
+  ASSERT_FALSE(here.empty());
+
+  for (unsigned seed = 0; seed < 4; ++seed) {
+    const ScatteredHeap heap(seed);
+    EXPECT_EQ(numbers(), here) << seed;
+  }
 }
 
 TEST(Calibrate, RefusesTooFewViews) {

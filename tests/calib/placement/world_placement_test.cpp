@@ -16,6 +16,7 @@
 #include "calib/placement/sheet_pose.h"
 #include "data/camera_parameters.h"
 #include "data/markers.h"
+#include "tests/calib/scattered_heap.h"
 
 namespace clothfit {
 namespace {
@@ -324,6 +325,25 @@ TEST(PlaceSheet, SurvivesMarkersThatAreWrong) {
   ASSERT_TRUE(placed.usable) << placed.message;
   EXPECT_NEAR(placed.rms_px, 0.1, 0.02);
   EXPECT_LT(pose_error(camera_from_sheet, placed.camera_from_sheet).norm(), 3e-3);
+}
+
+TEST(PlaceWorld, GivesTheSameBitsWhereverTheHeapPutsItsNumbers) {
+  std::mt19937_64 rng(13);
+  Scene scene = random_scene({.pixel_px = 0.2, .survey_m = 1e-3, .side = 1e-3}, rng);
+  for (size_t k = 0; k < 4; ++k) scene.reference[k].group = -1;  // four points of no square
+  const WorldPlacementResult placed = place_world(scene.camera, scene.reference, {});
+  ASSERT_TRUE(placed.usable) << placed.message;
+
+  for (unsigned seed = 0; seed < 8; ++seed) {
+    SCOPED_TRACE(seed);
+    const ScatteredHeap heap(seed);
+    const WorldPlacementResult again = place_world(scene.camera, scene.reference, {});
+    EXPECT_EQ(again.camera_from_world.rotation.coeffs(),
+              placed.camera_from_world.rotation.coeffs());
+    EXPECT_EQ(again.camera_from_world.translation_m, placed.camera_from_world.translation_m);
+    EXPECT_EQ(again.covariance, placed.covariance);
+    EXPECT_EQ(again.reference_survey_sigma_m, placed.reference_survey_sigma_m);
+  }
 }
 
 TEST(PlaceSheet, RefusesWhatIsNoSheet) {
