@@ -46,16 +46,17 @@ HWY_INLINE Vector<L> set(double number) {
 template <class L>
 HWY_INLINE Vector3<Vector<L>> scaled_sum(const Eigen::Vector3d& a, const Vector<L>& b,
                                          const Vector3<Vector<L>>& c) {
-  return {hn::MulAdd(set<L>(a.x()), b, c.x), hn::MulAdd(set<L>(a.y()), b, c.y),
-          hn::MulAdd(set<L>(a.z()), b, c.z)};
+  return {rounded_mul_add(set<L>(a.x()), b, c.x), rounded_mul_add(set<L>(a.y()), b, c.y),
+          rounded_mul_add(set<L>(a.z()), b, c.z)};
 }
 
 /// Returns a . b + c.
 template <class L>
 HWY_INLINE Vector<L> product_sum(const Eigen::Vector3d& a, const Vector3<Vector<L>>& b,
                                  const Vector<L>& c) {
-  return hn::MulAdd(set<L>(a.z()), b.z,
-                    hn::MulAdd(set<L>(a.y()), b.y, hn::MulAdd(set<L>(a.x()), b.x, c)));
+  return rounded_mul_add(
+      set<L>(a.z()), b.z,
+      rounded_mul_add(set<L>(a.y()), b.y, rounded_mul_add(set<L>(a.x()), b.x, c)));
 }
 
 /// Returns A b + c.
@@ -96,8 +97,9 @@ HWY_INLINE void add_spring_products(std::span<const SpringJacobian> springs,
       const Vector<L> stretching = product_sum<L>(spring.direction, rate, hn::Zero(d));
       const Vector<L> more =
           hn::LoadU(d, tension_n + L::kCount * static_cast<std::ptrdiff_t>(n) + lane);
-      const Vector<L> tension = product_sum<L>(
-          spring.w_n_per_m, along, hn::MulAdd(set<L>(spring.damping_ns_per_m), stretching, more));
+      const Vector<L> tension =
+          product_sum<L>(spring.w_n_per_m, along,
+                         rounded_mul_add(set<L>(spring.damping_ns_per_m), stretching, more));
       const auto turned = set<L>(spring.tension_ratio_n_per_m) * along;
       const auto pull = scaled_sum<L>(spring.direction, tension, turned);
       store(load(d, action, a) + pull, d, action, a);

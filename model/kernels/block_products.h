@@ -32,7 +32,7 @@ struct ForceBlock {
 };
 
 // These functions add products of such derivatives with changes in every lane to `action`. As in
-// TangentSweep the products may be fused with sums.
+// TangentSweep no product is fused with a sum.
 
 template <class L>
 void add_products(std::span<const MotionBlock> blocks, const LaneVectors<L>& position_m,

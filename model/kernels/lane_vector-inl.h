@@ -90,6 +90,13 @@ HWY_INLINE V minus_product(const V& c, const V& a, const V& b) {
     return hn::Sub(c, hn::Mul(a, b));
 }
 
+/// Returns a b + c, the product rounded first: the same bits on every instruction set, in `float`
+/// too. Derivatives are made of these, because where a fit ends depends on their last bits.
+template <class V>
+HWY_INLINE V rounded_mul_add(const V& a, const V& b, const V& c) {
+  return hn::Add(hn::Mul(a, b), c);
+}
+
 template <class V>
 HWY_INLINE Vector3<V> mul_add(const V& a, const Vector3<V>& b, const Vector3<V>& c) {
   return {mul_add(a, b.x, c.x), mul_add(a, b.y, c.y), mul_add(a, b.z, c.z)};

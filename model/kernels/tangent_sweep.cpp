@@ -141,13 +141,13 @@ struct Motion {
 };
 
 template <class V>
-HWY_INLINE Vector3<V> fused(const V& a, const Vector3<V>& b, const Vector3<V>& c) {
-  return {hn::MulAdd(a, b.x, c.x), hn::MulAdd(a, b.y, c.y), hn::MulAdd(a, b.z, c.z)};
+HWY_INLINE Vector3<V> rounded_mul_add(const V& a, const Vector3<V>& b, const Vector3<V>& c) {
+  return {rounded_mul_add(a, b.x, c.x), rounded_mul_add(a, b.y, c.y), rounded_mul_add(a, b.z, c.z)};
 }
 
 template <class V>
-HWY_INLINE V fused_dot(const Vector3<V>& a, const Vector3<V>& b) {
-  return hn::MulAdd(a.z, b.z, hn::MulAdd(a.y, b.y, hn::Mul(a.x, b.x)));
+HWY_INLINE V rounded_dot(const Vector3<V>& a, const Vector3<V>& b) {
+  return rounded_mul_add(a.z, b.z, rounded_mul_add(a.y, b.y, hn::Mul(a.x, b.x)));
 }
 
 /// The derivatives of the springs that leave eight neighbouring vertices.
@@ -232,8 +232,8 @@ HWY_INLINE void sweep_tangents(const TangentArrays<L>& arrays, const Sink& sink)
       const Vector3<V> u{at(chunk.direction[type][0]), at(chunk.direction[type][1]),
                          at(chunk.direction[type][2])};
       const Vector3<V> w{at(chunk.w[type][0]), at(chunk.w[type][1]), at(chunk.w[type][2])};
-      V tension =
-          hn::MulAdd(hn::Set(d, damping_ns_per_m[type]), fused_dot(u, rate), fused_dot(w, along));
+      V tension = rounded_mul_add(hn::Set(d, damping_ns_per_m[type]), rounded_dot(u, rate),
+                                  rounded_dot(w, along));
       if constexpr (constants != Constants::still) {
         V natural = by_natural[type], stiffness = by_stiffness[type];
         if constexpr (constants == Constants::change_by_factors) {
@@ -242,11 +242,11 @@ HWY_INLINE void sweep_tangents(const TangentArrays<L>& arrays, const Sink& sink)
           stiffness = hn::Mul(stiffness,
                               hn::Set(d, static_cast<Number>(from[type].stiffness_factor[vertex])));
         }
-        tension = hn::MulAdd(at(chunk.elongation[type]), stiffness, tension);
-        tension = hn::MulAdd(at(chunk.stretching[type]), by_damping[type], tension);
-        tension = hn::NegMulAdd(at(chunk.stiffness[type]), natural, tension);
+        tension = rounded_mul_add(at(chunk.elongation[type]), stiffness, tension);
+        tension = rounded_mul_add(at(chunk.stretching[type]), by_damping[type], tension);
+        tension = hn::Sub(tension, hn::Mul(at(chunk.stiffness[type]), natural));
       }
-      return fused(tension, u, at(chunk.tension_ratio[type]) * along);
+      return rounded_mul_add(tension, u, at(chunk.tension_ratio[type]) * along);
     };
     sweep_rows<L>(arrays.mesh, lane, arrays.scratch, here_at, pull_to, sink);
   }
@@ -295,9 +295,10 @@ HWY_INLINE void step_tangents(const TangentArrays<L>& arrays, const TangentEuler
     const Vector3<V> sum = any_effect ? springs + load(d, to.effect_force_n, self) : springs;
     const Vector3<V> gravity = load(d, to.gravity_m_per_s2, self % L::kCount);
     const V inverse_mass = hn::Set(d, static_cast<Number>(to.inverse_mass_per_kg[vertex]));
-    const Vector3<V> velocity = fused(h, fused(inverse_mass, sum, gravity), motion.velocity);
+    const Vector3<V> velocity =
+        rounded_mul_add(h, rounded_mul_add(inverse_mass, sum, gravity), motion.velocity);
     store(velocity, d, to.velocity_m_per_s, self);
-    store(fused(h, velocity, motion.position), d, to.position_m, self);
+    store(rounded_mul_add(h, velocity, motion.position), d, to.position_m, self);
   });
 }
 
@@ -347,15 +348,16 @@ void take_back(const MotionArrays& arrays) {
     const auto at = [&](const double* array)
                         HWY_ATTR CLOTHFIT_INLINE { return hn::LoadU(d, array + e); };
     const V h = hn::Set(d, arrays.time_step_s);
-    const V by_velocity = hn::MulAdd(h, at(arrays.by_position), at(arrays.by_velocity));
+    const V by_velocity = rounded_mul_add(h, at(arrays.by_position), at(arrays.by_velocity));
     const V by_force = hn::Mul(hn::Mul(h, at(arrays.inverse_mass_per_kg)), by_velocity);
     const V acceleration =
-        hn::MulSub(hn::Sub(at(arrays.driven_velocity_m_per_s), at(arrays.velocity_m_per_s)),
-                   hn::Set(d, 1 / arrays.time_step_s), hn::Set(d, arrays.gravity_m_per_s2));
+        hn::Sub(hn::Mul(hn::Sub(at(arrays.driven_velocity_m_per_s), at(arrays.velocity_m_per_s)),
+                        hn::Set(d, 1 / arrays.time_step_s)),
+                hn::Set(d, arrays.gravity_m_per_s2));
     hn::StoreU(by_velocity, d, arrays.by_velocity + e);
     hn::StoreU(by_force, d, arrays.by_force + e);
     // F / m is the acceleration less gravity.
-    hn::StoreU(hn::NegMulAdd(by_force, acceleration, at(arrays.by_mass)), d, arrays.by_mass + e);
+    hn::StoreU(hn::Sub(at(arrays.by_mass), hn::Mul(by_force, acceleration)), d, arrays.by_mass + e);
   });
 }
 

@@ -21,8 +21,8 @@ namespace clothfit {
 ///
 /// Directions lie in exact or in fast lanes; the state is in double precision.
 ///
-/// Products may be fused with sums, so derivatives differ in their last bits between processors
-/// with and without such an operation.
+/// No product is fused with a sum, so that every instruction set gives the same bits. Where a fit
+/// ends depends on them.
 ///
 /// Holds scratch memory: one object per thread.
 class TangentSweep {

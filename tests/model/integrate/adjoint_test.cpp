@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "model/effects/registry.h"
+#include "tests/model/instruction_sets.h"
 #include "tests/model/swing.h"
 
 namespace clothfit {
@@ -102,6 +103,29 @@ TEST(Adjoint, EqualsTheTangentAtTheStrainLimit) {
       swing.set.springs.critical_elongation.fill(0.03);
       expect_adjoint_to_equal_tangent(swing, uniform);
     }
+  }
+}
+
+TEST(Adjoint, IsTheSameBitsOnEveryInstructionSet) {
+  Uniform uniform(3);
+  Swing swing(uniform);
+  swing.cloth.held.back().motion = nullptr;
+  const Cost cost(swing, uniform);
+  const auto gradient = [&] {
+    return simulate_with_gradient(swing.cloth, swing.set, swing.schedule, {}, cost.by_position())
+        .gradient;
+  };
+  const CostGradient here = gradient();
+  for (const InstructionSet& set : instruction_sets()) {
+    SCOPED_TRACE(set);
+    const OnInstructionSet on(set);
+    const CostGradient there = gradient();
+    EXPECT_EQ(there.by_springs.natural_length_m, here.by_springs.natural_length_m);
+    EXPECT_EQ(there.by_springs.stiffness_n_per_m, here.by_springs.stiffness_n_per_m);
+    EXPECT_EQ(there.by_springs.damping_ns_per_m, here.by_springs.damping_ns_per_m);
+    EXPECT_EQ(there.by_mass_kg, here.by_mass_kg);
+    EXPECT_EQ(there.by_start_position, here.by_start_position);
+    EXPECT_EQ(there.by_start_velocity, here.by_start_velocity);
   }
 }
 

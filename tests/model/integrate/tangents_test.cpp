@@ -155,6 +155,33 @@ TEST(Tangents, InSinglePrecisionAreRightToFiveDigitsOnEveryInstructionSet) {
   }
 }
 
+TEST(Tangents, AreTheSameBitsOnEveryInstructionSet) {
+  for (const StrainLimitMode mode : {StrainLimitMode::off, StrainLimitMode::consistent})
+    for (const bool fast : {false, true}) {
+      SCOPED_TRACE(testing::Message() << "mode " << static_cast<int>(mode) << ", fast " << fast);
+      Uniform uniform(3);
+      Swing swing(uniform);
+      swing.cloth.strain_limit.mode = mode;
+      swing.set.springs.critical_elongation.fill(0.03);
+      add_effect(swing.cloth, "wind", "test");
+      swing.set.effects = {{0.1, 0.2, -0.3, 0.4}};
+      swing.schedule.fast_derivatives = fast;
+      std::vector<Direction> directions;
+      for (int d = 0; d < 17; ++d) directions.push_back(random_direction(swing.cloth, uniform));
+      const auto tangents = [&] {
+        return simulate_with_tangents(swing.cloth, swing.set, directions, swing.schedule)
+            .position_tangent;
+      };
+
+      const auto here = tangents();
+
+      for (const InstructionSet& set : instruction_sets()) {
+        const OnInstructionSet on(set);
+        EXPECT_TRUE(tangents() == here) << set;
+      }
+    }
+}
+
 TEST(Tangents, InSinglePrecisionAreRightToFiveDigitsAtTheStrainLimit) {
   Uniform uniform(9);
   Swing swing(uniform);
