@@ -3,10 +3,13 @@
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
+#include <Eigen/Core>
+#include <cstddef>
 #include <exception>
 #include <filesystem>
 #include <memory>
 #include <new>
+#include <opencv2/core/utility.hpp>
 #include <string>
 #include <utility>
 
@@ -34,6 +37,14 @@ class ShownMessage : public spdlog::custom_flag_formatter {
     return std::make_unique<ShownMessage>();
   }
 };
+
+/// OpenCV's code for newer processors rounds otherwise than that which every processor has. Eigen
+/// cuts long sums by the size of the caches.
+void round_alike_on_every_processor() {
+  cv::setUseOptimized(false);
+  constexpr std::ptrdiff_t kKiB = 1024;
+  Eigen::setCpuCacheSizes(32 * kKiB, 1024 * kKiB, 8192 * kKiB);
+}
 
 /// Parses the command line, runs the verb, and turns exceptions into messages and exit codes.
 int run(int argc, char** argv) {
@@ -92,6 +103,7 @@ int main(int argc, char** argv) {
   spdlog::set_formatter(std::move(formatter));
   // Ceres logs what its results say too.
   FLAGS_minloglevel = google::GLOG_FATAL;
+  round_alike_on_every_processor();
   try {
     return run(argc, argv);
   } catch (const std::exception& error) {

@@ -122,7 +122,9 @@ std::optional<ShapesFromPixels> shapes_from_pixels(const std::vector<Observation
     ceres::Problem problem;
     problem.AddResidualBlock(new FrameCost(frame), nullptr, at_nodes.data());
     ceres::Solver::Options options;
-    options.linear_solver_type = ceres::DENSE_NORMAL_CHOLESKY;
+    // As in refine(): the dense solvers' sums depend on the processor's caches.
+    options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
+    options.sparse_linear_algebra_library_type = ceres::EIGEN_SPARSE;
     options.logging_type = ceres::SILENT;
     options.max_num_iterations = 200;
     options.function_tolerance = 1e-6;

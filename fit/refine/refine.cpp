@@ -354,7 +354,9 @@ Round solve(const ObjectiveMaker& make_objective, std::unique_ptr<Objective>& ob
   }
 
   ceres::Solver::Options options;
-  options.linear_solver_type = ceres::DENSE_NORMAL_CHOLESKY;
+  // The dense solvers sum in an order that depends on the size of the processor's caches.
+  options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
+  options.sparse_linear_algebra_library_type = ceres::EIGEN_SPARSE;
   options.logging_type = ceres::SILENT;
   options.max_num_iterations = refine_options.iterations;
   options.function_tolerance = refine_options.least_gain;

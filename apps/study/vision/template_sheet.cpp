@@ -199,6 +199,7 @@ std::vector<Eigen::Matrix3Xd> follow_template(const TemplateSheet& sheet, const 
     }
     ceres::Solver::Options options;
     options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
+    options.sparse_linear_algebra_library_type = ceres::EIGEN_SPARSE;  // not one with a BLAS
     options.logging_type = ceres::SILENT;
     options.max_num_iterations = 200;
     options.function_tolerance = 1e-6;
