@@ -39,19 +39,23 @@ struct OddDot {
              .per_light_scale = 0.1F};
   }
 
+  PixelBox box() const {
+    return {.first = picture.data(),
+            .row_bytes = kColumns,
+            .columns = kColumns,
+            .rows = kRows,
+            .left = -11,
+            .top = -10};
+  }
+  DotReach reach() const {
+    return {.x = shape.x, .y = shape.y, .inverse = shape.inverse, .beyond_px = 3, .ratio = 1.8F};
+  }
   DotPixels pixels() const {
     DotPixels result;
-    gather_dot(
-        {.first = picture.data(),
-         .row_bytes = kColumns,
-         .columns = kColumns,
-         .rows = kRows,
-         .left = -11,
-         .top = -10},
-        {.x = shape.x, .y = shape.y, .inverse = shape.inverse, .beyond_px = 3, .ratio = 1.8F},
-        result);
+    gather_dot(box(), reach(), result);
     return result;
   }
+  DarkSums dark() const { return dark_sums(box(), reach(), 180, false); }
 
   std::vector<std::uint8_t> picture;
   DotShape shape;
@@ -181,6 +185,8 @@ TEST(DotKernels, GivesTheSameBitsOnEachInstructionSet) {
   const DotResiduals residuals = dot_residuals(pixels, rows);
   const DotEquations equations = dot_equations(pixels, kWeights, rows);
   const DotWaves waves = dot_waves(dot.shape, pixels, rows);
+  const DarkSums dark = dot.dark();
+  ASSERT_GT(dark.weight, 0);
   for (const InstructionSet& set : instruction_sets()) {
     SCOPED_TRACE(set.name());
     const OnInstructionSet only(set);
@@ -200,7 +206,17 @@ TEST(DotKernels, GivesTheSameBitsOnEachInstructionSet) {
     EXPECT_EQ(again.gradient, equations.gradient);
     const DotWaves other = dot_waves(dot.shape, same, here);
     EXPECT_EQ(other.square_residuals, waves.square_residuals);
-    EXPECT_EQ(other.waves[2][1].score, waves.waves[2][1].score);
+    for (size_t k = 0; k < 3; ++k)
+      for (size_t part = 0; part < 2; ++part) {
+        EXPECT_EQ(other.waves[k][part].score, waves.waves[k][part].score);
+        EXPECT_EQ(other.waves[k][part].information, waves.waves[k][part].information);
+        EXPECT_EQ(other.waves[k][part].plain_score, waves.waves[k][part].plain_score);
+        EXPECT_EQ(other.waves[k][part].plain_information, waves.waves[k][part].plain_information);
+      }
+    const DarkSums dark_here = dot.dark();
+    EXPECT_EQ(dark_here.weight, dark.weight);
+    EXPECT_EQ(dark_here.x, dark.x);
+    EXPECT_EQ(dark_here.y, dark.y);
   }
 }
 
