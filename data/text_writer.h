@@ -8,7 +8,7 @@ namespace clothfit {
 
 /// What stands at a path before it is written.
 enum class WriteStart {
-  replace,  ///< nothing or a file, which is written anew
+  replace,  ///< nothing or a file, which is written from its beginning
   create,   ///< nothing; a file or a link there is refused
 };
 
@@ -21,7 +21,7 @@ class TextWriter {
   ~TextWriter();
 
   void append(std::string_view text);
-  /// Writes what is left; without it the file is not whole.
+  /// Writes what was held back; without it the file is not whole.
   void close();
 
   class Sink;

@@ -118,7 +118,7 @@ TEST(CopyRecording, CopiesAFileThatTwoPartsNameForEach) {
   const Recording copied = copy_recording(original, scratch.path());
 
   EXPECT_NE(copied.tracks2d.at("front"), copied.markers_file);
-  fs::remove(copied.tracks2d.at("front"));  // as tracking anew does
+  fs::remove(copied.tracks2d.at("front"));  // as tracking it again does
   EXPECT_TRUE(fs::exists(copied.markers_file));
 }
 
