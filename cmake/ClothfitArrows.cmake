@@ -37,7 +37,7 @@ set(CLOTHFIT_ARROWS
   "model/integrate      -> data/input_error.h data/algebra model/kernels model/cloth
                            model/effects model/rest"
   "fit/interface        -> data model/fabric"
-  "fit/jobs             -> data"
+  "fit/jobs             -> data fit/interface/option_limits.h"
   "fit/observe          -> data/algebra data calib/camera model/topology fit/interface
                            fit/jobs"
   "fit/measurement_effects -> data model/cloth model/effects fit/observe"

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "data/input_error.h"
+#include "fit/affordable.h"
 #include "fit/cost/report_residuals.h"
 #include "fit/identify.h"
 #include "fit/jobs/stop_token.h"
@@ -327,12 +328,16 @@ void identify_all(const FitInput& input, const FitProblem& problem, const FitOpt
 
 }  // namespace
 
-FitReport fit(const FitInput& input, const FitOptions& options, const ProgressCallback& progress) {
-  options.validate();
+FitReport fit(const FitInput& input, const FitOptions& asked_options,
+              const ProgressCallback& progress) {
+  asked_options.validate();
+  FitOptions options = asked_options;
+  options.is_cancelled = throwing_check(asked_options.is_cancelled);
   const auto began = std::chrono::steady_clock::now();
   const ThreadLimit threads(options.threads);
   const auto [columns, rows] = mesh_of(input.recording.cloth, options);
   const FitProblem problem = make_problem(input, options, columns, rows);
+  require_affordable(input, problem, options);
   FitReport report = report_of(input, problem, options);
   try {
     if (options.forecast)

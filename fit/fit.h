@@ -13,7 +13,8 @@ namespace clothfit {
 
 /// Identifies the simulator that moves like the recording: evolutionary search, then refinement
 /// with a growing horizon, then uncertainty and the error on held-out frames. Throws InputError
-/// for a recording that cannot be fitted as it stands.
+/// for a recording that cannot be fitted as it stands, and for work or memory beyond the limits
+/// (fit/affordable.h).
 FitReport fit(const FitInput& input, const FitOptions& options, const ProgressCallback& progress);
 
 /// The findings of a fit elsewhere: parameters by name, and where markers are seen.

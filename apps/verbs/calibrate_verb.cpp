@@ -10,13 +10,13 @@
 #include "apps/terminal/grid_size.h"
 #include "apps/terminal/number_text.h"
 #include "apps/terminal/progress_line.h"
+#include "apps/terminal/result_folder.h"
 #include "apps/terminal/say.h"
 #include "apps/terminal/text_table.h"
 #include "apps/verbs/verb.h"
 #include "data/file_name.h"
 #include "data/input_error.h"
 #include "data/number_text.h"
-#include "data/output_folder.h"
 
 namespace clothfit {
 namespace {
@@ -105,7 +105,7 @@ int run_calibrate(const CalibrateVerbOptions& options) {
                            ? "no camera has stills to calibrate from"
                            : "camera '" + options.name + "' has no stills to calibrate from",
                        "`calibration: {images: FOLDER, board: ...}` in a camera's entry");
-    OutputFolder out(out_folder(options.out, recording.name + ".calibration"),
+    ResultFolder out(out_folder(options.out, recording.name + ".calibration"),
                      input_paths(recording));
     {
       ProgressLine line;
@@ -123,7 +123,7 @@ int run_calibrate(const CalibrateVerbOptions& options) {
                      "--board with them", "for example --board chessboard:9x6:0.025");
   const CalibrationStills stills{.images = options.input, .board = *parse_board(options.board)};
   const std::string name = options.name.empty() ? "camera" : options.name;
-  OutputFolder out(out_folder(options.out, name + ".calibration"), {options.input});
+  ResultFolder out(out_folder(options.out, name + ".calibration"), {options.input});
   {
     ProgressLine line;
     calibrations.push_back(calibrate_from_stills(name, stills, calibrate_options, watch(line)));

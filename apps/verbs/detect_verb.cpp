@@ -14,12 +14,12 @@
 #include "apps/terminal/number_text.h"
 #include "apps/terminal/option_flags.h"
 #include "apps/terminal/progress_line.h"
+#include "apps/terminal/result_folder.h"
 #include "apps/terminal/say.h"
 #include "apps/terminal/text_table.h"
 #include "apps/verbs/seen_summary.h"
 #include "apps/verbs/verb.h"
 #include "data/finding_json.h"
-#include "data/output_folder.h"
 #include "fit/jobs/thread_limit.h"
 #include "vision/encode/encode_picture.h"
 
@@ -88,7 +88,7 @@ int run_detect(const DetectVerbOptions& options) {
   const ThreadLimit limit(options.threads);
   const fs::path images = fs::absolute(options.images).lexically_normal();
   const fs::path named = images.has_filename() ? images : images.parent_path();
-  OutputFolder out(out_folder(options.out, named.filename().string() + ".detections"), {images});
+  ResultFolder out(out_folder(options.out, named.filename().string() + ".detections"), {images});
   LookResult result;
   {
     ProgressLine line;

@@ -21,6 +21,7 @@
 #include "apps/terminal/grid_size.h"
 #include "apps/terminal/interrupt.h"
 #include "apps/terminal/progress_line.h"
+#include "apps/terminal/result_folder.h"
 #include "apps/terminal/say.h"
 #include "apps/terminal/text_table.h"
 #include "apps/terminal/version.h"
@@ -28,7 +29,6 @@
 #include "apps/verbs/verb.h"
 #include "data/input_error.h"
 #include "data/number_text.h"
-#include "data/output_folder.h"
 #include "data/text_file.h"
 #include "fit/diagnosis/diagnose.h"
 #include "fit/verdict/verdict.h"
@@ -158,7 +158,8 @@ int run_diagnose(DiagnoseFlags flags, const std::string& command) {
   for (const std::string& prior : flags.priors) fit.priors.push_back(parse_prior(prior));
   flags.options.plants = parse_plant(flags.plant);
   flags.options.reinject = flags.options.plants > 0;
-  flags.options.is_enough = interrupted;
+  flags.options.is_enough = [] { return interrupted() && !terminated(); };
+  fit.is_cancelled = interrupted;
   fit.loss = flags.loss == "squared" ? Loss::squared : Loss::huber;
   flags.options.validate();
   if (flags.whole && flags.held_out.empty())
@@ -169,7 +170,7 @@ int run_diagnose(DiagnoseFlags flags, const std::string& command) {
   std::vector<fs::path> read;
   for (const Recording& recording : recordings)
     std::ranges::copy(input_paths(recording), std::back_inserter(read));
-  OutputFolder out(out_folder(flags.out, recordings.front().name + ".diagnosis"), read);
+  ResultFolder out(out_folder(flags.out, recordings.front().name + ".diagnosis"), read);
   Diagnosis diagnosis;
   std::vector<Findings> warnings;
   {

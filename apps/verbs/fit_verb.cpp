@@ -21,6 +21,7 @@
 #include "apps/terminal/grid_size.h"
 #include "apps/terminal/interrupt.h"
 #include "apps/terminal/progress_line.h"
+#include "apps/terminal/result_folder.h"
 #include "apps/terminal/say.h"
 #include "apps/terminal/text_table.h"
 #include "apps/terminal/version.h"
@@ -28,7 +29,6 @@
 #include "apps/verbs/verb.h"
 #include "data/input_error.h"
 #include "data/number_text.h"
-#include "data/output_folder.h"
 #include "data/text_file.h"
 
 namespace clothfit {
@@ -134,6 +134,7 @@ std::optional<double> areal_density(const Recording& recording) {
 int run_fit(const FitVerbOptions& given_options) {
   FitVerbOptions options = given_options;
   const auto begin = std::chrono::steady_clock::now();
+  options.fit.is_cancelled = interrupted;
   options.fit.validate();
   require_new_checkpoint(options.fit);
   const Recording given = typed_recording(options.recording, options.allow_outside);
@@ -142,7 +143,7 @@ int run_fit(const FitVerbOptions& given_options) {
     options.fit.forecast = at_density(std::move(*options.fit.forecast), areal_density(given));
   std::vector<fs::path> inputs = input_paths(given);
   inputs.insert(inputs.end(), {options.fit.checkpoint, options.earlier_fit});
-  OutputFolder out(out_folder(options.out, given.name + ".fit"), inputs);
+  ResultFolder out(out_folder(options.out, given.name + ".fit"), inputs);
   CheckedInput checked;
   FitReport report;
   {

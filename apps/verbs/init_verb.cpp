@@ -8,11 +8,11 @@
 #include "apps/terminal/exit_code.h"
 #include "apps/terminal/number_text.h"
 #include "apps/terminal/progress_line.h"
+#include "apps/terminal/result_folder.h"
 #include "apps/terminal/say.h"
 #include "apps/verbs/verb.h"
 #include "data/input_error.h"
 #include "data/number_text.h"
-#include "data/output_folder.h"
 #include "data/text_file.h"
 
 namespace clothfit {
@@ -136,7 +136,7 @@ int run_init(InitVerbOptions options) {
   const fs::path folder = new_folder(options, usual);
   std::vector<fs::path> inputs = options.images;
   inputs.push_back(options.sheet);
-  OutputFolder out(folder, inputs);
+  ResultFolder out(folder, inputs);
   if (options.sheet.empty())
     refuse_without_sheet(
         {options.images.front(), look_over(options.images.front(), {.boards = false})});

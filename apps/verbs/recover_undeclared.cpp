@@ -6,6 +6,7 @@
 #include "apps/report/study/undeclared_tables.h"
 #include "apps/terminal/csv_table.h"
 #include "apps/terminal/exit_code.h"
+#include "apps/terminal/interrupt.h"
 #include "apps/terminal/progress_line.h"
 #include "apps/terminal/say.h"
 #include "apps/terminal/text_table.h"
@@ -110,7 +111,8 @@ void add_undeclared_options(Verb verb, UndeclaredFlags& flags) {
 }
 
 int run_undeclared(const UndeclaredFlags& flags, const UndeclaredRun& asked) {
-  const UndeclaredOptions options = options_of(flags, asked);
+  UndeclaredOptions options = options_of(flags, asked);
+  options.diagnosis.fit.is_cancelled = options.scene.is_cancelled = terminated;
   options.validate();
   ResumableRun run(asked.out, "recover", asked.journal);
   Journal journal(run.journal(), options.key(),

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 
@@ -9,6 +10,7 @@
 #include "apps/terminal/csv_table.h"
 #include "apps/terminal/exit_code.h"
 #include "apps/terminal/grid_size.h"
+#include "apps/terminal/interrupt.h"
 #include "apps/terminal/progress_line.h"
 #include "apps/terminal/say.h"
 #include "apps/terminal/text_table.h"
@@ -45,8 +47,9 @@ std::string check_picture_size(const std::string& text) {
 
 RecoverOptions options_of(const RecoverFlags& flags) {
   RecoverOptions options = flags.study;
-  options.scene.frames =
-      1 + static_cast<int>(std::lround(flags.seconds * options.scene.frame_rate_hz));
+  // Beyond any range that the scene allows the product is cut: integers would overflow.
+  const double frames = std::min(std::round(flags.seconds * options.scene.frame_rate_hz), 1e9);
+  options.scene.frames = frames >= 0 ? 1 + static_cast<int>(frames) : 0;
   options.scene.noise_m = 1e-3 * flags.noise_mm;
   options.fit.mesh_columns = options.fit.mesh_rows = flags.mesh;
   const bool of_pixels =
@@ -85,7 +88,8 @@ UndeclaredRun undeclared_run(RecoverFlags flags, const Verb& verb, const std::st
 }
 
 int run_recover(const RecoverFlags& flags, const std::string& command) {
-  const RecoverOptions options = options_of(flags);
+  RecoverOptions options = options_of(flags);
+  options.fit.is_cancelled = options.scene.is_cancelled = terminated;
   options.validate();
   ResumableRun run(flags.out, "recover", flags.journal);
   Journal journal(run.journal(), options.key(),

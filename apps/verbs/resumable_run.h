@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "data/output_folder.h"
+#include "apps/terminal/result_folder.h"
 
 namespace clothfit {
 
@@ -13,7 +13,7 @@ namespace clothfit {
 class ResumableRun {
  public:
   /// `out` and `journal` are as asked for, or empty. A journal of its own has the name of the
-  /// results with `ending`. Throws InputError as OutputFolder does.
+  /// results with `ending`. Throws InputError as ResultFolder does.
   /// `inputs` are what the study reads.
   ResumableRun(const std::filesystem::path& out, const std::string& default_out,
                const std::filesystem::path& journal, std::vector<std::filesystem::path> inputs = {},
@@ -32,7 +32,7 @@ class ResumableRun {
   void print_report_path() const;
 
  private:
-  OutputFolder out_;
+  ResultFolder out_;
   bool own_journal_;
   std::filesystem::path journal_;
 };

@@ -9,11 +9,11 @@
 #include "apps/terminal/exit_code.h"
 #include "apps/terminal/grid_size.h"
 #include "apps/terminal/number_text.h"
+#include "apps/terminal/result_folder.h"
 #include "apps/terminal/say.h"
 #include "apps/verbs/verb.h"
 #include "data/input_error.h"
 #include "data/number_text.h"
-#include "data/output_folder.h"
 #include "data/text_file.h"
 #include "vision/print/draw_sheet.h"
 
@@ -140,7 +140,7 @@ int run_sheet(const SheetVerbOptions& options) {
   if (fs::exists(folder))
     throw InputError(folder.string(), "is there already", "a folder that does not exist yet",
                      "give another one with --out");
-  OutputFolder out(folder, {});
+  ResultFolder out(folder, {});
   write_sheet_pdf(sheet, options.draw, out.path() / "sheet.pdf");
   write_sheet_svg(sheet, options.draw, out.path() / "sheet.svg");
   write_sheet_png(sheet, options.draw, out.path() / "sheet.png");

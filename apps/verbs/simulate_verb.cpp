@@ -7,12 +7,14 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <utility>
 
 #include "apps/terminal/exit_code.h"
 #include "apps/terminal/interrupt.h"
 #include "apps/terminal/json_file.h"
 #include "apps/terminal/number_text.h"
 #include "apps/terminal/progress_line.h"
+#include "apps/terminal/result_folder.h"
 #include "apps/terminal/say.h"
 #include "apps/terminal/text_table.h"
 #include "apps/terminal/version.h"
@@ -21,10 +23,12 @@
 #include "apps/verbs/verb.h"
 #include "data/input_error.h"
 #include "data/number_text.h"
-#include "data/output_folder.h"
 #include "fit/preflight/obstacle_checks.h"
 #include "fit/preflight/preflight.h"
+#include "fit/problem/memory_limits.h"
 #include "fit/problem/simulation.h"
+#include "fit/problem/time_steps.h"
+#include "fit/problem/work_limits.h"
 #include "model/cloth/stability.h"
 #include "model/fabric/fabric_conversion.h"
 #include "model/integrate/divergence.h"
@@ -35,10 +39,8 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-/// A run keeps at most this many numbers of positions: some gigabytes.
-constexpr double kMostKeptNumbers = 1e9;
-/// A run takes some days at most; more is a slip in a step or a stiffness.
-constexpr double kMostSpringSteps = 1e13;
+/// More files make a folder that few programs open.
+constexpr size_t kMostObjFiles = 100'000;
 
 struct SimulateVerbOptions {
   ModelRequest request;
@@ -54,7 +56,7 @@ struct StepChoice {
   double stable_s = 0;     ///< largest stable one
   std::string source;      ///< "stability", "model" or "--time-step"
   int substeps = 0;        ///< in the longest frame interval
-  double steps = 0;        ///< in all
+  double steps = 0;        ///< in all, the relaxation of a start at rest left out
   double longest_s = 0;    ///< of the steps taken: frame intervals are cut evenly
   bool stable() const { return longest_s < stable_s; }
 };
@@ -69,11 +71,11 @@ StepChoice choose_step(const Simulation& simulation, const ModelDescription& mod
                                            : default_time_step_s(simulation);
   const Schedule schedule{.frame_time_s = simulation.frame_time_s,
                           .time_step_s = choice.time_step_s};
+  choice.steps = schedule.all_steps();
   for (size_t f = 1; f < schedule.frame_time_s.size(); ++f) {
     const int substeps = schedule.substeps(static_cast<int>(f));
     const double interval_s = schedule.frame_time_s[f] - schedule.frame_time_s[f - 1];
     choice.substeps = std::max(choice.substeps, substeps);
-    choice.steps += substeps;
     choice.longest_s = std::max(choice.longest_s, interval_s / substeps);
   }
   return choice;
@@ -97,22 +99,40 @@ void require_possible(const StepChoice& choice, const Simulation& simulation,
         fmt::format("--time-step {}, or leave it out; --allow-unstable runs it all the same",
                     rounded_down(choice.stable_s)));
   }
-  const double spring_steps = choice.steps * static_cast<double>(simulation.cloth.spring_count());
-  if (spring_steps > kMostSpringSteps)
-    throw InputError(where,
-                     fmt::format("{:.3g} time steps of {} springs would take days", choice.steps,
-                                 simulation.cloth.spring_count()),
-                     fmt::format("{:.0e} spring steps at most", kMostSpringSteps),
-                     "a shorter duration, a coarser mesh, or softer springs");
-  const double numbers = 3.0 * simulation.cloth.mesh.vertex_count() *
-                         static_cast<double>(simulation.frame_time_s.size());
-  if (numbers > kMostKeptNumbers)
+  if (choice.time_step_s < choice.stable_s / (kFinestStep * kStabilityMargin))
     throw InputError(
-        model.where(0),
-        fmt::format("{} frames of {} vertices do not fit into memory",
-                    simulation.frame_time_s.size(), simulation.cloth.mesh.vertex_count()),
-        fmt::format("{:.0e} coordinates at most", kMostKeptNumbers),
-        "a lower frame rate, a shorter duration, or a coarser mesh");
+        where,
+        fmt::format("steps of {} s are {:.2g} times as fine as stability asks for",
+                    significant(choice.time_step_s, 3), choice.stable_s / choice.time_step_s),
+        fmt::format("at most {:.0f} times", kFinestStep * kStabilityMargin),
+        fmt::format("a step near {} s, or leave it out",
+                    rounded_down(choice.stable_s / kStabilityMargin)));
+  const TimeSteps steps =
+      time_steps_of_run(simulation.cloth, simulation.parameters, choice.time_step_s);
+  require_affordable_run(
+      work_of_run(simulation.cloth, simulation.frame_time_s, steps,
+                  simulation.start == StartKind::at_rest, model.gravity_m_per_s2.norm()),
+      where, "a shorter duration, a coarser mesh, or softer springs");
+}
+
+/// Throws InputError for frames that fit into no memory, or no folder.
+void require_room(const Simulation& simulation, const ModelDescription& model,
+                  const std::vector<SimulationFormat>& formats) {
+  const auto wants = [&](SimulationFormat format) {
+    return std::ranges::find(formats, format) != formats.end();
+  };
+  const size_t frames = simulation.frame_time_s.size();
+  const int vertices = simulation.cloth.mesh.vertex_count();
+  // A frame's positions, and its part of a file that is made whole before it is written.
+  const double own = 3 * sizeof(double);
+  const double of_file = wants(SimulationFormat::pc2) || wants(SimulationFormat::gltf) ? own : 0;
+  require_memory((own + of_file) * static_cast<double>(frames) * vertices, model.where(0),
+                 fmt::format("{} frames of {} vertices", frames, vertices),
+                 "a lower frame rate, a shorter duration, or a coarser mesh");
+  if (wants(SimulationFormat::obj) && frames > kMostObjFiles)
+    throw InputError("--format", fmt::format("obj would write {} files", frames),
+                     fmt::format("at most {}", kMostObjFiles),
+                     "another format, such as csv or pc2, or a lower frame rate");
 }
 
 std::string node_text(const Mesh& mesh, int vertex) {
@@ -148,16 +168,19 @@ std::string divergence_text(const Divergence& divergence, const StepChoice& choi
 
 SimulateResult run_or_explain(const Simulation& simulation, const StepChoice& choice,
                               const ProgressCallback& progress) {
-  SimulateResult result = run(simulation, choice.time_step_s, progress);
+  SimulateResult result = run(simulation, choice.time_step_s, progress, interrupted);
   if (result.reason == StopReason::cancelled || interrupted()) throw Cancelled();
   if (result.usable()) return result;
   // A start that does not come to rest is examined as the sheet is let go.
   const bool never_rested = result.diverged_frame == 0;
+  result.position_m.clear();  // they are had again
+  result.position_m.shrink_to_fit();
   const ParameterSet parameters =
-      never_rested ? simulation.parameters : started(simulation, choice.time_step_s);
-  const std::optional<Divergence> divergence =
-      find_divergence(simulation.cloth, parameters,
-                      {.frame_time_s = simulation.frame_time_s, .time_step_s = choice.time_step_s});
+      never_rested ? simulation.parameters : started(simulation, choice.time_step_s, interrupted);
+  const std::optional<Divergence> divergence = find_divergence(
+      simulation.cloth, parameters,
+      {.frame_time_s = simulation.frame_time_s, .time_step_s = choice.time_step_s}, interrupted);
+  if (interrupted()) throw Cancelled();
   std::string text = never_rested ? "no simulation: the cloth did not come to rest"
                                   : "no simulation: the run diverged";
   if (never_rested && divergence) text += "; let go instead, it diverges too: ";
@@ -326,7 +349,7 @@ std::string step_text(const StepChoice& choice) {
 
 int run_simulate(const SimulateVerbOptions& options) {
   ModelDescription model;
-  std::optional<OutputFolder> out;
+  std::optional<ResultFolder> out;
   std::vector<std::string> files;
   std::string said;
   {
@@ -343,6 +366,7 @@ int run_simulate(const SimulateVerbOptions& options) {
     check_before(model, simulation);
     const StepChoice choice = choose_step(simulation, model, options.time_step_s);
     require_possible(choice, simulation, model, options.allow_unstable);
+    require_room(simulation, model, options.formats);
     said = fmt::format(
                "\nSimulated {}: {} frames, {} s, {} x {} nodes, {} springs\n", model.name,
                simulation.frame_time_s.size(),
@@ -350,7 +374,7 @@ int run_simulate(const SimulateVerbOptions& options) {
                simulation.cloth.mesh.columns, simulation.cloth.mesh.rows,
                simulation.cloth.spring_count()) +
            step_text(choice);
-    const SimulateResult result = run_or_explain(simulation, choice, progress);
+    SimulateResult result = run_or_explain(simulation, choice, progress);
     if (interrupted()) throw Cancelled();
     const double stretch = largest_stretch(simulation, result);
     if (stretch > kLengthBeyondReason)
@@ -363,8 +387,8 @@ int run_simulate(const SimulateVerbOptions& options) {
     write_model(model, out->path());
     // The model is read as it stands there, with the files of its held points.
     const ModelDescription written = read_model(out->path() / "model.yaml");
-    files =
-        write_simulation_files(written, result.position_m, options.formats, out->path(), progress);
+    files = write_simulation_files(written, std::move(result.position_m), options.formats,
+                                   out->path(), progress);
     files.insert(files.begin(), "model.yaml");
     write_json(describe_run(model, simulation, choice, result, stretch, files),
                out->path() / "simulation.json");

@@ -3,9 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <fstream>
+#include <functional>
+#include <utility>
 
 #include "apps/terminal/exit_code.h"
+#include "data/input_error.h"
 #include "data/mesh_sequence.h"
+#include "data/number_text.h"
 #include "data/tracks.h"
 #include "model/topology/mesh.h"
 
@@ -29,10 +34,36 @@ MarkerSet vertex_markers(const ModelDescription& model) {
   return set;
 }
 
+/// Told how many frames are written; throws Cancelled.
+using FrameReport = std::function<void(int frames)>;
+
+/// Writes the table of 3D tracks frame by frame, with a place of every vertex. Its text is that of
+/// write_tracks3d (data/tracks.h), which would need all rows at once.
+void write_tracks(const std::vector<Eigen::Matrix3Xd>& position_m, const MarkerSet& markers,
+                  const fs::path& file, const FrameReport& report) {
+  std::ofstream out(file, std::ios::binary);
+  std::string text = "frame,marker,x,y,z\n";
+  for (size_t f = 0; f < position_m.size(); ++f) {
+    for (Eigen::Index v = 0; v < position_m[f].cols(); ++v) {
+      const auto at_m = position_m[f].col(v);
+      text += fmt::format("{},{},{},{},{}\n", f, markers.markers[static_cast<size_t>(v)].name,
+                          number_text(at_m.x()), number_text(at_m.y()), number_text(at_m.z()));
+    }
+    out << text;
+    text.clear();
+    report(static_cast<int>(f) + 1);
+  }
+  out.close();
+  if (!out)
+    throw InputError(file.string(), "cannot be written", "a folder with room on its disk",
+                     "name another folder with --out");
+}
+
 /// Writes the simulation as a recording, in which the place of every vertex was measured. `written`
 /// is the model as it stands in the folder, with the files of its held points and its obstacle.
 void write_as_recording(const ModelDescription& written,
-                        const std::vector<Eigen::Matrix3Xd>& position_m, const fs::path& folder) {
+                        const std::vector<Eigen::Matrix3Xd>& position_m, const fs::path& folder,
+                        const FrameReport& report) {
   Recording recording;
   recording.folder = folder;
   recording.name = written.name;
@@ -54,25 +85,16 @@ void write_as_recording(const ModelDescription& written,
   recording.start = written.start;
   recording.declared = written.effects;
 
-  Tracks3d tracks;
-  for (size_t f = 0; f < position_m.size(); ++f) {
-    for (Eigen::Index v = 0; v < position_m[f].cols(); ++v) {
-      tracks.push_back({.frame = static_cast<int>(f),
-                        .marker = static_cast<int>(v),
-                        .position_m = position_m[f].col(v)});
-    }
-  }
   write_markers(recording.markers.markers, recording.markers_file);
-  write_tracks3d(tracks, recording.markers, *recording.tracks3d);
+  write_tracks(position_m, recording.markers, *recording.tracks3d, report);
   write_recording(recording, folder);
 }
 
-MeshSequence sequence_of(const ModelDescription& model,
-                         const std::vector<Eigen::Matrix3Xd>& position_m) {
+MeshSequence sequence_of(const ModelDescription& model, std::vector<Eigen::Matrix3Xd> position_m) {
   MeshSequence mesh{.columns = model.mesh_columns,
                     .rows = model.mesh_rows,
                     .time_s = model.frame_time_s,
-                    .position_m = position_m};
+                    .position_m = std::move(position_m)};
   if (model.gravity_m_per_s2.norm() > 0) mesh.up = -model.gravity_m_per_s2.normalized();
   return mesh;
 }
@@ -80,15 +102,15 @@ MeshSequence sequence_of(const ModelDescription& model,
 }  // namespace
 
 std::vector<std::string> write_simulation_files(const ModelDescription& model,
-                                                const std::vector<Eigen::Matrix3Xd>& position_m,
+                                                std::vector<Eigen::Matrix3Xd> position_m,
                                                 const std::vector<SimulationFormat>& formats,
                                                 const fs::path& folder,
                                                 const ProgressCallback& progress) {
-  const MeshSequence mesh = sequence_of(model, position_m);
+  const MeshSequence mesh = sequence_of(model, std::move(position_m));
   const auto wants = [&](SimulationFormat format) {
     return std::ranges::find(formats, format) != formats.end();
   };
-  const auto frames = static_cast<int>(position_m.size());
+  const auto frames = static_cast<int>(mesh.position_m.size());
   const auto report = [&](int done) {
     if (!progress({.stage = "write",
                    .done = static_cast<double>(done),
@@ -100,7 +122,7 @@ std::vector<std::string> write_simulation_files(const ModelDescription& model,
   std::vector<std::string> files;
   report(0);
   if (wants(SimulationFormat::csv)) {
-    write_as_recording(model, position_m, folder);
+    write_as_recording(model, mesh.position_m, folder, report);
     files.insert(files.end(), {"recording.yaml", "markers.csv", "tracks3d.csv"});
   }
   if (wants(SimulationFormat::obj)) {

@@ -19,9 +19,10 @@ enum class SimulationFormat { csv, obj, pc2, gltf };
 ///   pc2   cloth.pc2, and cloth.obj (the first frame) for the point cache to move
 ///   gltf  cloth.glb
 ///
+/// Tracks and OBJ files are written frame by frame: beside the positions they take no memory.
 /// Returns the files written, relative to the folder. Throws InputError, Cancelled.
 std::vector<std::string> write_simulation_files(const ModelDescription& model,
-                                                const std::vector<Eigen::Matrix3Xd>& position_m,
+                                                std::vector<Eigen::Matrix3Xd> position_m,
                                                 const std::vector<SimulationFormat>& formats,
                                                 const std::filesystem::path& folder,
                                                 const ProgressCallback& progress);

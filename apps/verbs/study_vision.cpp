@@ -14,10 +14,10 @@
 #include "apps/terminal/exit_code.h"
 #include "apps/terminal/json_file.h"
 #include "apps/terminal/progress_line.h"
+#include "apps/terminal/result_folder.h"
 #include "apps/terminal/say.h"
 #include "apps/terminal/text_table.h"
 #include "apps/verbs/verb.h"
-#include "data/output_folder.h"
 #include "data/text_file.h"
 #include "fit/jobs/thread_limit.h"
 
@@ -61,7 +61,8 @@ void require_measured(const std::vector<VisionResult>& results,
 
 int run_vision_study(const VisionFlags& flags, const std::string& command) {
   flags.options.validate();
-  OutputFolder out(out_folder(flags.out, kVisionFolder), {flags.options.data});
+  ResultFolder out(out_folder(flags.out, kVisionFolder), {flags.options.data});
+  require_threads(flags.threads);
   const ThreadLimit limit(flags.threads);
   const fs::path steps = out.path() / "steps";
   std::vector<VisionResult> results;

@@ -14,13 +14,13 @@
 #include "apps/terminal/number_text.h"
 #include "apps/terminal/option_flags.h"
 #include "apps/terminal/progress_line.h"
+#include "apps/terminal/result_folder.h"
 #include "apps/terminal/say.h"
 #include "apps/terminal/text_table.h"
 #include "apps/verbs/checked_input.h"
 #include "apps/verbs/verb.h"
 #include "data/finding_json.h"
 #include "data/input_error.h"
-#include "data/output_folder.h"
 #include "data/text_file.h"
 #include "fit/jobs/thread_limit.h"
 #include "fit/preflight/preflight.h"
@@ -97,7 +97,7 @@ int run_track(const TrackVerbOptions& options) {
                      "`images: FOLDER or VIDEO` in a camera's entry");
 
   require_footage(given, cameras);
-  OutputFolder out(out_folder(options.out, recording.name + ".tracks"), input_paths(given));
+  ResultFolder out(out_folder(options.out, recording.name + ".tracks"), input_paths(given));
   TrackStepResult step;
   {
     ProgressLine line;

@@ -69,12 +69,6 @@ std::string check_seed(const std::string& text) {
   return text.starts_with('-') ? "'" + text + "' is not a seed: a whole number, 0 or more" : "";
 }
 
-void require_threads(int threads) {
-  if (threads < 0)
-    throw InputError("--threads", std::to_string(threads),
-                     "0 for as many as the machine has, or more");
-}
-
 ObservationKind parse_observations(const std::string& text) {
   if (text == "tracks3d") return ObservationKind::tracks3d;
   if (text == "tracks2d") return ObservationKind::tracks2d;

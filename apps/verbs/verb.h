@@ -31,9 +31,6 @@ void add_study_verb(Verb program);
 /// huge one.
 std::string check_seed(const std::string& text);
 
-/// Throws InputError where --threads is negative.
-void require_threads(int threads);
-
 /// Returns what --observations names: tracks3d, tracks2d, or anything else for automatic.
 ObservationKind parse_observations(const std::string& text);
 

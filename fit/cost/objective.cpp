@@ -169,7 +169,7 @@ Linearisation TrajectoryObjective::linearise_by(const Eigen::VectorXd& values,
   for (const int p : simulated) along.push_back(std::move(every[static_cast<size_t>(p)]));
   if (of.start == StartKind::at_rest)
     start_at_rest_with_tangents(of.cloth, set, along, of.gravity_m_per_s2.norm(),
-                                of.frame_time_s.front(), steps().rest_s);
+                                of.frame_time_s.front(), steps().rest_s, of.stop);
   const Predictor predictor(of, values);
   const Schedule schedule{
       .frame_time_s = {of.frame_time_s.begin(),
@@ -178,7 +178,7 @@ Linearisation TrajectoryObjective::linearise_by(const Eigen::VectorXd& values,
       .velocities = predictor.needs_velocities(),
       .derivatives_kept_s = of.derivatives_kept_s,
       .fast_derivatives = of.fast_derivatives};
-  const TangentResult run = simulate_with_tangents(of.cloth, set, along, schedule);
+  const TangentResult run = simulate_with_tangents(of.cloth, set, along, schedule, of.stop);
   result.runs = 1 + static_cast<int>(simulated.size());
   if (!run.run.usable()) return result;
 

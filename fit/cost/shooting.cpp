@@ -177,10 +177,10 @@ std::vector<Direction> ShootingObjective::begin(int window, const Eigen::VectorX
     if (of.start == StartKind::at_rest) {
       if (model.along.empty())
         start_at_rest(of.cloth, {&model.set, 1}, of.gravity_m_per_s2.norm(),
-                      of.frame_time_s.front(), steps().rest_s);
+                      of.frame_time_s.front(), steps().rest_s, of.stop);
       else
         start_at_rest_with_tangents(of.cloth, model.set, model.along, of.gravity_m_per_s2.norm(),
-                                    of.frame_time_s.front(), steps().rest_s);
+                                    of.frame_time_s.front(), steps().rest_s, of.stop);
     }
     return {};
   }
@@ -268,7 +268,9 @@ std::optional<ShootingObjective::Window> ShootingObjective::run(
   const auto w = static_cast<size_t>(window);
   begin(window, corrections[w], model);
   const Cloth& cloth = window == 0 ? problem().cloth : model.cloth_of_later;
-  const SimulateResult run = simulate(cloth, {&model.set, 1}, schedule_of(window)).front();
+  const SimulateResult run =
+      simulate(cloth, {&model.set, 1}, schedule_of(window), Precision::exact, {}, problem().stop)
+          .front();
   if (!run.usable()) return std::nullopt;
   Window result{.residual = Eigen::VectorXd(rows(window)),
                 .by_parameter = {},
@@ -307,7 +309,8 @@ std::optional<ShootingObjective::Window> ShootingObjective::run_with_tangents(
   const auto parameters = static_cast<Eigen::Index>(along.size());
   along.insert(along.end(), own.begin(), own.end());
   const Cloth& cloth = window == 0 ? problem().cloth : model.cloth_of_later;
-  const TangentResult run = simulate_with_tangents(cloth, model.set, along, schedule_of(window));
+  const TangentResult run =
+      simulate_with_tangents(cloth, model.set, along, schedule_of(window), problem().stop);
   if (!run.run.usable()) return std::nullopt;
   Window result{.residual = Eigen::VectorXd(rows(window)),
                 .by_parameter = {},

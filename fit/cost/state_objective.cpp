@@ -103,7 +103,8 @@ std::vector<Eigen::VectorXd> StateObjective::residuals(
     const auto recorded =
         stacked(states_.position_m[n], states_.velocity_m_per_s[n], dt_s, unit_m_);
     const std::vector<SimulateResult> runs =
-        simulate(problem().cloth, sets, schedule_of(states_, transition, time_step_s()));
+        simulate(problem().cloth, sets, schedule_of(states_, transition, time_step_s()),
+                 Precision::exact, {}, problem().stop);
     for (size_t k = 0; k < runs.size(); ++k) {
       if (results[k].size() == 0) continue;
       const auto predicted =
@@ -136,8 +137,9 @@ Linearisation StateObjective::linearise(const Eigen::VectorXd& values) const {
     set.start_position_m = states_.position_m[n - 1];
     set.start_velocity_m_per_s = states_.velocity_m_per_s[n - 1];
     const double dt_s = states_.time_s[n] - states_.time_s[n - 1];
-    const TangentResult run = simulate_with_tangents(
-        problem().cloth, set, along, schedule_of(states_, transition, time_step_s()));
+    const TangentResult run =
+        simulate_with_tangents(problem().cloth, set, along,
+                               schedule_of(states_, transition, time_step_s()), problem().stop);
     if (!run.run.usable()) return result;
     const auto recorded =
         stacked(states_.position_m[n], states_.velocity_m_per_s[n], dt_s, unit_m_);

@@ -89,8 +89,10 @@ std::optional<DiscretisationOfFit> discretisation_of_fit(const FitInput& input,
                                                          const FitOptions& options,
                                                          const FitReport& report,
                                                          const ProgressCallback& progress) try {
+  FitOptions own = options;
+  own.is_cancelled = throwing_check(options.is_cancelled);
   const DiagnosisSetup setup{.inputs = {&input, 1},
-                             .options = options,
+                             .options = own,
                              .columns = report.result.mesh_columns,
                              .rows = report.result.mesh_rows};
   FittedModel model = fitted_to_all(setup, report, progress);

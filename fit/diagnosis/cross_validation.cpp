@@ -1,7 +1,5 @@
 #include "fit/diagnosis/cross_validation.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <iterator>
@@ -13,6 +11,7 @@
 #include "data/algebra/dense_factors.h"
 #include "fit/cost/huber.h"
 #include "fit/diagnosis/free_forces.h"
+#include "fit/jobs/parallel.h"
 #include "fit/problem/box.h"
 #include "fit/problem/prior_cost.h"
 #include "fit/uncertainty/uncertainty.h"
@@ -358,8 +357,8 @@ double squares_with_forces(const Folds& folds, double threshold) {
   constexpr double kSigmas_m_per_s2[] = {0.01, 0.1, 1, 10};
   constexpr int kSizes = std::size(kSigmas_m_per_s2);
   std::vector<double> squares(static_cast<size_t>(kSizes * folds.blocks()));
-  tbb::parallel_for(0, kSizes * folds.blocks(), [&](int k) {
-    const int b = k % folds.blocks();
+  for_each_index(static_cast<size_t>(kSizes * folds.blocks()), [&](size_t index) {
+    const int k = static_cast<int>(index), b = k % folds.blocks();
     if (b < folds.first_left_out()) return;
     const std::vector<Eigen::VectorXd> residuals =
         folds.residuals_with_forces_without(b, kSigmas_m_per_s2[k / folds.blocks()]);
@@ -384,7 +383,8 @@ CrossValidation cross_validate(const DiagnosisSetup& setup, const FittedModel& m
     forces = free_forces(*forces_mesh, model, kStretchesInBlock * blocks);
   const Folds folds(setup, model, blocks, threshold, whole, std::move(forces));
   std::vector<Sums> sums(static_cast<size_t>(folds.blocks()));
-  tbb::parallel_for(folds.first_left_out(), folds.blocks(), [&](int b) {
+  for_each_index(static_cast<size_t>(folds.blocks() - folds.first_left_out()), [&](size_t index) {
+    const int b = folds.first_left_out() + static_cast<int>(index);
     const std::vector<Eigen::VectorXd> residuals = folds.residuals_without(b);
     for (size_t n = 0; n < residuals.size(); ++n)
       add_block(folds, n, b, residuals[n], threshold, sums[static_cast<size_t>(b)]);

@@ -1,6 +1,7 @@
 #include "fit/diagnosis/diagnose.h"
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <utility>
 
@@ -24,7 +25,7 @@ class Run {
   Run(std::span<const FitInput> fitted, std::span<const FitInput> held_out,
       const DiagnoseOptions& options, const ProgressCallback& progress)
       : fitted_(fitted),
-        options_(options),
+        options_(with_check(options)),
         began_(std::chrono::steady_clock::now()),
         progress_(stop_token(until_winding_up(progress))),
         search_progress_(until_enough()),
@@ -51,6 +52,21 @@ class Run {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - began_).count();
   }
 
+  /// Returns the options with a check for simulations that ends what the progress ends.
+  DiagnoseOptions with_check(DiagnoseOptions options) const {
+    options.fit.is_cancelled = [this, asked = options.fit.is_cancelled] {
+      if (is_searching_) throw_if_time_is_up();
+      if (asked && !winding_up_ && asked()) throw StopRequested();
+      return false;
+    };
+    return options;
+  }
+
+  void throw_if_time_is_up() const {
+    const bool is_late = options_.budget_s > 0 && seconds() > options_.budget_s;
+    if (is_late || (options_.is_enough && options_.is_enough())) throw TimeIsUp();
+  }
+
   /// Returns a progress that nobody can stop once results are being made of what was found.
   ProgressCallback until_winding_up(const ProgressCallback& asked) const {
     if (!asked) return asked;
@@ -60,8 +76,7 @@ class Run {
   /// Returns the progress of a search, which ends once its time is up. Throws TimeIsUp then.
   ProgressCallback until_enough() const {
     return [this](const Progress& now) {
-      const bool is_late = options_.budget_s > 0 && seconds() > options_.budget_s;
-      if (is_late || (options_.is_enough && options_.is_enough())) throw TimeIsUp();
+      throw_if_time_is_up();
       report_progress(progress_, now);
       return true;
     };
@@ -71,7 +86,9 @@ class Run {
     Analysis declared(fitted_, options_, options_.fit);
     clock_.enter("base fit");
     report_base(declared);
+    is_searching_ = true;
     search_for_effects(declared, search_progress_, &clock_);
+    is_searching_ = false;
     result_.complete = declared.found.complete;
     winding_up_ = !result_.complete;
     clock_.enter("reports");
@@ -209,10 +226,10 @@ class Run {
   }
 
   std::span<const FitInput> fitted_;
-  const DiagnoseOptions& options_;
+  const DiagnoseOptions options_;
   std::chrono::steady_clock::time_point began_;
   ProgressCallback progress_, search_progress_;
-  bool winding_up_ = false;
+  std::atomic<bool> is_searching_ = false, winding_up_ = false;
   PhaseClock clock_;
   RecordingReports reports_;
   Diagnosis result_;

@@ -14,7 +14,7 @@ void DiagnoseOptions::validate() const {
   require(refits >= 1 && refits <= 50, "refits", "1 to 50");
   require(most_effects >= 0 && most_effects <= 10, "most_effects", "0 to 10");
   require(law_terms >= 0 && law_terms <= 10, "law_terms", "0 to 10");
-  require(budget_s >= 0, "budget_s", "0 or more");
+  require(budget_s >= 0 && budget_s <= 1e9, "budget_s", "0 to 1e9 seconds");
   require(plants >= 0, "plants", "a number of modes, or all");
   if (fit.forecast || fit.start)
     throw InputError("FitOptions::start", "is given", "a diagnosis, which finds its own");

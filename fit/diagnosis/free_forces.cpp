@@ -1,13 +1,12 @@
 #include "fit/diagnosis/free_forces.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <limits>
 #include <numeric>
 #include <utility>
 #include <vector>
 
+#include "fit/jobs/parallel.h"
 #include "model/cloth/cloth.h"
 #include "model/effects/number.h"
 
@@ -117,7 +116,7 @@ std::shared_ptr<const Effect> make_free_force(const Cloth& cloth, int waves_alon
 FreeForces free_forces(const DiagnosisSetup& mesh, const FittedModel& model, int stretches) {
   FittedModel there = model_at(mesh, model.hypotheses, model.values());
   FreeForces forces{.stretches = stretches, .columns = Columns(model.parts.size())};
-  tbb::parallel_for(size_t{0}, model.parts.size(), [&](size_t n) {
+  for_each_index(model.parts.size(), [&](size_t n) {
     forces.columns[n] =
         derivatives_in(*there.problems[n], there.parts[n], model.parts[n].frames, stretches);
   });

@@ -1,7 +1,5 @@
 #include "fit/diagnosis/hypothesis_derivatives.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -11,6 +9,7 @@
 
 #include "data/algebra/dense_factors.h"
 #include "fit/diagnosis/catalogue.h"
+#include "fit/jobs/parallel.h"
 #include "fit/measurement_effects/applicability.h"
 #include "fit/measurement_effects/registry.h"
 #include "fit/problem/effects_of.h"
@@ -125,7 +124,7 @@ std::vector<Eigen::MatrixXd> derivatives_in(const FitProblem& problem, const Poo
   }
 
   std::vector<Eigen::MatrixXd> result(hypotheses.size());
-  tbb::parallel_for(size_t{0}, batches.size(), [&](size_t b) {
+  for_each_index(batches.size(), [&](size_t b) {
     const Batch& batch = batches[b];
     std::vector<int> all;
     for (const Batch::Member& member : batch.members)
@@ -150,7 +149,7 @@ std::vector<Columns> derivatives_of_each(const FittedModel& model,
                                          std::span<const Hypothesis> hypotheses) {
   const size_t recordings = model.parts.size();
   std::vector<std::vector<Eigen::MatrixXd>> of_recording(recordings);
-  tbb::parallel_for(size_t{0}, recordings, [&](size_t n) {
+  for_each_index(recordings, [&](size_t n) {
     of_recording[n] = derivatives_in(*model.problems[n], model.parts[n], hypotheses);
   });
   std::vector<Columns> result(hypotheses.size());

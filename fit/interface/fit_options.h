@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <limits>
 #include <map>
 #include <optional>
@@ -55,7 +56,7 @@ struct FitOptions {
   LeadingCost cost = LeadingCost::trajectory;  ///< others: a search only if they lead nowhere
   SearchMethod search = SearchMethod::paper;
   int population = 100;       ///< individuals of the evolutionary search [louchet1995]
-  int generations = 40;       ///< at most; the search stops earlier when it no longer gains
+  int generations = 40;       ///< at most, >= 1; the search stops earlier when it no longer gains
   double search_share = 0.4;  ///< searched share of the fitted frames; 0 < share <= 1
   int refine_best = 3;        ///< individuals, or optima of CMA-ES, that go to refinement
   /// The search ends once its best cost, the mean error over its window in sigmas, is this low.
@@ -91,7 +92,10 @@ struct FitOptions {
   /// Parameters taken from an earlier fit. Nothing is then fitted: the recording is forecast from
   /// its own first frame.
   std::optional<FitResult> forecast;
-  void validate() const;  ///< throws InputError
+  /// Asked within simulations, every few milliseconds, whether to end at once; any thread may ask.
+  /// What it throws ends the call. Empty: the progress alone is asked, between simulations.
+  std::function<bool()> is_cancelled;
+  void validate() const;  ///< throws InputError, also beyond fit/interface/option_limits.h
 };
 
 }  // namespace clothfit

@@ -17,6 +17,7 @@
 #include "data/input_error.h"
 #include "data/shown_text.h"
 #include "fit/jobs/draws.h"
+#include "fit/jobs/stop_token.h"
 
 namespace clothfit {
 namespace {
@@ -85,6 +86,8 @@ class Run {
       if (journal_ != nullptr) journal_->append(index, payload(index));
       ++performed_;
       if (!stops_) tell_progress();
+    } catch (const StopRequested&) {
+      stops_ = true;
     } catch (...) {
       const std::lock_guard lock(mutex_);
       stops_ = true;

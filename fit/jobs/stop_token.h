@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <utility>
 
 #include "data/progress.h"
@@ -21,6 +22,16 @@ inline ProgressCallback stop_token(ProgressCallback progress) {
   return [asked = for_threads(std::move(progress))](const Progress& now) {
     if (!asked(now)) throw StopRequested();
     return true;
+  };
+}
+
+/// Returns a check for simulations (model/integrate/stop_check.h) that throws StopRequested where
+/// `asked` says so. It is empty where nothing asks.
+inline std::function<bool()> throwing_check(std::function<bool()> asked) {
+  if (!asked) return asked;
+  return [asked = std::move(asked)] {
+    if (asked()) throw StopRequested();
+    return false;
   };
 }
 

@@ -1,10 +1,13 @@
 #include "fit/problem/drive.h"
 
+#include <fmt/format.h>
+
 #include <memory>
 
 #include "data/input_error.h"
 #include "fit/observe/held_tracks.h"
 #include "fit/observe/smoothing_spline.h"
+#include "fit/problem/memory_limits.h"
 
 namespace clothfit {
 namespace {
@@ -53,9 +56,19 @@ TrackedPoint smooth_track(const Recording& recording, int marker, const Tracks3d
   return point;
 }
 
+bool is_along_s(const HeldPoint& edge) {
+  return edge.edge == ClothEdge::top || edge.edge == ClothEdge::bottom;
+}
+
+/// Returns how many points of the cloth are held for one of the recording.
+size_t held_count(const HeldPoint& point, const Mesh& mesh) {
+  if (!point.edge) return 1;
+  return static_cast<size_t>(is_along_s(point) ? mesh.columns : mesh.rows);
+}
+
 void hold_edge(const HeldPoint& edge, const Mesh& mesh, std::vector<HeldVertexWeights>& held) {
-  const bool along_s = edge.edge == ClothEdge::top || edge.edge == ClothEdge::bottom;
-  const int count = along_s ? mesh.columns : mesh.rows;
+  const bool along_s = is_along_s(edge);
+  const int count = static_cast<int>(held_count(edge, mesh));
   for (int n = 0; n < count; ++n) {
     int i = n, j = n;
     if (along_s)
@@ -68,8 +81,14 @@ void hold_edge(const HeldPoint& edge, const Mesh& mesh, std::vector<HeldVertexWe
 
 }  // namespace
 
-void hold(const HeldPoint& point, const HeldPath* path, const Mesh& mesh,
+void hold(const HeldPoint& point, const HeldPath* path, const Mesh& mesh, const std::string& where,
           std::vector<HeldVertexWeights>& held) {
+  const size_t count = held.size() + held_count(point, mesh);
+  if (count > kMostHeldPoints)
+    throw InputError(
+        where, fmt::format("holds {} points or more", count),
+        fmt::format("at most {}, an edge as one at each of its vertices", kMostHeldPoints),
+        "fewer held points, or a coarser mesh under a held edge");
   if (point.edge) return hold_edge(point, mesh, held);
   held.push_back(held_at(mesh, point.at_m.x(), point.at_m.y()));
   if (path != nullptr) held.back().motion = follow_path(*path);
@@ -78,14 +97,15 @@ void hold(const HeldPoint& point, const HeldPath* path, const Mesh& mesh,
 Drive make_drive(const Recording& recording, const Mesh& mesh, const Tracks3d& tracks,
                  const std::vector<double>& frame_time_s) {
   Drive drive;
+  const std::string where = (recording.folder / "recording.yaml").string();
   drive.driving_markers = driving_markers(recording);
   for (const HeldPoint& point : recording.held) {
     if (point.motion == HeldMotion::path) {
       const HeldPath path = read_held_path(*point.file);
-      hold(point, &path, mesh, drive.held);
+      hold(point, &path, mesh, where, drive.held);
       continue;
     }
-    hold(point, nullptr, mesh, drive.held);
+    hold(point, nullptr, mesh, where, drive.held);
     if (point.motion == HeldMotion::tracked) {
       const int marker = drive.driving_markers[drive.tracked.size()];
       TrackedPoint tracked = smooth_track(recording, marker, tracks, frame_time_s);

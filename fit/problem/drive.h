@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "data/recording.h"
@@ -26,8 +27,8 @@ struct Drive {
 };
 
 /// Adds a point or an edge. It follows `path` where that is given, else stays where the start shape
-/// has it.
-void hold(const HeldPoint& point, const HeldPath* path, const Mesh& mesh,
+/// has it. Throws InputError at `where` beyond kMostHeldPoints (fit/problem/memory_limits.h).
+void hold(const HeldPoint& point, const HeldPath* path, const Mesh& mesh, const std::string& where,
           std::vector<HeldVertexWeights>& held);
 
 /// Makes the held points with their motion. `fixed` ones stay where the start shape has them,

@@ -15,6 +15,7 @@
 #include "fit/problem/start_state.h"
 #include "model/cloth/cloth.h"
 #include "model/fabric/spring_set.h"
+#include "model/integrate/stop_check.h"
 #include "model/topology/surface.h"
 
 namespace clothfit {
@@ -74,6 +75,7 @@ struct FitProblem {
   /// Cameras read their rows in turn, in the time that they declare. The frame's time is that of
   /// the middle row, as the effect rolling_shutter has it.
   bool reads_in_rows = false;
+  StopCheck stop;  ///< of its simulations (FitOptions::is_cancelled)
 
   int frames() const { return static_cast<int>(frame_time_s.size()); }
 };

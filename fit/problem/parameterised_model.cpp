@@ -53,12 +53,13 @@ std::vector<SimulateResult> run_model(const FitProblem& problem,
   if (sets.empty()) return runs;
   if (problem.start == StartKind::at_rest)
     start_at_rest(problem.cloth, sets, problem.gravity_m_per_s2.norm(),
-                  problem.frame_time_s.front(), steps.rest_s);
+                  problem.frame_time_s.front(), steps.rest_s, problem.stop);
   const Schedule schedule{
       .frame_time_s = {problem.frame_time_s.begin(), problem.frame_time_s.begin() + frames},
       .time_step_s = steps.run_s,
       .velocities = velocities};
-  std::vector<SimulateResult> results = simulate(problem.cloth, sets, schedule);
+  std::vector<SimulateResult> results =
+      simulate(problem.cloth, sets, schedule, Precision::exact, {}, problem.stop);
   for (size_t n = 0; n < results.size(); ++n) runs[owner[n]] = std::move(results[n]);
   return runs;
 }

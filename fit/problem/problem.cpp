@@ -14,6 +14,7 @@
 #include "fit/measurement_effects/registry.h"
 #include "fit/observe/sheet_placement.h"
 #include "fit/problem/cloth_setup.h"
+#include "fit/problem/memory_limits.h"
 #include "fit/problem/unknown_group.h"
 
 namespace clothfit {
@@ -142,6 +143,27 @@ Rigid3 place_sheet_of(const Recording& recording, FitProblem& problem) {
   return *world_from_sheet;
 }
 
+/// Returns how many vertices along one axis a place has weights at: one where it lies on a vertex.
+double weights_along(double place_m, double length_m, int count) {
+  constexpr double kAround = 46, kOnVertex = 1e-9;
+  const double place = place_m / length_m * (count - 1);
+  return std::abs(place - std::round(place)) < kOnVertex ? 1 : std::min<double>(kAround, count);
+}
+
+/// Throws where the markers' weights on the mesh do not fit into memory.
+void require_weights(const Recording& recording, const Mesh& mesh) {
+  constexpr double kBytesOfWeight = 16;
+  double weights = 0;
+  for (const Marker& marker : recording.markers.markers)
+    weights += weights_along(marker.s_m, mesh.width_m, mesh.columns) *
+               weights_along(marker.t_m, mesh.height_m, mesh.rows);
+  // They stand twice, sorted and not, while they are made ready.
+  require_memory(2 * kBytesOfWeight * weights, recording_file(recording),
+                 fmt::format("the places of {} markers on {} x {} nodes",
+                             recording.markers.markers.size(), mesh.columns, mesh.rows),
+                 "fewer markers or a coarser mesh (FitOptions::mesh_columns)");
+}
+
 }  // namespace
 
 std::optional<std::string> why_readout_is_not_used(const FitProblem& problem) {
@@ -155,6 +177,7 @@ FitProblem make_problem(const FitInput& input, const FitOptions& options, int me
                         int mesh_rows) {
   const Recording& recording = input.recording;
   FitProblem problem;
+  problem.stop = options.is_cancelled;
   problem.start = recording.start;
   problem.gravity_m_per_s2 = recording.gravity_m_per_s2;
   const int frames = frame_count(input);
@@ -179,6 +202,7 @@ FitProblem make_problem(const FitInput& input, const FitOptions& options, int me
   if (!options.hypotheses.empty()) problem.derivatives_kept_s = kEmergingInterval_s;
   problem.fast_derivatives = !options.hypotheses.empty() || problem.start == StartKind::unknown;
   problem.marker_place_m = marker_places(recording.markers);
+  require_weights(recording, mesh);
   problem.vertex_weights = vertex_weights(
       make_surface(mesh.columns, mesh.rows, mesh.width_m, mesh.height_m, problem.marker_place_m));
   const Rigid3 world_from_sheet = place_sheet_of(recording, problem);

@@ -128,7 +128,7 @@ Simulation make_simulation(const ModelDescription& model) {
   cloth.obstacle = make_obstacle(model.obstacle);
   for (const ModelHeldPoint& held : model.held) {
     const bool has_path = held.point.motion == HeldMotion::path;
-    hold(held.point, has_path ? &held.path : nullptr, mesh, cloth.held);
+    hold(held.point, has_path ? &held.path : nullptr, mesh, model.where(0), cloth.held);
   }
 
   ParameterSet& set = simulation.parameters;
@@ -227,18 +227,18 @@ double default_time_step_s(const Simulation& simulation) {
   return std::min(stable_s / kStabilityMargin, longest_s);
 }
 
-ParameterSet started(const Simulation& simulation, double time_step_s) {
+ParameterSet started(const Simulation& simulation, double time_step_s, const StopCheck& stop) {
   ParameterSet set = simulation.parameters;
   if (simulation.start == StartKind::at_rest)
     start_at_rest(simulation.cloth, {&set, 1}, set.gravity_m_per_s2.norm(),
                   simulation.frame_time_s.front(),
-                  time_steps_of_run(simulation.cloth, set, time_step_s).rest_s);
+                  time_steps_of_run(simulation.cloth, set, time_step_s).rest_s, stop);
   return set;
 }
 
 SimulateResult run(const Simulation& simulation, double time_step_s,
-                   const ProgressCallback& progress) {
-  const ParameterSet set = started(simulation, time_step_s);
+                   const ProgressCallback& progress, const StopCheck& stop) {
+  const ParameterSet set = started(simulation, time_step_s, stop);
   const Schedule schedule{.frame_time_s = simulation.frame_time_s, .time_step_s = time_step_s};
   const auto after_frame = [&](int frame) {
     return !progress || progress({.stage = "simulate",
@@ -248,7 +248,7 @@ SimulateResult run(const Simulation& simulation, double time_step_s,
                                   .note = ""});
   };
   return std::move(
-      simulate(simulation.cloth, {&set, 1}, schedule, Precision::exact, after_frame).front());
+      simulate(simulation.cloth, {&set, 1}, schedule, Precision::exact, after_frame, stop).front());
 }
 
 }  // namespace clothfit

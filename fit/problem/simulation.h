@@ -34,7 +34,7 @@ ModelSprings springs_of(const SpringParameters& springs);
 /// Makes a model ready to run. A contact without a stiffness would touch nothing: it gets one into
 /// which the cloth sinks by a tenth of a millimetre under its own weight, and a third of the
 /// damping that lets it not bounce. Throws InputError for an unknown effect or parameter of an
-/// effect, and for contact_mesh without an obstacle.
+/// effect, for contact_mesh without an obstacle, and for more than kMostHeldPoints.
 Simulation make_simulation(const ModelDescription& model);
 
 /// Describes a fitted, or given, model of a recording as a model file has it. This is the cloth on
@@ -50,10 +50,11 @@ ModelDescription describe_model(const FitProblem& problem, const Recording& reco
 double default_time_step_s(const Simulation& simulation);
 
 /// Returns the parameters with which a run begins: a start at rest is relaxed.
-ParameterSet started(const Simulation& simulation, double time_step_s);
+ParameterSet started(const Simulation& simulation, double time_step_s, const StopCheck& stop = {});
 
-/// Returns positions of the mesh in every frame. A start at rest is relaxed first.
+/// Returns positions of the mesh in every frame. A start at rest is relaxed first. `stop` is asked
+/// within both; a run that it ends is not usable.
 SimulateResult run(const Simulation& simulation, double time_step_s,
-                   const ProgressCallback& progress = {});
+                   const ProgressCallback& progress = {}, const StopCheck& stop = {});
 
 }  // namespace clothfit

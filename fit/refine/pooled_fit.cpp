@@ -1,7 +1,5 @@
 #include "fit/refine/pooled_fit.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -9,6 +7,7 @@
 #include "data/algebra/dense_factors.h"
 #include "data/input_error.h"
 #include "fit/cost/huber.h"
+#include "fit/jobs/parallel.h"
 #include "fit/jobs/stop_token.h"
 #include "fit/problem/parameterised_model.h"
 #include "fit/problem/prior_cost.h"
@@ -70,7 +69,7 @@ class Pool final : public LeastSquares {
   double cost() const override { return cost_; }
   const Eigen::VectorXd* gradient() override {
     std::vector<Quadratic> quadratics(parts_.size());
-    tbb::parallel_for(size_t{0}, parts_.size(), [&](size_t n) {
+    for_each_index(parts_.size(), [&](size_t n) {
       quadratics[n] = quadratic_of(*problems_[n], parts_[n], threshold_);
     });
     here_ = space_.gather(quadratics);
@@ -160,7 +159,7 @@ class Pool final : public LeastSquares {
     std::vector<PooledPart> there = parts_;
     std::vector<char> usable(parts_.size(), 0);
     const bool expensive = options_.updated_within > 0;
-    tbb::parallel_for(size_t{0}, parts_.size(), [&](size_t n) {
+    for_each_index(parts_.size(), [&](size_t n) {
       PooledPart& part = there[n];
       const TrajectoryObjective objective = objective_of(*problems_[n], part);
       part.values = values[n];
@@ -196,7 +195,7 @@ class Pool final : public LeastSquares {
 
   double total_cost(std::vector<PooledPart>& parts) const {
     std::vector<double> costs(parts.size());
-    tbb::parallel_for(size_t{0}, parts.size(), [&](size_t n) {
+    for_each_index(parts.size(), [&](size_t n) {
       costs[n] = fit_directions(*problems_[n], parts[n], threshold_);
     });
     double sum = 0;
@@ -227,7 +226,7 @@ class Pool final : public LeastSquares {
     std::vector<char> usable(parts_.size(), 1);
     std::vector<double> spring_steps(parts_.size(), 0);
     for (const PooledPart& part : parts_) linearisations_ += part.linear.usable ? 0 : 1;
-    tbb::parallel_for(size_t{0}, parts_.size(), [&](size_t n) {
+    for_each_index(parts_.size(), [&](size_t n) {
       if (parts_[n].linear.usable) return;
       const TrajectoryObjective objective = objective_of(*problems_[n], parts_[n]);
       parts_[n].linear = objective.linearise(parts_[n].values);

@@ -46,8 +46,22 @@ class SharedEvaluation final : public ceres::EvaluationCallback {
     hold_at_bounds();  // by Huber's threshold, which only now is known
   }
 
+  /// No exception passes through Ceres. It gives up soon where nothing can be evaluated.
   void PrepareForEvaluation(bool evaluate_jacobians, bool) override {
-    evaluate(evaluate_jacobians);
+    if (!thrown_) {
+      try {
+        evaluate(evaluate_jacobians);
+        return;
+      } catch (...) {
+        thrown_ = std::current_exception();
+      }
+    }
+    now_.usable = false;
+  }
+  bool is_ended() const { return thrown_ != nullptr; }
+  /// Throws what ended an evaluation, if anything did.
+  void rethrow() const {
+    if (thrown_) std::rethrow_exception(thrown_);
   }
 
   const Linearisation& now() const { return now_; }
@@ -191,6 +205,7 @@ class SharedEvaluation final : public ceres::EvaluationCallback {
   bool has_jacobian_ = false;
   std::vector<bool> held_;
   int simulations_ = 0;
+  std::exception_ptr thrown_;
 };
 
 /// One observation's part of the shared evaluation.
@@ -267,6 +282,7 @@ class Reporter final : public ceres::IterationCallback {
         shared_(shared),
         most_spring_steps_(most_spring_steps) {}
   ceres::CallbackReturnType operator()(const ceres::IterationSummary& summary) override {
+    if (shared_.is_ended()) return ceres::SOLVER_ABORT;
     now_.done = summary.iteration;
     now_.note = "cost " + std::to_string(summary.cost);
     // No exception passes through Ceres.
@@ -374,6 +390,7 @@ Round solve(const ObjectiveMaker& make_objective, std::unique_ptr<Objective>& ob
                     shared, most_spring_steps);
   options.callbacks.push_back(&reporter);
   ceres::Solve(options, &least_squares, &round.summary);
+  shared.rethrow();
   reporter.rethrow();
   round.values = space.values(coordinates);
   const bool exact =

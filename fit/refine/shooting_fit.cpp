@@ -180,13 +180,14 @@ std::optional<ShootingWindows> make_windows(const FitProblem& problem, int frame
   const TimeSteps steps = steps_at(problem, values, options.stability_margin);
   if (problem.start == StartKind::at_rest)
     start_at_rest(problem.cloth, {&set, 1}, problem.gravity_m_per_s2.norm(),
-                  problem.frame_time_s.front(), steps.rest_s);
+                  problem.frame_time_s.front(), steps.rest_s, problem.stop);
   const SimulateResult run =
       simulate(
           problem.cloth, {&set, 1},
           {.frame_time_s = {problem.frame_time_s.begin(), problem.frame_time_s.begin() + frames},
            .time_step_s = steps.run_s,
-           .velocities = true})
+           .velocities = true},
+          Precision::exact, {}, problem.stop)
           .front();
   if (!run.usable()) return std::nullopt;
   for (size_t w = 1; w < wanted.size(); ++w) {

@@ -118,6 +118,8 @@ std::optional<EvolutionStop> stop_reason(const EvolutionOptions& options,
       relative_gain(state.best_cost, options.gain_window) < options.least_gain)
     return EvolutionStop::no_gain;
   if (state.generations() >= options.generations) return EvolutionStop::reached_generations;
+  if (static_cast<double>(state.evaluations) >= options.most_evaluations)
+    return EvolutionStop::out_of_work;
   return std::nullopt;
 }
 
@@ -136,6 +138,9 @@ std::string describe(EvolutionStop stop, const EvolutionOptions& options,
       break;
     case EvolutionStop::no_gain:
       text = "no gain over " + std::to_string(options.gain_window) + " generations";
+      break;
+    case EvolutionStop::out_of_work:
+      text = "cut short at the limit of work";
       break;
     case EvolutionStop::cancelled:
       text = "cancelled";

@@ -51,6 +51,8 @@ struct EvolutionOptions {
   /// generations after convergence, a shorter one mistakes a pause for the end.
   int gain_window = 20;
   double least_gain = 1e-3;
+  /// The search stops after the generation that reaches this many costs, whatever it has found.
+  double most_evaluations = std::numeric_limits<double>::infinity();
   unsigned long long seed = 1;
 
   int kept_count() const;
@@ -104,6 +106,7 @@ enum class EvolutionStop {
   reached_generations,
   cost_below,  ///< the best cost is as low as asked
   no_gain,     ///< the best cost hardly falls any more
+  out_of_work,
   cancelled
 };
 

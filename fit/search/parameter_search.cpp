@@ -9,6 +9,7 @@
 #include "fit/cost/observed_motion.h"
 #include "fit/jobs/checksum.h"
 #include "fit/jobs/stop_token.h"
+#include "fit/problem/work_limits.h"
 #include "fit/search/cma_es.h"
 #include "fit/search/evolutionary_strategy.h"
 #include "fit/search/search_checkpoint.h"
@@ -96,12 +97,13 @@ class Distinct {
 SearchedParameters search_by_strategy(const SearchSpace& space, const FitOptions& options,
                                       const std::string& problem, const ParameterSpace& parameters,
                                       const GenerationCost& cost, double stop_cost,
-                                      const ProgressCallback& progress) {
+                                      double affordable, const ProgressCallback& progress) {
   const EvolutionOptions evolution{.population = options.population,
                                    .generations = options.generations,
                                    .cost_below = stop_cost,
                                    .gain_window = 15,
                                    .least_gain = 1e-2,
+                                   .most_evaluations = affordable,
                                    .seed = options.seed};
   const EvolutionWatcher save = [&](const EvolutionState& state) {
     if (!options.checkpoint.empty())
@@ -134,10 +136,11 @@ SearchedParameters search_by_strategy(const SearchSpace& space, const FitOptions
 SearchedParameters search_by_restarts(const SearchSpace& space, const FitOptions& options,
                                       const std::string& problem, const ParameterSpace& parameters,
                                       const GenerationCost& cost, double stop_cost,
-                                      const ProgressCallback& progress) {
+                                      double affordable, const ProgressCallback& progress) {
+  const auto most = static_cast<double>(search_simulations(options));
   // A generation fills the lanes; a run may end where refinement takes over.
   const CmaOptions cma{.population = 16,
-                       .most_evaluations = search_simulations(options),
+                       .most_evaluations = static_cast<long>(std::min(most, affordable)),
                        .cost_below = stop_cost,
                        .cost_tolerance = 1e-3,
                        .step_tolerance = 1e-2,
@@ -193,10 +196,13 @@ SearchedParameters search_parameters(const Objective& objective, const FitOption
   const std::string problem =
       options.checkpoint.empty() ? std::string() : problem_line(objective, start);
   const double stop_cost = options.stop_cost.value_or(cost_of_following(objective));
+  const double affordable = kMostSpringStepsOfSearch / objective.spring_steps_per_run();
   const ProgressCallback token = stop_token(progress);
   return options.search == SearchMethod::cma
-             ? search_by_restarts(space, options, problem, parameters, cost, stop_cost, token)
-             : search_by_strategy(space, options, problem, parameters, cost, stop_cost, token);
+             ? search_by_restarts(space, options, problem, parameters, cost, stop_cost, affordable,
+                                  token)
+             : search_by_strategy(space, options, problem, parameters, cost, stop_cost, affordable,
+                                  token);
 }
 
 }  // namespace clothfit

@@ -38,7 +38,8 @@ inline constexpr double kDifferentOptima = 0.2;
 ///
 /// The state is saved to `options.checkpoint` after each generation, where that names a file. With
 /// `options.resume` the search begins from that state, and the result is the same to the last bit.
-/// Throws InputError for a checkpoint of another search, recording or model.
+/// Throws InputError for a checkpoint of another search, recording or model. A search ends early at
+/// kMostSpringStepsOfSearch (fit/problem/work_limits.h), as its message says.
 SearchedParameters search_parameters(const Objective& objective, const FitOptions& options,
                                      const Eigen::VectorXd& start,
                                      const ProgressCallback& progress);

@@ -394,6 +394,9 @@ class Frames {
     if (!is_running()) now.setConstant(NAN);
     result_.position_m.push_back(std::move(now));
   }
+  void cancel() {
+    if (is_running()) result_.reason = StopReason::cancelled;
+  }
   /// Returns the run, which is over. Call it once.
   SimulateResult take_result() {
     if (is_running()) result_.reason = StopReason::reached_end;
@@ -411,20 +414,27 @@ class Frames {
 }  // namespace
 
 SimulateResult simulate_with_fields(const Cloth& cloth, const ParameterSet& parameters,
-                                    const Schedule& schedule, const SimulationFields& fields) {
+                                    const Schedule& schedule, const SimulationFields& fields,
+                                    const StopCheck& stop) {
+  StopAsker asker(stop, cloth.spring_count());
   Run run(cloth, parameters, fields, static_cast<int>(schedule.frame_time_s.size()) - 1);
   Frames frames(cloth, parameters);
   frames.add(run.state());
   for (const Step& step : steps_of(schedule)) {
     run.forward(step);
     if (step.ends_frame) frames.add(run.state());
+    if (!asker.ends()) continue;
+    frames.cancel();
+    break;
   }
   return frames.take_result();
 }
 
 GradientResult simulate_with_gradient(const Cloth& cloth, const ParameterSet& parameters,
                                       const Schedule& schedule, const SimulationFields& fields,
-                                      const CostByPosition& cost_by_position) {
+                                      const CostByPosition& cost_by_position,
+                                      const StopCheck& stop) {
+  StopAsker asker(stop, cloth.spring_count());
   const std::vector<Step> steps = steps_of(schedule);
   const size_t stride =
       std::max<size_t>(1, static_cast<size_t>(std::ceil(std::sqrt(steps.size()))));
@@ -441,6 +451,9 @@ GradientResult simulate_with_gradient(const Cloth& cloth, const ParameterSet& pa
     // The last stretch is taken back first: it need not be computed again.
     run.forward(steps[n], n / stride == last_stretch ? &records[n % stride] : nullptr);
     if (steps[n].ends_frame) frames.add(run.state());
+    if (!asker.ends()) continue;
+    frames.cancel();
+    break;
   }
   GradientResult result;
   result.run = frames.take_result();
@@ -460,6 +473,9 @@ GradientResult simulate_with_gradient(const Cloth& cloth, const ParameterSet& pa
     for (size_t n = end; n-- > first;) {
       if (steps[n].ends_frame) run.add_cost(by_position[static_cast<size_t>(steps[n].frame)]);
       run.backward(steps[n], records[n - first]);
+      if (!asker.ends()) continue;
+      result.run.reason = StopReason::cancelled;
+      return result;
     }
   }
   run.add_cost(by_position.front());

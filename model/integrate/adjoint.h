@@ -40,19 +40,22 @@ struct CostGradient {
 
 struct GradientResult {
   SimulateResult run;
-  CostGradient gradient;  ///< without meaning where the run has diverged
+  CostGradient gradient;  ///< without meaning where the run is not usable
 };
 
 /// Simulates one parameter set and differentiates a cost of its frames by whole fields. The adjoint
 /// of each step is exact for the discrete scheme wherever it is smooth. It costs a few simulations
 /// whatever the number of derivatives. The state is kept every sqrt(n) of n steps and computed
-/// again between, so memory grows with sqrt(n) states.
+/// again between, so memory grows with sqrt(n) states. A run that `stop` ends, asked between steps,
+/// is cancelled and has no gradient.
 GradientResult simulate_with_gradient(const Cloth& cloth, const ParameterSet& parameters,
                                       const Schedule& schedule, const SimulationFields& fields,
-                                      const CostByPosition& cost_by_position);
+                                      const CostByPosition& cost_by_position,
+                                      const StopCheck& stop = {});
 
-/// Runs the simulation alone.
+/// Runs the simulation alone. What `stop` ends is cancelled and has fewer frames.
 SimulateResult simulate_with_fields(const Cloth& cloth, const ParameterSet& parameters,
-                                    const Schedule& schedule, const SimulationFields& fields);
+                                    const Schedule& schedule, const SimulationFields& fields,
+                                    const StopCheck& stop = {});
 
 }  // namespace clothfit

@@ -50,36 +50,77 @@ size_t first_bad_frame(const Cloth& cloth, const ParameterSet& parameters,
   return result.position_m.size();
 }
 
-/// Returns the schedule up to frame `last`, with every step of its interval a frame of its own.
-Schedule with_steps_before(const Schedule& schedule, size_t last) {
+/// Some steps of an interval: every `stride`-th from `first` on to `end`.
+struct SomeSteps {
+  int first = 0, end = 0, stride = 1;
+};
+
+/// Returns the schedule up to frame `last`, with some steps of its interval frames of their own.
+/// `steps` gets the step of each of these.
+Schedule with_steps_before(const Schedule& schedule, size_t last, const SomeSteps& wanted,
+                           std::vector<int>& steps) {
   Schedule fine{.frame_time_s = {schedule.frame_time_s.begin(),
                                  schedule.frame_time_s.begin() + static_cast<std::ptrdiff_t>(last)},
                 .time_step_s = schedule.time_step_s};
-  const int steps = schedule.substeps(static_cast<int>(last));
   const double from_s = schedule.frame_time_s[last - 1];
-  const double h = (schedule.frame_time_s[last] - from_s) / steps;
-  for (int n = 1; n <= steps; ++n) fine.frame_time_s.push_back(from_s + n * h);
+  const double h =
+      (schedule.frame_time_s[last] - from_s) / schedule.substeps(static_cast<int>(last));
+  // Several steps of one interval are cut as they were.
+  if (wanted.first > 0 || wanted.stride > 1) fine.time_step_s = h * (1 + 1e-12);
+  steps.clear();
+  if (wanted.first > 0) steps.push_back(wanted.first);
+  for (int n = wanted.first; n < wanted.end;) {
+    n = wanted.end - n > wanted.stride ? n + wanted.stride : wanted.end;
+    steps.push_back(n);
+  }
+  for (const int n : steps) fine.frame_time_s.push_back(from_s + n * h);
   return fine;
+}
+
+/// Steps whose positions are kept at once: some hundred megabytes.
+int most_kept_steps(const Mesh& mesh) {
+  constexpr double kMostKept = 2e7;
+  return static_cast<int>(std::max(100.0, kMostKept / mesh.vertex_count()));
 }
 
 }  // namespace
 
 std::optional<Divergence> find_divergence(const Cloth& cloth, const ParameterSet& parameters,
-                                          const Schedule& schedule) {
-  const SimulateResult coarse = simulate(cloth, {&parameters, 1}, schedule).front();
-  const size_t frame = first_bad_frame(cloth, parameters, coarse);
-  if (frame == coarse.position_m.size()) return std::nullopt;
+                                          const Schedule& schedule, const StopCheck& stop) {
+  const auto run = [&](const Schedule& over) {
+    return std::move(simulate(cloth, {&parameters, 1}, over, Precision::exact, {}, stop).front());
+  };
+  size_t frame = 0;
+  {
+    const SimulateResult coarse = run(schedule);
+    if (coarse.reason == StopReason::cancelled) return std::nullopt;
+    frame = first_bad_frame(cloth, parameters, coarse);
+    if (frame == coarse.position_m.size()) return std::nullopt;
+  }
   Divergence divergence{.frame = static_cast<int>(frame), .time_s = schedule.frame_time_s[frame]};
   if (frame == 0) return divergence;
 
-  const Schedule fine = with_steps_before(schedule, frame);
-  const SimulateResult result = simulate(cloth, {&parameters, 1}, fine).front();
-  // Steps that end frames are rounded a little differently here, so the last one is bad at the
-  // latest.
-  const size_t bad =
-      std::min(first_bad_frame(cloth, parameters, result), result.position_m.size() - 1);
+  // Where an interval has more steps than can be kept, some of them tell between which to look.
+  SomeSteps wanted{.first = 0, .end = schedule.substeps(static_cast<int>(frame)), .stride = 1};
+  Schedule fine;
+  SimulateResult result;
+  size_t bad = 0;
+  while (true) {
+    wanted.stride = (wanted.end - wanted.first - 1) / most_kept_steps(cloth.mesh) + 1;
+    std::vector<int> steps;
+    fine = with_steps_before(schedule, frame, wanted, steps);
+    result = run(fine);
+    if (result.reason == StopReason::cancelled) return std::nullopt;
+    // Steps that end frames are rounded a little differently here, so the last one is bad at the
+    // latest.
+    bad = std::min(first_bad_frame(cloth, parameters, result), result.position_m.size() - 1);
+    const size_t place = bad - std::min(bad, frame);
+    wanted.end = steps[place];
+    if (wanted.stride == 1) break;
+    if (place > 0) wanted.first = std::max(0, steps[place - 1] - 1);
+  }
   for (size_t f = 1; f < frame; ++f) divergence.step += schedule.substeps(static_cast<int>(f));
-  divergence.step += static_cast<int>(bad - frame) + 1;
+  divergence.step += wanted.end;
   divergence.time_s = fine.frame_time_s[bad];
   divergence.time_step_s = fine.frame_time_s[bad] - fine.frame_time_s[bad - 1];
 

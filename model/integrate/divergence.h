@@ -36,9 +36,9 @@ inline constexpr double kLengthBeyondReason = 5;
 /// that was longest for its natural length before it. Nothing for a run that stays within reason.
 ///
 /// Costs two runs, the second only up to that step and with every step of the last frame interval
-/// kept.
+/// kept; a few more where these are more than fit into some hundred megabytes. Nothing also where `stop` ends it.
 std::optional<Divergence> find_divergence(const Cloth& cloth, const ParameterSet& parameters,
-                                          const Schedule& schedule);
+                                          const Schedule& schedule, const StopCheck& stop = {});
 
 /// Returns "structural", "shear" or "flexion".
 const char* spring_family(int type);

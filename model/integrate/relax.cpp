@@ -31,6 +31,12 @@ bool moves_supports(const Effect& effect) {
   return effect.shifts_supports() && !effect.shifts_supports_at_rest();
 }
 
+constexpr double kPendulumTimes = 7;  ///< (1 + 7) exp(-7) of the distance remains: 0.7 %
+
+double pendulum_rate(const Cloth& cloth, double gravity_m_per_s2) {
+  return std::sqrt(std::max(gravity_m_per_s2, 1e-3) / cloth.mesh.height_m);
+}
+
 /// A cloth with calm springs in heavy air. It is `cloth`, held where motions have its points at one
 /// time, with its own effects but those that move supports. The air takes a share of all velocities
 /// before each step.
@@ -44,13 +50,13 @@ struct HeavyAir {
   HeavyAir(const Cloth& light, double pendulum_gravity_m_per_s2, double time_s,
            double longest_step_s)
       : cloth(light) {
-    constexpr double kPendulumTimes = 7;  // (1 + 7) exp(-7) of the distance remains: 0.7 %
-    const double pendulum_rate =
-        std::sqrt(std::max(pendulum_gravity_m_per_s2, 1e-3) / light.mesh.height_m);
-    const double duration_s = kPendulumTimes / pendulum_rate;
-    steps = std::max(1, static_cast<int>(std::ceil(duration_s / longest_step_s)));
+    const double rate = pendulum_rate(light, pendulum_gravity_m_per_s2);
+    const double duration_s = kPendulumTimes / rate;
+    constexpr double kMost = 1e9;  // as of a run (Schedule::substeps)
+    steps = static_cast<int>(
+        std::min(rest_steps(light, pendulum_gravity_m_per_s2, longest_step_s), kMost));
     time_step_s = duration_s / steps;
-    slowing = std::exp(-2 * pendulum_rate * time_step_s);
+    slowing = std::exp(-2 * rate * time_step_s);
 
     for (HeldVertexWeights& point : cloth.held)
       if (point.motion) point.motion = [place_m = point.motion(time_s)](double) { return place_m; };
@@ -121,9 +127,15 @@ void slow(double share, LaneVectors<L>& velocity_m_per_s) {
   velocity_m_per_s.z *= factor;
 }
 
+/// Leaves a state of which nothing can be made: the relaxation was ended on the way.
+template <class L>
+void spoil(LaneState<L>& state) {
+  state.position_m.x.setConstant(NAN);
+}
+
 template <class L>
 void settle(const HeavyAir& heavy, double time_s, std::span<const ParameterSet> group,
-            LaneState<L>& state) {
+            const StopCheck& stop, LaneState<L>& state) {
   const auto set_of = [&](Eigen::Index lane) -> const ParameterSet& {
     return group[std::min(static_cast<size_t>(lane), group.size() - 1)];
   };
@@ -132,7 +144,9 @@ void settle(const HeavyAir& heavy, double time_s, std::span<const ParameterSet> 
   const LaneParameters<L> parameters = lane_parameters<L>(heavy.cloth, group);
   const LaneVectors<L> from_m = stepper.held().locate(state.position_m);
   LaneVectors<L> target_m = from_m;
+  StopAsker asker(stop, heavy.cloth.spring_count());
   for (int n = 0; n < heavy.steps; ++n) {
+    if (asker.ends()) return spoil(state);
     for (size_t h = 0; h < heavy.cloth.held.size(); ++h) {
       if (!heavy.cloth.held[h].motion) continue;
       const Eigen::Vector3d by_motion = heavy.cloth.held[h].motion(time_s);
@@ -155,13 +169,15 @@ void settle(const HeavyAir& heavy, double time_s, std::span<const ParameterSet> 
 
 /// Relaxes one simulation and its derivatives.
 void settle(const HeavyAir& heavy, double time_s, const ParameterSet& set,
-            std::span<const Direction> directions, TangentStepper<>& stepper,
+            std::span<const Direction> directions, const StopCheck& stop, TangentStepper<>& stepper,
             TangentState<>& state) {
   state = TangentState<>::of(heavy.cloth, set, directions);
   const auto parameters = TangentParameters<>::of(heavy.cloth, set, directions);
   const TangentVectors<> from_m = stepper.locate(state);
   TangentVectors<> target_m = from_m;
+  StopAsker asker(stop, heavy.cloth.spring_count());
   for (int n = 0; n < heavy.steps; ++n) {
+    if (asker.ends()) return spoil(state.value);
     for (size_t h = 0; h < heavy.cloth.held.size(); ++h) {
       if (!heavy.cloth.held[h].motion) continue;
       const auto column = static_cast<Eigen::Index>(h);
@@ -192,6 +208,11 @@ void settle(const HeavyAir& heavy, double time_s, const ParameterSet& set,
 
 }  // namespace
 
+double rest_steps(const Cloth& cloth, double pendulum_gravity_m_per_s2, double time_step_s) {
+  const double duration_s = kPendulumTimes / pendulum_rate(cloth, pendulum_gravity_m_per_s2);
+  return std::max(1.0, std::ceil(duration_s / time_step_s));
+}
+
 double stable_rest_step_s(const Cloth& cloth, const ParameterSet& parameters) {
   ParameterSet set = parameters;
   set.springs.damping_ns_per_m.fill(0);
@@ -210,8 +231,8 @@ TimeSteps time_steps_of_run(const Cloth& cloth, const ParameterSet& parameters, 
 }
 
 std::vector<RelaxedCloth> relax(const Cloth& cloth, std::span<const ParameterSet> parameters,
-                                double pendulum_gravity_m_per_s2, double time_s,
-                                double time_step_s) {
+                                double pendulum_gravity_m_per_s2, double time_s, double time_step_s,
+                                const StopCheck& stop) {
   if (parameters.empty()) return {};
   const HeavyAir heavy(cloth, pendulum_gravity_m_per_s2, time_s, time_step_s);
   std::vector<ParameterSet> sets;
@@ -220,7 +241,7 @@ std::vector<RelaxedCloth> relax(const Cloth& cloth, std::span<const ParameterSet
   for_lane_groups<ExactLanes>(
       sets, [&]<class L>(std::span<const ParameterSet> group, size_t first) {
         LaneState<L> state = LaneState<L>::of(heavy.cloth);
-        settle<L>(heavy, time_s, group, state);
+        settle<L>(heavy, time_s, group, stop, state);
         for (size_t l = 0; l < group.size(); ++l) {
           RelaxedCloth& result = relaxed[first + l];
           result.position_m = state.position_m.lane(static_cast<int>(l));
@@ -233,9 +254,10 @@ std::vector<RelaxedCloth> relax(const Cloth& cloth, std::span<const ParameterSet
 }
 
 void start_at_rest(const Cloth& cloth, std::span<ParameterSet> parameters,
-                   double pendulum_gravity_m_per_s2, double time_s, double time_step_s) {
+                   double pendulum_gravity_m_per_s2, double time_s, double time_step_s,
+                   const StopCheck& stop) {
   std::vector<RelaxedCloth> relaxed =
-      relax(cloth, parameters, pendulum_gravity_m_per_s2, time_s, time_step_s);
+      relax(cloth, parameters, pendulum_gravity_m_per_s2, time_s, time_step_s, stop);
   for (size_t n = 0; n < parameters.size(); ++n) {
     parameters[n].start_position_m = std::move(relaxed[n].position_m);
     parameters[n].start_effect_memory = std::move(relaxed[n].effect_memory);
@@ -245,7 +267,7 @@ void start_at_rest(const Cloth& cloth, std::span<ParameterSet> parameters,
 
 void start_at_rest_with_tangents(const Cloth& cloth, ParameterSet& set,
                                  std::span<Direction> directions, double pendulum_gravity_m_per_s2,
-                                 double time_s, double time_step_s) {
+                                 double time_s, double time_step_s, const StopCheck& stop) {
   const HeavyAir heavy(cloth, pendulum_gravity_m_per_s2, time_s, time_step_s);
   const ParameterSet damped = heavy.in_it(set);
   std::vector<Direction> moved;
@@ -257,7 +279,7 @@ void start_at_rest_with_tangents(const Cloth& cloth, ParameterSet& set,
     TangentState<> state;
     const std::span<const Direction> group = std::span(moved).subspan(first, count);
     TangentStepper<> stepper(heavy.cloth, group);
-    settle(heavy, time_s, damped, group, stepper, state);
+    settle(heavy, time_s, damped, group, stop, stepper, state);
     for (size_t d = 0; d < count; ++d) {
       const auto lane = static_cast<int>(d);
       directions[first + d].start_position_m = state.tangent.front().position_m.lane(lane);

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "model/cloth/cloth.h"
+#include "model/integrate/stop_check.h"
 #include "model/integrate/tangent_step.h"
 
 namespace clothfit {
@@ -44,22 +45,28 @@ TimeSteps time_steps_of_run(const Cloth& cloth, const ParameterSet& parameters, 
 /// (at least 0.001). A shape therefore depends on its own set alone, and smoothly. Less than a
 /// percent of the pendulum's distance to equilibrium remains; more of slower motions (folds that
 /// open, a cloth that turns about a single support); a twentieth of the supports' shifts by
-/// effects. Effects that shift supports in time, which remember nothing, are left out.
+/// effects. Effects that shift supports in time, which remember nothing, are left out. A cloth that
+/// `stop` ends, asked between steps, has no finite positions.
 std::vector<RelaxedCloth> relax(const Cloth& cloth, std::span<const ParameterSet> parameters,
-                                double pendulum_gravity_m_per_s2, double time_s,
-                                double time_step_s);
+                                double pendulum_gravity_m_per_s2, double time_s, double time_step_s,
+                                const StopCheck& stop = {});
+
+/// Returns how many steps relax() takes, as a number that cannot overflow.
+double rest_steps(const Cloth& cloth, double pendulum_gravity_m_per_s2, double time_step_s);
 
 /// Lets every set start from rest. It is relaxed from its former start, as relax() does it, with
 /// the memory that its effects gain, and without velocity. The exact minimum of the energy is not
-/// looked for: docs/theory/equilibrium.md says why.
+/// looked for: docs/theory/equilibrium.md says why. A run from a set that `stop` ended diverges at
+/// its start.
 void start_at_rest(const Cloth& cloth, std::span<ParameterSet> parameters,
-                   double pendulum_gravity_m_per_s2, double time_s, double time_step_s);
+                   double pendulum_gravity_m_per_s2, double time_s, double time_step_s,
+                   const StopCheck& stop = {});
 
 /// Lets one set start from rest, with the derivatives along every direction, exact for the discrete
 /// scheme where it is smooth. Directions begin as derivatives of the set that goes in, and end as
 /// those of the one that comes out; `set` gets the bits that start_at_rest() gives it.
 void start_at_rest_with_tangents(const Cloth& cloth, ParameterSet& set,
                                  std::span<Direction> directions, double pendulum_gravity_m_per_s2,
-                                 double time_s, double time_step_s);
+                                 double time_s, double time_step_s, const StopCheck& stop = {});
 
 }  // namespace clothfit

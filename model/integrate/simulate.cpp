@@ -29,14 +29,16 @@ class LaneRun {
   const LaneState<L>& state() const { return state_; }
 
   /// Advances from `from_s` to `to_s` in `steps` equal steps. Held points are placed at the end of
-  /// each step.
-  void advance(double from_s, double to_s, int steps) {
+  /// each step. False where it was asked to stop on the way.
+  bool advance(double from_s, double to_s, int steps, StopAsker& asker) {
     const double h = (to_s - from_s) / steps;
     for (int n = 0; n < steps; ++n) {
       aim_held_points(from_s + (n + 1) * h);
       stepper_.step(parameters_, held_target_m_, from_s + n * h, h, state_);
       unmet_ += stepper_.limit_outcome().unmet;
+      if (asker.ends()) return false;
     }
+    return true;
   }
 
   /// Returns the number of steps that left the strain limit unmet.
@@ -94,6 +96,12 @@ double largest_excess(const Cloth& cloth, const SpringParameters& springs,
   return largest;
 }
 
+/// Returns the steps in the interval that ends at a frame; infinite for a step of nothing.
+double steps_of_interval(const Schedule& schedule, size_t frame) {
+  const double interval_s = schedule.frame_time_s[frame] - schedule.frame_time_s[frame - 1];
+  return std::max(1.0, std::ceil(interval_s / schedule.time_step_s - 1e-9));
+}
+
 }  // namespace
 
 bool left_the_scene(const Eigen::Matrix3Xd& now, const Eigen::Matrix3Xd& start, const Mesh& mesh) {
@@ -103,15 +111,20 @@ bool left_the_scene(const Eigen::Matrix3Xd& now, const Eigen::Matrix3Xd& start, 
 }
 
 int Schedule::substeps(int frame) const {
-  const auto f = static_cast<size_t>(frame);
-  const double interval_s = frame_time_s[f] - frame_time_s[f - 1];
   constexpr double kMost = 1e9;  // years of computing; the run diverges instead
-  return static_cast<int>(std::clamp(std::ceil(interval_s / time_step_s - 1e-9), 1.0, kMost));
+  return static_cast<int>(std::min(steps_of_interval(*this, static_cast<size_t>(frame)), kMost));
+}
+
+double Schedule::all_steps() const {
+  double steps = 0;
+  for (size_t frame = 1; frame < frame_time_s.size(); ++frame)
+    steps += steps_of_interval(*this, frame);
+  return steps;
 }
 
 std::vector<SimulateResult> simulate(const Cloth& cloth, std::span<const ParameterSet> parameters,
                                      const Schedule& schedule, Precision precision,
-                                     const FrameCallback& after_frame) {
+                                     const FrameCallback& after_frame, const StopCheck& stop) {
   assert(schedule.time_step_s > 0);
   std::vector<SimulateResult> results(parameters.size());
   const size_t frames = schedule.frame_time_s.size();
@@ -121,11 +134,24 @@ std::vector<SimulateResult> simulate(const Cloth& cloth, std::span<const Paramet
   };
   const auto run_group = [&]<class L>(std::span<const ParameterSet> group, size_t first) {
     LaneRun<L> run(cloth, group);
+    StopAsker asker(stop, cloth.spring_count());
+    const auto cancel = [&] {
+      const Eigen::Matrix3Xd none = Eigen::Matrix3Xd::Constant(3, cloth.mesh.vertex_count(), NAN);
+      for (size_t l = 0; l < group.size(); ++l) {
+        SimulateResult& result = results[first + l];
+        if (is_running(result) && result.position_m.size() < frames)
+          result.reason = StopReason::cancelled;
+        result.position_m.resize(frames, none);
+        if (schedule.velocities) result.velocity_m_per_s.resize(frames, none);
+      }
+    };
     for (size_t l = 0; l < group.size(); ++l) results[first + l].position_m.reserve(frames);
     for (size_t frame = 0; frame < frames; ++frame) {
-      if (frame > 0)
-        run.advance(schedule.frame_time_s[frame - 1], schedule.frame_time_s[frame],
-                    schedule.substeps(static_cast<int>(frame)));
+      if (frame > 0 && !run.advance(schedule.frame_time_s[frame - 1], schedule.frame_time_s[frame],
+                                    schedule.substeps(static_cast<int>(frame)), asker)) {
+        cancel();
+        break;
+      }
       bool any_alive = false;
       for (size_t l = 0; l < group.size(); ++l) {
         SimulateResult& result = results[first + l];
@@ -147,15 +173,9 @@ std::vector<SimulateResult> simulate(const Cloth& cloth, std::span<const Paramet
           if (!is_running(result)) result.velocity_m_per_s.back().setConstant(NAN);
         }
       }
-      const bool stop = after_frame && frame + 1 < frames && !after_frame(static_cast<int>(frame));
-      if (any_alive && !stop) continue;
-      const Eigen::Matrix3Xd none = Eigen::Matrix3Xd::Constant(3, cloth.mesh.vertex_count(), NAN);
-      for (size_t l = 0; l < group.size(); ++l) {
-        SimulateResult& result = results[first + l];
-        if (is_running(result) && frame + 1 < frames) result.reason = StopReason::cancelled;
-        result.position_m.resize(frames, none);
-        if (schedule.velocities) result.velocity_m_per_s.resize(frames, none);
-      }
+      const bool stops = after_frame && frame + 1 < frames && !after_frame(static_cast<int>(frame));
+      if (any_alive && !stops) continue;
+      cancel();
       break;
     }
     for (size_t l = 0; l < group.size(); ++l)

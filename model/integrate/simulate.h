@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "model/cloth/cloth.h"
+#include "model/integrate/stop_check.h"
 
 namespace clothfit {
 
@@ -22,6 +23,8 @@ struct Schedule {
 
   /// Returns the equal steps in the interval that ends at frame `frame` >= 1.
   int substeps(int frame) const;
+  /// Returns the steps of all intervals, as a number that cannot overflow.
+  double all_steps() const;
 };
 
 enum class StopReason { not_run, reached_end, diverged, cancelled };
@@ -55,9 +58,11 @@ using FrameCallback = std::function<bool(int frame)>;
 
 /// Simulates every parameter set, several side by side in lanes, groups of lanes in parallel. With
 /// `exact` a result does not depend on the number of sets, their order or the number of threads.
+/// `stop` is asked between steps: a run that it ends is cancelled.
 std::vector<SimulateResult> simulate(const Cloth& cloth, std::span<const ParameterSet> parameters,
                                      const Schedule& schedule,
                                      Precision precision = Precision::exact,
-                                     const FrameCallback& after_frame = {});
+                                     const FrameCallback& after_frame = {},
+                                     const StopCheck& stop = {});
 
 }  // namespace clothfit

@@ -12,7 +12,8 @@ namespace {
 /// Runs one simulation and its derivatives along some directions.
 template <class L>
 TangentResult run_chunk(const Cloth& cloth, const ParameterSet& set,
-                        std::span<const Direction> directions, const Schedule& schedule) {
+                        std::span<const Direction> directions, const Schedule& schedule,
+                        const StopCheck& stop) {
   // A few steps change the derivatives as little as they do the cloth.
   constexpr double kFewSteps = 5;
   const double kept_s = schedule.derivatives_kept_s > 0 ? std::max(schedule.derivatives_kept_s,
@@ -48,6 +49,7 @@ TangentResult run_chunk(const Cloth& cloth, const ParameterSet& set,
   if (schedule.velocities) result.velocity_tangent.resize(directions.size());
   const auto is_running = [&] { return result.run.reason == StopReason::not_run; };
   const size_t frames = schedule.frame_time_s.size();
+  StopAsker asker(stop, cloth.spring_count());
   for (size_t frame = 0; frame < frames; ++frame) {
     if (frame > 0 && is_running()) {
       const double from_s = schedule.frame_time_s[frame - 1];
@@ -56,6 +58,10 @@ TangentResult run_chunk(const Cloth& cloth, const ParameterSet& set,
       for (int n = 0; n < steps; ++n) {
         aim(from_s + (n + 1) * h);
         stepper.step(parameters, target_m, from_s + n * h, h, state);
+        if (asker.ends()) {
+          result.run.reason = StopReason::cancelled;
+          break;
+        }
       }
     }
     Eigen::Matrix3Xd now = state.value.position_m.lane(0);
@@ -96,7 +102,8 @@ size_t directions_at_once(size_t directions, size_t lanes) {
 
 template <class L>
 TangentResult run_in_lanes(const Cloth& cloth, const ParameterSet& parameters,
-                           std::span<const Direction> directions, const Schedule& schedule) {
+                           std::span<const Direction> directions, const Schedule& schedule,
+                           const StopCheck& stop) {
   const size_t chunk = directions_at_once(directions.size(), L::kCount);
   const size_t chunks = std::max<size_t>(1, (directions.size() + chunk - 1) / chunk);
   std::vector<TangentResult> results(chunks);
@@ -104,8 +111,10 @@ TangentResult run_in_lanes(const Cloth& cloth, const ParameterSet& parameters,
     const size_t first = c * chunk;
     results[c] = run_chunk<L>(cloth, parameters,
                               directions.subspan(first, std::min(chunk, directions.size() - first)),
-                              schedule);
+                              schedule, stop);
   });
+  for (const TangentResult& part : results)
+    if (part.run.reason == StopReason::cancelled) results.front().run.reason = part.run.reason;
   TangentResult result = std::move(results.front());
   for (size_t c = 1; c < chunks; ++c) {
     std::ranges::move(results[c].position_tangent, std::back_inserter(result.position_tangent));
@@ -118,11 +127,11 @@ TangentResult run_in_lanes(const Cloth& cloth, const ParameterSet& parameters,
 
 TangentResult simulate_with_tangents(const Cloth& cloth, const ParameterSet& parameters,
                                      std::span<const Direction> directions,
-                                     const Schedule& schedule) {
+                                     const Schedule& schedule, const StopCheck& stop) {
   // A group of fast lanes takes little longer than a group of exact ones, which holds half as many.
   const bool fast = schedule.fast_derivatives && directions.size() > ExactLanes::kCount;
-  return fast ? run_in_lanes<FastLanes>(cloth, parameters, directions, schedule)
-              : run_in_lanes<ExactLanes>(cloth, parameters, directions, schedule);
+  return fast ? run_in_lanes<FastLanes>(cloth, parameters, directions, schedule, stop)
+              : run_in_lanes<ExactLanes>(cloth, parameters, directions, schedule, stop);
 }
 
 }  // namespace clothfit

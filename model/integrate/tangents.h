@@ -20,9 +20,10 @@ struct TangentResult {
 /// direction. Each step is differentiated forwards: exact for the discrete scheme wherever it is
 /// smooth. Directions that share a run share its cost and the linearisation of effects; such groups
 /// run in parallel. Bits depend on no other direction, but for Schedule::fast_derivatives, nor on
-/// the number of threads; `run` has the bits that simulate() gives.
+/// the number of threads; `run` has the bits that simulate() gives. `stop` is asked between steps:
+/// what it ends is cancelled, derivatives and all.
 TangentResult simulate_with_tangents(const Cloth& cloth, const ParameterSet& parameters,
                                      std::span<const Direction> directions,
-                                     const Schedule& schedule);
+                                     const Schedule& schedule, const StopCheck& stop = {});
 
 }  // namespace clothfit

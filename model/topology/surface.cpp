@@ -12,35 +12,52 @@ namespace {
 constexpr double kSmallestRelativeWeight = 1e-12;
 constexpr double kOutsideAllowed_m = 1e-6;
 
-/// Returns second derivatives of the natural cubic spline at the knots, as an n x n operator on the
-/// values. There are n evenly spaced knots (spacing 1):
+/// Second derivatives of the natural cubic spline at its knots, as an n x n operator on the values.
+/// There are n evenly spaced knots (spacing 1):
 ///
 ///   M_{k-1} + 4 M_k + M_{k+1} = 6 (f_{k-1} - 2 f_k + f_{k+1}),  M_0 = M_{n-1} = 0
 ///
-/// by elimination without pivoting: the matrix is strictly diagonally dominant.
-Eigen::MatrixXd natural_second_derivatives(int n) {
-  Eigen::MatrixXd m = Eigen::MatrixXd::Zero(n, n);
-  Eigen::VectorXd above = Eigen::VectorXd::Zero(n);
-  for (int k = 1; k + 1 < n; ++k) {
-    const double pivot = 4 - above(k - 1);
-    above(k) = 1 / pivot;
-    m(k, k - 1) += 6;
-    m(k, k) -= 12;
-    m(k, k + 1) += 6;
-    m.row(k) = (m.row(k) - m.row(k - 1)) / pivot;
+/// by elimination without pivoting: the matrix is strictly diagonally dominant. Entries fall by 3.7
+/// from one to the next beside the diagonal. Those beyond kBand, below 1e-37, are left out, so that
+/// memory grows with n and not with its square.
+class SecondDerivatives {
+ public:
+  static constexpr int kBand = 64;
+
+  explicit SecondDerivatives(int n) : band_(BandRows::Zero(n, kWidth)) {
+    Eigen::VectorXd above = Eigen::VectorXd::Zero(n);
+    for (int k = 1; k + 1 < n; ++k) {
+      const double pivot = 4 - above(k - 1);
+      above(k) = 1 / pivot;
+      band_(k, kBand - 1) += 6;
+      band_(k, kBand) -= 12;
+      band_(k, kBand + 1) += 6;
+      band_.row(k).head(kWidth - 1) -= band_.row(k - 1).tail(kWidth - 1);
+      band_.row(k) /= pivot;
+    }
+    for (int k = n - 2; k >= 1; --k)
+      band_.row(k).tail(kWidth - 1) -= above(k) * band_.row(k + 1).head(kWidth - 1);
   }
-  for (int k = n - 2; k >= 1; --k) m.row(k) -= above(k) * m.row(k + 1);
-  return m;
-}
+
+  double operator()(int k, int column) const {
+    const int place = column - k + kBand;
+    return place >= 0 && place < kWidth ? band_(k, place) : 0;
+  }
+
+ private:
+  static constexpr int kWidth = 2 * kBand + 1;
+  using BandRows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+  BandRows band_;  ///< row k holds columns k - kBand to k + kBand
+};
 
 /// Returns weights (points x n) of the interpolation at the coordinates `x_m`, or of its derivative
 /// there. The `n` knots are evenly spaced over [0, length_m]; the derivative has that `order` (0 to
 /// 2; 1/m^order).
 Surface::Weights axis_weights(int n, double length_m, const Eigen::VectorXd& x_m,
                               SurfaceInterpolation interpolation, int order) {
-  Eigen::MatrixXd second_derivatives;
-  if (interpolation == SurfaceInterpolation::bicubic)
-    second_derivatives = natural_second_derivatives(n);
+  const bool is_bicubic = interpolation == SurfaceInterpolation::bicubic;
+  const SecondDerivatives second_derivatives(is_bicubic ? n : 0);
   std::vector<Eigen::Triplet<double>> kept;
   for (Eigen::Index point = 0; point < x_m.size(); ++point) {
     assert(x_m(point) >= -kOutsideAllowed_m && x_m(point) <= length_m + kOutsideAllowed_m);
@@ -49,21 +66,26 @@ Surface::Weights axis_weights(int n, double length_m, const Eigen::VectorXd& x_m
     const double u = x - k;
 
     // On [k, k + 1]: f = (1 - u) f_k + u f_{k+1} + c(1 - u) M_k + c(u) M_{k+1}, c(u) = (u^3 - u)/6.
-    Eigen::RowVectorXd weight = Eigen::RowVectorXd::Zero(n);
-    if (order == 0) weight.segment<2>(k) << 1 - u, u;
-    if (order == 1) weight.segment<2>(k) << -1, 1;
-    if (interpolation == SurfaceInterpolation::bicubic) {
+    const int first = is_bicubic ? std::max(0, k - SecondDerivatives::kBand) : k;
+    const int end = is_bicubic ? std::min(n, k + 2 + SecondDerivatives::kBand) : k + 2;
+    Eigen::RowVectorXd weight = Eigen::RowVectorXd::Zero(end - first);
+    if (order == 0) weight.segment<2>(k - first) << 1 - u, u;
+    if (order == 1) weight.segment<2>(k - first) << -1, 1;
+    if (is_bicubic) {
       const auto c = [order](double v) {
         return order == 0 ? v * (v * v - 1) / 6 : order == 1 ? (3 * v * v - 1) / 6 : v;
       };
-      weight += (order == 1 ? -1 : 1) * c(1 - u) * second_derivatives.row(k) +
-                c(u) * second_derivatives.row(k + 1);
+      const double of_k = (order == 1 ? -1 : 1) * c(1 - u), of_next = c(u);
+      for (int j = first; j < end; ++j)
+        weight(j - first) +=
+            of_k * second_derivatives(k, j) + of_next * second_derivatives(k + 1, j);
     }
     weight *= std::pow((n - 1) / length_m, order);
 
     const double smallest = kSmallestRelativeWeight * weight.cwiseAbs().maxCoeff();
-    for (int j = 0; j < n; ++j)
-      if (std::abs(weight(j)) > smallest) kept.emplace_back(static_cast<int>(point), j, weight(j));
+    for (int j = first; j < end; ++j)
+      if (std::abs(weight(j - first)) > smallest)
+        kept.emplace_back(static_cast<int>(point), j, weight(j - first));
   }
   Surface::Weights weights(x_m.size(), n);
   weights.setFromTriplets(kept.begin(), kept.end());

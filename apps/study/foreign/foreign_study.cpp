@@ -19,6 +19,7 @@
 #include "fit/diagnosis/diagnose.h"
 #include "fit/jobs/executor.h"
 #include "fit/jobs/journal_key.h"
+#include "fit/jobs/thread_limit.h"
 
 namespace clothfit {
 namespace {
@@ -59,6 +60,7 @@ ForeignDiagnosis diagnose_one(const fs::path& folder, const ForeignStudyOptions&
   diagnosis_options.fit.seed = options.seed;
   diagnosis_options.fit.threads = options.threads;
   diagnosis_options.budget_s = options.budget_s;
+  diagnosis_options.fit.is_cancelled = interrupted;
   try {
     const ObservationKind observations = diagnosis_options.fit.observations;
     const Recording recording =
@@ -118,8 +120,9 @@ std::vector<fs::path> find_foreign_recordings(const fs::path& folder,
 }
 
 void ForeignStudyOptions::validate() const {
-  if (threads < 0) throw InputError("--threads", "is out of range", "0 (all) or more");
-  if (budget_s < 0) throw InputError("--budget", "is out of range", "seconds, or 0");
+  require_threads(threads);
+  if (!(budget_s >= 0 && budget_s <= 1e9))
+    throw InputError("--budget", "is out of range", "0 to 1e9 seconds");
 }
 
 std::string ForeignStudyOptions::key() const {

@@ -12,6 +12,7 @@
 #include "data/input_error.h"
 #include "fit/jobs/executor.h"
 #include "fit/jobs/journal_key.h"
+#include "fit/jobs/thread_limit.h"
 #include "fit/problem/parameterised_model.h"
 
 namespace clothfit {
@@ -149,10 +150,10 @@ std::pair<const FullCostTrial*, const FullCostTrial*> best_and_worst(
 }  // namespace
 
 void Louchet1995Options::validate() const {
-  if (seeds < 1) throw InputError("--seeds", fmt::format("{} seeds", seeds), "give 1 or more");
-  if (threads < 0)
-    throw InputError("--threads", fmt::format("{} threads", threads),
-                     "give a number, or 0 for as many as the machine has");
+  constexpr int kMostSeeds = 10'000;
+  if (seeds < 1 || seeds > kMostSeeds)
+    throw InputError("--seeds", fmt::format("{} seeds", seeds), fmt::format("1 to {}", kMostSeeds));
+  require_threads(threads);
 }
 
 std::string Louchet1995Options::key() const {

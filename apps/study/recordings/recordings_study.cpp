@@ -22,6 +22,7 @@
 #include "data/input_error.h"
 #include "fit/jobs/executor.h"
 #include "fit/jobs/journal_key.h"
+#include "fit/jobs/thread_limit.h"
 #include "fit/observe/marker_error.h"
 #include "fit/observe/trivial_predictors.h"
 #include "fit/problem/drive.h"
@@ -194,6 +195,7 @@ std::vector<StudyRow> fit_one(const fs::path& folder, const StudiedModel& model,
     FitOptions fit_options = options.fit;
     fit_options.effects = model.effects;
     if (!model.marker_offsets) fit_options.marker_offset_sigma_m = 0;
+    fit_options.is_cancelled = interrupted;
     fit_options.threads = 0;  // a limit of one fit would be one of all that are at work
     const FitReport report =
         fit(input, fit_options, [](const Progress&) { return !interrupted(); });
@@ -230,7 +232,7 @@ std::vector<fs::path> find_recordings(const std::vector<fs::path>& folders) {
 
 void RecordingsStudyOptions::validate() const {
   fit.validate();
-  if (threads < 0) throw InputError("--threads", "is out of range", "0 (all) or more");
+  require_threads(threads);
   const bool offsets = std::ranges::any_of(models, &StudiedModel::marker_offsets);
   if (offsets && fit.marker_offset_sigma_m == 0)
     throw InputError("--marker-offsets", "is 0, and a model has offsets of markers",

@@ -81,7 +81,8 @@ class Motion {
 }  // namespace
 
 std::vector<Eigen::Matrix3Xd> run_runge_kutta(const Cloth& cloth, const ParameterSet& parameters,
-                                              const Schedule& schedule) {
+                                              const Schedule& schedule, const StopCheck& stop) {
+  StopAsker asker(stop, cloth.spring_count());
   const Motion motion(cloth, parameters);
   const std::vector<double>& time_s = schedule.frame_time_s;
   Eigen::Matrix3Xd p = parameters.start_position_m;
@@ -113,6 +114,7 @@ std::vector<Eigen::Matrix3Xd> run_runge_kutta(const Cloth& cloth, const Paramete
       p = p0 + h * p_sum;
       v = v0 + h * v_sum;
       motion.hold(now_s + h, p, v);
+      if (asker.ends()) return {};
     }
     if (left_the_scene(p, parameters.start_position_m, cloth.mesh)) return {};
     position_m.push_back(p);

@@ -13,8 +13,8 @@ namespace clothfit {
 /// forces: neither the steps nor the kernels are those of fits. Its error is of fourth order in the
 /// step where forces are smooth. The memory of effects moves on once a step, which is of first
 /// order. Held points lie at vertices; no effect shifts them, and nothing limits strain. The result
-/// is empty where the numbers do not work out.
+/// is empty where the numbers do not work out, or `stop` ends it.
 std::vector<Eigen::Matrix3Xd> run_runge_kutta(const Cloth& cloth, const ParameterSet& parameters,
-                                              const Schedule& schedule);
+                                              const Schedule& schedule, const StopCheck& stop = {});
 
 }  // namespace clothfit

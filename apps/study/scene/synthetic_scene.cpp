@@ -9,8 +9,12 @@
 #include "apps/study/scene/runge_kutta_run.h"
 #include "data/input_error.h"
 #include "fit/jobs/draws.h"
+#include "fit/jobs/stop_token.h"
 #include "fit/measurement_effects/registry.h"
+#include "fit/problem/memory_limits.h"
 #include "fit/problem/simulation.h"
+#include "fit/problem/time_steps.h"
+#include "fit/problem/work_limits.h"
 #include "model/cloth/cloth.h"
 #include "model/cloth/stability.h"
 #include "model/effects/registry.h"
@@ -103,6 +107,22 @@ Truth make_truth(const SyntheticScene& scene, std::uint64_t seed) {
   return truth;
 }
 
+/// Fits leave room to the largest stable step, and so does this.
+double time_step_s(const SyntheticScene& scene, const Truth& truth) {
+  return stable_time_step_s(truth.cloth, truth.set) / (kStabilityMargin * scene.truth_steps);
+}
+
+void require_affordable(const SyntheticScene& scene, const Truth& truth, const Schedule& schedule) {
+  RunWork work = work_of_run(truth.cloth, schedule.frame_time_s, schedule.time_step_s, false, 0);
+  constexpr double kStages = 4;
+  if (scene.integrator == TruthIntegrator::runge_kutta) work.springs *= kStages;
+  require_affordable_run(work, "--truth-steps",
+                         "fewer --truth-steps, a coarser --truth-mesh, or fewer --seconds");
+}
+
+constexpr int kMostSide = 256;  ///< as the finest square mesh of a recording
+constexpr int kMostSceneFrames = 100'000;
+
 }  // namespace
 
 std::string to_string(TruthIntegrator integrator) {
@@ -113,22 +133,36 @@ void SyntheticScene::validate() const {
   const auto require = [](bool good, const char* option, const char* expected) {
     if (!good) throw InputError(option, "is out of range", expected);
   };
-  require(size_m > 0, "--size", "metres, more than 0");
-  require(mass_kg > 0, "--mass", "kilograms, more than 0");
-  require(drag_per_s >= 0, "--drag", "1/s, 0 or more");
-  require(truth_mesh >= 3, "--truth-mesh", "at least 3 vertices a side");
-  require(truth_steps >= 1, "--truth-steps", "1 or more");
-  require(markers >= 2, "--markers", "at least 2 a side");
-  require(frames >= 10, "--seconds", "at least 10 frames");
+  require(size_m > 0 && size_m <= 1e3, "--size", "metres, more than 0");
+  require(mass_kg > 0 && mass_kg <= 1e6, "--mass", "kilograms, more than 0");
+  require(drag_per_s >= 0 && drag_per_s <= 1e6, "--drag", "1/s, 0 to 1e6");
+  require(truth_mesh >= 3 && truth_mesh <= kMostSide, "--truth-mesh", "3 to 256 vertices a side");
+  require(truth_steps >= 1 && truth_steps <= kFinestStep, "--truth-steps", "1 to 1000");
+  require(markers >= 2 && markers <= kMostSide, "--markers", "2 to 256 a side");
+  require(frames >= 10 && frames <= kMostSceneFrames, "--seconds",
+          "10 to 100000 frames at this --rate");
   require(held_out_from == 0 || (held_out_from >= 8 && held_out_from < frames), "--fitted",
           "a frame from 8 to before the last");
-  require(frame_rate_hz > 0, "--rate", "frames per second, more than 0");
-  require(before_s >= 0, "--before", "seconds, 0 or more");
+  require(frame_rate_hz > 0 && frame_rate_hz <= 1e6, "--rate",
+          "frames per second, more than 0, at most 1e6");
+  require(before_s >= 0 && before_s <= 1e4, "--before", "seconds, 0 to 10000");
   require(cameras >= 1 && cameras <= 4, "--cameras", "1 to 4");
-  require(noise_m > 0, "--noise-mm", "millimetres, more than 0");
-  require(noise_px > 0, "--noise-px", "pixels, more than 0");
+  require(noise_m > 0 && noise_m <= 1e3, "--noise-mm", "millimetres, more than 0, at most 1e6");
+  require(noise_px > 0 && noise_px <= 1e4, "--noise-px", "pixels, more than 0, at most 1e4");
   require(missing >= 0 && missing <= 0.9, "--missing", "a share, 0 to 0.9");
   require(outliers >= 0 && outliers <= 0.5, "--outliers", "a share, 0 to 0.5");
+  // A row of the tracks and what a fit makes of it; a frame of the truth.
+  constexpr double kBytesOfRow = 200, kBytesOfVertex = 24;
+  const double vertices = static_cast<double>(truth_mesh) * truth_mesh,
+               rows = static_cast<double>(markers) * markers * cameras;
+  require_memory(frames * (rows * kBytesOfRow + vertices * kBytesOfVertex), "--markers",
+                 fmt::format("{} frames of {} x {} markers", frames, markers, markers),
+                 "fewer --markers, a coarser --truth-mesh, or fewer --seconds");
+  // The work is the same for every release.
+  const Truth truth = make_truth(*this, 1);
+  require_affordable(*this, truth,
+                     {.frame_time_s = {-before_s, (frames - 1) / frame_rate_hz},
+                      .time_step_s = time_step_s(*this, truth)});
 }
 
 Recording scene_recording(const SyntheticScene& scene) {
@@ -190,16 +224,18 @@ std::vector<Eigen::Matrix3Xd> simulate_scene(const SyntheticScene& scene, std::u
   for (const double since_release_s : time_s)
     schedule.frame_time_s.push_back(since_release_s - scene.before_s);
 
-  // Fits leave room to the largest stable step, and so does this.
-  schedule.time_step_s = stable_time_step_s(truth.cloth, truth.set) / (1.5 * scene.truth_steps);
+  schedule.time_step_s = time_step_s(scene, truth);
+  require_affordable(scene, truth, schedule);
   std::vector<Eigen::Matrix3Xd> position_m;
+  const StopCheck stop = throwing_check(scene.is_cancelled);
   // Only a step itself can shift supports otherwise than by a prescribed motion.
   const bool shifts_supports =
       std::ranges::any_of(truth.cloth.effects, [](const auto& e) { return e->shifts_supports(); });
   if (scene.integrator == TruthIntegrator::runge_kutta && !shifts_supports) {
-    position_m = run_runge_kutta(truth.cloth, truth.set, schedule);
+    position_m = run_runge_kutta(truth.cloth, truth.set, schedule, stop);
   } else {
-    SimulateResult run = std::move(simulate(truth.cloth, {&truth.set, 1}, schedule).front());
+    SimulateResult run = std::move(
+        simulate(truth.cloth, {&truth.set, 1}, schedule, Precision::exact, {}, stop).front());
     if (run.usable()) position_m = std::move(run.position_m);
   }
   if (position_m.empty())

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <span>
 #include <string>
@@ -59,6 +60,7 @@ struct SyntheticScene {
   double missing = 0;         ///< share of observations dropped at random, 0 to 0.9
   bool hand = false;          ///< a hand hides a quarter of the cloth for a third of the time
   double outliers = 0;        ///< share of observations off by up to 0.1 m or 60 px, 0 to 0.5
+  std::function<bool()> is_cancelled;  ///< as FitOptions::is_cancelled
 
   void validate() const;  ///< throws InputError, naming options of `clothfit recover`
 };
@@ -81,7 +83,8 @@ std::vector<double> scene_frame_times_s(const SyntheticScene& scene);
 /// Returns vertices of the truth's mesh, truth_mesh a side, at times (rising, s) since the release
 /// that `seed` draws. They are 3 x vertices, world, m. Hidden effects of motion act; the
 /// recording's first frame is time 0 for them, and effects that move supports are prescribed
-/// motions. Throws InputError where that cannot be simulated.
+/// motions. Throws InputError where that cannot be simulated, and StopRequested where
+/// `is_cancelled` says so.
 std::vector<Eigen::Matrix3Xd> simulate_scene(const SyntheticScene& scene, std::uint64_t seed,
                                              std::span<const double> time_s);
 

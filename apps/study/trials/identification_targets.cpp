@@ -229,7 +229,7 @@ bool is_wanted(const TargetsOptions& options, const TargetStudy& study) {
 void TargetsOptions::validate() const {
   if (!(share > 0 && share <= 1))
     throw InputError("--share", "is out of range", "a share of the trials, more than 0, at most 1");
-  if (threads < 0) throw InputError("--threads", "is out of range", "0 (all) or more");
+  require_threads(threads);
   for (const std::string& name : only) {
     const std::vector<TargetStudy> studies = target_studies({});
     const bool known = name == "seconds" || name == "drag" ||

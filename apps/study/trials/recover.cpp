@@ -15,6 +15,8 @@
 #include "data/median.h"
 #include "fit/cost/objective.h"
 #include "fit/jobs/draws.h"
+#include "fit/jobs/stop_token.h"
+#include "fit/jobs/thread_limit.h"
 #include "fit/problem/parameterised_model.h"
 #include "fit/problem/prior_cost.h"
 #include "fit/problem/problem.h"
@@ -164,10 +166,11 @@ void RecoverOptions::validate() const {
       throw InputError("--observations", "tracks3d cannot be had from pictures", "tracks2d",
                        "leave it out beside --render");
   }
-  if (trials < 1) throw InputError("--trials", "is out of range", "at least 1");
-  if (start_factor != 0 && !(start_factor >= 1))
-    throw InputError("--start-factor", "is out of range", "1 or more, or 0 for a search");
-  if (threads < 0) throw InputError("--threads", "is out of range", "0 (all) or more");
+  if (trials < 1 || trials > kMostTrials)
+    throw InputError("--trials", "is out of range", fmt::format("1 to {}", kMostTrials));
+  if (start_factor != 0 && !(start_factor >= 1 && start_factor <= 1e6))
+    throw InputError("--start-factor", "is out of range", "1 to 1e6, or 0 for a search");
+  require_threads(threads);
 }
 
 std::string RecoverOptions::key() const {
@@ -271,6 +274,7 @@ RecoverTrial recover_once(const RecoverOptions& options, int, std::uint64_t seed
     }
   }
   const FitReport report = fit(recording.input, fit_options, {});
+  if (report.stop == FitStop::cancelled) throw StopRequested();
   RecoverTrial trial{.stop = report.stop, .message = report.message, .tracker = tracker};
   for (const auto& [reason, count] : report.result.observations_rejected) trial.rejected += count;
   if (report.usable()) {

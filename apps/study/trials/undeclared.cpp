@@ -18,6 +18,8 @@
 #include "data/input_error.h"
 #include "fit/diagnosis/hypothesis_derivatives.h"
 #include "fit/jobs/draws.h"
+#include "fit/jobs/stop_token.h"
+#include "fit/jobs/thread_limit.h"
 #include "fit/measurement_effects/registry.h"
 #include "fit/problem/effects_of.h"
 
@@ -195,6 +197,7 @@ double error_with_truth(const FitInput& input, const UndeclaredOptions& options,
   }
   told.hypotheses = terms;
   const FitReport report = fit(input, told, {});
+  if (report.stop == FitStop::cancelled) throw StopRequested();
   return report.usable() ? held_out_rms(report) : kNothingHidden;
 }
 
@@ -244,10 +247,11 @@ void UndeclaredOptions::validate() const {
   const auto require = [](bool good, const char* option, const char* expected) {
     if (!good) throw InputError(option, "is out of range", expected);
   };
-  require(trials >= 1, "--trials", "at least 1");
-  require(threads >= 0, "--threads", "0 (all) or more");
+  require(trials >= 1 && trials <= kMostTrials, "--trials", "1 to 1000000");
+  require_threads(threads);
   require(most_mimicked > 0 && most_mimicked <= 1, "--mimicked", "a share, to 1");
-  require(draw.least > 0 && draw.least <= draw.most, "--least-sigmas", "rising, more than 0");
+  require(draw.least > 0 && draw.least <= draw.most && draw.most <= 1e9, "--least-sigmas",
+          "rising, more than 0");
   require(diagnosis.fit.mesh_columns >= 3 && diagnosis.fit.mesh_columns == diagnosis.fit.mesh_rows,
           "--mesh", "at least 3 vertices a side");
   require(scene.held_out_from > 0, "--fitted", "frames to judge by");
@@ -341,6 +345,7 @@ UndeclaredTrial undeclared_once(const UndeclaredOptions& options, int index, std
     own.diagnosis.law_terms = 0;  // nobody asks for it where the hidden effect is known
   const auto diagnosis_began = std::chrono::steady_clock::now();
   const Diagnosis diagnosis = diagnose(recording.input, own.diagnosis, {});
+  if (diagnosis.stop == FitStop::cancelled) throw StopRequested();
   trial.seconds = seconds_since(diagnosis_began);
   trial.stop = diagnosis.stop;
   trial.message = diagnosis.message;

@@ -50,6 +50,7 @@ ChainResult fit_pictures(const Recording& recording, const fs::path& steps,
   const FitInput input = tracked_input(recording, steps, progress);
   FitOptions options;
   options.observations = ObservationKind::tracks2d;
+  options.is_cancelled = interrupted;
   const FitReport report = fit_and_judge(input, options, progress);
   if (report.stop == FitStop::cancelled || interrupted()) throw Cancelled();
   if (!report.usable()) throw NoResult("no fit: " + report.message);
@@ -65,6 +66,7 @@ ChainResult diagnose_pictures(const Recording& recording, const fs::path& steps,
   const FitInput input = tracked_input(recording, steps, progress);
   DiagnoseOptions options;
   options.fit.observations = ObservationKind::tracks2d;
+  options.fit.is_cancelled = interrupted;
   const Diagnosis diagnosis = diagnose(input, options, progress);
   if (diagnosis.stop == FitStop::cancelled || interrupted()) throw Cancelled();
   if (!diagnosis.usable()) throw NoResult("no diagnosis: " + diagnosis.message);
