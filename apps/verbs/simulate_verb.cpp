@@ -92,13 +92,6 @@ void require_possible(const StepChoice& choice, const Simulation& simulation,
   const std::string where = choice.source == "model"         ? model.where(model.time_step_line)
                             : choice.source == "--time-step" ? choice.source
                                                              : model.where(model.fabric_line);
-  if (!choice.stable() && !allow_unstable) {
-    throw InputError(
-        where, fmt::format("steps of {} s would be unstable", significant(choice.longest_s, 3)),
-        fmt::format("at most {} s for this cloth and these springs", rounded_down(choice.stable_s)),
-        fmt::format("--time-step {}, or leave it out; --allow-unstable runs it all the same",
-                    rounded_down(choice.stable_s)));
-  }
   if (choice.time_step_s < choice.stable_s / (kFinestStep * kStabilityMargin))
     throw InputError(
         where,
@@ -113,6 +106,13 @@ void require_possible(const StepChoice& choice, const Simulation& simulation,
       work_of_run(simulation.cloth, simulation.frame_time_s, steps,
                   simulation.start == StartKind::at_rest, model.gravity_m_per_s2.norm()),
       where, "a shorter duration, a coarser mesh, or softer springs");
+  if (!choice.stable() && !allow_unstable) {
+    throw InputError(
+        where, fmt::format("steps of {} s would be unstable", significant(choice.longest_s, 3)),
+        fmt::format("at most {} s for this cloth and these springs", rounded_down(choice.stable_s)),
+        fmt::format("--time-step {}, or leave it out; --allow-unstable runs it all the same",
+                    rounded_down(choice.stable_s)));
+  }
 }
 
 /// Throws InputError for frames that fit into no memory, or no folder.
