@@ -19,7 +19,7 @@ namespace {
 constexpr double kLongestInterval_s = 1000;
 
 /// Each held point is a path of its own; as many as this no person types.
-constexpr size_t kMostHeldPoints = 1000;
+constexpr size_t kMostHeldEntries = 1024;
 
 void require(const YamlValue& value, bool found, const std::string& expected) {
   if (found) return;
@@ -165,9 +165,9 @@ std::vector<HeldPoint> read_held(const YamlValue& value, const RecordingFiles& f
                                  const ClothDescription& cloth, const Words<HeldMotion>& motions) {
   std::vector<HeldPoint> held;
   const std::vector<YamlValue> items = value.items();
-  if (items.size() > kMostHeldPoints)
+  if (items.size() > kMostHeldEntries)
     value.refuse(fmt::format("{} has {} entries", value.name(), items.size()),
-                 fmt::format("{} at most", kMostHeldPoints),
+                 fmt::format("{} at most", kMostHeldEntries),
                  "name an edge where all of its points are held");
   for (const YamlValue& item : items) {
     const YamlMap map = item.map({"at", "edge", "motion", "file"});

@@ -27,9 +27,14 @@ void estimate_missing_sigma(ObservationSet& set, const ObservedFrames& frames, i
     estimate = estimate_noise(frames.time_s, tracks, {.interval_tolerance = tolerance});
     if (estimate.differences >= kFewest) break;
   }
-  if (!(estimate.sigma > 0))
-    throw InputError(set.kind, "the tracks state no sigma and are too short to estimate it from",
-                     "at least four consecutive frames of one marker, or a sigma column");
+  if (!(estimate.sigma > 0)) {
+    const bool exact = estimate.differences > 0;
+    throw InputError(set.kind,
+                     exact ? "the tracks state no sigma and do not scatter by themselves"
+                           : "the tracks state no sigma and are too short to estimate it from",
+                     exact ? "measured positions, or a sigma column"
+                           : "at least four consecutive frames of one marker, or a sigma column");
+  }
   for (Observation& row : set.rows)
     if (!(row.sigma > 0)) row.sigma = estimate.sigma;
 }

@@ -17,7 +17,7 @@
 namespace clothfit {
 namespace {
 
-const SyntheticCloth kSmall{.mesh = 5, .markers = 4, .frames = 30, .held_out_from = 24};
+const SyntheticCloth kCancelledCloth{.mesh = 5, .markers = 4, .frames = 30, .held_out_from = 24};
 
 FitOptions small_fit() {
   FitOptions options;
@@ -42,7 +42,7 @@ int questions_of(FitOptions options, const FitInput& input) {
 }
 
 TEST(CancelledFit, EndsAtTheQuestionWherever) {
-  const FitInput input = synthetic_input(kSmall);
+  const FitInput input = synthetic_input(kCancelledCloth);
   for (const LeadingCost cost :
        {LeadingCost::trajectory, LeadingCost::shooting, LeadingCost::small}) {
     FitOptions options = small_fit();
@@ -66,7 +66,7 @@ TEST(CancelledFit, EndsAtTheQuestionWherever) {
 }
 
 TEST(CancelledFit, LeavesACheckpointFromWhichItGoesOnToTheSameBits) {
-  const FitInput input = synthetic_input(kSmall);
+  const FitInput input = synthetic_input(kCancelledCloth);
   const FitOptions whole = small_fit();
   const FitReport expected = fit(input, whole, {});
   ASSERT_TRUE(expected.usable());
@@ -92,7 +92,7 @@ TEST(CancelledFit, LeavesACheckpointFromWhichItGoesOnToTheSameBits) {
 }
 
 TEST(CancelledFit, ForecastsEndToo) {
-  const FitInput input = synthetic_input(kSmall);
+  const FitInput input = synthetic_input(kCancelledCloth);
   FitOptions options = small_fit();
   const FitReport known = fit(input, options, {});
   ASSERT_TRUE(known.usable());
@@ -116,7 +116,7 @@ DiagnoseOptions small_diagnosis() {
 }
 
 TEST(CancelledDiagnosis, EndsWithWhatItHasWhereverTheSearchIs) {
-  SyntheticCloth cloth = kSmall;
+  SyntheticCloth cloth = kCancelledCloth;
   cloth.drag_rate_per_s = 1.2;
   const FitInput input = synthetic_input(cloth);
   // The search begins once scores are asked for. From then on some question is the last.
@@ -135,7 +135,7 @@ TEST(CancelledDiagnosis, EndsWithWhatItHasWhereverTheSearchIs) {
 }
 
 TEST(CancelledDiagnosis, IsCancelledBeforeAndDuringTheSearch) {
-  const FitInput input = synthetic_input(kSmall);
+  const FitInput input = synthetic_input(kCancelledCloth);
   for (const int last : {0, 20}) {
     SCOPED_TRACE(last);
     DiagnoseOptions options = small_diagnosis();

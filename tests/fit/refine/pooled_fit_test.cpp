@@ -29,7 +29,7 @@ std::map<std::string, double> truth() {
   return named(SyntheticCloth{}.fabric);
 }
 
-Eigen::VectorXd true_values(const FitProblem& problem) {
+Eigen::VectorXd true_coordinates(const FitProblem& problem) {
   return start_with(problem, SyntheticCloth{}.fabric);
 }
 
@@ -38,7 +38,7 @@ Eigen::VectorXd true_values(const FitProblem& problem) {
 void make_exact(FitProblem& problem, unsigned seed) {
   std::mt19937_64 generator(seed);
   std::uniform_real_distribution<double> uniform(-1, 1);
-  Eigen::VectorXd values = true_values(problem);
+  Eigen::VectorXd values = true_coordinates(problem);
   for (const Binding& binding : problem.sheet_motion)
     values[binding.parameter] = 2e-3 * uniform(generator);
   const double time_step_s =
@@ -74,7 +74,7 @@ struct TwoRecordings {
   Eigen::VectorXd somewhere() const {
     std::mt19937_64 generator(5);
     std::uniform_real_distribution<double> uniform(-0.2, 0.2);
-    Eigen::VectorXd x = space.coordinates({true_values(first), true_values(second)});
+    Eigen::VectorXd x = space.coordinates({true_coordinates(first), true_coordinates(second)});
     for (double& coordinate : x) coordinate += uniform(generator);
     return x;
   }
@@ -173,7 +173,7 @@ TEST(Quadratic, CountsDirectionsAsACovariance) {
   const Eigen::MatrixXd jacobian = random(problem.space.size()), errs = 2 * random(3);
   const Eigen::VectorXd residual = random(1), correction = random(1);
   PooledPart part;
-  part.values = true_values(problem);
+  part.values = true_coordinates(problem);
   part.frames = 4;
   part.steps = 1e-3;
   part.linear.residual = residual - correction;
@@ -206,7 +206,7 @@ TEST(PooledSpace, StepsAsTheWholeSystemOfEquationsSays) {
   const PooledSpace space(problems);
   std::vector<Quadratic> quadratics;
   for (const FitProblem* problem : problems) {
-    const Eigen::VectorXd values = true_values(*problem);
+    const Eigen::VectorXd values = true_coordinates(*problem);
     const TrajectoryObjective objective(*problem, problem->first_held_out, 1e-3);
     PooledPart part;
     part.values = values;
@@ -309,7 +309,7 @@ TEST(PooledFit, GoesRoughlyTheWholeWayWithTheDerivativesThatItBeginsWith) {
   make_exact(problem, 1);
   const FitProblem* const problems[] = {&problem};
   PooledPart part;
-  part.values = 1.05 * true_values(problem);
+  part.values = 1.05 * true_coordinates(problem);
   part.frames = problem.first_held_out;
   part.steps = stable_time_steps(problem.cloth, parameter_set(problem, part.values)).times(0.5);
   part.linear = TrajectoryObjective(problem, part.frames, part.steps).linearise(part.values);
