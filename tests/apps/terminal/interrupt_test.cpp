@@ -50,7 +50,7 @@ TEST(Interrupt, TermEndsAProgramThatNeverLooksAndRemovesWhatIsHalfWritten) {
   EXPECT_EXIT(
       {
         catch_interrupts();
-        ResultFolder out(here.path() / "result");
+        ResultFolder out(here.path() / "result", {});
         std::ofstream(out.path() / "half") << "half";
         std::raise(SIGTERM);
         work_on(1.5);  // ends after kLongestEnding_ms
@@ -65,7 +65,7 @@ TEST(Interrupt, TheSecondSignalOfAKindHalfASecondLaterEndsItAtOnce) {
     EXPECT_EXIT(
         {
           catch_interrupts();
-          ResultFolder out(here.path() / "result");
+          ResultFolder out(here.path() / "result", {});
           std::raise(signal);
           work_for(0.6);
           std::raise(signal);
@@ -105,7 +105,7 @@ TEST(Interrupt, AResultThatIsBeingPublishedIsLeftWhole) {
   EXPECT_EXIT(
       {
         catch_interrupts();
-        ResultFolder out(here.path() / "result");
+        ResultFolder out(here.path() / "result", {});
         std::ofstream(out.path() / "file") << "whole";
         const auto lock = PartialFolder::keep_whole();  // as publish() has it
         std::raise(SIGTERM);
@@ -114,7 +114,7 @@ TEST(Interrupt, AResultThatIsBeingPublishedIsLeftWhole) {
       ExitedWithCode(kExitCancelled), "ended at once");
   EXPECT_FALSE(fs::exists(here.path() / "result"));
   // The hidden folder stays, and the next run removes it.
-  { ResultFolder next(here.path() / "result"); }
+  { ResultFolder next(here.path() / "result", {}); }
   EXPECT_TRUE(fs::is_empty(here.path()));
 }
 
@@ -123,7 +123,7 @@ TEST(Interrupt, PublishedResultsStay) {
   EXPECT_EXIT(
       {
         catch_interrupts();
-        ResultFolder out(here.path() / "result");
+        ResultFolder out(here.path() / "result", {});
         std::ofstream(out.path() / "file") << "whole";
         out.publish();
         std::raise(SIGTERM);
