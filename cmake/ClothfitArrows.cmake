@@ -107,6 +107,7 @@ set(CLOTHFIT_TEST_ARROWS
   "tests/model  -> model data"
   "tests/fit    -> fit model calib data tests/data"
   "tests/apps   -> apps fit model vision calib data tests/data"
+  "tests/fuzz   -> apps fit model vision calib data"
   "tests/bench  -> fit model vision calib data tests/model tests/vision"
 )
 

@@ -12,7 +12,8 @@ add_library(clothfit_warnings INTERFACE)
 target_compile_options(clothfit_warnings INTERFACE
   -Wall -Wextra -Wconversion -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual
   -Wno-missing-field-initializers  # a designated initialiser leaves defaults out on purpose
-  -Wno-restrict)  # g++ 12 sees overlaps in std::string's operator+ that are not there (PR 105651)
+  $<$<CXX_COMPILER_ID:Clang>:-Wno-sign-conversion>  # g++'s -Wconversion leaves it out in C++
+  $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict>)  # g++ 12 sees overlaps in std::string's operator+ that are not there (PR 105651)
 if(CLOTHFIT_WARNINGS_AS_ERRORS)
   target_compile_options(clothfit_warnings INTERFACE -Werror)
 endif()

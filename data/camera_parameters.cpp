@@ -9,6 +9,7 @@
 
 #include "data/algebra/dense_factors.h"
 #include "data/input_error.h"
+#include "data/number_limits.h"
 #include "data/text_file.h"
 #include "data/unit_quaternion.h"
 #include "data/yaml_value.h"
@@ -16,6 +17,14 @@
 
 namespace clothfit {
 namespace {
+
+/// Numbers of a camera beyond these are slips in a unit or an exponent. What computes with pixels
+/// would overflow on them, and a fit would take what comes out for a place.
+constexpr int kMostSide_px = 1'000'000;
+constexpr double kShortestFocal_px = 1e-3, kLongestFocal_px = 1e9;
+constexpr double kMostDistortion = 1e6;
+constexpr double kMostVariance = 1e12;  ///< rad^2, m^2
+constexpr double kLongestReadout_s = 1e3;
 
 std::vector<std::pair<std::string, CameraModel>> camera_model_words() {
   return {{"pinhole", CameraModel::pinhole},
@@ -46,6 +55,11 @@ std::vector<double> read_distortion(const YamlValue* value, CameraModel model,
   if (std::find(counts.begin(), counts.end(), distortion.size()) == counts.end())
     value->refuse(fmt::format("{} distortion coefficients for {}", distortion.size(), model_name),
                   "brown_conrady has 4, 5 or 8, kannala_brandt 4, pinhole none");
+  for (const double coefficient : distortion)
+    if (std::abs(coefficient) > kMostDistortion)
+      value->refuse(
+          fmt::format("a distortion coefficient of {}", coefficient),
+          fmt::format("coefficients from {:g} to {:g}", -kMostDistortion, kMostDistortion));
   return distortion;
 }
 
@@ -65,7 +79,8 @@ bool is_covariance(const Eigen::Matrix<double, 6, 6>& matrix) {
 }
 
 Eigen::Matrix<double, 6, 6> read_covariance(const YamlValue& value) {
-  const std::array<double, kTriangleSize> triangle = value.numbers<kTriangleSize>();
+  const std::array<double, kTriangleSize> triangle = value.numbers_between<kTriangleSize>(
+      -kMostVariance, kMostVariance, "variances and covariances in rad2 and m2");
   Eigen::Matrix<double, 6, 6> covariance;
   size_t next = 0;
   for (int row = 0; row < kPoseSize; ++row)
@@ -87,7 +102,8 @@ CameraPose read_pose(const YamlValue& value) {
     rotation.refuse(fmt::format("{} = [{}, {}, {}, {}]", rotation.name(), w, x, y, z),
                     "a quaternion [w, x, y, z] of norm 1, off by 0.001 at most");
   pose.rotation = *unit;
-  const auto [tx, ty, tz] = map.at("translation").numbers<3>();
+  const auto [tx, ty, tz] =
+      map.at("translation").numbers_between<3>(-kFarthest_m, kFarthest_m, "metres along each axis");
   pose.translation_m = {tx, ty, tz};
   if (const YamlValue* covariance = map.find("covariance"))
     pose.covariance = read_covariance(*covariance);
@@ -110,24 +126,29 @@ CameraParameters read_camera(const std::filesystem::path& file) {
   const std::vector<YamlValue> sides = size.items();
   if (sides.size() != 2)
     size.refuse(fmt::format("image_size has {} items", sides.size()), "[width, height] in pixels");
-  camera.image_width = sides[0].whole_number(1);
-  camera.image_height = sides[1].whole_number(1);
+  camera.image_width = sides[0].whole_number(1, kMostSide_px);
+  camera.image_height = sides[1].whole_number(1, kMostSide_px);
 
   const YamlValue& focal = map.at("focal");
   const auto [fx, fy] = focal.numbers<2>();
   if (fx <= 0 || fy <= 0)
     focal.refuse(fmt::format("focal = [{}, {}]", fx, fy), "[fx, fy] in pixels, both > 0");
+  for (const double length : {fx, fy})
+    if (length < kShortestFocal_px || length > kLongestFocal_px)
+      focal.refuse(fmt::format("focal = [{}, {}]", fx, fy),
+                   fmt::format("pixels, {:g} to {:g}", kShortestFocal_px, kLongestFocal_px));
   camera.focal_px = {fx, fy};
-  const auto [cx, cy] = map.at("centre").numbers<2>();
+  const auto [cx, cy] = map.at("centre").numbers_between<2>(-kFarthest_px, kFarthest_px, "pixels");
   camera.centre_px = {cx, cy};
   camera.distortion = read_distortion(map.find("distortion"), camera.model, model.text());
   if (const YamlValue* pose = map.find("camera_from_world"))
     camera.camera_from_world = read_pose(*pose);
   if (const YamlValue* readout = map.find("readout_time")) {
     camera.readout_time_s = readout->number();
-    if (camera.readout_time_s < 0)
-      readout->refuse(fmt::format("readout_time = {}", camera.readout_time_s),
-                      "seconds from the first to the last row, >= 0");
+    if (camera.readout_time_s < 0 || camera.readout_time_s > kLongestReadout_s)
+      readout->refuse(
+          fmt::format("readout_time = {}", camera.readout_time_s),
+          fmt::format("seconds from the first to the last row, 0 to {:g}", kLongestReadout_s));
   }
   return camera;
 }

@@ -23,6 +23,7 @@ namespace {
 using Json = nlohmann::ordered_json;  // keys stay in the order of docs/formats.md
 
 constexpr const char* kFormat = "clothfit-fit/1";
+constexpr const char* kArealDensity = "areal_density";
 constexpr const char* kExpectedFile = "a file of format clothfit-fit/1";
 constexpr const char* kRemedy = "run `clothfit fit` again";
 
@@ -182,6 +183,11 @@ class JsonValue {
 
 /// Numbers of a fit beyond these are damaged, or slips in an exponent.
 constexpr double kLargestNumber = 1e15;
+/// Ends of intervals lie some sigmas beside a value.
+constexpr double kFarthestEnd = 10 * kLargestNumber;
+/// The masses per area (kg/m2) that a recording's limits of mass and size leave possible. Ratios
+/// are multiplied or divided by it.
+constexpr double kLightest_kg_per_m2 = 1e-12, kHeaviest_kg_per_m2 = 1e12;
 constexpr int kMostSubsteps = 10'000'000;
 constexpr double kLongestStep_s = 1e6;
 
@@ -199,7 +205,8 @@ std::optional<Interval> read_interval(const JsonValue& json, const std::string& 
   const JsonValue list = json.at(key);
   const std::vector<JsonValue> ends = list.items();
   if (ends.size() != 2) list.refuse("is no interval", "two numbers");
-  const Interval interval{.lower = ends[0].number(), .upper = ends[1].number()};
+  const Interval interval{.lower = ends[0].number_from(-kFarthestEnd, kFarthestEnd),
+                          .upper = ends[1].number_from(-kFarthestEnd, kFarthestEnd)};
   if (interval.lower > interval.upper) list.refuse("is no interval", "the lower end first");
   return interval;
 }
@@ -208,7 +215,9 @@ ParameterEstimate read_parameter(const JsonValue& json) {
   ParameterEstimate parameter;
   parameter.name = json.at("name").text();
   parameter.unit = json.at("unit").text();
-  parameter.value = json.at("value").number_from(-kLargestNumber, kLargestNumber);
+  const bool density = parameter.name == kArealDensity;
+  parameter.value = json.at("value").number_from(density ? kLightest_kg_per_m2 : -kLargestNumber,
+                                                 density ? kHeaviest_kg_per_m2 : kLargestNumber);
   parameter.sigma = json.at("sigma").number_from(0, kLargestNumber);
   const JsonValue state = json.at("state");
   const std::string word = state.text();
@@ -373,7 +382,7 @@ ParameterEstimate scaled(ParameterEstimate parameter, double factor) {
 
 FitResult at_density(FitResult result, std::optional<double> areal_density) {
   const auto assumed =
-      std::ranges::find(result.parameters, "areal_density", &ParameterEstimate::name);
+      std::ranges::find(result.parameters, kArealDensity, &ParameterEstimate::name);
   if (assumed == result.parameters.end()) return result;
   const double density = areal_density.value_or(assumed->value);
   const auto turn = [&](ParameterEstimate& parameter) {

@@ -10,6 +10,7 @@
 
 #include <fstream>
 
+#include "data/camera_parameters.h"
 #include "data/clouds.h"
 #include "data/csv_reader.h"
 #include "data/file_bytes.h"
@@ -217,6 +218,65 @@ TEST(FitJson, OfAnImpossibleMeshOrNumberIsRefused) {
                  [&] { read("\"value\": 12.0", "\"value\": 1e200"); });
   expect_refused(folder, "fit.json: `/parameters/0/sigma` is -1",
                  [&] { read("\"sigma\": 1.0", "\"sigma\": -1.0"); });
+}
+
+TEST(FitJson, WithNumbersThatOverflowForAClothOfAnotherDensityIsRefused) {
+  const TemporaryFolder folder;
+  FitResult result;
+  result.recording = "swing";
+  result.mesh_columns = result.mesh_rows = 9;
+  result.errors.resize(1);
+  result.parameters.push_back({.name = "areal_density", .unit = "kg/m2", .value = 0.1});
+  result.parameters.push_back({.name = "shear",
+                               .unit = std::string("N/m") + kPerArealDensity,
+                               .value = 12,
+                               .interval_90 = Interval{.lower = 11, .upper = 13.5}});
+  write_fit_result(result, folder / "fit.json");
+  const std::string whole = read_text(folder / "fit.json");
+  const auto read = [&](const std::string& what, const std::string& by) {
+    return read_fit_result(folder.write("fit.json", replaced(whole, what, by)));
+  };
+  EXPECT_NO_THROW(
+      write_fit_result(at_density(read("0.1,", "1e-12,"), std::nullopt), folder / "x.json"));
+  for (const char* number : {"0", "-1", "1e-320", "1e13"})
+    expect_refused(folder, "fit.json: `/parameters/0/value` is ",
+                   [&] { read("0.1,", std::string(number) + ","); });
+  expect_refused(folder, "fit.json: `/parameters/1/interval_90/1` is 1e+308",
+                 [&] { read("13.5", "1e308"); });
+}
+
+TEST(Camera, OfNumbersBeyondAnyCameraIsRefused) {
+  const TemporaryFolder folder;
+  CameraParameters camera;
+  camera.name = "front";
+  camera.model = CameraModel::brown_conrady;
+  camera.image_width = 961;
+  camera.image_height = 722;
+  camera.focal_px = {1001, 1002};
+  camera.centre_px = {483, 364};
+  camera.distortion = {-0.5, 0.25, 0, 0};
+  camera.camera_from_world = CameraPose{
+      .translation_m = {17.5, 18.5, 19.5},
+      .covariance = Eigen::Matrix<double, 6, 6>(Eigen::Matrix<double, 6, 6>::Identity() * 0.125)};
+  camera.readout_time_s = 0.0625;
+  write_camera(camera, folder / "camera.yaml");
+  const std::string whole = read_text(folder / "camera.yaml");
+  ASSERT_NO_THROW(read_camera(folder / "camera.yaml"));
+  for (const char* number : {"961", "722", "1001", "1002", "483", "364", "-0.5", "0.25", "17.5",
+                             "18.5", "19.5", "0.125", "0.0625"})
+    for (const char* absurd : {"1e160", "-1e160", "1e308", "2147483647", "-2147483648e6"}) {
+      SCOPED_TRACE(std::string(number) + " is " + absurd);
+      // A focal length of 2e9 px is refused as well.
+      const bool possible = std::string(number) == "0.125" && absurd == std::string("2147483647");
+      const auto read = [&] {
+        read_camera(folder.write("camera.yaml", replaced(whole, number, absurd)));
+      };
+      if (!possible) expect_refused(folder, "camera.yaml:", read);
+    }
+  for (const char* focal : {"1e-320", "1e-160", "0"})
+    expect_refused(folder, "camera.yaml:5: focal", [&] {
+      read_camera(folder.write("camera.yaml", replaced(whole, "1001", focal)));
+    });
 }
 
 TEST(Coordinates, BeyondAnyClothAreRefused) {
