@@ -83,9 +83,9 @@ TEST(CameraFile, ReadsBackToTheLastBit) {
     camera.image_width = 1 + round;
     camera.image_height = 720;
     camera.focal_px = {1000 * std::exp(draw()), 1000 * std::exp(draw())};
-    camera.centre_px = {draw(), 1e6 * draw()};
+    camera.centre_px = {draw(), 1e5 * draw()};
     for (size_t i = 0; i < distortion_count; ++i)
-      camera.distortion.push_back(draw() * std::exp(20 * draw()));
+      camera.distortion.push_back(draw() * std::exp(3 * draw()));
     camera.readout_time_s = std::abs(draw());
     if (round % 3 > 0) {
       CameraPose pose;
@@ -142,7 +142,7 @@ TEST(CameraFile, IsRefusedWithFileAndLine) {
       {"0.0008, -0.0005, 0]", "0.0008]", "c.yaml:7: 3 distortion coefficients for brown_conrady"},
       {"[960, 720]", "[960]", "c.yaml:4: image_size has 1 items; [width, height]"},
       {"[960, 720]", "960", "c.yaml:4: image_size = 960; a list"},
-      {"[960, 720]", "[960, 0]", "c.yaml:4: image_size[1] = 0; a whole number, 1 or more"},
+      {"[960, 720]", "[960, 0]", "c.yaml:4: image_size[1] = 0; a whole number, 1 to 1000000"},
       {"[960, 720]", "[960.5, 720]", "c.yaml:4: image_size[0] = 960.5; a whole number"},
       {"[1012.3, 1012.1]", "[1012.3, -1]", "c.yaml:5: focal = [1012.3, -1]; [fx, fy] in pixels"},
       {"[1012.3, 1012.1]", "[.inf, 1]", "c.yaml:5: focal[0] = .inf; a finite number"},

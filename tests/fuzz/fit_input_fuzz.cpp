@@ -33,6 +33,13 @@ FitInput fit_input(const Recording& recording) {
   return input;
 }
 
+/// Numbers that overflowed would be told to the user as if they meant something.
+void require_numbers(const Findings& findings) {
+  for (const Finding& finding : findings)
+    for (const char* overflown : {" nan", "(nan", " inf", "(inf", " -nan", " -inf"})
+      if (finding.found.find(overflown) != std::string::npos) __builtin_trap();
+}
+
 /// More is a matter of time, which a fit bounds by itself.
 constexpr int kMostMeshNodes = 400;
 constexpr double kMostSteps = 2000;
@@ -41,13 +48,15 @@ void simulate_first_frames(const FitInput& input) {
   const ClothDescription& cloth = input.recording.cloth;
   if (cloth.mesh_columns * cloth.mesh_rows > kMostMeshNodes) return;
   const FitProblem problem = make_problem(input, {}, cloth.mesh_columns, cloth.mesh_rows);
+  if (!problem.placed_sheet_m.allFinite()) __builtin_trap();
   Simulation simulation =
       make_simulation(describe_model(problem, input.recording, problem.space.start()));
   const double step_s = default_time_step_s(simulation);
   auto& times_s = simulation.frame_time_s;
   while (times_s.size() > 1 && times_s.back() - times_s.front() > kMostSteps * step_s)
     times_s.pop_back();
-  run(simulation, step_s);
+  const SimulateResult result = run(simulation, step_s);
+  if (result.usable() && !result.position_m.back().allFinite()) __builtin_trap();
 }
 
 }  // namespace
@@ -58,11 +67,15 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, size_t size) {
   const auto& folder = write_files(files_of(text_of(data, size), "recording.yaml"));
   read_or_refuse([&] {
     const Recording recording = read_recording(folder);
-    refuse_wrong(check_declarations(recording));
+    const Findings of_declarations = check_declarations(recording);
+    require_numbers(of_declarations);
+    refuse_wrong(of_declarations);
     const FitInput input = fit_input(recording);
     const ObservationKind kind =
         recording.tracks3d ? ObservationKind::tracks3d : ObservationKind::tracks2d;
-    refuse_wrong(check_recording(input, kind));
+    const Findings of_tracks = check_recording(input, kind);
+    require_numbers(of_tracks);
+    refuse_wrong(of_tracks);
     simulate_first_frames(input);
   });
   return 0;

@@ -130,8 +130,8 @@ PictureContent content_of_bytes(std::string_view bytes) {
     return kind == '5' ? read_format(PictureFormat::pgm)
                        : foreign_format(kind == '2' ? "text PGM" : "PBM, PPM or PAM");
   const bool riff = bytes.starts_with("RIFF");
-  if (riff && bytes.substr(8, 4) == "WEBP") return read_format(PictureFormat::webp);
-  if (bytes.size() >= 12 && bytes.substr(4, 4) == "ftyp") {
+  if (riff && stands_at({8, "WEBP"sv}, bytes)) return read_format(PictureFormat::webp);
+  if (bytes.size() >= 12 && stands_at({4, "ftyp"sv}, bytes)) {
     const Mark* still = find_mark(kForeignBrands, bytes);
     return still != nullptr ? foreign_format(still->name) : PictureContent{.kind = Kind::video};
   }

@@ -81,6 +81,26 @@ TEST(HostilePicture, IsRefusedByItsStatedSizeInEveryFormat) {
   EXPECT_LT(most_memory_MB() - before_MB, 50) << "nothing was made of the stated size";
 }
 
+TEST(HostilePicture, CutBehindAnyByteIsReadOrRefused) {
+  const TemporaryFolder folder;
+  std::vector<StatedPicture> files = pictures_of_size(40, 40);
+  files.push_back({"video.avi", std::string("RIFF\x10\0\0\0AVI LIST", 16)});
+  files.push_back({"video.mp4", std::string("\0\0\0\x18"
+                                            "ftypisom\0\0\0\0",
+                                            16)});
+  for (const StatedPicture& file : files)
+    for (size_t length = 0; length <= std::min<size_t>(file.bytes.size(), 64); ++length) {
+      SCOPED_TRACE(std::string(file.name) + " of " + std::to_string(length) + " bytes");
+      write_bytes(file.bytes.substr(0, length), folder / "picture");
+      EXPECT_NO_THROW(refusal(folder / "picture"));
+      try {
+        open_images(folder / "picture");
+      } catch (const InputError&) {
+        // Anything else fails the test.
+      }
+    }
+}
+
 TEST(HostilePicture, MayHaveTheLeastAndTheGreatestSize) {
   for (const auto& [width, height] :
        {std::pair(32, 32), std::pair(32, 16384), std::pair(16384, 32), std::pair(8192, 8192)})
