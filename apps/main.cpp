@@ -2,15 +2,18 @@
 #include <spdlog/pattern_formatter.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
+#include <unistd.h>
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <cstdlib>
 #include <exception>
 #include <filesystem>
 #include <memory>
 #include <new>
 #include <opencv2/core/utility.hpp>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "apps/terminal/command_line.h"
@@ -44,6 +47,21 @@ void round_alike_on_every_processor() {
   cv::setUseOptimized(false);
   constexpr std::ptrdiff_t kKiB = 1024;
   Eigen::setCpuCacheSizes(32 * kKiB, 1024 * kKiB, 8192 * kKiB);
+}
+
+/// Ends the program as for any other lack of memory. Some libraries allocate where nothing may be
+/// thrown: nlohmann's JSON in its destructor, libstdc++ when it opens a folder.
+[[noreturn]] void end_without_memory() {
+  try {
+    if (std::current_exception()) std::rethrow_exception(std::current_exception());
+  } catch (const std::bad_alloc&) {
+    constexpr std::string_view kMessage =
+        "clothfit: error: memory: there is not enough for this; a smaller mesh or recording\n";
+    static_cast<void>(!write(STDERR_FILENO, kMessage.data(), kMessage.size()));
+    _exit(clothfit::kExitBadInput);
+  } catch (...) {
+  }
+  std::abort();
 }
 
 /// Parses the command line, runs the verb, and turns exceptions into messages and exit codes.
@@ -97,6 +115,7 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  std::set_terminate(end_without_memory);
   spdlog::set_default_logger(spdlog::stderr_color_mt("clothfit"));
   auto formatter = std::make_unique<spdlog::pattern_formatter>();
   formatter->add_flag<ShownMessage>('*').set_pattern("%n: %^%l%$: %*");

@@ -108,6 +108,7 @@ set(CLOTHFIT_TEST_ARROWS
   "tests/fit    -> fit model calib data tests/data"
   "tests/apps   -> apps fit model vision calib data tests/data"
   "tests/fuzz   -> apps fit model vision calib data"
+  "tests/faults -> apps fit model vision calib data tests/apps tests/data"
   "tests/bench  -> fit model vision calib data tests/model tests/vision"
 )
 

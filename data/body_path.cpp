@@ -4,11 +4,14 @@
 
 #include "data/csv_reader.h"
 #include "data/number_limits.h"
+#include "data/reading.h"
 #include "data/unit_quaternion.h"
 
 namespace clothfit {
 
-BodyPath read_body_path(const std::filesystem::path& file) {
+namespace {
+
+BodyPath parsed_body_path(const std::filesystem::path& file) {
   enum Column { kTime, kX, kY, kZ, kQw, kQx, kQy, kQz };
   CsvReader table(file, {{"time"}, {"x"}, {"y"}, {"z"}, {"qw"}, {"qx"}, {"qy"}, {"qz"}});
   BodyPath path;
@@ -25,6 +28,12 @@ BodyPath read_body_path(const std::filesystem::path& file) {
   }
   table.require_rows("poses");
   return path;
+}
+
+}  // namespace
+
+BodyPath read_body_path(const std::filesystem::path& file) {
+  return reading(file, [&] { return parsed_body_path(file); });
 }
 
 }  // namespace clothfit

@@ -10,6 +10,7 @@
 #include "data/algebra/dense_factors.h"
 #include "data/input_error.h"
 #include "data/number_limits.h"
+#include "data/reading.h"
 #include "data/text_file.h"
 #include "data/unit_quaternion.h"
 #include "data/yaml_value.h"
@@ -110,9 +111,7 @@ CameraPose read_pose(const YamlValue& value) {
   return pose;
 }
 
-}  // namespace
-
-CameraParameters read_camera(const std::filesystem::path& file) {
+CameraParameters parsed_camera(const std::filesystem::path& file) {
   const YamlMap map =
       read_yaml(file).map({"format", "name", "model", "image_size", "focal", "centre", "distortion",
                            "camera_from_world", "readout_time"});
@@ -151,6 +150,12 @@ CameraParameters read_camera(const std::filesystem::path& file) {
           fmt::format("seconds from the first to the last row, 0 to {:g}", kLongestReadout_s));
   }
   return camera;
+}
+
+}  // namespace
+
+CameraParameters read_camera(const std::filesystem::path& file) {
+  return reading(file, [&] { return parsed_camera(file); });
 }
 
 void write_camera(const CameraParameters& camera, const std::filesystem::path& file) {

@@ -8,6 +8,7 @@
 #include "data/folder_entries.h"
 #include "data/input_error.h"
 #include "data/number_limits.h"
+#include "data/reading.h"
 
 namespace clothfit {
 namespace {
@@ -26,9 +27,7 @@ bool is_table(const fs::path& file, int& frame) {
   return true;
 }
 
-}  // namespace
-
-PointClouds read_point_clouds(const fs::path& folder) {
+PointClouds parsed_point_clouds(const fs::path& folder) {
   PointClouds clouds;
   for (const FolderEntry& entry : list_folder(folder)) {
     const fs::path& path = entry.path;
@@ -47,6 +46,12 @@ PointClouds read_point_clouds(const fs::path& folder) {
       throw InputError(file, "is a second cloud of its frame", "one file per frame");
   }
   return clouds;
+}
+
+}  // namespace
+
+PointClouds read_point_clouds(const fs::path& folder) {
+  return reading(folder, [&] { return parsed_point_clouds(folder); });
 }
 
 }  // namespace clothfit

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "data/input_error.h"
+#include "data/reading.h"
 
 namespace clothfit {
 namespace {
@@ -34,8 +35,8 @@ std::string file_kind(mode_t mode) {
   struct stat status {};
   if (stat(file.c_str(), &status) == 0 && !S_ISREG(status.st_mode))
     refuse_kind(file, status.st_mode);
-  throw InputError(file, std::string("cannot be opened: ") + std::strerror(error_number),
-                   "a readable file");
+  throw UnreadableFile(file, std::string("cannot be opened: ") + std::strerror(error_number),
+                       "a readable file");
 }
 
 }  // namespace
@@ -64,8 +65,8 @@ size_t FileBytes::read(char* to, size_t most) {
     const ssize_t count = ::read(descriptor_, to, most);
     if (count >= 0) return static_cast<size_t>(count);
     if (errno != EINTR)
-      throw InputError(file_, std::string("cannot be read: ") + std::strerror(errno),
-                       "a readable file", "copy it again, to a disk without errors");
+      throw UnreadableFile(file_, std::string("cannot be read: ") + std::strerror(errno),
+                           "a readable file", "copy it again, to a disk without errors");
   }
 }
 
@@ -73,7 +74,9 @@ int FileBytes::release() {
   return std::exchange(descriptor_, -1);
 }
 
-std::string read_file_bytes(const std::filesystem::path& file, std::uintmax_t most_bytes) {
+namespace {
+
+std::string whole_file(const std::filesystem::path& file, std::uintmax_t most_bytes) {
   FileBytes in(file);
   if (in.size() > most_bytes) refuse_file_size(file, most_bytes);
   std::string bytes(static_cast<size_t>(in.size()), '\0');
@@ -89,6 +92,12 @@ std::string read_file_bytes(const std::filesystem::path& file, std::uintmax_t mo
     bytes.resize(filled);
     return bytes;
   }
+}
+
+}  // namespace
+
+std::string read_file_bytes(const std::filesystem::path& file, std::uintmax_t most_bytes) {
+  return reading(file, [&] { return whole_file(file, most_bytes); });
 }
 
 int open_regular_file(const std::filesystem::path& file) {

@@ -14,6 +14,7 @@
 #include "data/input_error.h"
 #include "data/number_limits.h"
 #include "data/read_json.h"
+#include "data/reading.h"
 #include "data/recording.h"
 #include "data/text_file.h"
 
@@ -459,7 +460,9 @@ void write_fit_result(const FitResult& result, const std::filesystem::path& file
   write_text(json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n", file);
 }
 
-FitResult read_fit_result(const std::filesystem::path& file) {
+namespace {
+
+FitResult parsed_fit_result(const std::filesystem::path& file) {
   const nlohmann::json parsed = read_json(file, kExpectedFile, kRemedy);
   const std::string name = file.string();
   const JsonValue json(parsed, name, "");
@@ -523,6 +526,12 @@ FitResult read_fit_result(const std::filesystem::path& file) {
   for (const std::string& reason : rejected.keys())
     result.observations_rejected[reason] = rejected.at(reason).count();
   return result;
+}
+
+}  // namespace
+
+FitResult read_fit_result(const std::filesystem::path& file) {
+  return reading(file, [&] { return parsed_fit_result(file); });
 }
 
 }  // namespace clothfit

@@ -1,9 +1,16 @@
 #include "data/folder_entries.h"
 
+#include <dirent.h>
+
 #include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <memory>
+#include <string>
 #include <system_error>
 
 #include "data/input_error.h"
+#include "data/reading.h"
 
 namespace clothfit {
 namespace {
@@ -33,21 +40,34 @@ FolderEntry look_up(const fs::path& path) {
   }
 }
 
-}  // namespace
+[[noreturn]] void refuse_listing(const fs::path& folder, int error_number) {
+  throw InputError(folder.string(),
+                   std::string("the folder cannot be listed: ") + std::strerror(error_number),
+                   "a readable folder", "give yourself the right to read it, or copy it");
+}
 
-std::vector<FolderEntry> list_folder(const fs::path& folder) {
-  std::error_code error;
+std::vector<FolderEntry> sorted_entries(const fs::path& folder) {
+  // libstdc++'s directory_iterator ends the program where memory runs out.
+  const std::unique_ptr<DIR, int (*)(DIR*)> listed(opendir(folder.c_str()), closedir);
+  if (!listed) refuse_listing(folder, errno);
   std::vector<fs::path> paths;
-  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
-       entry.increment(error))
-    if (!entry->path().filename().string().starts_with(".")) paths.push_back(entry->path());
-  if (error)
-    throw InputError(folder.string(), "the folder cannot be listed: " + error.message(),
-                     "a readable folder", "give yourself the right to read it, or copy it");
+  for (;;) {
+    errno = 0;
+    const dirent* const entry = readdir(listed.get());
+    if (entry == nullptr && errno != 0) refuse_listing(folder, errno);
+    if (entry == nullptr) break;
+    if (entry->d_name[0] != '.') paths.push_back(folder / entry->d_name);
+  }
   std::ranges::sort(paths);
   std::vector<FolderEntry> entries;
   for (const fs::path& path : paths) entries.push_back(look_up(path));
   return entries;
+}
+
+}  // namespace
+
+std::vector<FolderEntry> list_folder(const fs::path& folder) {
+  return reading(folder, [&] { return sorted_entries(folder); });
 }
 
 std::vector<FolderEntry> list_whole_folder(const fs::path& folder) {

@@ -5,6 +5,7 @@
 #include "data/csv_reader.h"
 #include "data/number_limits.h"
 #include "data/number_text.h"
+#include "data/reading.h"
 #include "data/text_file.h"
 
 namespace clothfit {
@@ -71,8 +72,10 @@ bool lies_on_cloth(double s_m, double t_m, double width_m, double height_m) {
          t_m >= -kPlaceRounding_m && t_m <= height_m + kPlaceRounding_m;
 }
 
-std::vector<Marker> read_markers(const std::filesystem::path& file, double width_m,
-                                 double height_m) {
+namespace {
+
+std::vector<Marker> parsed_markers(const std::filesystem::path& file, double width_m,
+                                   double height_m) {
   enum Column { kMarker, kS, kT, kTag, kCorner };
   CsvReader table(file, {{"marker"}, {"s"}, {"t"}, {"tag", false}, {"corner", false}});
   std::vector<Marker> markers;
@@ -95,6 +98,13 @@ std::vector<Marker> read_markers(const std::filesystem::path& file, double width
   return markers;
 }
 
+}  // namespace
+
+std::vector<Marker> read_markers(const std::filesystem::path& file, double width_m,
+                                 double height_m) {
+  return reading(file, [&] { return parsed_markers(file, width_m, height_m); });
+}
+
 void write_markers(const std::vector<Marker>& markers, const std::filesystem::path& file) {
   const bool tags = any_tag(markers);
   std::string text = tags ? "marker,s,t,tag,corner\n" : "marker,s,t\n";
@@ -104,7 +114,9 @@ void write_markers(const std::vector<Marker>& markers, const std::filesystem::pa
   write_text(text, file);
 }
 
-std::vector<ReferencePoint> read_reference_points(const std::filesystem::path& file) {
+namespace {
+
+std::vector<ReferencePoint> parsed_reference_points(const std::filesystem::path& file) {
   enum Column { kPoint, kX, kY, kZ, kTag, kCorner };
   CsvReader table(file, {{"point"}, {"x"}, {"y"}, {"z"}, {"tag", false}, {"corner", false}});
   std::vector<ReferencePoint> points;
@@ -121,6 +133,12 @@ std::vector<ReferencePoint> read_reference_points(const std::filesystem::path& f
   }
   table.require_rows("reference points");
   return points;
+}
+
+}  // namespace
+
+std::vector<ReferencePoint> read_reference_points(const std::filesystem::path& file) {
+  return reading(file, [&] { return parsed_reference_points(file); });
 }
 
 void write_reference_points(const std::vector<ReferencePoint>& points,

@@ -11,6 +11,7 @@
 #include "data/model_description.h"
 #include "data/model_words.h"
 #include "data/number_limits.h"
+#include "data/reading.h"
 #include "data/recording_parts.h"
 #include "data/unit_quaternion.h"
 #include "data/yaml_value.h"
@@ -164,7 +165,9 @@ void read_start(const YamlMap& map, const RecordingFiles& files, ModelDescriptio
   }
   const YamlValue& file = map.at("file");
   files.file(file);
-  model.start_state = read_start_state(files.shown(file), model.mesh_columns, model.mesh_rows);
+  const std::filesystem::path shown = files.shown(file);
+  model.start_state =
+      reading(shown, [&] { return read_start_state(shown, model.mesh_columns, model.mesh_rows); });
 }
 
 void read_model_time(const YamlValue& value, const RecordingFiles& files, ModelDescription& model) {
@@ -194,9 +197,7 @@ void read_model_time(const YamlValue& value, const RecordingFiles& files, ModelD
   model.frame_time_s = *times;
 }
 
-}  // namespace
-
-ModelDescription read_model(const std::filesystem::path& file, OutsideFiles outside) {
+ModelDescription parsed_model(const std::filesystem::path& file, OutsideFiles outside) {
   const RecordingFiles files(file.has_parent_path() ? file.parent_path() : ".", outside);
   const YamlMap map =
       read_yaml(file).map({"format", "name", "cloth", "mesh", "fabric", "springs", "strain_limit",
@@ -239,6 +240,12 @@ ModelDescription read_model(const std::filesystem::path& file, OutsideFiles outs
     model.time_step_line = step->line();
   }
   return model;
+}
+
+}  // namespace
+
+ModelDescription read_model(const std::filesystem::path& file, OutsideFiles outside) {
+  return reading(file, [&] { return parsed_model(file, outside); });
 }
 
 }  // namespace clothfit

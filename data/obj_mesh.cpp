@@ -12,6 +12,7 @@
 #include "data/input_error.h"
 #include "data/number_limits.h"
 #include "data/number_text.h"
+#include "data/reading.h"
 #include "data/shown_text.h"
 #include "data/text_file.h"
 
@@ -34,9 +35,7 @@ bool has_area(const SurfaceMesh& mesh) {
   });
 }
 
-}  // namespace
-
-SurfaceMesh read_obj(const std::filesystem::path& file) {
+SurfaceMesh parsed_obj(const std::filesystem::path& file) {
   TextLines lines(file);
   std::vector<double> coordinates;
   std::vector<int> corners;
@@ -91,6 +90,12 @@ SurfaceMesh read_obj(const std::filesystem::path& file) {
     throw InputError(file.string(), "no face has an area",
                      "a surface: faces whose corners do not lie on a line");
   return mesh;
+}
+
+}  // namespace
+
+SurfaceMesh read_obj(const std::filesystem::path& file) {
+  return reading(file, [&] { return parsed_obj(file); });
 }
 
 void write_obj(const SurfaceMesh& mesh, const std::filesystem::path& file) {

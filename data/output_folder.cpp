@@ -90,7 +90,10 @@ bool exchange(const fs::path& a, const fs::path& b) {
     errno = error_number;
     return false;
   }
-  return rename(aside.c_str(), a.c_str()) == 0;
+  // The new result is in place; the older one is only to be removed, from wherever it lies.
+  std::error_code ignored;
+  if (rename(aside.c_str(), a.c_str()) != 0) fs::remove_all(aside, ignored);
+  return true;
 }
 
 /// Moves a folder to a free place.
@@ -121,7 +124,7 @@ OutputFolder::OutputFolder(const fs::path& final_path, const std::vector<fs::pat
 }
 
 OutputFolder::~OutputFolder() {
-  if (published_) return;
+  // Once published, an older result may lie there.
   std::error_code error;
   fs::remove_all(work_path_, error);
 }

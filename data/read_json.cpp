@@ -6,13 +6,16 @@
 #include <vector>
 
 #include "data/input_error.h"
+#include "data/reading.h"
 #include "data/shown_text.h"
 #include "data/text_file.h"
 
 namespace clothfit {
 
-nlohmann::json read_json(const std::filesystem::path& file, const std::string& expected,
-                         const std::string& remedy) {
+namespace {
+
+nlohmann::json parsed_json(const std::filesystem::path& file, const std::string& expected,
+                           const std::string& remedy) {
   using Json = nlohmann::json;
   const std::string text = read_text(file, kMostJsonBytes);
   std::vector<std::set<std::string>> keys;  // of each object that is open
@@ -34,6 +37,13 @@ nlohmann::json read_json(const std::filesystem::path& file, const std::string& e
   } catch (const Json::exception&) {  // a number too large for any type
     throw InputError(file.string(), "holds a number too large", expected, remedy);
   }
+}
+
+}  // namespace
+
+nlohmann::json read_json(const std::filesystem::path& file, const std::string& expected,
+                         const std::string& remedy) {
+  return reading(file, [&] { return parsed_json(file, expected, remedy); });
 }
 
 }  // namespace clothfit

@@ -8,6 +8,7 @@
 #include "data/csv_reader.h"
 #include "data/file_name.h"
 #include "data/number_text.h"
+#include "data/reading.h"
 #include "data/recording_words.h"
 #include "data/shown_text.h"
 #include "data/text_file.h"
@@ -125,7 +126,9 @@ double read_frame_rate(const YamlValue& value) {
   return value.number_between(1e-3, 1e6, "frames per second");
 }
 
-std::vector<double> read_times(const std::filesystem::path& file) {
+namespace {
+
+std::vector<double> parsed_times(const std::filesystem::path& file) {
   enum Column { kFrame, kTime };
   CsvReader table(file, {{"frame"}, {"time"}});
   std::vector<double> times_s;
@@ -144,6 +147,12 @@ std::vector<double> read_times(const std::filesystem::path& file) {
   }
   table.require_rows("times");
   return times_s;
+}
+
+}  // namespace
+
+std::vector<double> read_times(const std::filesystem::path& file) {
+  return reading(file, [&] { return parsed_times(file); });
 }
 
 void write_times(const std::vector<double>& times_s, const std::filesystem::path& file) {

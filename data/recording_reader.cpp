@@ -7,6 +7,7 @@
 #include "data/input_error.h"
 #include "data/nearest_name.h"
 #include "data/number_limits.h"
+#include "data/reading.h"
 #include "data/recording.h"
 #include "data/recording_parts.h"
 #include "data/recording_words.h"
@@ -158,9 +159,7 @@ std::filesystem::path find_recording_file(const std::filesystem::path& given) {
   return given / kName;
 }
 
-}  // namespace
-
-Recording read_recording(const std::filesystem::path& folder, OutsideFiles outside) {
+Recording parsed_recording(const std::filesystem::path& folder, OutsideFiles outside) {
   const std::filesystem::path file = find_recording_file(folder);
   const RecordingFiles files(file.has_parent_path() ? file.parent_path() : ".", outside);
   const YamlMap map = read_yaml(file).map(
@@ -208,7 +207,15 @@ Recording read_recording(const std::filesystem::path& folder, OutsideFiles outsi
   return recording;
 }
 
-HeldPath read_held_path(const std::filesystem::path& file) {
+}  // namespace
+
+Recording read_recording(const std::filesystem::path& folder, OutsideFiles outside) {
+  return reading(folder, [&] { return parsed_recording(folder, outside); });
+}
+
+namespace {
+
+HeldPath parsed_held_path(const std::filesystem::path& file) {
   enum Column { kTime, kX, kY, kZ };
   CsvReader table(file, {{"time"}, {"x"}, {"y"}, {"z"}});
   HeldPath path;
@@ -218,6 +225,12 @@ HeldPath read_held_path(const std::filesystem::path& file) {
   }
   table.require_rows("positions");
   return path;
+}
+
+}  // namespace
+
+HeldPath read_held_path(const std::filesystem::path& file) {
+  return reading(file, [&] { return parsed_held_path(file); });
 }
 
 }  // namespace clothfit

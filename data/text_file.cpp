@@ -7,6 +7,7 @@
 
 #include "data/file_bytes.h"
 #include "data/input_error.h"
+#include "data/reading.h"
 #include "data/text_writer.h"
 
 namespace clothfit {
@@ -79,7 +80,9 @@ bool TextLines::next() {
   }
 }
 
-std::string read_text(const std::filesystem::path& file, std::uintmax_t most_bytes) {
+namespace {
+
+std::string unpacked_text(const std::filesystem::path& file, std::uintmax_t most_bytes) {
   UnpackedBytes bytes(file);
   std::string text;
   for (;;) {
@@ -97,6 +100,12 @@ std::string read_text(const std::filesystem::path& file, std::uintmax_t most_byt
     refuse_nul(file.string(),
                1 + static_cast<int>(std::count(text.begin(), text.begin() + nul, '\n')));
   return text;
+}
+
+}  // namespace
+
+std::string read_text(const std::filesystem::path& file, std::uintmax_t most_bytes) {
+  return reading(file, [&] { return unpacked_text(file, most_bytes); });
 }
 
 void write_text(std::string_view text, const std::filesystem::path& file) {

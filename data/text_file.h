@@ -26,7 +26,7 @@ class TextLines {
   int line() const { return line_; }
 
  private:
-  /// Moves what is left to the front of the buffer and reads on; false at the end.
+  /// Moves unused bytes to the front of the buffer and reads on; false at the end.
   bool read_on();
 
   std::string file_;

@@ -10,6 +10,7 @@
 #include "data/nearest_name.h"
 #include "data/number_limits.h"
 #include "data/number_text.h"
+#include "data/reading.h"
 #include "data/text_writer.h"
 
 namespace clothfit {
@@ -107,9 +108,7 @@ std::string sigma_field(double sigma) {
   return sigma > 0 ? fmt::format(",{}", number_text(sigma)) : ",";
 }
 
-}  // namespace
-
-Tracks3d read_tracks3d(const std::filesystem::path& file, const MarkerSet& markers) {
+Tracks3d parsed_tracks3d(const std::filesystem::path& file, const MarkerSet& markers) {
   enum Column { kFrame, kMarker, kX, kY, kZ, kSigma };
   CsvReader table(file, {{"frame"}, {"marker"}, {"x"}, {"y"}, {"z"}, {"sigma", false}});
   Tracks3d tracks;
@@ -127,7 +126,15 @@ Tracks3d read_tracks3d(const std::filesystem::path& file, const MarkerSet& marke
   return tracks;
 }
 
-Tracks2d read_tracks2d(const std::filesystem::path& file, const MarkerSet& markers) {
+}  // namespace
+
+Tracks3d read_tracks3d(const std::filesystem::path& file, const MarkerSet& markers) {
+  return reading(file, [&] { return parsed_tracks3d(file, markers); });
+}
+
+namespace {
+
+Tracks2d parsed_tracks2d(const std::filesystem::path& file, const MarkerSet& markers) {
   enum Column { kFrame, kMarker, kU, kV, kSigma, kStatus };
   CsvReader table(file, {{"frame"}, {"marker"}, {"u"}, {"v"}, {"sigma", false}, {"status", false}});
   Tracks2d tracks;
@@ -144,6 +151,12 @@ Tracks2d read_tracks2d(const std::filesystem::path& file, const MarkerSet& marke
   }
   sort_rows(table, lines, markers, tracks);
   return tracks;
+}
+
+}  // namespace
+
+Tracks2d read_tracks2d(const std::filesystem::path& file, const MarkerSet& markers) {
+  return reading(file, [&] { return parsed_tracks2d(file, markers); });
 }
 
 void write_tracks3d(const Tracks3d& tracks, const MarkerSet& markers,

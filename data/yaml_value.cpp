@@ -10,6 +10,7 @@
 #include "data/input_error.h"
 #include "data/nearest_name.h"
 #include "data/number_text.h"
+#include "data/reading.h"
 #include "data/shown_text.h"
 #include "data/text_file.h"
 
@@ -206,7 +207,9 @@ const YamlValue& YamlMap::at(const std::string& key) const {
   whole_.refuse("`" + key + "` is missing" + within, "a line `" + key + ": ...`");
 }
 
-YamlValue read_yaml(const std::filesystem::path& file) {
+namespace {
+
+YamlValue parsed_yaml(const std::filesystem::path& file) {
   const auto name = std::make_shared<const std::string>(file.string());
   const std::string text = read_text(file, kMostYamlBytes);
   try {
@@ -221,6 +224,12 @@ YamlValue read_yaml(const std::filesystem::path& file) {
     throw InputError(*name, line_of(error.mark, 1), "not YAML: " + error.msg,
                      "`key: value` lines, indented by spaces", "quote text that holds `: ` or `#`");
   }
+}
+
+}  // namespace
+
+YamlValue read_yaml(const std::filesystem::path& file) {
+  return reading(file, [&] { return parsed_yaml(file); });
 }
 
 }  // namespace clothfit

@@ -22,6 +22,7 @@
 #include "data/finding_json.h"
 #include "data/input_error.h"
 #include "data/text_file.h"
+#include "data/unreadable_file.h"
 #include "fit/jobs/thread_limit.h"
 #include "fit/preflight/preflight.h"
 
@@ -67,6 +68,8 @@ Findings check_tracks(const TrackStepResult& step, const Recording& given) {
   try {
     const FitInput input = read_fit_input(step.recording, ObservationKind::tracks2d);
     return findings_of(input, given, ObservationKind::tracks2d);
+  } catch (const UnreadableFile&) {
+    throw;
   } catch (const InputError& error) {
     return {finding_of(error, step.recording.folder, given.folder)};
   }

@@ -15,6 +15,7 @@
 #include <optional>
 
 #include "data/input_error.h"
+#include "data/reading.h"
 #include "data/shown_text.h"
 #include "data/sync_to_disk.h"
 #include "fit/jobs/checksum.h"
@@ -130,6 +131,10 @@ Journal::Journal(const std::filesystem::path& file, int descriptor)
 Journal::Journal(const std::filesystem::path& file, const std::string& key, JournalStart start)
     : Journal(file, open_locked(file, start)) {
   assert(key.find('\n') == std::string::npos);
+  reading(file_, [&] { open_records(key); });
+}
+
+void Journal::open_records(const std::string& key) {
   const std::string header = fmt::format("{}{}\n", kVersionLine, key);
   const std::string bytes = read_all(file_, descriptor_);
   if (bytes.starts_with(header)) {

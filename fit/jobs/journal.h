@@ -54,6 +54,8 @@ class Journal {
 
  private:
   Journal(const std::filesystem::path& file, int descriptor);
+  /// Reads what an earlier run left, or writes the header.
+  void open_records(const std::string& key);
   void read_records(std::string_view bytes, size_t begin);
   void write_at_end(std::string_view bytes);
   void sync();

@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "data/input_error.h"
+#include "data/reading.h"
 #include "data/replace_text.h"
 #include "data/shown_text.h"
 #include "data/text_file.h"
@@ -390,13 +391,13 @@ EvolutionState load_evolution_checkpoint(const std::filesystem::path& file,
                                          const std::string& problem,
                                          const std::vector<SearchParameter>& parameters,
                                          const EvolutionOptions& options) {
-  return load(file, problem, parameters, options);
+  return reading(file, [&] { return load(file, problem, parameters, options); });
 }
 
 CmaState load_cma_checkpoint(const std::filesystem::path& file, const std::string& problem,
                              const std::vector<SearchParameter>& parameters,
                              const CmaOptions& options) {
-  return load(file, problem, parameters, options);
+  return reading(file, [&] { return load(file, problem, parameters, options); });
 }
 
 }  // namespace clothfit

@@ -7,11 +7,10 @@
 #include <bit>
 #include <cassert>
 #include <csetjmp>
-#include <fstream>
 #include <memory>
 #include <stdexcept>
 
-#include "data/input_error.h"
+#include "data/text_file.h"
 
 // OpenCV's codecs would do, but bring a hundred libraries that every start of the program must
 // load.
@@ -59,11 +58,7 @@ std::string encode_png(const cv::Mat& picture) {
 }
 
 void write_png(const cv::Mat& picture, const std::filesystem::path& file) {
-  std::ofstream out(file, std::ios::binary);
-  out << encode_png(picture);
-  out.close();
-  if (!out)
-    throw InputError(file.string(), "cannot be written", "a writable place with room on its disk");
+  write_text(encode_png(picture), file);
 }
 
 std::string encode_jpeg(const cv::Mat& grey, int quality) {

@@ -10,11 +10,12 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <fstream>
 #include <memory>
-#include <sstream>
+#include <new>
+#include <string>
 
 #include "data/input_error.h"
+#include "data/text_file.h"
 
 namespace clothfit {
 namespace {
@@ -62,11 +63,19 @@ std::string big_endian(std::uint32_t value) {
   return bytes;
 }
 
+/// Takes what Cairo writes into a string. Of a file that it writes itself, Cairo does not tell
+/// every failure: a full disk left half a PDF.
+cairo_status_t take(void* bytes, const unsigned char* data, unsigned int size) {
+  try {
+    static_cast<std::string*>(bytes)->append(reinterpret_cast<const char*>(data), size);
+  } catch (const std::bad_alloc&) {
+    return CAIRO_STATUS_NO_MEMORY;
+  }
+  return CAIRO_STATUS_SUCCESS;
+}
+
 /// Puts the scale into a PNG (its chunk pHYs), which Cairo leaves out: viewers print by it.
-void state_scale(const fs::path& file, double pixels_per_m) {
-  std::stringstream bytes;
-  bytes << std::ifstream(file, std::ios::binary).rdbuf();
-  std::string png = bytes.str();
+void state_scale(std::string& png, double pixels_per_m) {
   constexpr size_t kAfterHeader = 8 + 4 + 4 + 13 + 4;  // signature, and the chunk IHDR
   const std::string scale = big_endian(static_cast<std::uint32_t>(std::lround(pixels_per_m)));
   const std::string chunk = "pHYs" + scale + scale + '\x01';
@@ -74,9 +83,6 @@ void state_scale(const fs::path& file, double pixels_per_m) {
       crc32(0, reinterpret_cast<const Bytef*>(chunk.data()), static_cast<uInt>(chunk.size()));
   png.insert(kAfterHeader, big_endian(static_cast<std::uint32_t>(chunk.size() - 4)) + chunk +
                                big_endian(static_cast<std::uint32_t>(check)));
-  std::ofstream out(file, std::ios::binary);
-  out.write(png.data(), static_cast<std::streamsize>(png.size()));
-  if (!out.flush()) require(CAIRO_STATUS_WRITE_ERROR, file);
 }
 
 /// Fills all that is black with one path, since paths of their own would leave fine lines between
@@ -271,9 +277,11 @@ int page_count(const PrintedSheet& sheet, const std::string& paper) {
 void write_sheet_pdf(const PrintedSheet& sheet, const PageOptions& options, const fs::path& file) {
   options.validate();
   const PagePlan plan = plan_pages(sheet, options.paper);
-  const Surface surface(cairo_pdf_surface_create(file.c_str(), plan.width_mm * kPointsPerMm,
-                                                 plan.height_mm * kPointsPerMm),
-                        cairo_surface_destroy);
+  std::string pdf;
+  const Surface surface(
+      cairo_pdf_surface_create_for_stream(take, &pdf, plan.width_mm * kPointsPerMm,
+                                          plan.height_mm * kPointsPerMm),
+      cairo_surface_destroy);
   require(cairo_surface_status(surface.get()), file);
   const Pen pen = pen_on(surface);
   cairo_scale(pen.get(), kPointsPerMm, kPointsPerMm);
@@ -283,13 +291,15 @@ void write_sheet_pdf(const PrintedSheet& sheet, const PageOptions& options, cons
   }
   cairo_surface_finish(surface.get());
   require(cairo_surface_status(surface.get()), file);
+  write_text(pdf, file);
 }
 
 void write_sheet_svg(const PrintedSheet& sheet, const PageOptions& options, const fs::path& file) {
   options.validate();
-  const Surface surface(
-      cairo_svg_surface_create(file.c_str(), width_mm(sheet), height_mm(sheet) + kStrip_mm),
-      cairo_surface_destroy);
+  std::string svg;
+  const Surface surface(cairo_svg_surface_create_for_stream(take, &svg, width_mm(sheet),
+                                                            height_mm(sheet) + kStrip_mm),
+                        cairo_surface_destroy);
   require(cairo_surface_status(surface.get()), file);
   cairo_svg_surface_set_document_unit(surface.get(), CAIRO_SVG_UNIT_MM);
   const Pen pen = pen_on(surface);
@@ -298,6 +308,7 @@ void write_sheet_svg(const PrintedSheet& sheet, const PageOptions& options, cons
   draw_strip(pen.get(), sheet, options.mirrored, 1e3 * sheet.width_m, "");
   cairo_surface_finish(surface.get());
   require(cairo_surface_status(surface.get()), file);
+  write_text(svg, file);
 }
 
 double png_dots_per_inch(const PrintedSheet& sheet, const PageOptions& options) {
@@ -324,8 +335,10 @@ void write_sheet_png(const PrintedSheet& sheet, const PageOptions& options, cons
     cairo_scale(pen.get(), -1, 1);
   }
   fill_sheet(pen.get(), sheet);
-  require(cairo_surface_write_to_png(surface.get(), file.c_str()), file);
-  state_scale(file, 1e3 * pixels_per_mm);
+  std::string png;
+  require(cairo_surface_write_to_png_stream(surface.get(), take, &png), file);
+  state_scale(png, 1e3 * pixels_per_mm);
+  write_text(png, file);
 }
 
 }  // namespace clothfit

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "data/input_error.h"
+#include "data/unreadable_file.h"
 #include "vision/encode/encode_picture.h"
 #include "vision/ingest/footage.h"
 
@@ -27,6 +28,8 @@ std::optional<BackgroundPicture> read_picture(const std::string& kind, const Rec
                              .width = grey.cols,
                              .height = grey.rows,
                              .jpeg = encode_jpeg(grey, 80)};
+  } catch (const UnreadableFile&) {
+    throw;
   } catch (const InputError&) {
     return std::nullopt;
   }
