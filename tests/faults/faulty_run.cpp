@@ -129,16 +129,19 @@ void FaultyRuns::judge(const ProgramRun& done, bool older, const Fault& fault) {
   if (!command_.replaces) out.erase(".clothfit");  // it is removed last of all
   const bool is_whole = out == whole_, is_older = out == (older ? older_ : Files());
   EXPECT_TRUE(is_whole || is_older) << names_of(out);
-  if (done.exit_code == 0)
+  if (done.exit_code == 0) {
     EXPECT_TRUE(is_whole) << names_of(out);
-  else
+  } else {
     judge_message(done);
+  }
   for (const auto& [name, bytes] : inputs_)
     EXPECT_TRUE(fs::is_directory(here_ / name) || bytes_of(here_ / name) == bytes) << name;
 
   const bool cannot_remove = fault.kind.name == "remove" || fault.kind.name == "list" ||
                              fault.kind.name == "open_folder" || fault.kind.name == "look";
-  if (!cannot_remove) EXPECT_THAT(hidden_names(), ::testing::IsEmpty());
+  if (!cannot_remove) {
+    EXPECT_THAT(hidden_names(), ::testing::IsEmpty());
+  }
   const bool resumes = done.exit_code != 0 && !command_.kept.empty();
   if (resumes || !hidden_names().empty()) judge_resumed();
 }
