@@ -39,7 +39,8 @@ void FitOptions::validate() const {
   };
   // A mesh side that is left open gets the recording's, which is at least 2.
   require(mesh_columns == 0 || is_possible_mesh(mesh_columns, mesh_rows == 0 ? 2 : mesh_rows),
-          "mesh_columns", fmt::format("at least 2 columns, {} vertices at most", kMostMeshVertices));
+          "mesh_columns",
+          fmt::format("at least 2 columns, {} vertices at most", kMostMeshVertices));
   require(mesh_rows == 0 || is_possible_mesh(mesh_columns == 0 ? 2 : mesh_columns, mesh_rows),
           "mesh_rows", fmt::format("at least 2 rows, {} vertices at most", kMostMeshVertices));
   const auto to = [](const std::string& least, auto most) {

@@ -36,7 +36,8 @@ inline constexpr double kLengthBeyondReason = 5;
 /// that was longest for its natural length before it. Nothing for a run that stays within reason.
 ///
 /// Costs two runs, the second only up to that step and with every step of the last frame interval
-/// kept; a few more where these are more than fit into some hundred megabytes. Nothing also where `stop` ends it.
+/// kept; a few more where these are more than fit into some hundred megabytes. Nothing also where
+/// `stop` ends it.
 std::optional<Divergence> find_divergence(const Cloth& cloth, const ParameterSet& parameters,
                                           const Schedule& schedule, const StopCheck& stop = {});
 

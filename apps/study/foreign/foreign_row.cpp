@@ -4,7 +4,6 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
-
 namespace clothfit {
 namespace {
 
@@ -49,15 +48,14 @@ std::string payload_of(const ForeignDiagnosis& diagnosis) {
 
 ForeignDiagnosis foreign_diagnosis_of(const std::string& payload) {
   const Json json = Json::parse(payload);
-  ForeignDiagnosis diagnosis{
-      .reason = json.at("reason"),
-      .verdict = verdict_of(json.at("verdict").get<int>()),
-      .complete = json.at("complete"),
-      .named = {},
-      .unit = json.at("unit"),
-      .held_out_rms = number_of(json.at("held_out_rms")),
-      .noise = number_of(json.at("noise")),
-      .seconds = json.at("seconds")};
+  ForeignDiagnosis diagnosis{.reason = json.at("reason"),
+                             .verdict = verdict_of(json.at("verdict").get<int>()),
+                             .complete = json.at("complete"),
+                             .named = {},
+                             .unit = json.at("unit"),
+                             .held_out_rms = number_of(json.at("held_out_rms")),
+                             .noise = number_of(json.at("noise")),
+                             .seconds = json.at("seconds")};
   for (const Json& named : json.at("named"))
     diagnosis.named.push_back({.effect = named.at("effect"),
                                .title = named.at("title"),
