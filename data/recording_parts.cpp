@@ -44,10 +44,10 @@ std::filesystem::path RecordingFiles::file(const YamlValue& value) const {
   const std::filesystem::path target = std::filesystem::canonical(file, error);
   const std::filesystem::path inside = target.lexically_relative(folder_);
   if (outside_ == OutsideFiles::refused && (inside.empty() || *inside.begin() == ".."))
-    value.refuse(
-        fmt::format("{} = {} lies outside the folder", value.name(), shown_text(value.text())),
-        "a file inside the folder of the file that names it",
-        "copy it there, or allow it with --allow-outside");
+    value.refuse(fmt::format("{} = {} lies outside the folder", value.name(),
+                             without_controls(value.text())),
+                 "a file inside the folder of the file that names it",
+                 "copy it there, or allow it by OutsideFiles::allowed");
   return file;
 }
 
@@ -176,7 +176,7 @@ std::vector<HeldPoint> read_held(const YamlValue& value, const RecordingFiles& f
   const std::vector<YamlValue> items = value.items();
   if (items.size() > kMostHeldEntries)
     value.refuse(fmt::format("{} has {} entries", value.name(), items.size()),
-                 fmt::format("{} at most", kMostHeldEntries),
+                 fmt::format("at most {}", kMostHeldEntries),
                  "name an edge where all of its points are held");
   for (const YamlValue& item : items) {
     const YamlMap map = item.map({"at", "edge", "motion", "file"});

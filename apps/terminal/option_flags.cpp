@@ -10,6 +10,7 @@ namespace {
 /// Returns the flag that sets a member: its name with dashes, but for these.
 std::string flag_of(std::string member) {
   static const std::map<std::string, std::string> kOthers = {
+      {"allowed", "allow-outside"},
       {"beam_width", "lines"},
       {"budget_s", "budget"},
       {"columns", "grid"},
@@ -34,7 +35,8 @@ std::string flag_of(std::string member) {
 }  // namespace
 
 std::string with_flags(const std::string& message) {
-  static const std::regex kMember(R"((?:[A-Z][A-Za-z]*Options|JournalStart)::([a-z_]+)( = )?)");
+  static const std::regex kMember(
+      R"((?:[A-Z][A-Za-z]*Options|JournalStart|OutsideFiles)::([a-z_]+)( = )?)");
   std::string result;
   auto rest = message.begin();
   for (std::sregex_iterator match(message.begin(), message.end(), kMember), end; match != end;

@@ -13,6 +13,7 @@
 #include <charconv>
 #include <cstring>
 #include <optional>
+#include <utility>
 
 #include "data/input_error.h"
 #include "data/reading.h"
@@ -125,11 +126,18 @@ std::optional<Record> record_at(std::string_view bytes, size_t begin) {
 
 }  // namespace
 
-Journal::Journal(const std::filesystem::path& file, int descriptor)
-    : file_(file), descriptor_(descriptor), synced_at_(std::chrono::steady_clock::now()) {}
+Journal::Journal(Opened opened)
+    : file_(std::move(opened.file)),
+      descriptor_(opened.descriptor),
+      synced_at_(std::chrono::steady_clock::now()) {}
 
 Journal::Journal(const std::filesystem::path& file, const std::string& key, JournalStart start)
-    : Journal(file, open_locked(file, start)) {
+    : Journal(reading(file, [&] {
+        // The copy, which takes memory, comes before what has to be closed again.
+        Opened opened{.file = file};
+        opened.descriptor = open_locked(file, start);
+        return opened;
+      })) {
   assert(key.find('\n') == std::string::npos);
   reading(file_, [&] { open_records(key); });
 }

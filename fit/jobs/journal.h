@@ -53,7 +53,11 @@ class Journal {
   void append(int index, std::string_view payload);
 
  private:
-  Journal(const std::filesystem::path& file, int descriptor);
+  struct Opened {
+    std::filesystem::path file;
+    int descriptor = -1;
+  };
+  explicit Journal(Opened opened);
   /// Reads what an earlier run left, or writes the header.
   void open_records(const std::string& key);
   void read_records(std::string_view bytes, size_t begin);

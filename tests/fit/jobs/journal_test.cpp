@@ -11,6 +11,7 @@
 
 #include "fit/jobs/journal_key.h"
 #include "tests/data/expect_refused.h"
+#include "tests/data/file_bytes.h"
 
 namespace clothfit {
 namespace {
@@ -73,7 +74,7 @@ TEST(Journal, CutAtAnyByteLosesOnlyTheRecordThatWasCut) {
       held_from[std::filesystem::file_size(folder / "journal")] = journal.finished();
     }
   }
-  const std::string whole = read_text(folder / "journal");
+  const std::string whole = file_bytes(folder / "journal");
 
   // when it is cut at any byte, header included,
   for (size_t size = 0; size <= whole.size(); ++size) {
@@ -91,7 +92,7 @@ TEST(Journal, CutAtAnyByteLosesOnlyTheRecordThatWasCut) {
         if (!held.contains(index)) cut.append(index, payload);
     }
     // then the records before the cut are there, and those redone end up as if never cut.
-    EXPECT_EQ(read_text(folder / "cut"), whole);
+    EXPECT_EQ(file_bytes(folder / "cut"), whole);
   }
 }
 
@@ -107,7 +108,7 @@ TEST(Journal, LeavesOutTheDamagedRecordAloneAndTakesItsPieceAgain) {
       place[index] = {begin, std::filesystem::file_size(folder / "journal")};
     }
   }
-  const std::string whole = read_text(folder / "journal");
+  const std::string whole = file_bytes(folder / "journal");
 
   for (const int spoiled : {0, 1, 2}) {
     for (size_t at = place[spoiled].first; at < place[spoiled].second; ++at) {
@@ -135,8 +136,8 @@ TEST(Journal, TakesNoRecordFromInsideADamagedOne) {
   // Given a payload that is itself a whole journal, whose record head is then spoiled,
   const TemporaryFolder folder;
   write_journal(folder / "inner", {{0, "wrong"}, {1, "wrong"}});
-  write_journal(folder / "outer", {{0, read_text(folder / "inner")}, {1, "right"}});
-  std::string text = read_text(folder / "outer");
+  write_journal(folder / "outer", {{0, file_bytes(folder / "inner")}, {1, "right"}});
+  std::string text = file_bytes(folder / "outer");
   const size_t head = text.find("record 0");
   text[head] = 'R';
   folder.write("damaged", text);
@@ -149,7 +150,7 @@ TEST(Journal, TakesNoRecordFromInsideADamagedOne) {
 TEST(Journal, RefusesAnotherRunsJournalAndLeavesItAsItIs) {
   const TemporaryFolder folder;
   write_journal(folder / "journal", {{0, "zero"}});
-  const std::string before = read_text(folder / "journal");
+  const std::string before = file_bytes(folder / "journal");
 
   expect_refused(
       folder,
@@ -171,7 +172,7 @@ TEST(Journal, RefusesAnotherRunsJournalAndLeavesItAsItIs) {
   expect_refused(folder,
                  "journal: exists; a new file, for this run starts from scratch; go on with it",
                  [&] { Journal(folder / "journal", kKey, JournalStart::fresh); });
-  EXPECT_EQ(read_text(folder / "journal"), before);
+  EXPECT_EQ(file_bytes(folder / "journal"), before);
 }
 
 TEST(JournalKey, NamesTheFieldsThatDiffer) {

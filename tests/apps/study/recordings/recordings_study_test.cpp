@@ -49,6 +49,8 @@ class RecordingsStudy : public ::testing::Test {
     fs::create_directories(folder_ / to);
     recording.tracks3d = folder_ / to / "tracks3d.csv";
     write_tracks3d(tracks, recording.markers, *recording.tracks3d);
+    recording.markers_file = folder_ / to / "markers.csv";
+    write_markers(recording.markers.markers, recording.markers_file);
     write_recording(recording, folder_ / to);
   }
   /// Adds a recording that names a file which is not there.
