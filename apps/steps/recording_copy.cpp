@@ -68,7 +68,10 @@ class CopyPlaces {
     const fs::path target = folder_ / place;
     std::error_code error;
     fs::create_directories(target.parent_path(), error);
-    if (!error) fs::copy_file(file, target, error);
+    if (error)
+      throw InputError(target.parent_path().string(), "cannot be made: " + error.message(),
+                       "a writable folder with room on its disk");
+    fs::copy_file(file, target, error);
     if (error)
       throw InputError(file.string(), "cannot be copied: " + error.message(),
                        "a file of the recording that can be read, and room for its copy");
