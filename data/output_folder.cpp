@@ -54,8 +54,7 @@ void require_holds_no_input(const fs::path& final_path, const std::vector<fs::pa
       const fs::path inside = path.lexically_relative(final_path);
       if (inside.empty() || *inside.begin() == "..") continue;
       throw InputError(final_path.string(), "holds " + path.string() + ", which this run reads",
-                       "a folder for the results that holds no input",
-                       "name another folder");
+                       "a folder for the results that holds no input", "name another folder");
     }
   }
 }
