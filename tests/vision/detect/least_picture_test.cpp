@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <opencv2/imgproc.hpp>
+#include <string>
 
 #include "tests/data/temporary_folder.h"
 #include "tests/vision/dot_sheet.h"
@@ -89,13 +90,19 @@ TEST_P(LeastFootage, IsLookedAtForWhatItShows) {
   EXPECT_EQ(look(folder.path(), options, {}).count, 2);
 }
 
+std::string name_of_size(const testing::TestParamInfo<cv::Size>& size) {
+  return std::to_string(size.param.width) + "_by_" + std::to_string(size.param.height);
+}
+
 INSTANTIATE_TEST_SUITE_P(Sizes, LeastPicture,
                          testing::Values(cv::Size(kLeastSide_px, kLeastSide_px),
                                          cv::Size(kLeastSide_px, 4000),
-                                         cv::Size(4000, kLeastSide_px), cv::Size(33, 47)));
+                                         cv::Size(4000, kLeastSide_px), cv::Size(33, 47)),
+                         name_of_size);
 INSTANTIATE_TEST_SUITE_P(Sizes, LeastFootage,
                          testing::Values(cv::Size(kLeastSide_px, kLeastSide_px),
-                                         cv::Size(kLeastSide_px, 1000), cv::Size(33, 47)));
+                                         cv::Size(kLeastSide_px, 1000), cv::Size(33, 47)),
+                         name_of_size);
 
 }  // namespace
 }  // namespace clothfit
