@@ -39,7 +39,7 @@ struct ClothDescription {
 /// Bounds of the inner corners along a side of a board. Fewer cannot be told from other corners,
 /// more are finer than any picture shows.
 inline constexpr int kFewestBoardCorners = 3;
-inline constexpr int kMostBoardCorners = 200;
+inline constexpr int kMostBoardCorners = 60;
 
 /// A printed calibration board; columns and rows count inner corners.
 struct BoardDescription {

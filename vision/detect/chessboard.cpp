@@ -38,6 +38,68 @@ bool turns_like_the_board(const std::vector<cv::Point2f>& corners, int columns, 
   return along_row.cross(along_column) > 0;
 }
 
+/// The search compares every quadrilateral with every other, a hundred times: 2000 cost some
+/// seconds. A board of kMostBoardCorners has 1860 dark squares.
+constexpr int kMostQuadrilaterals = 2000;
+
+/// Says whether an outline is a quadrilateral to within some pixels, as the search takes it.
+bool is_quadrilateral(const std::vector<cv::Point>& outline) {
+  constexpr int kLeastArea_px2 = 25;
+  constexpr int kCoarsest_px = 7;
+  if (cv::boundingRect(outline).area() < kLeastArea_px2) return false;
+  std::vector<cv::Point> polygon;
+  for (int tolerance_px = 1; tolerance_px <= kCoarsest_px; ++tolerance_px) {
+    cv::approxPolyDP(outline, polygon, tolerance_px, true);
+    if (polygon.size() == 4) return cv::isContourConvex(polygon);
+  }
+  return false;
+}
+
+/// Says whether a picture has more dark quadrilaterals than the search can take in.
+bool has_too_many_quadrilaterals(const cv::Mat& grey) {
+  constexpr double kNeighbourhood = 0.2;  // of the shorter side
+  constexpr int kMostDilations = 2;       // further ones leave fewer
+  const int window =
+      std::max(3, static_cast<int>(kNeighbourhood * std::min(grey.cols, grey.rows)) | 1);
+  cv::Mat light;
+  cv::adaptiveThreshold(grey, light, 255, cv::ADAPTIVE_THRESH_MEAN_C, cv::THRESH_BINARY, window, 0);
+  for (int dilations = 0; dilations <= kMostDilations; ++dilations) {
+    if (dilations > 0) cv::dilate(light, light, cv::Mat());
+    std::vector<std::vector<cv::Point>> outlines;
+    std::vector<cv::Vec4i> relations;
+    cv::findContours(light, outlines, relations, cv::RETR_CCOMP, cv::CHAIN_APPROX_SIMPLE);
+    int count = 0;
+    for (size_t i = 0; i < outlines.size(); ++i) {
+      const bool is_dark = relations[i][3] >= 0;  // a hole in what is light
+      if (is_dark && is_quadrilateral(outlines[i]) && ++count > kMostQuadrilaterals) return true;
+    }
+  }
+  return false;
+}
+
+/// Finds the corners to about a pixel. Noise and fine texture are searched in smaller copies, which
+/// average them out.
+std::optional<std::vector<cv::Point2f>> search_corners(const cv::Mat& grey, cv::Size pattern) {
+  constexpr int kSmallestSquare_px = 4;
+  cv::Mat copy = grey;
+  float scale = 1;
+  while (has_too_many_quadrilaterals(copy)) {
+    cv::Mat smaller;
+    cv::pyrDown(copy, smaller);
+    copy = smaller;
+    scale *= 2;
+    if (std::min(copy.cols, copy.rows) <
+        kSmallestSquare_px * std::min(pattern.width, pattern.height))
+      return std::nullopt;
+  }
+  std::vector<cv::Point2f> corners;
+  const int flags = cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_NORMALIZE_IMAGE;
+  if (!cv::findChessboardCorners(copy, pattern, corners, flags)) return std::nullopt;
+  // The middle of a pixel of the copy is the middle of a pixel of the picture.
+  for (cv::Point2f& corner : corners) corner *= scale;
+  return corners;
+}
+
 }  // namespace
 
 std::optional<std::vector<Eigen::Vector2d>> find_chessboard(const cv::Mat& grey,
@@ -47,10 +109,10 @@ std::optional<std::vector<Eigen::Vector2d>> find_chessboard(const cv::Mat& grey,
         "board", fmt::format("{} x {} inner corners", board.columns, board.rows),
         fmt::format("{} to {} along each side", kFewestBoardCorners, kMostBoardCorners),
         "count where four squares meet");
-  std::vector<cv::Point2f> corners;
-  const cv::Size pattern(board.columns, board.rows);
-  const int flags = cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_NORMALIZE_IMAGE;
-  if (!cv::findChessboardCorners(grey, pattern, corners, flags)) return std::nullopt;
+  std::optional<std::vector<cv::Point2f>> found =
+      search_corners(grey, cv::Size(board.columns, board.rows));
+  if (!found) return std::nullopt;
+  std::vector<cv::Point2f>& corners = *found;
 
   // The window takes in as much of the four edges as it can without touching the next corner.
   const double spacing_px = smallest_spacing_px(corners, board.columns, board.rows);

@@ -85,6 +85,40 @@ TEST(Chessboard, IsNotFoundWhereItIsNotWhole) {
   EXPECT_THROW(find_chessboard(picture, {.columns = 1, .rows = 6, .square_m = 0.02}), InputError);
 }
 
+/// Squares of 3 px, finer than any board's, fill the picture around a part that is left out.
+cv::Mat fine_texture(cv::Size size) {
+  cv::Mat picture(size, CV_8UC1);
+  for (int y = 0; y < size.height; ++y)
+    for (int x = 0; x < size.width; ++x)
+      picture.at<std::uint8_t>(y, x) = (x / 3 + y / 3) % 2 == 0 ? 40 : 210;
+  return picture;
+}
+
+TEST(Chessboard, IsFoundAmongMoreQuadrilateralsThanTheSearchTakesIn) {
+  const BoardDescription board{.columns = 9, .rows = 6, .square_m = 0.02};
+  const cv::Mat small = drawn_board(board);
+  const auto alone = find_chessboard(small, board);
+  ASSERT_TRUE(alone);
+  cv::Mat picture = fine_texture({640, 520});
+  const cv::Rect place(150, 130, small.cols, small.rows);
+  small.copyTo(picture(place));
+
+  const auto corners = find_chessboard(picture, board);
+
+  ASSERT_TRUE(corners);
+  ASSERT_EQ(corners->size(), alone->size());
+  for (size_t i = 0; i < corners->size(); ++i)
+    EXPECT_LT(((*corners)[i] - (*alone)[i] - Eigen::Vector2d(place.x, place.y)).norm(), 1e-3);
+}
+
+TEST(Chessboard, IsNotFoundInNoise) {
+  cv::Mat noise(600, 800, CV_8UC1);
+  cv::setRNGSeed(1);
+  cv::randu(noise, 0, 256);
+
+  EXPECT_FALSE(find_chessboard(noise, {.columns = 9, .rows = 6, .square_m = 0.02}));
+}
+
 TEST(Chessboard, LiesWhereTheBundledStillsWereRendered) {
   const std::filesystem::path truth = kSource / "tests/fixtures/truth/tags_onecam";
   const CameraParameters camera = read_camera(truth / "truth_camera_front.yaml");
