@@ -20,9 +20,9 @@
 #include "apps/terminal/exit_code.h"
 #include "apps/terminal/interrupt.h"
 #include "apps/terminal/option_flags.h"
-#include "apps/terminal/version.h"
 #include "apps/verbs/verb.h"
 #include "data/input_error.h"
+#include "data/program_version.h"
 #include "data/shown_text.h"
 
 namespace {

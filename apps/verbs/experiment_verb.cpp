@@ -12,10 +12,10 @@
 #include "apps/terminal/progress_line.h"
 #include "apps/terminal/say.h"
 #include "apps/terminal/text_table.h"
-#include "apps/terminal/version.h"
 #include "apps/verbs/identification_experiment.h"
 #include "apps/verbs/resumable_run.h"
 #include "apps/verbs/verb.h"
+#include "data/program_version.h"
 #include "data/text_file.h"
 
 namespace clothfit {

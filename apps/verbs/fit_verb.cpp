@@ -24,11 +24,11 @@
 #include "apps/terminal/result_folder.h"
 #include "apps/terminal/say.h"
 #include "apps/terminal/text_table.h"
-#include "apps/terminal/version.h"
 #include "apps/verbs/checked_input.h"
 #include "apps/verbs/verb.h"
 #include "data/input_error.h"
 #include "data/number_text.h"
+#include "data/program_version.h"
 #include "data/text_file.h"
 
 namespace clothfit {

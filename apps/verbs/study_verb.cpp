@@ -15,12 +15,12 @@
 #include "apps/terminal/progress_line.h"
 #include "apps/terminal/say.h"
 #include "apps/terminal/text_table.h"
-#include "apps/terminal/version.h"
 #include "apps/verbs/resumable_run.h"
 #include "apps/verbs/study_foreign.h"
 #include "apps/verbs/study_vision.h"
 #include "apps/verbs/verb.h"
 #include "data/input_error.h"
+#include "data/program_version.h"
 #include "data/text_file.h"
 #include "fit/measurement_effects/registry.h"
 

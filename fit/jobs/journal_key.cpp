@@ -4,7 +4,9 @@
 #include <utility>
 #include <vector>
 
+#include "data/program_version.h"
 #include "data/shown_text.h"
+#include "fit/jobs/arithmetic.h"
 
 namespace clothfit {
 namespace {
@@ -32,6 +34,10 @@ std::vector<Field> fields_of(std::string_view line) {
 }
 
 }  // namespace
+
+JournalKey::JournalKey(std::string study) : line_(std::move(study)) {
+  add("clothfit", program_version()).add("arithmetic", arithmetic_name());
+}
 
 void JournalKey::add_text(std::string_view name, std::string text) {
   std::ranges::replace_if(

@@ -9,11 +9,12 @@ namespace clothfit {
 
 /// One line that names all that determines the pieces of a run, field by field:
 /// "STUDY; NAME=VALUE; NAME=VALUE". A journal of another run is refused by the names of the fields
-/// that differ.
+/// that differ. Two fields are in every key: the program's version and its arithmetic, for other
+/// versions and other roundings give other bits.
 class JournalKey {
  public:
   /// `study` names the run's kind and the version of its pieces, such as "recover/3".
-  explicit JournalKey(std::string study) : line_(std::move(study)) {}
+  explicit JournalKey(std::string study);
 
   /// Adds a field. Neither the name nor the value's text may hold a line's end or a semicolon,
   /// which become blanks.

@@ -262,9 +262,9 @@ CmaState next_cma_generation(const std::vector<SearchParameter>& parameters,
     Eigen::VectorXd mean(n);
     for (double& share : mean) share = draws.uniform();
     // A generation that alone uses up the evaluations is as large as one can be.
-    const double larger =
-        std::min(state.population * options.growth,
-                 static_cast<double>(std::min(options.most_evaluations, 1000000L)));
+    const double larger = std::min(
+        state.population * options.growth,
+        static_cast<double>(std::min<long>(options.most_evaluations, kLargestCmaPopulation)));
     begin_run(mean, std::max(state.population, static_cast<int>(larger)), options, state);
   }
   return state;

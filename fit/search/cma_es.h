@@ -37,6 +37,9 @@ struct CmaOptions {
   bool valid() const;  ///< what a search asks of them
 };
 
+/// Populations of restarts grow to this at most.
+inline constexpr int kLargestCmaPopulation = 1'000'000;
+
 /// The reason why one run ended.
 enum class CmaEnd {
   costs_equal,      ///< cost_tolerance

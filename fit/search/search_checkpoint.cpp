@@ -13,10 +13,12 @@
 #include <utility>
 
 #include "data/input_error.h"
+#include "data/program_version.h"
 #include "data/reading.h"
 #include "data/replace_text.h"
 #include "data/shown_text.h"
 #include "data/text_file.h"
+#include "fit/jobs/arithmetic.h"
 #include "fit/jobs/checksum.h"
 #include "fit/jobs/shown_difference.h"
 
@@ -24,7 +26,7 @@ namespace clothfit {
 namespace {
 
 constexpr std::string_view kFormat = "clothfit-search/";
-constexpr std::string_view kVersionLine = "clothfit-search/1";
+constexpr std::string_view kVersionLine = "clothfit-search/2";
 constexpr const char* kDamageRemedy = "take an older copy, or remove it and start from scratch";
 
 template <class Enum, size_t count>
@@ -236,6 +238,7 @@ Lines header_lines(const std::string& problem, const std::vector<SearchParameter
   for (const SearchParameter& parameter : parameters)
     lines.push_back(fmt::format("parameter {} {} {} {}", parameter.lower, parameter.upper,
                                 parameter.log_scale ? "logarithmic" : "linear", parameter.name));
+  lines.push_back(fmt::format("program clothfit {}, {}", program_version(), arithmetic_name()));
   lines.push_back("state");
   return lines;
 }
@@ -249,6 +252,13 @@ void require_header(const Lines& expected, LineReader& reader) {
                   fmt::format("this search has `{}`", shown_difference(line, found)),
                   "give what it was started with, or another file");
   }
+}
+
+/// Refuses a count that no search reaches and that sums could carry beyond the type's range.
+void require_evaluations(long count, const LineReader& reader) {
+  constexpr long kMostEvaluations = 1'000'000'000'000'000;
+  reader.require(count >= 0 && count <= kMostEvaluations,
+                 fmt::format("0 to {} evaluations", kMostEvaluations));
 }
 
 void write_state(const EvolutionState& state, LineWriter& writer) {
@@ -265,6 +275,7 @@ EvolutionState read_state(Eigen::Index parameters, const EvolutionOptions& optio
   EvolutionState state;
   reader.begin("evaluations");
   state.evaluations = reader.number<long>();
+  require_evaluations(state.evaluations, reader);
   reader.require_end_of_line();
   reader.begin("best_cost");
   state.best_cost = reader.numbers_left<double>();
@@ -290,6 +301,7 @@ CmaOptimum read_optimum(Eigen::Index parameters, LineReader& reader) {
   CmaOptimum optimum;
   optimum.end = reader.choice(kEnds);
   optimum.evaluations = reader.number<long>();
+  require_evaluations(optimum.evaluations, reader);
   optimum.cost = reader.number<double>();
   // A run without a finite cost has no best values.
   if (!reader.at_end_of_line()) optimum.values = reader.vector(parameters);
@@ -332,14 +344,18 @@ CmaState read_state(Eigen::Index parameters, const CmaOptions&, LineReader& read
     return reader.numbers_left<double>();
   };
   number("evaluations", state.evaluations);
+  require_evaluations(state.evaluations, reader);
   state.best_cost = series("best_cost");
   size_t optima = 0;
   number("optima", optima);
   for (size_t run = 0; run < optima; ++run)
     state.optima.push_back(read_optimum(parameters, reader));
   number("population", state.population);
-  reader.require(state.population >= 4, "4 individuals at least");
+  reader.require(state.population >= 4 && state.population <= kLargestCmaPopulation,
+                 fmt::format("4 to {} individuals", kLargestCmaPopulation));
   number("generation", state.generation);
+  reader.require(state.generation >= 0 && state.generation <= state.generations(),
+                 "no more generations than best costs");
   number("step", state.step);
   state.mean = vector("mean");
   state.covariance_path = vector("covariance_path");

@@ -12,12 +12,13 @@ namespace clothfit {
 /// Saves a search between two generations, so that it goes on to the same bits as if it had not
 /// stopped. Save from the search's `after_generation`, at each generation or every so many.
 ///
-/// The file holds the properties that must be the same when it is read. These are the method,
-/// `problem`, the options that determine the generations, and names and ranges of the parameters.
-/// `problem` is one line of the caller's that names all that determines the costs. Rules that end
-/// the whole search (generations, restarts, evaluations, a cost that is low enough, no gain) may
-/// change, so that a search can be prolonged. Populations that CMA-ES made smaller to stay within
-/// the evaluations are then not made larger.
+/// The file holds the properties that must be the same when it is read. These are the program's
+/// version and arithmetic (fit/jobs/arithmetic.h), the method, `problem`, the options that
+/// determine the generations, and names and ranges of the parameters. `problem` is one line of the
+/// caller's that names all that determines the costs. Rules that end the whole search (generations,
+/// restarts, evaluations, a cost that is low enough, no gain) may change, so that a search can be
+/// prolonged. Populations that CMA-ES made smaller to stay within the evaluations are then not made
+/// larger.
 ///
 /// The file is text, one thing a line; every line ends with the checksum of the file up to there.
 /// Numbers are written as the shortest decimals that read back as the same bits, infinities

@@ -8,8 +8,8 @@
 #include "apps/report/diagnosis/diagnosis_law.h"
 #include "apps/report/diagnosis/diagnosis_tables.h"
 #include "apps/terminal/json_file.h"
-#include "apps/terminal/version.h"
 #include "data/finding_json.h"
+#include "data/program_version.h"
 #include "fit/problem/effect_words.h"
 #include "fit/problem/effects_of.h"
 

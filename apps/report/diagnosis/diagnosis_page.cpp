@@ -14,7 +14,7 @@
 #include "apps/report/fit/notices.h"
 #include "apps/report/page/html.h"
 #include "apps/terminal/number_text.h"
-#include "apps/terminal/version.h"
+#include "data/program_version.h"
 #include "fit/problem/effect_words.h"
 #include "fit/problem/effects_of.h"
 

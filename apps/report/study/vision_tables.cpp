@@ -6,7 +6,7 @@
 
 #include "apps/report/page/html.h"
 #include "apps/terminal/number_text.h"
-#include "apps/terminal/version.h"
+#include "data/program_version.h"
 
 namespace clothfit {
 namespace {

@@ -12,7 +12,6 @@
 #include "apps/terminal/exit_code.h"
 #include "apps/terminal/interrupt.h"
 #include "apps/terminal/option_flags.h"
-#include "apps/terminal/version.h"
 #include "data/folder_entries.h"
 #include "data/input_error.h"
 #include "data/text_file.h"
@@ -127,7 +126,7 @@ void ForeignStudyOptions::validate() const {
 
 std::string ForeignStudyOptions::key() const {
   JournalKey key("study foreign/1");
-  key.add("clothfit", program_version()).add("seed", seed).add("budget", budget_s);
+  key.add("seed", seed).add("budget", budget_s);
   key.add("recordings", fmt::format("{:016x}", recordings_checksum(recordings)));
   return key.line();
 }

@@ -17,7 +17,6 @@
 #include "apps/terminal/exit_code.h"
 #include "apps/terminal/interrupt.h"
 #include "apps/terminal/option_flags.h"
-#include "apps/terminal/version.h"
 #include "data/folder_entries.h"
 #include "data/input_error.h"
 #include "fit/jobs/executor.h"
@@ -254,7 +253,7 @@ std::string RecordingsStudyOptions::key() const {
   if (weights)
     for (const auto& [name, weight] : *weights) add(fmt::format("{} {}", name, weight));
   JournalKey key("study recordings/2");
-  key.add("clothfit", program_version()).add("seed", fit.seed);
+  key.add("seed", fit.seed);
   key.add("mesh_columns", fit.mesh_columns).add("mesh_rows", fit.mesh_rows);
   key.add("observations", static_cast<int>(fit.observations));
   key.add("search", static_cast<int>(fit.search)).add("search_share", fit.search_share);
@@ -280,7 +279,7 @@ std::vector<StudyRow> study_recordings(const RecordingsStudyOptions& options, Jo
               {.threads = options.threads,
                .seed = options.fit.seed,
                .unit = "fits",
-               .accept = [](const std::string& payload) { rows_from_text(payload); }},
+               .accept = [](int, const std::string& payload) { rows_from_text(payload); }},
               journal, progress);
   if (!result.usable()) throw Cancelled();
   std::vector<StudyRow> rows;

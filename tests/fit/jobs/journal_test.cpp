@@ -4,11 +4,14 @@
 
 #include "fit/jobs/journal.h"
 
+#include <fmt/format.h>
 #include <signal.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "data/program_version.h"
+#include "fit/jobs/arithmetic.h"
 #include "fit/jobs/journal_key.h"
 #include "tests/data/expect_refused.h"
 #include "tests/data/file_bytes.h"
@@ -145,6 +148,28 @@ TEST(Journal, TakesNoRecordFromInsideADamagedOne) {
   const Journal journal(folder / "damaged", kKey, JournalStart::resume);
 
   EXPECT_EQ(journal.finished(), (std::map<int, std::string>{{1, "right"}}));
+}
+
+TEST(Journal, RefusesAnotherVersionOfTheProgramAndAnotherArithmeticByName) {
+  const TemporaryFolder folder;
+  const std::string key = JournalKey("trials/1").add("seed", 4).line();
+  const auto with_field = [&](const std::string& name, const std::string& value) {
+    const size_t begin = key.find(name + "=") + name.size() + 1;
+    return key.substr(0, begin) + value + key.substr(key.find("; ", begin));
+  };
+  Journal(folder / "older", with_field("clothfit", "0.0.1"), JournalStart::fresh);
+  Journal(folder / "elsewhere", with_field("arithmetic", "glibc 2.0"), JournalStart::fresh);
+
+  expect_refused(folder,
+                 fmt::format("older:2: belongs to another run, of `clothfit=0.0.1`; this run is of "
+                             "`clothfit={}`; give",
+                             program_version()),
+                 [&] { Journal(folder / "older", key, JournalStart::resume); });
+  expect_refused(folder,
+                 fmt::format("elsewhere:2: belongs to another run, of `arithmetic=glibc 2.0`; this "
+                             "run is of `arithmetic={}`; give",
+                             arithmetic_name()),
+                 [&] { Journal(folder / "elsewhere", key, JournalStart::resume); });
 }
 
 TEST(Journal, RefusesAnotherRunsJournalAndLeavesItAsItIs) {

@@ -3,13 +3,16 @@
 
 #include "fit/search/search_checkpoint.h"
 
+#include <fmt/format.h>
 #include <sys/resource.h>
 
 #include <bit>
 #include <cmath>
 #include <csignal>
 #include <limits>
+#include <sstream>
 
+#include "fit/jobs/checksum.h"
 #include "tests/data/expect_refused.h"
 
 namespace clothfit {
@@ -265,6 +268,45 @@ std::vector<std::pair<std::string, std::function<void()>>> small_checkpoints(
            [&folder, cma] { load_cma_checkpoint(folder / "damaged", kProblem, ranges(), cma); }}};
 }
 
+/// Returns the text of a checkpoint with another line in one place and the checksums for it.
+std::string with_line(const std::string& text, const std::string& name, const std::string& line) {
+  std::istringstream lines(text);
+  std::string result, old;
+  std::uint64_t sum = kEmptyChecksum;
+  while (std::getline(lines, old)) {
+    old.resize(old.size() - 17);  // a blank and the checksum
+    const std::string& taken = old.starts_with(name + " ") ? line : old;
+    sum = checksum("\n", checksum(taken, sum));
+    result += fmt::format("{} {:016x}\n", taken, sum);
+  }
+  return result;
+}
+
+TEST(SearchCheckpoint, RefusesAnotherVersionOfTheProgramByName) {
+  const TemporaryFolder folder;
+  const auto [name, load_damaged] = small_checkpoints(folder).back();
+  const std::string whole = read_text(folder / name);
+  folder.write("damaged", with_line(whole, "step", "step 0.25"));
+  ASSERT_NO_THROW(load_damaged());
+
+  folder.write("damaged", with_line(whole, "program", "program clothfit 0.0.1, glibc 2.36"));
+  expect_refused(folder, "damaged:13: belongs to a search with `program clothfit 0.0.1, ",
+                 load_damaged);
+}
+
+TEST(SearchCheckpoint, RefusesCountsThatNoSearchReaches) {
+  const TemporaryFolder folder;
+  const auto [name, load_damaged] = small_checkpoints(folder).back();
+  const std::string whole = read_text(folder / name);
+  for (const std::string line :
+       {"population 3", "population 2147483647", "generation 2", "generation -1",
+        "evaluations 9223372036854775807", "optima 18446744073709551615"}) {
+    SCOPED_TRACE(line);
+    folder.write("damaged", with_line(whole, line.substr(0, line.find(' ')), line));
+    EXPECT_THROW(load_damaged(), InputError);
+  }
+}
+
 TEST(SearchCheckpoint, NamesTheLineOfAnyChangedBit) {
   const TemporaryFolder folder;
   for (const auto& [name, load_damaged] : small_checkpoints(folder)) {
@@ -325,8 +367,8 @@ TEST(SearchCheckpoint, NamesTheLineWhereAFileWasCutSwappedOrGoesOn) {
                    load_damaged);
     folder.write("damaged", "");
     expect_refused(folder, "damaged:1: is no checkpoint of a search", load_damaged);
-    folder.write("damaged", "clothfit-search/2 0\n");
-    expect_refused(folder, "damaged:1: is a checkpoint of version `clothfit-search/2`",
+    folder.write("damaged", "clothfit-search/3 0\n");
+    expect_refused(folder, "damaged:1: is a checkpoint of version `clothfit-search/3`",
                    load_damaged);
   }
 }

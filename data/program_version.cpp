@@ -1,4 +1,4 @@
-#include "apps/terminal/version.h"
+#include "data/program_version.h"
 
 namespace clothfit {
 
