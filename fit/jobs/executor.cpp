@@ -75,7 +75,9 @@ class Run {
   std::string& payload(int index) { return payloads_[static_cast<size_t>(index)]; }
 
   void resume(int index) {
-    if (options_.accept) accept_record(*journal_, index, options_.accept);
+    if (options_.accept)
+      accept_record(*journal_, index,
+                    [&](const std::string& payload) { options_.accept(index, payload); });
     payload(index) = journal_->finished().at(index);
   }
 

@@ -19,9 +19,9 @@ struct ExecuteOptions {
   int threads = 0;              ///< >= 0; 0: as many as the machine has
   unsigned long long seed = 1;  ///< seed of the run
   std::string unit = "trials";  ///< name of the pieces in progress reports
-  /// Throws for a payload that this run cannot have made. Those of a journal are asked before any
-  /// piece is done.
-  std::function<void(const std::string& payload)> accept = {};
+  /// Throws for a payload that this run cannot have made of a piece. Those of a journal are asked
+  /// before any piece is done.
+  std::function<void(int index, const std::string& payload)> accept = {};
 };
 
 enum class ExecuteStop { not_run, finished, cancelled };

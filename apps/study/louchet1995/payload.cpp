@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 
 namespace clothfit {
 namespace {
@@ -11,6 +12,18 @@ using nlohmann::json;
 
 json number(double value) {
   return std::isfinite(value) ? json(value) : json(nullptr);
+}
+
+void require(bool good, const char* what) {
+  if (!good) throw std::range_error(what);
+}
+
+/// Returns the enumerator of a number from 0 to that of `last`.
+template <class Enum>
+Enum enumerator_of(const json& value, Enum last) {
+  const int number = value.get<int>();
+  require(number >= 0 && number <= static_cast<int>(last), "no such choice");
+  return static_cast<Enum>(number);
 }
 
 double number_of(const json& value) {
@@ -50,14 +63,14 @@ json json_of(const ScannedSetting& setting) {
 
 ScannedSetting setting_of(const json& text) {
   ScannedSetting setting;
-  setting.experiment.limit = static_cast<StrainLimitMode>(text.at("limit").get<int>());
-  setting.experiment.release = static_cast<PaperRelease>(text.at("release").get<int>());
+  setting.experiment.limit = enumerator_of(text.at("limit"), StrainLimitMode::consistent);
+  setting.experiment.release = enumerator_of(text.at("release"), PaperRelease::upright);
   const std::vector<double> of_motion = numbers_of(text.at("numbers"));
   setting.experiment.vertex_mass_kg = of_motion.at(0);
   setting.experiment.time_step_s = of_motion.at(1);
   setting.experiment.duration_s = of_motion.at(2);
   setting.experiment.damping_per_s = of_motion.at(3);
-  setting.cost = static_cast<PaperCost>(text.at("cost").get<int>());
+  setting.cost = enumerator_of(text.at("cost"), PaperCost::small);
   setting.searched = text.at("searched").get<bool>();
   setting.match.usable = text.at("usable").get<bool>();
   const std::vector<double> of_match = numbers_of(text.at("match"));
@@ -71,9 +84,10 @@ json json_of(const Individual& individual) {
   return {{"values", numbers(individual.values)}, {"cost", number(individual.cost)}};
 }
 
-Individual individual_of(const json& text) {
+Individual individual_of(const json& text, Eigen::Index parameters) {
   Individual individual;
   individual.values = vector_of(text.at("values"));
+  require(individual.values.size() == parameters, "values of another number of parameters");
   individual.cost = number_of(text.at("cost"));
   return individual;
 }
@@ -97,6 +111,7 @@ SettingSearch setting_search_of(const std::string& payload) {
     const std::vector<double> off = numbers_of(near.at("off"));
     search.nearest.push_back({setting_of(near.at("setting")), off.at(0), off.at(1)});
   }
+  require(!search.grid.empty(), "no setting");
   return search;
 }
 
@@ -114,12 +129,14 @@ CostLandscape landscape_of(const std::string& payload) {
   const json text = json::parse(payload);
   CostLandscape landscape;
   landscape.reference_elongation = text.at("reference_elongation").get<double>();
-  landscape.cost = static_cast<PaperCost>(text.at("cost").get<int>());
+  landscape.cost = enumerator_of(text.at("cost"), PaperCost::small);
   landscape.stiffness_n_per_m = numbers_of(text.at("stiffness"));
   landscape.elongation = numbers_of(text.at("elongation"));
-  landscape.value_m2 =
-      vector_of(text.at("value"))
-          .reshaped(std::ssize(landscape.stiffness_n_per_m), std::ssize(landscape.elongation));
+  const Eigen::VectorXd values = vector_of(text.at("value"));
+  const auto rows = std::ssize(landscape.stiffness_n_per_m),
+             columns = std::ssize(landscape.elongation);
+  require(values.size() > 0 && values.size() == rows * columns, "a grid with other places");
+  landscape.value_m2 = values.reshaped(rows, columns);
   landscape.transitions = text.at("transitions").get<int>();
   return landscape;
 }
@@ -137,13 +154,14 @@ std::string to_payload(const Recovery& recovery) {
       .dump();
 }
 
-Recovery recovery_of(const std::string& payload) {
+Recovery recovery_of(const std::string& payload, Eigen::Index parameters) {
   const json text = json::parse(payload);
   Recovery recovery;
   for (const json& individual : text.at("listed"))
-    recovery.listed.push_back(individual_of(individual));
-  recovery.strategy = individual_of(text.at("strategy"));
-  recovery.refined = individual_of(text.at("refined"));
+    recovery.listed.push_back(individual_of(individual, parameters));
+  require(!recovery.listed.empty(), "no individual listed");
+  recovery.strategy = individual_of(text.at("strategy"), parameters);
+  recovery.refined = individual_of(text.at("refined"), parameters);
   recovery.exact = text.at("exact").get<bool>();
   recovery.searches = text.at("searches").get<int>();
   recovery.refinements = text.at("refinements").get<int>();
@@ -164,6 +182,8 @@ Race race_of(const std::string& payload) {
   Race race;
   race.evaluations = text.at("evaluations").get<std::vector<long>>();
   race.relative_cost = numbers_of(text.at("relative_cost"));
+  require(!race.evaluations.empty() && race.evaluations.size() == race.relative_cost.size(),
+          "not one cost for each number of evaluations");
   text.at("generations").get_to(race.generations);
   text.at("costs_asked").get_to(race.costs_asked);
   return race;

@@ -10,7 +10,8 @@
 namespace clothfit {
 
 // The journal keeps finished pieces of the study as JSON. Numbers have all their digits, infinite
-// ones are null. Anything that the reader knows anyway is not written.
+// ones are null. Anything that the reader knows anyway is not written. Readers throw a
+// std::exception where a payload is no such JSON or cannot be of the piece.
 
 std::string to_payload(const SettingSearch& search);
 std::string to_payload(const CostLandscape& landscape);
@@ -19,7 +20,8 @@ std::string to_payload(const Race& race);
 
 SettingSearch setting_search_of(const std::string& payload);
 CostLandscape landscape_of(const std::string& payload);
-Recovery recovery_of(const std::string& payload);
+/// `parameters` is the number of values of an individual.
+Recovery recovery_of(const std::string& payload, Eigen::Index parameters);
 Race race_of(const std::string& payload);
 
 }  // namespace clothfit

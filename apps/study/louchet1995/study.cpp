@@ -50,6 +50,7 @@ struct Setting {
   const FitProblem& problem(SpringSet set) const {
     return set == SpringSet::louchet5 ? five : eighteen;
   }
+  Eigen::Index parameters(SpringSet set) const { return std::ssize(problem(set).space.parameters); }
 };
 
 Recovery recovery_piece(const Setting& setting, SpringSet set, const std::vector<int>& transitions,
@@ -66,24 +67,34 @@ std::vector<int> places_in_motion(const RecordedStates& states, int count) {
   return places;
 }
 
-using Pieces = std::vector<std::function<std::string()>>;
+struct Piece {
+  std::function<std::string()> make;
+  std::function<void(const std::string& payload)> accept;  ///< throws for what is not of it
+};
+using Pieces = std::vector<Piece>;
 
 /// Returns pieces by number; the readers below take their payloads in the same order.
 Pieces pieces_of(const Louchet1995Options& options, const Setting& setting) {
   const Extent extent = Extent::of(options);
   Pieces pieces;
   for (const SettingReading& reading : setting_readings())
-    pieces.emplace_back([=] { return to_payload(search_setting(reading, options.quick)); });
+    pieces.push_back(
+        {[=] { return to_payload(search_setting(reading, options.quick)); }, setting_search_of});
   for (const double elongation : kLandscapeElongations)
     for (const PaperCost cost : {PaperCost::full, PaperCost::small})
-      pieces.emplace_back([=, &setting] {
-        return to_payload(cost_landscape(setting.experiment, elongation, cost,
-                                         extent.landscape_points, extent.landscape_transitions));
-      });
+      pieces.push_back({[=, &setting] {
+                          return to_payload(cost_landscape(setting.experiment, elongation, cost,
+                                                           extent.landscape_points,
+                                                           extent.landscape_transitions));
+                        },
+                        landscape_of});
   const auto recovery = [&](SpringSet set, const std::vector<int>& transitions,
                             const RecoveryOptions& how) {
-    pieces.emplace_back(
-        [=, &setting] { return to_payload(recovery_piece(setting, set, transitions, how)); });
+    pieces.push_back(
+        {[=, &setting] { return to_payload(recovery_piece(setting, set, transitions, how)); },
+         [=, &setting](const std::string& payload) {
+           recovery_of(payload, setting.parameters(set));
+         }});
   };
   const auto options_of = [&](int n) {
     return RecoveryOptions{.generations = extent.generations,
@@ -102,10 +113,12 @@ Pieces pieces_of(const Louchet1995Options& options, const Setting& setting) {
   }
   for (const Racer racer : kRacers)
     for (int n = 0; n < options.compared_seeds(); ++n)
-      pieces.emplace_back([=, &setting] {
-        return to_payload(race(setting.experiment, setting.states, racer,
-                               options.seed + static_cast<unsigned long long>(n), options.quick));
-      });
+      pieces.push_back({[=, &setting] {
+                          return to_payload(race(setting.experiment, setting.states, racer,
+                                                 options.seed + static_cast<unsigned long long>(n),
+                                                 options.quick));
+                        },
+                        race_of});
   for (const int place : places_in_motion(setting.states, extent.places))
     for (int n = 0; n < options.compared_seeds(); ++n) {
       RecoveryOptions one_place = options_of(n);
@@ -183,15 +196,19 @@ Louchet1995Study study_louchet1995(const Louchet1995Options& options, Journal* j
   std::vector<double> seconds(pieces.size(), -1);
   const Work work = [&](int index, std::uint64_t) {
     const auto begin = std::chrono::steady_clock::now();
-    std::string payload = pieces[static_cast<size_t>(index)]();
+    std::string payload = pieces[static_cast<size_t>(index)].make();
     seconds[static_cast<size_t>(index)] =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     return payload;
   };
   Louchet1995Study study;
+  const auto accept = [&](int index, const std::string& payload) {
+    pieces[static_cast<size_t>(index)].accept(payload);
+  };
   const ExecuteResult done = execute(
       static_cast<int>(pieces.size()), work,
-      {.threads = options.threads, .seed = options.seed, .unit = "pieces"}, journal, progress);
+      {.threads = options.threads, .seed = options.seed, .unit = "pieces", .accept = accept},
+      journal, progress);
   if (!done.usable()) {
     study.cancelled = true;
     return study;
@@ -213,14 +230,15 @@ Louchet1995Study study_louchet1995(const Louchet1995Options& options, Journal* j
         described(setting, trials == &study.five ? SpringSet::louchet5 : SpringSet::louchet18);
     for (int n = 0; n < options.seeds; ++n) {
       RecoveryTrial trial{.seed = seed_of(n), .seconds = seconds[next]};
-      trial.recovery = recovery_of(payload());
+      trial.recovery = recovery_of(payload(), setting.parameters(trials->set));
       trial.error = largest_relative_error(trial.recovery.refined.values, trials->truth);
       trials->trials.push_back(std::move(trial));
     }
   }
   study.full_cost_transitions = std::min(extent.full_cost_transitions, setting.states.last());
   for (int n = 0; n < options.compared_seeds(); ++n)
-    study.full_cost.push_back({seed_of(n), recovery_of(payload())});
+    study.full_cost.push_back(
+        {seed_of(n), recovery_of(payload(), setting.parameters(SpringSet::louchet5))});
   for (const Racer racer : kRacers) {
     study.races.push_back({.racer = racer});
     for (int n = 0; n < options.compared_seeds(); ++n)
@@ -234,8 +252,9 @@ Louchet1995Study study_louchet1995(const Louchet1995Options& options, Journal* j
         .relative_sigma = transition_sigmas(setting.experiment, setting.states, SpringSet::louchet5,
                                             transition, kMeasuringNoise_m)};
     for (int n = 0; n < options.compared_seeds(); ++n)
-      place.errors.push_back(
-          largest_relative_error(recovery_of(payload()).refined.values, study.five.truth));
+      place.errors.push_back(largest_relative_error(
+          recovery_of(payload(), setting.parameters(SpringSet::louchet5)).refined.values,
+          study.five.truth));
     study.places.push_back(std::move(place));
   }
 

@@ -320,7 +320,7 @@ RecoverResult recover(const RecoverOptions& options, Journal* journal,
       execute(options.trials, work,
               {.threads = options.threads,
                .seed = options.seed,
-               .accept = [](const std::string& payload) { trial_of(payload); }},
+               .accept = [](int, const std::string& payload) { trial_of(payload); }},
               journal, progress);
   RecoverResult result{.stop = executed.stop, .message = executed.message};
   for (const std::string& payload : executed.payloads) result.trials.push_back(trial_of(payload));

@@ -392,7 +392,7 @@ UndeclaredResult recover_undeclared(const UndeclaredOptions& options, Journal* j
       execute(options.count(), work,
               {.threads = options.threads,
                .seed = options.seed,
-               .accept = [](const std::string& payload) { undeclared_trial_of(payload); }},
+               .accept = [](int, const std::string& payload) { undeclared_trial_of(payload); }},
               journal, progress);
   UndeclaredResult result{.stop = executed.stop, .message = executed.message, .trials = {}};
   for (const std::string& payload : executed.payloads)

@@ -78,9 +78,35 @@ TEST(Louchet1995Payload, ComesBackAsItWentIn) {
   Recovery recovery{.listed = std::vector<Individual>(10), .exact = true, .iterations = 7};
   for (Individual& individual : recovery.listed) individual.values = Eigen::VectorXd::Random(5);
   recovery.strategy = recovery.refined = recovery.listed[3];
-  const Recovery again = recovery_of(to_payload(recovery));
+  const Recovery again = recovery_of(to_payload(recovery), 5);
   EXPECT_EQ(again.listed[9].values, recovery.listed[9].values);
   EXPECT_EQ(to_payload(again), to_payload(recovery));
+}
+
+TEST(Louchet1995Payload, IsRefusedWhereItCannotBeOfThePiece) {
+  const auto individual = [](const char* values) {
+    return std::string(R"({"values": )") + values + R"(, "cost": 1})";
+  };
+  const auto recovery = [&](const std::string& listed, const std::string& strategy) {
+    return R"({"listed": [)" + listed + R"(], "strategy": )" + strategy + R"(, "refined": )" +
+           individual("[1, 2]") +
+           R"(, "exact": true, "searches": 1, "refinements": 1, "iterations": 1})";
+  };
+  const std::string good = individual("[1, 2]"), shorter = individual("[1]");
+  EXPECT_NO_THROW(recovery_of(recovery(good, good), 2));
+  EXPECT_THROW(recovery_of(recovery("", good), 2), std::exception);
+  EXPECT_THROW(recovery_of(recovery(shorter, good), 2), std::exception);
+  EXPECT_THROW(recovery_of(recovery(good, shorter), 2), std::exception);
+  EXPECT_THROW(recovery_of("[]", 2), std::exception);
+
+  const auto landscape = [](const char* cost, const char* stiffness) {
+    return std::string(R"({"reference_elongation": 0.5, "cost": )") + cost + R"(, "stiffness": )" +
+           stiffness + R"(, "elongation": [1, 2], "value": [1, 2, 3, 4], "transitions": 3})";
+  };
+  EXPECT_NO_THROW(landscape_of(landscape("1", "[1, 2]")));
+  EXPECT_THROW(landscape_of(landscape("2", "[1, 2]")), std::exception);
+  EXPECT_THROW(landscape_of(landscape("-1", "[1, 2]")), std::exception);
+  EXPECT_THROW(landscape_of(landscape("1", "[1, 2, 3]")), std::exception);
 }
 
 TEST(CostLandscape, CountsTheTrapsBesideTheLowestPlace) {
