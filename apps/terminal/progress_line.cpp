@@ -12,10 +12,16 @@
 namespace clothfit {
 namespace {
 
+constexpr std::chrono::milliseconds kTerminalInterval{100};
+constexpr int kLogWidth = 160;
+
+std::string clock_text(long long seconds) {
+  return fmt::format("{}:{:02}:{:02}", seconds / 3600, seconds / 60 % 60, seconds % 60);
+}
+
 std::string duration_text(double seconds) {
   const auto whole = static_cast<long long>(std::ceil(seconds));
-  if (whole >= 3600)
-    return fmt::format("{}:{:02}:{:02}", whole / 3600, whole / 60 % 60, whole % 60);
+  if (whole >= 3600) return clock_text(whole);
   return fmt::format("{}:{:02}", whole / 60, whole % 60);
 }
 
@@ -55,8 +61,13 @@ std::string progress_text(const Progress& progress, double elapsed_s, int width)
   return text;
 }
 
-ProgressLine::ProgressLine(std::FILE* stream)
-    : stream_(stream), terminal_(isatty(fileno(stream)) != 0) {}
+ProgressLine::ProgressLine(std::FILE* stream, std::chrono::seconds log_interval)
+    : stream_(stream),
+      terminal_(isatty(fileno(stream)) != 0),
+      interval_(terminal_ ? Clock::duration(kTerminalInterval) : Clock::duration(log_interval)),
+      begin_(Clock::now()),
+      stage_begin_(begin_),
+      last_shown_(begin_) {}
 
 ProgressLine::~ProgressLine() {
   if (dirty_) {
@@ -66,20 +77,26 @@ ProgressLine::~ProgressLine() {
 }
 
 void ProgressLine::show(const Progress& progress) {
-  if (!terminal_) return;
   const Clock::time_point now = Clock::now();
-  if (progress.stage != stage_) {
+  const bool is_new_stage = progress.stage != stage_;
+  if (is_new_stage) {
     stage_ = progress.stage;
     stage_begin_ = now;
-  } else if (now - last_shown_ < std::chrono::milliseconds(100)) {
-    return;
   }
+  // A terminal shows a new stage at once; a log would fill with stages of a moment.
+  if (now - last_shown_ < interval_ && !(terminal_ && is_new_stage)) return;
   last_shown_ = now;
   const double elapsed_s = std::chrono::duration<double>(now - stage_begin_).count();
-  fmt::print(stream_, "\r\033[K{}",
-             progress_text(progress, elapsed_s, terminal_width(stream_) - 1));
+  if (terminal_) {
+    fmt::print(stream_, "\r\033[K{}",
+               progress_text(progress, elapsed_s, terminal_width(stream_) - 1));
+    dirty_ = true;
+  } else {
+    const auto since_begin = std::chrono::duration_cast<std::chrono::seconds>(now - begin_);
+    fmt::print(stream_, "{}  {}\n", clock_text(since_begin.count()),
+               progress_text(progress, elapsed_s, kLogWidth));
+  }
   std::fflush(stream_);
-  dirty_ = true;
 }
 
 ProgressCallback watch(ProgressLine& line) {

@@ -1,10 +1,13 @@
-// Checks the text of the progress line and when it is silent. That Ctrl-C ends a fit:
+// Checks the text of the progress line and what of it comes into a file. That Ctrl-C ends a fit:
 // program_end_to_end_test.cpp.
 #include "apps/terminal/progress_line.h"
 
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <cstdio>
+#include <string>
+#include <vector>
 
 namespace clothfit {
 namespace {
@@ -42,16 +45,30 @@ TEST(ProgressText, FitsTheTerminalWithoutCuttingACharacterInTwo) {
   EXPECT_EQ(progress_text(progress, 0, 0), "");
 }
 
-TEST(ProgressLine, IsSilentWhereTheStreamIsNotATerminal) {
+/// Returns what a line shows of these stages in a file.
+std::string shown_in_a_file(std::chrono::seconds interval, const std::vector<Progress>& stages) {
   std::FILE* file = std::tmpfile();
-  ASSERT_NE(file, nullptr);
+  if (file == nullptr) return "no temporary file";
   {
-    ProgressLine line(file);
-    line.show({"track", 1, 2, "frames", ""});
+    ProgressLine line(file, interval);
+    for (const Progress& progress : stages) line.show(progress);
   }
-
-  EXPECT_EQ(std::ftell(file), 0);
+  std::string text(static_cast<size_t>(std::ftell(file)), '\0');
+  std::rewind(file);
+  text.resize(std::fread(text.data(), 1, text.size(), file));
   std::fclose(file);
+  return text;
+}
+
+TEST(ProgressLine, WritesWholeLinesWhereTheStreamIsNotATerminal) {
+  const std::vector<Progress> stages = {{"track", 0, 2, "frames", ""}, {"fit", 0, 3, "steps", ""}};
+
+  EXPECT_EQ(shown_in_a_file(std::chrono::seconds(0), stages),
+            "0:00:00  track  0/2 frames\n0:00:00  fit  0/3 steps\n");
+}
+
+TEST(ProgressLine, WritesNothingToAFileBeforeTheFirstInterval) {
+  EXPECT_EQ(shown_in_a_file(std::chrono::hours(1), {{"track", 1, 2, "frames", ""}}), "");
 }
 
 }  // namespace
