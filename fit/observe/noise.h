@@ -31,6 +31,7 @@ struct NoiseOptions {
 /// They remove any motion that is a parabola over four frames. Of a smooth motion they keep the
 /// jerk times the interval cubed. Their median absolute value is 0.6745 sqrt(20) sigma for normal
 /// noise; differences beyond five standard deviations are left out of it (an outlier spoils four).
+/// Of more than four million differences, those of evenly spaced frames are taken.
 /// Noise that is correlated in time (a smoothed track) is underestimated: no difference in time can
 /// see it.
 NoiseEstimate estimate_noise(const std::vector<double>& time_s,

@@ -111,6 +111,17 @@ TEST(Noise, UsesRunsOfConsecutiveFramesOnly) {
   EXPECT_EQ(estimate_noise(time_s, tracks).differences, 3 * (1 + 3));
 }
 
+TEST(Noise, OfVeryManyTracksIsTakenFromSomeOfTheirFrames) {
+  const auto time_s = even_times(500, 60);
+  Draws draws(7);
+  const auto tracks = swinging_tracks(time_s, 3000, kNoiseSigma, draws);
+
+  const NoiseEstimate estimate = estimate_noise(time_s, tracks);
+
+  EXPECT_EQ(estimate.differences, 3000 * 3 * 249);  // every other run of frames
+  EXPECT_NEAR(estimate.sigma, kNoiseSigma, 0.005 * kNoiseSigma);
+}
+
 TEST(Noise, IsUnknownWithoutARun) {
   Eigen::MatrixXd track = Eigen::MatrixXd::Zero(2, 3);
 
