@@ -87,7 +87,8 @@ std::vector<CameraEntry> read_cameras(const YamlValue& value, const RecordingFil
 /// pictures and tracks, such as that of a printed sheet, has no frames.
 void require_time(const Recording& recording, const std::filesystem::path& file) {
   const auto has_video = [](const CameraEntry& camera) {
-    return camera.images && std::filesystem::is_regular_file(*camera.images);
+    std::error_code error;
+    return camera.images && std::filesystem::is_regular_file(*camera.images, error);
   };
   const bool has_frames =
       !recording.cameras.empty() || recording.tracks3d || !recording.tracks2d.empty();
@@ -133,7 +134,8 @@ std::vector<RigidBody> read_bodies(const YamlValue& value, const RecordingFiles&
     body.file = files.file_anywhere(map.at("file"));
     if (const YamlValue* offset = map.find("clock_offset")) {
       if (offset->is_number())
-        body.clock_offset_s = offset->number();
+        body.clock_offset_s =
+            offset->number_between(-kLatest_s, kLatest_s, "a clock offset in seconds");
       else if (!offset->is_word("unknown"))
         offset->refuse(offset->name() + " is neither", "a number of seconds, or `unknown`");
     }
