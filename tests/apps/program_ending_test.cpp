@@ -1,14 +1,23 @@
-// Checks from outside that the program ends soon after a signal inside long simulations, and what
-// it refuses as too long or too large before it begins. Signals alone: terminal/interrupt_test.cpp;
-// long fits that end at a generation: program_end_to_end_test.cpp.
+// Checks from outside that the program ends soon after a signal inside long simulations, that a
+// study that was killed ends as one that was not, and what is refused as too long or too large
+// before it begins. Signals alone: terminal/interrupt_test.cpp; long fits that end at a generation:
+// program_end_to_end_test.cpp.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <filesystem>
 #include <fstream>
+#include <functional>
+#include <iterator>
+#include <map>
+#include <regex>
+#include <sstream>
 #include <string>
 #include <thread>
 #include <vector>
@@ -16,6 +25,7 @@
 #include "tests/apps/bundled_recordings.h"
 #include "tests/apps/program_run.h"
 #include "tests/apps/scratch_folder.h"
+#include "tests/data/whole_runs.h"
 
 namespace clothfit {
 namespace {
@@ -46,8 +56,33 @@ void write_model(const fs::path& file, const std::string& time, const std::strin
                       << more;
 }
 
+bool has_ended(int process) {
+  siginfo_t info{};
+  return waitid(P_PID, static_cast<id_t>(process), &info, WEXITED | WNOHANG | WNOWAIT) != 0 ||
+         info.si_pid != 0;
+}
+
+/// Waits until a running program shows something, or ends, or half a minute is over.
+void wait_until(int process, const std::function<bool()>& shown) {
+  const auto give_up = Clock::now() + std::chrono::seconds(30);
+  while (!shown() && !has_ended(process) && Clock::now() < give_up) std::this_thread::yield();
+}
+
+/// Returns the seconds of a processor that a running program has had.
+double processor_s(int process) {
+  std::ifstream in("/proc/" + std::to_string(process) + "/stat");
+  std::string text;
+  std::getline(in, text);
+  std::istringstream fields(text.substr(std::min(text.rfind(')') + 1, text.size())));
+  std::string passed_over;
+  for (int field = 3; field < 14; ++field) fields >> passed_over;
+  double user = 0, system = 0;
+  fields >> user >> system;
+  return (user + system) / static_cast<double>(sysconf(_SC_CLK_TCK));
+}
+
 /// Runs the program, sends it a signal once it is at work, and says how long it took to end. A
-/// hidden folder shows that it is.
+/// hidden folder shows that it is, and then the time that it has had.
 struct Ended {
   ProgramRun run;
   double seconds = 0;
@@ -58,10 +93,10 @@ Ended end_by(int signal, const std::vector<std::string>& arguments, const fs::pa
   Clock::time_point sent;
   Ended ended;
   ended.run = run_program(arguments, folder, [&](int process) {
-    const auto give_up = Clock::now() + std::chrono::seconds(30);
-    while (names_in(folder).size() == before && Clock::now() < give_up) std::this_thread::yield();
+    wait_until(process, [&] { return names_in(folder).size() != before; });
     // It is inside its first simulation soon; what comes before ends as soon.
-    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+    const double begun_s = processor_s(process);
+    wait_until(process, [&] { return processor_s(process) > begun_s + 0.2; });
     sent = Clock::now();
     kill(process, signal);
   });
@@ -112,6 +147,85 @@ TEST(ProgramEnding, OfAStudyByTermKeepsItsJournalAlone) {
   EXPECT_EQ(ended.run.exit_code, 130) << ended.run.error;
   EXPECT_LT(ended.seconds, kSoon_s);
   EXPECT_THAT(names_in(here.path()), ElementsAre("r.journal"));
+}
+
+// --- killed runs ------------------------------------------------------------------------------
+
+std::string bytes_of(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+/// Returns the files of a result by name, without columns and numbers that a clock measured.
+std::map<std::string, std::string> result_of(const fs::path& folder) {
+  const std::regex pages(R"(class="(number )?measured">[^<]*|data-name="([a-z]+ )?s" [^>]*>[^<]*)");
+  const std::regex one_cell(R"(,[^,\n]*\n)"), two_cells(R"(,[^,\n]*,[^,\n]*\n)");
+  std::map<std::string, std::string> files;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    const std::string bytes = bytes_of(entry.path());
+    const std::string head = bytes.substr(0, bytes.find('\n'));
+    // Columns of seconds are the last.
+    const std::regex& timed = head.ends_with("seconds,drawing_seconds") ? two_cells
+                              : head.ends_with("seconds")               ? one_cell
+                                                                        : pages;
+    files[entry.path().filename()] = std::regex_replace(bytes, timed, "");
+  }
+  return files;
+}
+
+/// Kills a study each time that its journal has grown, until it ends. Returns the kills.
+int kill_at_each_record(std::vector<std::string> arguments, const fs::path& folder) {
+  arguments.emplace_back("--resume");
+  const fs::path journal = folder / "out.journal";
+  for (int kills = 0;; ++kills) {
+    const auto records = [&] {
+      const std::string bytes = bytes_of(journal);
+      int count = 0;
+      for (size_t at = bytes.find("\nrecord "); at != std::string::npos;
+           at = bytes.find("\nrecord ", at + 1))
+        ++count;
+      return count;
+    };
+    const int before = records();
+    const ProgramRun run = run_program(arguments, folder, [&](int process) {
+      wait_until(process, [&] { return records() > before; });
+      kill(process, SIGKILL);
+    });
+    if (run.exit_code == 0) return kills;
+    EXPECT_EQ(run.exit_code, 128 + SIGKILL) << run.error;
+    if (run.exit_code != 128 + SIGKILL || kills > 50) return kills;
+  }
+}
+
+void expect_kills_to_leave_no_trace(const std::vector<std::string>& arguments, int least_kills) {
+  const test::ScratchFolder here("killed_study");
+  const auto once = here.path() / "once", killed = here.path() / "killed";
+  fs::create_directory(once);
+  fs::create_directory(killed);
+  ASSERT_EQ(run_program(arguments, once).exit_code, 0);
+
+  EXPECT_GE(kill_at_each_record(arguments, killed), least_kills);
+
+  EXPECT_EQ(result_of(killed / "out"), result_of(once / "out"));
+  EXPECT_EQ(names_in(killed), names_in(once));  // neither journals nor partial folders
+}
+
+TEST(KilledStudy, EndsWithTheBytesOfAnUndisturbedOne) {
+  expect_kills_to_leave_no_trace(
+      {"recover", "--trials", "6", "--start-factor", "2", "--mesh", "9", "--truth-mesh", "9",
+       "--markers", "9", "--seconds", "0.5", "--threads", "1", "--out", "out"},
+      3);
+}
+
+TEST(KilledStudy, OfDiagnosesEndsWithTheBytesOfAnUndisturbedOne) {
+  CLOTHFIT_ONLY_IN_WHOLE_RUNS();
+  expect_kills_to_leave_no_trace(
+      {"recover", "--undeclared", "--clean", "--trials",      "3", "--rate",
+       "30",      "--seconds",    "0.4",     "--mesh",        "4", "--truth-mesh",
+       "4",       "--markers",    "4",       "--truth-steps", "1", "--lines",
+       "1",       "--refits",     "1",       "--threads",     "1", "--out",
+       "out"},
+      2);
 }
 
 // --- limits -----------------------------------------------------------------------------------
@@ -193,11 +307,7 @@ TEST(ProgramLimits, RefuseScenesBeyondMemoryAndADay) {
 TEST(ProgramLimits, RefuseMoreHeldPointsThanCanBePlaced) {
   const test::ScratchFolder here("limits_held");
   write_model(here.path() / "sheet.yaml", "{frame_rate: 60, duration: 0.1}", "50");
-  std::string text;
-  {
-    std::ifstream in(here.path() / "sheet.yaml");
-    text.assign(std::istreambuf_iterator<char>(in), {});
-  }
+  std::string text = bytes_of(here.path() / "sheet.yaml");
   std::string held = "held: [{edge: top, motion: fixed}";
   for (int n = 0; n < 1100; ++n)
     held += ", {at: [" + std::to_string(0.0003 * n) + ", 0.1], motion: fixed}";
