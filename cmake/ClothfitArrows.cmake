@@ -104,7 +104,7 @@ set(CLOTHFIT_TEST_ARROWS
   "tests/data   -> data"
   "tests/calib  -> calib data"
   "tests/vision -> vision calib data tests/data tests/model"
-  "tests/model  -> model data"
+  "tests/model  -> model data tests/data"
   "tests/fit    -> fit model calib data tests/data"
   "tests/apps   -> apps fit model vision calib data tests/data"
   "tests/fuzz   -> apps fit model vision calib data"

@@ -30,40 +30,18 @@
 #include "fit/jobs/journal.h"
 #include "fit/search/search_checkpoint.h"
 #include "tests/data/full_recording.h"
+#include "tests/data/replaced_new.h"
 
 namespace {
 
 /// How many more allocations of this thread succeed before one fails; negative: all of them.
 thread_local long allocations_left = -1;
 
-void* allocated(size_t size, size_t alignment) {
+void before_allocation() {
   if (allocations_left >= 0 && allocations_left-- == 0) throw std::bad_alloc();
-  const size_t whole = (size + alignment - 1) / alignment * alignment;
-  void* const memory = std::aligned_alloc(alignment, whole > 0 ? whole : alignment);
-  if (memory == nullptr) throw std::bad_alloc();
-  return memory;
 }
 
 }  // namespace
-
-void* operator new(size_t size) {
-  return allocated(size, alignof(std::max_align_t));
-}
-void* operator new(size_t size, std::align_val_t alignment) {
-  return allocated(size, static_cast<size_t>(alignment));
-}
-void operator delete(void* memory) noexcept {
-  std::free(memory);
-}
-void operator delete(void* memory, size_t) noexcept {
-  std::free(memory);
-}
-void operator delete(void* memory, std::align_val_t) noexcept {
-  std::free(memory);
-}
-void operator delete(void* memory, size_t, std::align_val_t) noexcept {
-  std::free(memory);
-}
 
 namespace clothfit {
 namespace {

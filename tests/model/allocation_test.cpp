@@ -13,40 +13,18 @@
 #include "model/effects/registry.h"
 #include "model/integrate/step.h"
 #include "model/integrate/tangent_step.h"
+#include "tests/data/replaced_new.h"
 #include "tests/model/random_cloth.h"
 
 namespace {
 
 std::atomic<long> allocations{0};
 
-void* counted(size_t size, size_t alignment) {
+void before_allocation() {
   ++allocations;
-  const size_t whole = (size + alignment - 1) / alignment * alignment;
-  void* const memory = std::aligned_alloc(alignment, whole > 0 ? whole : alignment);
-  if (memory == nullptr) throw std::bad_alloc();
-  return memory;
 }
 
 }  // namespace
-
-void* operator new(size_t size) {
-  return counted(size, alignof(std::max_align_t));
-}
-void* operator new(size_t size, std::align_val_t alignment) {
-  return counted(size, static_cast<size_t>(alignment));
-}
-void operator delete(void* memory) noexcept {
-  std::free(memory);
-}
-void operator delete(void* memory, size_t) noexcept {
-  std::free(memory);
-}
-void operator delete(void* memory, std::align_val_t) noexcept {
-  std::free(memory);
-}
-void operator delete(void* memory, size_t, std::align_val_t) noexcept {
-  std::free(memory);
-}
 
 namespace clothfit {
 namespace {
