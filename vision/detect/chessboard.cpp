@@ -55,14 +55,10 @@ bool is_quadrilateral(const std::vector<cv::Point>& outline) {
   return false;
 }
 
-/// Says whether a picture has more dark quadrilaterals than the search can take in.
-bool has_too_many_quadrilaterals(const cv::Mat& grey) {
-  constexpr double kNeighbourhood = 0.2;  // of the shorter side
-  constexpr int kMostDilations = 2;       // further ones leave fewer
-  const int window =
-      std::max(3, static_cast<int>(kNeighbourhood * std::min(grey.cols, grey.rows)) | 1);
-  cv::Mat light;
-  cv::adaptiveThreshold(grey, light, 255, cv::ADAPTIVE_THRESH_MEAN_C, cv::THRESH_BINARY, window, 0);
+/// Says whether a picture of black and white has more dark quadrilaterals than the search can take
+/// in.
+bool has_too_many_quadrilaterals(cv::Mat light) {
+  constexpr int kMostDilations = 2;  // further ones leave fewer
   for (int dilations = 0; dilations <= kMostDilations; ++dilations) {
     if (dilations > 0) cv::dilate(light, light, cv::Mat());
     std::vector<std::vector<cv::Point>> outlines;
@@ -77,13 +73,38 @@ bool has_too_many_quadrilaterals(const cv::Mat& grey) {
   return false;
 }
 
-/// Finds the corners to about a pixel. Noise and fine texture are searched in smaller copies, which
-/// average them out.
+/// Returns a picture's pixels that are lighter than their neighbourhood.
+cv::Mat lighter_than_around(const cv::Mat& grey) {
+  constexpr double kNeighbourhood = 0.2;  // of the shorter side
+  const int window =
+      std::max(3, static_cast<int>(kNeighbourhood * std::min(grey.cols, grey.rows)) | 1);
+  cv::Mat light;
+  cv::adaptiveThreshold(grey, light, 255, cv::ADAPTIVE_THRESH_MEAN_C, cv::THRESH_BINARY, window, 0);
+  return light;
+}
+
+/// Returns a picture's pixels that are lighter than one level for all of it.
+cv::Mat lighter_than_most(const cv::Mat& grey) {
+  cv::Mat light;
+  cv::threshold(grey, light, 0, 255, cv::THRESH_BINARY | cv::THRESH_OTSU);
+  return light;
+}
+
+/// Finds the corners to about a pixel. Against a neighbourhood, the noise of a plain wall is full
+/// of quadrilaterals; one level for all has none there. Fine texture and noise of all levels are
+/// searched in smaller copies, which average them out.
 std::optional<std::vector<cv::Point2f>> search_corners(const cv::Mat& grey, cv::Size pattern) {
   constexpr int kSmallestSquare_px = 4;
   cv::Mat copy = grey;
   float scale = 1;
-  while (has_too_many_quadrilaterals(copy)) {
+  std::vector<cv::Point2f> corners;
+  const auto finds = [&](int flags) {
+    return cv::findChessboardCorners(copy, pattern, corners, flags | cv::CALIB_CB_NORMALIZE_IMAGE);
+  };
+  while (true) {
+    const bool is_plain = !has_too_many_quadrilaterals(lighter_than_around(copy));
+    if (is_plain && !finds(cv::CALIB_CB_ADAPTIVE_THRESH)) return std::nullopt;
+    if (is_plain || (!has_too_many_quadrilaterals(lighter_than_most(copy)) && finds(0))) break;
     cv::Mat smaller;
     cv::pyrDown(copy, smaller);
     copy = smaller;
@@ -92,9 +113,6 @@ std::optional<std::vector<cv::Point2f>> search_corners(const cv::Mat& grey, cv::
         kSmallestSquare_px * std::min(pattern.width, pattern.height))
       return std::nullopt;
   }
-  std::vector<cv::Point2f> corners;
-  const int flags = cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_NORMALIZE_IMAGE;
-  if (!cv::findChessboardCorners(copy, pattern, corners, flags)) return std::nullopt;
   // The middle of a pixel of the copy is the middle of a pixel of the picture.
   for (cv::Point2f& corner : corners) corner *= scale;
   return corners;

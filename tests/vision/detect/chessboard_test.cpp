@@ -111,10 +111,37 @@ TEST(Chessboard, IsFoundAmongMoreQuadrilateralsThanTheSearchTakesIn) {
     EXPECT_LT(((*corners)[i] - (*alone)[i] - Eigen::Vector2d(place.x, place.y)).norm(), 1e-3);
 }
 
+TEST(Chessboard, OfFewPixelsIsFoundBeforeANoisyWall) {
+  const BoardDescription board{.columns = 9, .rows = 6, .square_m = 0.02};
+  for (const int square_px : {6, 9, 14}) {
+    SCOPED_TRACE(square_px);
+    cv::Mat picture(720, 1280, CV_8UC1, cv::Scalar(150));
+    const cv::Rect paper(300, 200, (board.columns + 3) * square_px, (board.rows + 3) * square_px);
+    cv::rectangle(picture, paper, cv::Scalar(230), cv::FILLED);
+    for (int r = 0; r <= board.rows; ++r)
+      for (int c = r % 2; c <= board.columns; c += 2)
+        cv::rectangle(picture,
+                      cv::Rect(paper.x + (c + 1) * square_px, paper.y + (r + 1) * square_px,
+                               square_px, square_px),
+                      cv::Scalar(30), cv::FILLED);
+    cv::Mat noise(picture.size(), CV_16SC1), noisy;
+    cv::RNG(2).fill(noise, cv::RNG::NORMAL, 0, 2);
+    picture.convertTo(noisy, CV_16S);
+    noisy += noise;
+    noisy.convertTo(noisy, CV_8U);
+
+    const auto corners = find_chessboard(noisy, board);
+
+    ASSERT_TRUE(corners);
+    const Eigen::Vector2d first_px(paper.x + 2 * square_px - 0.5, paper.y + 2 * square_px - 0.5);
+    EXPECT_LT((corners->front() - first_px).norm(), 0.2);
+  }
+}
+
 TEST(Chessboard, IsNotFoundInNoise) {
-  cv::Mat noise(600, 800, CV_8UC1);
-  cv::setRNGSeed(1);
-  cv::randu(noise, 0, 256);
+  // Searched as it is, it takes a quarter of an hour.
+  cv::Mat noise(1200, 1600, CV_8UC1);
+  cv::RNG(1).fill(noise, cv::RNG::UNIFORM, 0, 256);
 
   EXPECT_FALSE(find_chessboard(noise, {.columns = 9, .rows = 6, .square_m = 0.02}));
 }
