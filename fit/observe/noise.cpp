@@ -45,26 +45,45 @@ double robust_sigma(const std::vector<double>& sorted) {
   }
 }
 
+/// Returns first frames of four that are evenly spaced and show a track. Of those with too many
+/// differences in all, it returns evenly spread ones.
+std::vector<size_t> some_runs(const std::vector<double>& time_s,
+                              const std::vector<Eigen::MatrixXd>& tracks,
+                              const NoiseOptions& options) {
+  std::vector<size_t> starts;
+  size_t differences = 0;
+  for (size_t f = 0; f + 3 < time_s.size(); ++f) {
+    if (!evenly_spaced(time_s, f, options.interval_tolerance)) continue;
+    const size_t before = differences;
+    for (const Eigen::MatrixXd& track : tracks) {
+      assert(track.cols() == static_cast<Eigen::Index>(time_s.size()));
+      if (!track.middleCols(static_cast<Eigen::Index>(f), 4).hasNaN())
+        differences += static_cast<size_t>(track.rows());
+    }
+    if (differences > before) starts.push_back(f);
+  }
+  const size_t stride =
+      std::max<size_t>(1, (differences + kMostDifferences - 1) / kMostDifferences);
+  std::vector<size_t> some;
+  for (size_t n = 0; n < starts.size(); n += stride) some.push_back(starts[n]);
+  return some;
+}
+
 }  // namespace
 
 NoiseEstimate estimate_noise(const std::vector<double>& time_s,
                              const std::vector<Eigen::MatrixXd>& tracks,
                              const NoiseOptions& options) {
   assert(options.interval_tolerance >= 0);
-  size_t numbers = 0;
-  for (const Eigen::MatrixXd& track : tracks) numbers += static_cast<size_t>(track.size());
-  const size_t stride = 1 + numbers / kMostDifferences;
+  const std::vector<size_t> starts = some_runs(time_s, tracks, options);
   std::vector<double> differences;
-  for (size_t f = 0; f + 3 < time_s.size(); f += stride) {
-    if (!evenly_spaced(time_s, f, options.interval_tolerance)) continue;
+  for (const size_t f : starts)
     for (const Eigen::MatrixXd& track : tracks) {
-      assert(track.cols() == static_cast<Eigen::Index>(time_s.size()));
       const auto x = track.middleCols(static_cast<Eigen::Index>(f), 4);
       if (x.hasNaN()) continue;
       const Eigen::VectorXd d = x.col(0) - 3 * x.col(1) + 3 * x.col(2) - x.col(3);
       for (const double value : d) differences.push_back(std::abs(value));
     }
-  }
 
   NoiseEstimate estimate;
   estimate.differences = static_cast<int>(differences.size());
