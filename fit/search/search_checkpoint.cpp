@@ -248,9 +248,13 @@ void require_header(const Lines& expected, LineReader& reader) {
   for (const std::string& line : expected) {
     const std::string found(reader.line());
     if (found == line) continue;
+    const bool is_program = line.starts_with("program ");
     reader.refuse(fmt::format("belongs to a search with `{}`", shown_difference(found, line)),
                   fmt::format("this search has `{}`", shown_difference(line, found)),
-                  "give what it was started with, or another file");
+                  is_program
+                      ? "go on with that version on such a processor, or remove it and start "
+                        "from scratch"
+                      : "give what it was started with, or another file");
   }
 }
 
