@@ -1,6 +1,7 @@
 #include "apps/terminal/progress_line.h"
 
 #include <fmt/format.h>
+#include <poll.h>
 #include <sys/ioctl.h>
 #include <unistd.h>
 
@@ -29,6 +30,12 @@ int terminal_width(std::FILE* stream) {
   winsize size{};
   const bool known = ioctl(fileno(stream), TIOCGWINSZ, &size) == 0 && size.ws_col > 0;
   return known ? size.ws_col : 80;
+}
+
+/// Says whether a stream takes a line at once: a pipe may have lost its reader, or be full.
+bool takes_a_line(std::FILE* stream) {
+  pollfd asked{.fd = fileno(stream), .events = POLLOUT, .revents = 0};
+  return poll(&asked, 1, 0) == 1 && asked.revents == POLLOUT;
 }
 
 }  // namespace
@@ -91,7 +98,7 @@ void ProgressLine::show(const Progress& progress) {
     fmt::print(stream_, "\r\033[K{}",
                progress_text(progress, elapsed_s, terminal_width(stream_) - 1));
     dirty_ = true;
-  } else {
+  } else if (takes_a_line(stream_)) {
     const auto since_begin = std::chrono::duration_cast<std::chrono::seconds>(now - begin_);
     fmt::print(stream_, "{}  {}\n", clock_text(since_begin.count()),
                progress_text(progress, elapsed_s, kLogWidth));

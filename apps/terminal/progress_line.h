@@ -16,8 +16,8 @@ namespace clothfit {
 std::string progress_text(const Progress& progress, double elapsed_s, int width);
 
 /// Shows progress on one line of a terminal. The line is wiped when the object goes, so that
-/// messages and tables start on a clean line. Elsewhere, as in a log file, it writes a line each
-/// `log_interval`, which begins with the time since the object was made:
+/// messages and tables start on a clean line. Elsewhere, as in a log file, it writes at most a line
+/// each `log_interval`, which begins with the time since the object was made:
 ///
 ///   0:02:00  refine  240/1000 evaluations  12.3/s  1:02 left  cost 0.41
 class ProgressLine {

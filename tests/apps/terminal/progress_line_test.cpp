@@ -3,7 +3,9 @@
 #include "apps/terminal/progress_line.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
+#include <array>
 #include <chrono>
 #include <cstdio>
 #include <string>
@@ -65,6 +67,20 @@ TEST(ProgressLine, WritesWholeLinesWhereTheStreamIsNotATerminal) {
 
   EXPECT_EQ(shown_in_a_file(std::chrono::seconds(0), stages),
             "0:00:00  track  0/2 frames\n0:00:00  fit  0/3 steps\n");
+}
+
+TEST(ProgressLine, WritesNothingToAPipeWithoutAReader) {
+  // A signal would end the program.
+  std::array<int, 2> ends{};
+  ASSERT_EQ(pipe(ends.data()), 0);
+  close(ends[0]);
+  std::FILE* stream = fdopen(ends[1], "w");
+  {
+    ProgressLine line(stream, std::chrono::seconds(0));
+    line.show({"track", 1, 2, "frames", ""});
+  }
+  EXPECT_EQ(std::ferror(stream), 0);
+  std::fclose(stream);
 }
 
 TEST(ProgressLine, WritesNothingToAFileBeforeTheFirstInterval) {
