@@ -3,7 +3,8 @@
 # read. A header in the place of a folder: of that folder, this header only.
 #
 #   apps -> vision -> calib/* -> calib/camera -> data
-#   apps -> fit    -> model                   -> data/input_error.h, data/algebra
+#   apps -> fit    -> model                   -> data/input_error.h, data/parallel.h,
+#                                                        data/algebra
 #           fit    -> calib/camera
 
 # A script has no project to take its policies from; a function keeps those of its definition.
@@ -32,10 +33,10 @@ set(CLOTHFIT_ARROWS
   "model/fabric         -> data/input_error.h data/algebra model/topology"
   "model/cloth          -> data/input_error.h model/topology model/kernels model/fabric"
   "model/effects        -> data/input_error.h model/topology model/kernels model/cloth"
-  "model/rest           -> data/input_error.h data/algebra model/topology model/kernels
-                           model/cloth"
-  "model/integrate      -> data/input_error.h data/algebra model/kernels model/cloth
-                           model/effects model/rest"
+  "model/rest           -> data/input_error.h data/parallel.h data/algebra model/topology
+                           model/kernels model/cloth"
+  "model/integrate      -> data/input_error.h data/parallel.h data/algebra model/kernels
+                           model/cloth model/effects model/rest"
   "fit/interface        -> data model/fabric"
   "fit/jobs             -> data fit/interface/option_limits.h"
   "fit/observe          -> data/algebra data calib/camera model/topology fit/interface

@@ -1,7 +1,5 @@
 #include "fit/cost/shooting.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cassert>
 #include <cmath>
@@ -9,6 +7,7 @@
 #include <utility>
 
 #include "data/algebra/dense_factors.h"
+#include "data/parallel.h"
 #include "fit/cost/huber.h"
 #include "fit/observe/node_weights.h"
 #include "fit/problem/parameterised_model.h"
@@ -363,8 +362,8 @@ std::vector<std::optional<ShootingObjective::Window>> ShootingObjective::run_all
   std::vector<std::optional<Window>> windows(static_cast<size_t>(windows_.count()));
   if (!is_stable(values)) return windows;
   const Model model = model_at(values, false);
-  tbb::parallel_for(0, windows_.count(),
-                    [&](int w) { windows[static_cast<size_t>(w)] = run(w, model, corrections); });
+  for_each_index(windows.size(),
+                 [&](size_t w) { windows[w] = run(static_cast<int>(w), model, corrections); });
   return windows;
 }
 
@@ -373,8 +372,8 @@ std::vector<std::optional<ShootingObjective::Window>> ShootingObjective::lineari
   std::vector<std::optional<Window>> windows(static_cast<size_t>(windows_.count()));
   if (!is_stable(values)) return windows;
   const Model model = model_at(values, true);
-  tbb::parallel_for(0, windows_.count(), [&](int w) {
-    windows[static_cast<size_t>(w)] = run_with_tangents(w, model, by_states);
+  for_each_index(windows.size(), [&](size_t w) {
+    windows[w] = run_with_tangents(static_cast<int>(w), model, by_states);
   });
   return windows;
 }

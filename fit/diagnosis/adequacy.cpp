@@ -9,10 +9,10 @@
 #include <utility>
 
 #include "data/algebra/dense_factors.h"
+#include "data/parallel.h"
 #include "fit/diagnosis/criteria.h"
 #include "fit/diagnosis/hypothesis_derivatives.h"
 #include "fit/diagnosis/projection.h"
-#include "fit/jobs/parallel.h"
 
 namespace clothfit {
 namespace {

@@ -4,13 +4,13 @@
 #include <limits>
 #include <utility>
 
+#include "data/parallel.h"
 #include "fit/diagnosis/basin.h"
 #include "fit/diagnosis/criteria.h"
 #include "fit/diagnosis/discretisation.h"
 #include "fit/diagnosis/expand.h"
 #include "fit/diagnosis/shortlist.h"
 #include "fit/diagnosis/space_mapping.h"
-#include "fit/jobs/parallel.h"
 
 namespace clothfit {
 namespace {

@@ -6,10 +6,10 @@
 #include <utility>
 
 #include "data/algebra/dense_factors.h"
+#include "data/parallel.h"
 #include "fit/diagnosis/criteria.h"
 #include "fit/diagnosis/residual_acceleration.h"
 #include "fit/diagnosis/search_context.h"
-#include "fit/jobs/parallel.h"
 #include "fit/problem/effects_of.h"
 
 namespace clothfit {

@@ -9,9 +9,9 @@
 #include <utility>
 
 #include "data/algebra/dense_factors.h"
+#include "data/parallel.h"
 #include "fit/cost/huber.h"
 #include "fit/diagnosis/free_forces.h"
-#include "fit/jobs/parallel.h"
 #include "fit/problem/box.h"
 #include "fit/problem/prior_cost.h"
 #include "fit/uncertainty/uncertainty.h"

@@ -4,6 +4,7 @@
 #include <limits>
 #include <utility>
 
+#include "data/parallel.h"
 #include "fit/diagnosis/basin.h"
 #include "fit/diagnosis/criteria.h"
 #include "fit/diagnosis/discretisation.h"
@@ -13,7 +14,6 @@
 #include "fit/diagnosis/shortlist.h"
 #include "fit/diagnosis/space_mapping.h"
 #include "fit/diagnosis/worth.h"
-#include "fit/jobs/parallel.h"
 #include "fit/problem/effects_of.h"
 
 namespace clothfit {

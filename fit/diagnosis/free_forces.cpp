@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "fit/jobs/parallel.h"
+#include "data/parallel.h"
 #include "model/cloth/cloth.h"
 #include "model/effects/number.h"
 

@@ -8,8 +8,8 @@
 #include <tuple>
 
 #include "data/algebra/dense_factors.h"
+#include "data/parallel.h"
 #include "fit/diagnosis/catalogue.h"
-#include "fit/jobs/parallel.h"
 #include "fit/measurement_effects/applicability.h"
 #include "fit/measurement_effects/registry.h"
 #include "fit/problem/effects_of.h"

@@ -7,11 +7,11 @@
 #include <cmath>
 #include <utility>
 
+#include "data/parallel.h"
 #include "fit/diagnosis/catalogue.h"
 #include "fit/diagnosis/criteria.h"
 #include "fit/diagnosis/refit.h"
 #include "fit/diagnosis/worth.h"
-#include "fit/jobs/parallel.h"
 #include "fit/jobs/stop_token.h"
 #include "fit/problem/effects_of.h"
 #include "fit/uncertainty/uncertainty.h"

@@ -5,13 +5,13 @@
 #include <limits>
 #include <numeric>
 
+#include "data/parallel.h"
 #include "fit/diagnosis/catalogue.h"
 #include "fit/diagnosis/criteria.h"
 #include "fit/diagnosis/discretisation.h"
 #include "fit/diagnosis/horizons.h"
 #include "fit/diagnosis/worth.h"
 #include "fit/identify.h"
-#include "fit/jobs/parallel.h"
 #include "fit/problem/problem.h"
 
 namespace clothfit {

@@ -11,13 +11,13 @@
 #include <set>
 #include <utility>
 
+#include "data/parallel.h"
 #include "fit/diagnosis/candidate_recording.h"
 #include "fit/diagnosis/discretisation.h"
 #include "fit/diagnosis/horizons.h"
 #include "fit/diagnosis/hypothesis_derivatives.h"
 #include "fit/diagnosis/projection.h"
 #include "fit/diagnosis/refit.h"
-#include "fit/jobs/parallel.h"
 #include "fit/jobs/stop_token.h"
 #include "fit/problem/effects_of.h"
 #include "fit/problem/parameterised_model.h"

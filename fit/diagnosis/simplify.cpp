@@ -4,6 +4,7 @@
 #include <utility>
 #include <vector>
 
+#include "data/parallel.h"
 #include "fit/diagnosis/adequacy.h"
 #include "fit/diagnosis/beam.h"
 #include "fit/diagnosis/clearance.h"
@@ -11,7 +12,6 @@
 #include "fit/diagnosis/search_context.h"
 #include "fit/diagnosis/trial.h"
 #include "fit/diagnosis/worth.h"
-#include "fit/jobs/parallel.h"
 #include "fit/problem/effects_of.h"
 
 namespace clothfit {

@@ -15,6 +15,7 @@
 #include <optional>
 
 #include "data/input_error.h"
+#include "data/parallel.h"
 #include "data/shown_text.h"
 #include "fit/jobs/draws.h"
 #include "fit/jobs/stop_token.h"
@@ -155,12 +156,21 @@ ExecuteResult execute(int count, const Work& work, const ExecuteOptions& options
 
   Run run(count, work, options, journal, progress);
   tbb::task_arena arena(threads);
+  ThreadEdge begin, end;
+  begin.leave();
   arena.execute([&] {
     // There are as many loops as threads, not a task for each piece. Tasks would be split into
     // ranges and not begun in order.
     tbb::parallel_for(
-        0, std::min(threads, run.left()), [&](int) { run.do_pieces(); }, tbb::simple_partitioner());
+        0, std::min(threads, run.left()),
+        [&](int) {
+          begin.enter();
+          run.do_pieces();
+          end.leave();
+        },
+        tbb::simple_partitioner());
   });
+  end.enter();
   return run.result();
 }
 

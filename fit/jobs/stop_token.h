@@ -15,7 +15,7 @@ struct StopRequested {};
 struct TimeIsUp {};
 
 /// Returns a callback that throws StopRequested where `progress` says to stop, and else returns
-/// true. Several threads may call it at once, in loops of for_each_index (fit/jobs/parallel.h). It
+/// true. Several threads may call it at once, in loops of for_each_index (data/parallel.h). It
 /// is empty where there is no `progress`.
 inline ProgressCallback stop_token(ProgressCallback progress) {
   if (!progress) return progress;

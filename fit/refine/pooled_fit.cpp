@@ -6,8 +6,8 @@
 
 #include "data/algebra/dense_factors.h"
 #include "data/input_error.h"
+#include "data/parallel.h"
 #include "fit/cost/huber.h"
-#include "fit/jobs/parallel.h"
 #include "fit/jobs/stop_token.h"
 #include "fit/problem/parameterised_model.h"
 #include "fit/problem/prior_cost.h"

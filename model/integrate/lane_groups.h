@@ -1,11 +1,10 @@
 #pragma once
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <span>
 #include <type_traits>
 
+#include "data/parallel.h"
 #include "model/cloth/cloth.h"
 #include "model/kernels/lanes.h"
 
@@ -20,7 +19,7 @@ void for_lane_groups(std::span<const ParameterSet> parameters, const Run& run) {
   constexpr size_t kWorthAGroup = std::is_same_v<L, FastLanes> ? 3 : 5;
   const size_t groups = whole + (left > kWorthAGroup ? 1 : 0);
   const size_t in_groups = std::min(groups * L::kCount, parameters.size());
-  tbb::parallel_for(size_t{0}, groups + parameters.size() - in_groups, [&](size_t g) {
+  for_each_index(groups + parameters.size() - in_groups, [&](size_t g) {
     if (g < groups) {
       const size_t first = g * L::kCount;
       run.template operator()<L>(

@@ -1,11 +1,10 @@
 #include "model/integrate/relax.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 
+#include "data/parallel.h"
 #include "model/cloth/stability.h"
 #include "model/integrate/lane_groups.h"
 #include "model/integrate/step.h"
@@ -273,7 +272,7 @@ void start_at_rest_with_tangents(const Cloth& cloth, ParameterSet& set,
   std::vector<Direction> moved;
   for (const Direction& direction : directions) moved.push_back(heavy.in_it(direction));
   const size_t groups = std::max<size_t>(1, (directions.size() + kLanes - 1) / kLanes);
-  tbb::parallel_for(size_t{0}, groups, [&](size_t g) {
+  for_each_index(groups, [&](size_t g) {
     const size_t first = g * kLanes;
     const size_t count = std::min<size_t>(kLanes, directions.size() - first);
     TangentState<> state;

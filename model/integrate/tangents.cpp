@@ -1,10 +1,11 @@
 #include "model/integrate/tangents.h"
 
 #include <tbb/global_control.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
+
+#include "data/parallel.h"
 
 namespace clothfit {
 namespace {
@@ -107,7 +108,7 @@ TangentResult run_in_lanes(const Cloth& cloth, const ParameterSet& parameters,
   const size_t chunk = directions_at_once(directions.size(), L::kCount);
   const size_t chunks = std::max<size_t>(1, (directions.size() + chunk - 1) / chunk);
   std::vector<TangentResult> results(chunks);
-  tbb::parallel_for(size_t{0}, chunks, [&](size_t c) {
+  for_each_index(chunks, [&](size_t c) {
     const size_t first = c * chunk;
     results[c] = run_chunk<L>(cloth, parameters,
                               directions.subspan(first, std::min(chunk, directions.size() - first)),

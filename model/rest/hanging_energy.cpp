@@ -1,7 +1,5 @@
 #include "model/rest/hanging_energy.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cassert>
 
@@ -11,6 +9,7 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
+#include "data/parallel.h"
 #include "model/kernels/lane_vector-inl.h"
 
 #ifndef CLOTHFIT_MODEL_EQUILIBRIUM_HANGING_ENERGY_ONCE
@@ -307,7 +306,8 @@ void for_row_blocks(const FieldLayout& layout, std::vector<std::vector<double>>&
                     const Work& work) {
   const int blocks = (layout.rows + kBlockRows - 1) / kBlockRows;
   scratch.resize(static_cast<size_t>(blocks));
-  const auto one = [&](int b) {
+  const auto one = [&](size_t block) {
+    const int b = static_cast<int>(block);
     std::vector<double>& mine = scratch[static_cast<size_t>(b)];
     mine.resize(static_cast<size_t>(RowBlock::scratch_size(layout)));
     work(RowBlock{layout, b * kBlockRows, std::min((b + 1) * kBlockRows, layout.rows), mine.data()},
@@ -316,7 +316,7 @@ void for_row_blocks(const FieldLayout& layout, std::vector<std::vector<double>>&
   if (blocks == 1)
     one(0);
   else
-    tbb::parallel_for(0, blocks, one);
+    for_each_index(static_cast<size_t>(blocks), one);
 }
 
 template <class Pointer, class Arrays>

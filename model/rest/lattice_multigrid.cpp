@@ -1,9 +1,9 @@
 #include "model/rest/lattice_multigrid.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cassert>
+
+#include "data/parallel.h"
 
 namespace clothfit {
 namespace {
@@ -47,7 +47,8 @@ void for_rows(int rows, const Work& work) {
     return;
   }
   const int tasks = (rows + kRowsPerTask - 1) / kRowsPerTask;
-  tbb::parallel_for(0, tasks, [&](int n) {
+  for_each_index(static_cast<size_t>(tasks), [&](size_t task) {
+    const int n = static_cast<int>(task);
     const int end = std::min(rows, (n + 1) * kRowsPerTask);
     for (int i = n * kRowsPerTask; i < end; ++i) work(i);
   });
@@ -120,7 +121,8 @@ void for_segments(const FieldLayout& layout, const Work& work) {
     return;
   }
   const int tasks = (layout.rows + kRowsPerTask - 1) / kRowsPerTask;
-  tbb::parallel_for(0, tasks, [&](int n) {
+  for_each_index(static_cast<size_t>(tasks), [&](size_t task) {
+    const int n = static_cast<int>(task);
     const int begin = n * kRowsPerTask, end = std::min(layout.rows, begin + kRowsPerTask);
     work(layout.at(begin, 0), (end - begin) * layout.stride);
   });
@@ -235,7 +237,7 @@ struct LatticeMultigrid::Level {
     const std::ptrdiff_t s = layout.stride;
     const std::array<std::array<std::ptrdiff_t, 2>, kSpringTypes> ends = {
         {{0, s}, {0, 1}, {0, s + 1}, {s, 1}, {0, 2 * s}, {0, 2}}};
-    tbb::parallel_for(size_t{0}, size_t{6}, [&](size_t c) {
+    for_each_index(6, [&](size_t c) {
       for (size_t t = 0; t < kSpringTypes; ++t)
         for (const std::ptrdiff_t end : ends[t])
           if (layout.plane() > end)

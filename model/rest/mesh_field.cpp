@@ -1,10 +1,10 @@
 #include "model/rest/mesh_field.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <vector>
+
+#include "data/parallel.h"
 
 namespace clothfit {
 namespace {
@@ -15,14 +15,15 @@ constexpr std::ptrdiff_t kChunk = 32768;
 template <class Work>
 void for_chunks(std::ptrdiff_t size, const Work& work) {
   const std::ptrdiff_t chunks = (size + kChunk - 1) / kChunk;
-  const auto one = [&](std::ptrdiff_t c) {
+  const auto one = [&](size_t chunk) {
+    const auto c = static_cast<std::ptrdiff_t>(chunk);
     const std::ptrdiff_t begin = c * kChunk;
     work(c, begin, std::min(kChunk, size - begin));
   };
   if (chunks == 1)
     one(0);
   else
-    tbb::parallel_for(std::ptrdiff_t{0}, chunks, one);
+    for_each_index(static_cast<size_t>(chunks), one);
 }
 
 double dot_of_chunk(const double* a, const double* b, std::ptrdiff_t count) {

@@ -1,10 +1,9 @@
 #include "model/rest/rest_shapes.h"
 
-#include <tbb/parallel_for.h>
-
 #include <Eigen/Geometry>
 #include <cmath>
 
+#include "data/parallel.h"
 #include "model/rest/equilibrium.h"
 
 namespace clothfit {
@@ -41,7 +40,7 @@ void turn_towards(const Cloth& cloth, const Eigen::Vector3d& gravity,
 std::vector<Eigen::Matrix3Xd> rest_shapes(const Cloth& cloth,
                                           std::span<const ParameterSet> parameters, double time_s) {
   std::vector<Eigen::Matrix3Xd> shapes(parameters.size());
-  tbb::parallel_for(size_t{0}, parameters.size(), [&](size_t n) {
+  for_each_index(parameters.size(), [&](size_t n) {
     const ParameterSet& set = parameters[n];
     EquilibriumResult result = find_equilibrium(
         cloth, set, {.tolerance = kTolerance, .most_iterations = kMostIterations}, time_s);

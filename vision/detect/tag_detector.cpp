@@ -1,7 +1,6 @@
 #include "vision/detect/tag_detector.h"
 
 #include <apriltag/apriltag.h>
-#include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
@@ -9,6 +8,7 @@
 #include <map>
 #include <tuple>
 
+#include "data/parallel.h"
 #include "vision/detect/sharpened_copy.h"
 #include "vision/detect/tag_family.h"
 #include "vision/detect/tag_refine.h"
@@ -176,7 +176,7 @@ std::optional<TagDetection> read_one(const cv::Mat& grey, const TagPattern& patt
 /// no other work up, since that may want the same detector.
 template <class Read>
 void for_each_tag(size_t count, const Read& read) {
-  tbb::this_task_arena::isolate([&] { tbb::parallel_for(size_t{0}, count, read); });
+  tbb::this_task_arena::isolate([&] { for_each_index(count, read); });
 }
 
 }  // namespace

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "data/input_error.h"
+#include "data/parallel.h"
 #include "vision/detect/tag_detector.h"
 #include "vision/ingest/open_images.h"
 #include "vision/look/families_shown.h"
@@ -170,6 +171,7 @@ LookResult look(const std::filesystem::path& images, const LookOptions& options,
     return all;
   });
   int next = 0;
+  ThreadEdge handed_on;
   const auto load = [&](tbb::flow_control& control) {
     LookedAt picture{.number = next++, .grey = {}, .seen = {}};
     if (cancelled || !source->next(picture.grey)) {
@@ -180,13 +182,17 @@ LookResult look(const std::filesystem::path& images, const LookOptions& options,
     picture.wanted = due && source->damage().empty();
     picture.seen.name = source->current_name();
     picture.seen.frame = source->frame();
+    handed_on.leave();
     return picture;
   };
   const auto detect = [&](LookedAt picture) {
+    handed_on.enter();
     if (picture.wanted) look_at(picture, detectors.local(), wanted);
+    handed_on.leave();
     return picture;
   };
   const auto collect = [&](const LookedAt& picture) {
+    handed_on.enter();
     if (!picture.wanted || cancelled) return;
     if (first.empty()) first = picture.grey;
     if (is_drawn(picture.number, result.count, every))

@@ -11,6 +11,7 @@
 
 #include "calib/camera/projection.h"
 #include "data/input_error.h"
+#include "data/parallel.h"
 
 namespace clothfit {
 namespace {
@@ -75,8 +76,11 @@ cv::Mat sample_rows(const CameraRays& rays, std::span<const std::vector<PlacedSh
   for (size_t k = 0; k < across; ++k) u_px[k] = axis.place_px(static_cast<int>(k));
 
   cv::Mat rows(axis.count(rays.camera().image_height), width, CV_32FC1);
+  ThreadEdge begin, end;
+  begin.leave();
   tbb::parallel_for(tbb::blocked_range<int>(0, rows.rows),
                     [&](const tbb::blocked_range<int>& part) {
+                      begin.enter();
                       std::vector<Eigen::Vector2d> direction(across), below(across);
                       std::vector<Eigen::Matrix2d> step(across);
                       std::vector<SheetHit> hit(across);
@@ -105,7 +109,9 @@ cv::Mat sample_rows(const CameraRays& rays, std::span<const std::vector<PlacedSh
                           out[u] = static_cast<float>(sum / static_cast<double>(scenes.size()));
                         }
                       }
+                      end.leave();
                     });
+  end.enter();
   return rows;
 }
 
@@ -156,7 +162,8 @@ cv::Mat render_cloth(const CameraRays& rays, std::span<const std::vector<PlacedS
   const cv::Mat rows = sample_rows(rays, instants, scenes, lighting, axis);
 
   cv::Mat picture(camera.image_height, camera.image_width, CV_8UC1);
-  tbb::parallel_for(0, picture.rows, [&](int v) {
+  for_each_index(static_cast<size_t>(picture.rows), [&](size_t row) {
+    const int v = static_cast<int>(row);
     std::mt19937_64 generator = row_generator(noise_seed, v);
     std::normal_distribution<double> normal;
     for (int u = 0; u < picture.cols; ++u) {

@@ -1,10 +1,10 @@
 #include "vision/texture/smooth_picture.h"
 
-#include <tbb/parallel_for.h>
-
 #include <cassert>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
+
+#include "data/parallel.h"
 
 namespace clothfit {
 namespace {
@@ -39,11 +39,11 @@ SmoothPicture::SmoothPicture(const cv::Mat& grey, double blur_px) {
   assert(grey.type() == CV_8UC1 && blur_px > 0);
   grey.convertTo(weights_, CV_32F);
   cv::GaussianBlur(weights_, weights_, cv::Size(), blur_px, blur_px, cv::BORDER_REPLICATE);
-  tbb::parallel_for(0, weights_.rows, [&](int row) {
-    to_spline_weights(weights_.ptr<float>(row), weights_.cols, 1);
+  for_each_index(static_cast<size_t>(weights_.rows), [&](size_t row) {
+    to_spline_weights(weights_.ptr<float>(static_cast<int>(row)), weights_.cols, 1);
   });
   const auto stride = static_cast<std::ptrdiff_t>(weights_.step1());
-  tbb::parallel_for(0, weights_.cols, [&](int column) {
+  for_each_index(static_cast<size_t>(weights_.cols), [&](size_t column) {
     to_spline_weights(weights_.ptr<float>(0) + column, weights_.rows, stride);
   });
 }

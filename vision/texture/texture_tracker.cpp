@@ -1,7 +1,6 @@
 #include "vision/texture/texture_tracker.h"
 
 #include <fmt/core.h>
-#include <tbb/parallel_for.h>
 
 #include <Eigen/LU>
 #include <algorithm>
@@ -11,6 +10,7 @@
 
 #include "data/input_error.h"
 #include "data/median.h"
+#include "data/parallel.h"
 #include "vision/texture/residual_correlation.h"
 
 namespace clothfit {
@@ -94,7 +94,7 @@ TextureTracker::Follower::Follower(const TextureLayout& layout, const cv::Mat& f
       history_(size()),
       last_picture_(first.clone()) {
   options.validate();
-  tbb::parallel_for(size_t{0}, size(), [&](size_t m) { templates_[m] = make_template(m); });
+  for_each_index(size(), [&](size_t m) { templates_[m] = make_template(m); });
   for (size_t m = 0; m < size(); ++m) {
     if (templates_[m].plain) continue;
     history_[m].last.emplace();
@@ -173,7 +173,7 @@ PatchFit TextureTracker::Follower::align_from_afar(const Working& working, size_
 
 void TextureTracker::Follower::follow(const std::vector<PatchWarp>& starts,
                                       Working& working) const {
-  tbb::parallel_for(size_t{0}, size(), [&](size_t m) {
+  for_each_index(size(), [&](size_t m) {
     if (!history_[m].in_last_picture) return;
     PatchFit fit = align_patch(working.fine, templates_[m].fine, starts[m], options_.align);
     if (!acceptable(fit)) fit = align_from_afar(working, m, starts[m]);
@@ -235,7 +235,7 @@ void TextureTracker::Follower::leave_out_cut(Working& working) const {
 /// placed, where they were last. Returns how many it found.
 int TextureTracker::Follower::seek_once(Working& working) const {
   std::vector<std::optional<PatchFit>> found(size());
-  tbb::parallel_for(size_t{0}, size(), [&](size_t m) {
+  for_each_index(size(), [&](size_t m) {
     if (working.fits[m] || templates_[m].plain) return;
     const std::optional<ExpectedWarp> expected = expected_warp(layout_, working.placed, m);
     if (!expected && !history_[m].last) return;
@@ -307,7 +307,7 @@ TextureFrame TextureTracker::Follower::report(const Working& working) const {
     if (working.fits[m]) correlation.add(templates_[m].fine, *working.fits[m]);
   std::vector<double> sigma(size());
   std::vector<const char*> reason(size(), nullptr);
-  tbb::parallel_for(size_t{0}, size(), [&](size_t m) {
+  for_each_index(size(), [&](size_t m) {
     if (!working.fits[m]) {
       reason[m] = why_missing(working, m);
       return;

@@ -1,13 +1,12 @@
 #include "vision/track/dot_identity.h"
 
-#include <tbb/parallel_for.h>
-
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <set>
 
 #include "data/median.h"
+#include "data/parallel.h"
 
 namespace clothfit {
 namespace {
@@ -148,7 +147,7 @@ int PlacedDots::count() const {
 
 std::vector<LocalMap> survey(const DotLayout& layout, const PlacedDots& placed) {
   std::vector<LocalMap> maps(layout.sites.size());
-  tbb::parallel_for(size_t{0}, maps.size(), [&](size_t site) {
+  for_each_index(maps.size(), [&](size_t site) {
     if (placed.dots[site])
       maps[site] = fit_local_map(layout, static_cast<int>(site), placed.places, true);
   });
@@ -318,7 +317,7 @@ std::vector<int> leave_out_conflicts(const DotLayout& layout, PlacedDots& placed
     if (map.neighbours < 3) return 1e6;
     return gate_distance(map, *placed.places[site]);
   };
-  tbb::parallel_for(size_t{0}, conflict.size(), [&](size_t site) { conflict[site] = judge(site); });
+  for_each_index(conflict.size(), [&](size_t site) { conflict[site] = judge(site); });
   while (true) {
     const auto worst = std::max_element(conflict.begin(), conflict.end());
     if (*worst <= 1) return left_out;

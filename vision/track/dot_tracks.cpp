@@ -1,7 +1,6 @@
 #include "vision/track/dot_tracks.h"
 
 #include <fmt/core.h>
-#include <tbb/parallel_for.h>
 
 #include <Eigen/LU>
 #include <algorithm>
@@ -12,6 +11,7 @@
 
 #include "data/input_error.h"
 #include "data/median.h"
+#include "data/parallel.h"
 #include "vision/detect/tag_family.h"
 #include "vision/track/dot_bend.h"
 #include "vision/track/dot_identity.h"
@@ -171,7 +171,7 @@ void DotTracker::Follower::search_whole(const cv::Mat& grey, Working& working) {
 
 DotTracker::Follower::Working DotTracker::Follower::follow(const cv::Mat& grey) {
   Working working(size());
-  tbb::parallel_for(size_t{0}, size(), [&](size_t site) {
+  for_each_index(size(), [&](size_t site) {
     const SiteHistory& history = history_[site];
     if (!history.last) return;
     DotStart start{.outline = history.last->outline, .blur_px = history.last->blur_px};
@@ -317,7 +317,7 @@ void DotTracker::Follower::complete(const cv::Mat& grey, Working& working) const
 int DotTracker::Follower::complete_once(const cv::Mat& grey, Working& working,
                                         double blur_px) const {
   std::vector<std::optional<Dot>> found(size());
-  tbb::parallel_for(size_t{0}, size(), [&](size_t site) {
+  for_each_index(size(), [&](size_t site) {
     const DotSite& here = layout_.sites[site];
     if (!here.is_dot || working.placed.places[site] || working.reason[site]) return;
     const LocalMap map =

@@ -9,6 +9,7 @@
 #include <set>
 
 #include "data/input_error.h"
+#include "data/parallel.h"
 #include "vision/detect/tag_family.h"
 #include "vision/detect/tag_layout.h"
 #include "vision/ingest/footage.h"
@@ -132,6 +133,7 @@ Readings read_all(ImageSource& images, const std::string& where, const MarkerSet
   TagTracker tracker(sheet.family, layout_of(sheet, markers), listed_tags(markers, reference));
 
   int next = 0;
+  ThreadEdge handed_on;
   const auto load = [&](tbb::flow_control& control) {
     Picture picture{.number = next++, .grey = {}, .tags = {}};
     if (cancelled || !images.next(picture.grey)) {
@@ -142,13 +144,17 @@ Readings read_all(ImageSource& images, const std::string& where, const MarkerSet
     picture.state = !images.damage().empty() ? FramePicture::damaged
                     : images.dark()          ? FramePicture::dark
                                              : FramePicture::whole;
+    handed_on.leave();
     return picture;
   };
   const auto read = [&](Picture picture) {
+    handed_on.enter();
     if (picture.readable()) picture.tags = tracker.next(picture.grey, picture.frame);
+    handed_on.leave();
     return picture;
   };
   const auto collect = [&](const Picture& picture) {
+    handed_on.enter();
     if (cancelled) return;
     if (picture.readable()) keep_pictures(picture, images.count(), readings);
     for (const TagDetection& tag : picture.tags.read) {

@@ -7,7 +7,7 @@
 #include <atomic>
 #include <vector>
 
-#include "fit/jobs/parallel.h"
+#include "data/parallel.h"
 
 namespace clothfit {
 namespace {
