@@ -62,15 +62,20 @@ bool has_ended(int process) {
          info.si_pid != 0;
 }
 
-/// Waits until a running program shows something, or ends, or half a minute is over.
-void wait_until(int process, const std::function<bool()>& shown) {
-  const auto give_up = Clock::now() + std::chrono::seconds(30);
-  while (!shown() && !has_ended(process) && Clock::now() < give_up) std::this_thread::yield();
+/// Waits until a running program shows something or ends. Says no where it did neither.
+bool wait_until(int process, const std::function<bool()>& shown) {
+  const auto give_up = Clock::now() + std::chrono::minutes(2);
+  while (!shown() && !has_ended(process)) {
+    if (Clock::now() > give_up) return false;
+    std::this_thread::yield();
+  }
+  return true;
 }
 
-/// Returns the seconds of a processor that a running program has had.
+/// Returns the seconds of a processor that a running program's first thread has had.
 double processor_s(int process) {
-  std::ifstream in("/proc/" + std::to_string(process) + "/stat");
+  std::ifstream in("/proc/" + std::to_string(process) + "/task/" + std::to_string(process) +
+                   "/stat");
   std::string text;
   std::getline(in, text);
   std::istringstream fields(text.substr(std::min(text.rfind(')') + 1, text.size())));
@@ -187,34 +192,35 @@ int kill_at_each_record(std::vector<std::string> arguments, const fs::path& fold
       return count;
     };
     const int before = records();
+    bool in_time = false;
     const ProgramRun run = run_program(arguments, folder, [&](int process) {
-      wait_until(process, [&] { return records() > before; });
+      in_time = wait_until(process, [&] { return records() > before; });
       kill(process, SIGKILL);
     });
+    EXPECT_TRUE(in_time) << "no record came";
     if (run.exit_code == 0) return kills;
     EXPECT_EQ(run.exit_code, 128 + SIGKILL) << run.error;
-    if (run.exit_code != 128 + SIGKILL || kills > 50) return kills;
+    if (run.exit_code != 128 + SIGKILL || !in_time) return kills;
   }
 }
 
-void expect_kills_to_leave_no_trace(const std::vector<std::string>& arguments, int least_kills) {
+void expect_kills_to_leave_no_trace(const std::vector<std::string>& arguments) {
   const test::ScratchFolder here("killed_study");
   const auto once = here.path() / "once", killed = here.path() / "killed";
   fs::create_directory(once);
   fs::create_directory(killed);
   ASSERT_EQ(run_program(arguments, once).exit_code, 0);
 
-  EXPECT_GE(kill_at_each_record(arguments, killed), least_kills);
+  EXPECT_GE(kill_at_each_record(arguments, killed), 1);
 
   EXPECT_EQ(result_of(killed / "out"), result_of(once / "out"));
   EXPECT_EQ(names_in(killed), names_in(once));  // neither journals nor partial folders
 }
 
 TEST(KilledStudy, EndsWithTheBytesOfAnUndisturbedOne) {
-  expect_kills_to_leave_no_trace(
-      {"recover", "--trials", "6", "--start-factor", "2", "--mesh", "9", "--truth-mesh", "9",
-       "--markers", "9", "--seconds", "0.5", "--threads", "1", "--out", "out"},
-      3);
+  expect_kills_to_leave_no_trace({"recover", "--trials", "6", "--start-factor", "2", "--mesh", "9",
+                                  "--truth-mesh", "9", "--markers", "9", "--seconds", "0.5",
+                                  "--threads", "1", "--out", "out"});
 }
 
 TEST(KilledStudy, OfDiagnosesEndsWithTheBytesOfAnUndisturbedOne) {
