@@ -230,8 +230,7 @@ TEST(KilledStudy, OfDiagnosesEndsWithTheBytesOfAnUndisturbedOne) {
        "30",      "--seconds",    "0.4",     "--mesh",        "4", "--truth-mesh",
        "4",       "--markers",    "4",       "--truth-steps", "1", "--lines",
        "1",       "--refits",     "1",       "--threads",     "1", "--out",
-       "out"},
-      2);
+       "out"});
 }
 
 // --- limits -----------------------------------------------------------------------------------

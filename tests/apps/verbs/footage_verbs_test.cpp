@@ -88,7 +88,7 @@ TEST_F(FootageVerbs, RefuseSheetsThatCannotBePrinted) {
   expect_refused({"sheet", "tags", "--tag", "60mm"}, "--tag", "do not fit");
   expect_refused({"sheet", "dots", "--grid", "2x2"}, "--grid", "3 to 64");
   expect_refused({"sheet", "dots", "--grid", "16x8"}, "--grid", "such as 16x16");
-  expect_refused({"sheet", "board", "--grid", "3x3"}, "--grid", "4 to 200");
+  expect_refused({"sheet", "board", "--grid", "3x3"}, "--grid", "4 to 60");
   expect_refused({"sheet", "board", "--square", "20"}, "--square", "20 mm is 0.02");
   expect_refused({"sheet", "tags", "--dpi", "10"}, "--dpi", "50 to 1200");
   expect_refused({"sheet", "tags", "--out", "no/where"}, "no/where", "mkdir -p");
