@@ -38,9 +38,9 @@ bool turns_like_the_board(const std::vector<cv::Point2f>& corners, int columns, 
   return along_row.cross(along_column) > 0;
 }
 
-/// The search compares every quadrilateral with every other, a hundred times: 2000 cost some
-/// seconds. A board of kMostBoardCorners has 1860 dark squares.
-constexpr int kMostQuadrilaterals = 2000;
+/// Quadrilaterals beside the board's that a search takes in. It compares each with each, a hundred
+/// times: a thousand cost a second.
+constexpr int kMostOthers = 1000;
 
 /// Says whether an outline is a quadrilateral to within some pixels, as the search takes it.
 bool is_quadrilateral(const std::vector<cv::Point>& outline) {
@@ -57,7 +57,7 @@ bool is_quadrilateral(const std::vector<cv::Point>& outline) {
 
 /// Says whether a picture of black and white has more dark quadrilaterals than the search can take
 /// in.
-bool has_too_many_quadrilaterals(cv::Mat light) {
+bool has_too_many_quadrilaterals(cv::Mat light, int most) {
   constexpr int kMostDilations = 2;  // further ones leave fewer
   for (int dilations = 0; dilations <= kMostDilations; ++dilations) {
     if (dilations > 0) cv::dilate(light, light, cv::Mat());
@@ -67,7 +67,7 @@ bool has_too_many_quadrilaterals(cv::Mat light) {
     int count = 0;
     for (size_t i = 0; i < outlines.size(); ++i) {
       const bool is_dark = relations[i][3] >= 0;  // a hole in what is light
-      if (is_dark && is_quadrilateral(outlines[i]) && ++count > kMostQuadrilaterals) return true;
+      if (is_dark && is_quadrilateral(outlines[i]) && ++count > most) return true;
     }
   }
   return false;
@@ -97,14 +97,16 @@ std::optional<std::vector<cv::Point2f>> search_corners(const cv::Mat& grey, cv::
   constexpr int kSmallestSquare_px = 4;
   cv::Mat copy = grey;
   float scale = 1;
+  const int most = kMostOthers + ((pattern.width + 1) * (pattern.height + 1) + 1) / 2;
   std::vector<cv::Point2f> corners;
   const auto finds = [&](int flags) {
     return cv::findChessboardCorners(copy, pattern, corners, flags | cv::CALIB_CB_NORMALIZE_IMAGE);
   };
   while (true) {
-    const bool is_plain = !has_too_many_quadrilaterals(lighter_than_around(copy));
+    const bool is_plain = !has_too_many_quadrilaterals(lighter_than_around(copy), most);
     if (is_plain && !finds(cv::CALIB_CB_ADAPTIVE_THRESH)) return std::nullopt;
-    if (is_plain || (!has_too_many_quadrilaterals(lighter_than_most(copy)) && finds(0))) break;
+    if (is_plain || (!has_too_many_quadrilaterals(lighter_than_most(copy), most) && finds(0)))
+      break;
     cv::Mat smaller;
     cv::pyrDown(copy, smaller);
     copy = smaller;
