@@ -231,7 +231,8 @@ TEST(HostileVideo, OfAnImpossibleSizeIsRefusedBeforeAnyMemoryIsTaken) {
                       folder / name);
         EXPECT_THROW(whole_pictures_in(folder / name), InputError);
       }
-  EXPECT_LT(most_memory_of_process_MB() - before_MB, 50);
+  // 20000 x 20000 pixels are 400 MB at least; sanitizers keep back some of what is freed.
+  EXPECT_LT(most_memory_of_process_MB() - before_MB, 100);
 }
 
 TEST(HostileVideo, WithAHugePictureMidwayLeavesThatOneOutAndSaysSo) {
