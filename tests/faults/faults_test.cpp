@@ -153,8 +153,7 @@ TEST_P(EveryFault, IsSaidOrDoneWithout) {
 
 INSTANTIATE_TEST_SUITE_P(Of, EveryFault,
                          ::testing::Values(simulate(), fit(), track(), calibrate(), recover(),
-                                           diagnose(), sheet(), check()),
-                         [](const auto& tested) { return tested.param.name; });
+                                           diagnose(), sheet(), check()));
 
 }  // namespace
 }  // namespace clothfit

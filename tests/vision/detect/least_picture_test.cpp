@@ -55,12 +55,19 @@ void follow_texture(const cv::Mat& first, const cv::Mat& second) {
   tracker.next(second);
 }
 
-class LeastPicture : public testing::TestWithParam<cv::Size> {};
+/// A size that is printed without blanks, which would cut the test's name in ctest's list of times.
+struct PictureSize : cv::Size {
+  using cv::Size::Size;
+};
+
+void PrintTo(const PictureSize& size, std::ostream* out) {
+  *out << size.width << "x" << size.height;
+}
+
+class LeastPicture : public testing::TestWithParam<PictureSize> {};
 
 TEST_P(LeastPicture, IsSearchedForAllThatIsPrinted) {
   for (const Content content : {Content::plain, Content::noise, Content::squares}) {
-    // A strip of squares takes OpenCV seconds, whose search pairs all of them.
-    if (content == Content::squares && GetParam().area() > 10'000) continue;
     SCOPED_TRACE(static_cast<int>(content));
     const cv::Mat grey = filled(GetParam(), content, 0);
     EXPECT_NO_THROW({
@@ -77,7 +84,7 @@ TEST_P(LeastPicture, IsSearchedForAllThatIsPrinted) {
   }
 }
 
-class LeastFootage : public testing::TestWithParam<cv::Size> {};
+class LeastFootage : public testing::TestWithParam<PictureSize> {};
 
 TEST_P(LeastFootage, IsLookedAtForWhatItShows) {
   const TemporaryFolder folder;
@@ -90,19 +97,13 @@ TEST_P(LeastFootage, IsLookedAtForWhatItShows) {
   EXPECT_EQ(look(folder.path(), options, {}).count, 2);
 }
 
-std::string name_of_size(const testing::TestParamInfo<cv::Size>& size) {
-  return std::to_string(size.param.width) + "_by_" + std::to_string(size.param.height);
-}
-
 INSTANTIATE_TEST_SUITE_P(Sizes, LeastPicture,
-                         testing::Values(cv::Size(kLeastSide_px, kLeastSide_px),
-                                         cv::Size(kLeastSide_px, 4000),
-                                         cv::Size(4000, kLeastSide_px), cv::Size(33, 47)),
-                         name_of_size);
+                         testing::Values(PictureSize(kLeastSide_px, kLeastSide_px),
+                                         PictureSize(kLeastSide_px, 4000),
+                                         PictureSize(4000, kLeastSide_px), PictureSize(33, 47)));
 INSTANTIATE_TEST_SUITE_P(Sizes, LeastFootage,
-                         testing::Values(cv::Size(kLeastSide_px, kLeastSide_px),
-                                         cv::Size(kLeastSide_px, 1000), cv::Size(33, 47)),
-                         name_of_size);
+                         testing::Values(PictureSize(kLeastSide_px, kLeastSide_px),
+                                         PictureSize(kLeastSide_px, 1000), PictureSize(33, 47)));
 
 }  // namespace
 }  // namespace clothfit
