@@ -87,9 +87,14 @@ function(clothfit_add_test room)
   target_precompile_headers(${ARG_NAME} REUSE_FROM clothfit_test_headers)
   target_compile_definitions(${ARG_NAME} PRIVATE
     CLOTHFIT_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
+  # Sanitizers slow tests down: on a busy machine the slowest take more than ten minutes.
+  set(seconds 600)
+  if(CMAKE_CXX_FLAGS MATCHES "-fsanitize")
+    set(seconds 1800)
+  endif()
   gtest_discover_tests(${ARG_NAME}
     DISCOVERY_TIMEOUT 60
-    PROPERTIES LABELS ${room} TIMEOUT 600 COST ${ARG_COST})
+    PROPERTIES LABELS ${room} TIMEOUT ${seconds} COST ${ARG_COST})
   # Discovery takes no lists: a second label would shift the properties behind it.
   if(ARG_LABELS)
     set(labels ${CMAKE_CURRENT_BINARY_DIR}/${ARG_NAME}_labels.cmake)
