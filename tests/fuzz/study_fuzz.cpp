@@ -1,8 +1,11 @@
 // What a study keeps in its journal, and what it reads beside the recordings, each told by its
 // name. The journal's checksums are left out: they would end nearly all here.
 
+#include <exception>
 #include <functional>
 #include <map>
+#include <new>
+#include <string>
 
 #include "apps/study/foreign/foreign_row.h"
 #include "apps/study/louchet1995/payload.h"
@@ -14,12 +17,14 @@
 namespace clothfit {
 namespace {
 
-/// Writes what a payload was read as, and holds what is read from that against it.
+/// Expects a payload that was read and written to be the same once read and written again.
 void expect_same_again(const std::string& payload,
                        const std::function<std::string(const std::string&)>& written_again) {
   std::string once;
   try {
     once = written_again(payload);
+  } catch (const std::bad_alloc&) {
+    throw;
   } catch (const std::exception&) {
     return;  // the run says which record is damaged
   }
@@ -45,7 +50,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, size_t size) {
     if (const auto payload = kPayloads.find(name); payload != kPayloads.end())
       expect_same_again(text, payload->second);
     if (name == "truth.json") read_or_refuse([&] { parse_foreign_truth(text, name); });
-    if (!name.ends_with(".csv")) continue;
+    if (name != "weights.csv" && name != "published.csv") continue;
     const auto file = write_scratch("table.csv", text);
     read_or_refuse([&] {
       if (name == "weights.csv") read_marker_weights(file);
