@@ -1,7 +1,5 @@
 #include "fit/diagnosis/fitted_model.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <set>

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 #include <tbb/global_control.h>
 #include <tbb/info.h>
-#include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
@@ -156,21 +155,13 @@ ExecuteResult execute(int count, const Work& work, const ExecuteOptions& options
 
   Run run(count, work, options, journal, progress);
   tbb::task_arena arena(threads);
-  ThreadEdge begin, end;
-  begin.leave();
   arena.execute([&] {
     // There are as many loops as threads, not a task for each piece. Tasks would be split into
     // ranges and not begun in order.
-    tbb::parallel_for(
-        0, std::min(threads, run.left()),
-        [&](int) {
-          begin.enter();
-          run.do_pieces();
-          end.leave();
-        },
+    for_each_index(
+        static_cast<size_t>(std::min(threads, run.left())), [&](size_t) { run.do_pieces(); },
         tbb::simple_partitioner());
   });
-  end.enter();
   return run.result();
 }
 

@@ -3,15 +3,15 @@
 #include <fmt/core.h>
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/info.h>
-#include <tbb/parallel_pipeline.h>
 
 #include <algorithm>
 #include <atomic>
+#include <optional>
 #include <set>
 #include <utility>
 
 #include "data/input_error.h"
-#include "data/parallel.h"
+#include "data/pipeline.h"
 #include "vision/detect/tag_detector.h"
 #include "vision/ingest/open_images.h"
 #include "vision/look/families_shown.h"
@@ -171,28 +171,20 @@ LookResult look(const std::filesystem::path& images, const LookOptions& options,
     return all;
   });
   int next = 0;
-  ThreadEdge handed_on;
-  const auto load = [&](tbb::flow_control& control) {
+  const auto load = [&]() -> std::optional<LookedAt> {
     LookedAt picture{.number = next++, .grey = {}, .seen = {}};
-    if (cancelled || !source->next(picture.grey)) {
-      control.stop();
-      return picture;
-    }
+    if (cancelled || !source->next(picture.grey)) return std::nullopt;
     const bool due = picture.number % every == 0 || picture.number < options.head;
     picture.wanted = due && source->damage().empty();
     picture.seen.name = source->current_name();
     picture.seen.frame = source->frame();
-    handed_on.leave();
     return picture;
   };
   const auto detect = [&](LookedAt picture) {
-    handed_on.enter();
     if (picture.wanted) look_at(picture, detectors.local(), wanted);
-    handed_on.leave();
     return picture;
   };
   const auto collect = [&](const LookedAt& picture) {
-    handed_on.enter();
     if (!picture.wanted || cancelled) return;
     if (first.empty()) first = picture.grey;
     if (is_drawn(picture.number, result.count, every))
@@ -202,10 +194,7 @@ LookResult look(const std::filesystem::path& images, const LookOptions& options,
     if (progress && !progress(report)) cancelled = true;
   };
   const size_t in_flight = 2 * static_cast<size_t>(tbb::info::default_concurrency());
-  tbb::parallel_pipeline(
-      in_flight, tbb::make_filter<void, LookedAt>(tbb::filter_mode::serial_in_order, load) &
-                     tbb::make_filter<LookedAt, LookedAt>(tbb::filter_mode::parallel, detect) &
-                     tbb::make_filter<LookedAt, void>(tbb::filter_mode::serial_in_order, collect));
+  run_pipeline<LookedAt>(in_flight, MiddleStep::several_at_once, load, detect, collect);
 
   leave_out_invented(result.pictures);
   if (!options.families.empty() && shows_no_tag(result))

@@ -1,7 +1,6 @@
 #include "vision/render/render_cloth.h"
 
 #include <fmt/core.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <array>
@@ -76,42 +75,37 @@ cv::Mat sample_rows(const CameraRays& rays, std::span<const std::vector<PlacedSh
   for (size_t k = 0; k < across; ++k) u_px[k] = axis.place_px(static_cast<int>(k));
 
   cv::Mat rows(axis.count(rays.camera().image_height), width, CV_32FC1);
-  ThreadEdge begin, end;
-  begin.leave();
-  tbb::parallel_for(tbb::blocked_range<int>(0, rows.rows),
-                    [&](const tbb::blocked_range<int>& part) {
-                      begin.enter();
-                      std::vector<Eigen::Vector2d> direction(across), below(across);
-                      std::vector<Eigen::Matrix2d> step(across);
-                      std::vector<SheetHit> hit(across);
-                      std::vector<double> level(across);
-                      for (int row = part.begin(); row < part.end(); ++row) {
-                        rays.row(u_px, axis.place_px(row), direction);
-                        rays.row(u_px, axis.place_px(row + 1), below);
-                        for (size_t k = 0; k < across; ++k) {
-                          const size_t left = std::min(k, across - 2);
-                          step[k] << direction[left + 1] - direction[left], below[k] - direction[k];
-                          if (!step[k].allFinite())
-                            step[k].setZero();  // at the rim of what the lens shows
-                        }
-                        std::fill(level.begin(), level.end(), 0.0);
-                        for (size_t i = 0; i < scenes.size(); ++i) {
-                          scenes[i].look(direction, hit);
-                          for (size_t k = 0; k < across; ++k)
-                            level[k] += lighting.level(hit[k], step[k], instants[i]);
-                        }
-                        float* out = rows.ptr<float>(row);
-                        for (int u = 0; u < width; ++u) {
-                          const double* around = &level[static_cast<size_t>(u * axis.samples)];
-                          double sum = 0;
-                          for (size_t k = 0; k < axis.weight.size(); ++k)
-                            sum += axis.weight[k] * around[k];
-                          out[u] = static_cast<float>(sum / static_cast<double>(scenes.size()));
-                        }
-                      }
-                      end.leave();
-                    });
-  end.enter();
+  constexpr int kRowsAtOnce = 8;  // they share buffers
+  const int parts = (rows.rows + kRowsAtOnce - 1) / kRowsAtOnce;
+  for_each_index(static_cast<size_t>(parts), [&](size_t part) {
+    std::vector<Eigen::Vector2d> direction(across), below(across);
+    std::vector<Eigen::Matrix2d> step(across);
+    std::vector<SheetHit> hit(across);
+    std::vector<double> level(across);
+    const int first = static_cast<int>(part) * kRowsAtOnce;
+    for (int row = first; row < std::min(first + kRowsAtOnce, rows.rows); ++row) {
+      rays.row(u_px, axis.place_px(row), direction);
+      rays.row(u_px, axis.place_px(row + 1), below);
+      for (size_t k = 0; k < across; ++k) {
+        const size_t left = std::min(k, across - 2);
+        step[k] << direction[left + 1] - direction[left], below[k] - direction[k];
+        if (!step[k].allFinite()) step[k].setZero();  // at the rim of what the lens shows
+      }
+      std::fill(level.begin(), level.end(), 0.0);
+      for (size_t i = 0; i < scenes.size(); ++i) {
+        scenes[i].look(direction, hit);
+        for (size_t k = 0; k < across; ++k)
+          level[k] += lighting.level(hit[k], step[k], instants[i]);
+      }
+      float* out = rows.ptr<float>(row);
+      for (int u = 0; u < width; ++u) {
+        const double* around = &level[static_cast<size_t>(u * axis.samples)];
+        double sum = 0;
+        for (size_t k = 0; k < axis.weight.size(); ++k) sum += axis.weight[k] * around[k];
+        out[u] = static_cast<float>(sum / static_cast<double>(scenes.size()));
+      }
+    }
+  });
   return rows;
 }
 

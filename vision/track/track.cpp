@@ -1,15 +1,15 @@
 #include "vision/track/track.h"
 
 #include <fmt/core.h>
-#include <tbb/parallel_pipeline.h>
 
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <optional>
 #include <set>
 
 #include "data/input_error.h"
-#include "data/parallel.h"
+#include "data/pipeline.h"
 #include "vision/detect/tag_family.h"
 #include "vision/detect/tag_layout.h"
 #include "vision/ingest/footage.h"
@@ -133,28 +133,20 @@ Readings read_all(ImageSource& images, const std::string& where, const MarkerSet
   TagTracker tracker(sheet.family, layout_of(sheet, markers), listed_tags(markers, reference));
 
   int next = 0;
-  ThreadEdge handed_on;
-  const auto load = [&](tbb::flow_control& control) {
+  const auto load = [&]() -> std::optional<Picture> {
     Picture picture{.number = next++, .grey = {}, .tags = {}};
-    if (cancelled || !images.next(picture.grey)) {
-      control.stop();
-      return picture;
-    }
+    if (cancelled || !images.next(picture.grey)) return std::nullopt;
     picture.frame = images.frame();
     picture.state = !images.damage().empty() ? FramePicture::damaged
                     : images.dark()          ? FramePicture::dark
                                              : FramePicture::whole;
-    handed_on.leave();
     return picture;
   };
   const auto read = [&](Picture picture) {
-    handed_on.enter();
     if (picture.readable()) picture.tags = tracker.next(picture.grey, picture.frame);
-    handed_on.leave();
     return picture;
   };
   const auto collect = [&](const Picture& picture) {
-    handed_on.enter();
     if (cancelled) return;
     if (picture.readable()) keep_pictures(picture, images.count(), readings);
     for (const TagDetection& tag : picture.tags.read) {
@@ -181,10 +173,7 @@ Readings read_all(ImageSource& images, const std::string& where, const MarkerSet
 
   // The next picture is decoded while the tags of one are read.
   constexpr size_t kInFlight = 3;
-  constexpr auto kInOrder = tbb::filter_mode::serial_in_order;
-  tbb::parallel_pipeline(kInFlight, tbb::make_filter<void, Picture>(kInOrder, load) &
-                                        tbb::make_filter<Picture, Picture>(kInOrder, read) &
-                                        tbb::make_filter<Picture, void>(kInOrder, collect));
+  run_pipeline<Picture>(kInFlight, MiddleStep::in_order, load, read, collect);
   readings.cancelled = cancelled;
   return readings;
 }

@@ -5,7 +5,6 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <tbb/parallel_for.h>
 
 #include <atomic>
 #include <cmath>
@@ -14,6 +13,7 @@
 #include <stdexcept>
 #include <thread>
 
+#include "data/parallel.h"
 #include "fit/jobs/draws.h"
 #include "tests/data/temporary_folder.h"
 
@@ -104,7 +104,8 @@ TEST(Executor, LetsNoThreadDoAnotherPiecesWorkWhileItWaitsInOne) {
       at_work_on = index;
       std::atomic<int> sum = 0;
       for (int round = 0; round < 100; ++round)
-        tbb::parallel_for(0, 50, [&](int k) {
+        for_each_index(50, [&](size_t n) {
+          const int k = static_cast<int>(n);
           if (at_work_on != -1 && at_work_on != index) ++strayed;
           std::atomic<int> effort = 0;
           while (++effort < 100 * k) {
@@ -126,7 +127,7 @@ TEST(Executor, KeepsAllWorkOnTheCallingThreadWhenThereIsOne) {
   std::mutex mutex;
   std::set<std::thread::id> seen;
   const Work work = [&](int, std::uint64_t) {
-    tbb::parallel_for(0, 1000, [&](int) {
+    for_each_index(1000, [&](size_t) {
       const std::lock_guard lock(mutex);
       seen.insert(std::this_thread::get_id());
     });
