@@ -82,6 +82,7 @@ int run(int argc, char** argv) {
   clothfit::add_fit_verb(program);
   clothfit::add_diagnose_verb(program);
   clothfit::add_simulate_verb(program);
+  clothfit::add_drape_verb(program);
   clothfit::add_recover_verb(program);
   clothfit::add_experiment_verb(program);
   clothfit::add_study_verb(program);

@@ -28,13 +28,16 @@ set(CLOTHFIT_ARROWS
   "vision/look          -> data vision/ingest vision/detect vision/track"
   "vision/print         -> data vision/detect"
   "vision/render        -> data calib/camera vision/detect"
-  "model/topology       ->"
+  "model/topology       -> data/input_error.h"
   "model/kernels        -> model/topology"
   "model/fabric         -> data/input_error.h data/algebra model/topology"
   "model/cloth          -> data/input_error.h model/topology model/kernels model/fabric"
   "model/effects        -> data/input_error.h model/topology model/kernels model/cloth"
   "model/rest           -> data/input_error.h data/parallel.h data/algebra model/topology
                            model/kernels model/cloth"
+  "model/sheet          -> model/topology model/fabric model/rest"
+  "model/laboratory     -> data/input_error.h data/parallel.h model/topology model/fabric
+                           model/rest model/sheet"
   "model/integrate      -> data/input_error.h data/parallel.h data/algebra model/kernels
                            model/cloth model/effects model/rest"
   "fit/interface        -> data model/fabric"
@@ -91,7 +94,8 @@ set(CLOTHFIT_ARROWS
                            apps/study/trials apps/study/louchet1995 apps/study/recordings
                            apps/study/foreign apps/study/vision"
   "apps/verbs           -> data vision/encode vision/detect vision/track vision/look vision/print
-                           model/topology model/fabric model/cloth model/effects model/integrate
+                           model/topology model/fabric model/cloth model/effects model/rest
+                           model/laboratory model/integrate
                            fit/interface fit/jobs fit/measurement_effects
                            fit/problem fit/preflight fit/verdict fit fit/diagnosis apps/terminal
                            apps/steps apps/report/page apps/report/fit apps/report/diagnosis

@@ -24,6 +24,7 @@ void add_simulate_verb(Verb program);
 void add_recover_verb(Verb program);
 void add_demo_verb(Verb program);
 void add_detect_verb(Verb program);
+void add_drape_verb(Verb program);
 void add_experiment_verb(Verb program);
 void add_study_verb(Verb program);
 

@@ -98,6 +98,18 @@ FaultyCommand sheet() {
           .words = {"sheet", "dots", "--size", "0.1x0.1", "--grid", "4x4", "--dpi", "72"},
           .replaces = false};
 }
+FaultyCommand drape() {
+  return {.name = "drape",
+          .prepare =
+              [](const fs::path& folder) {
+                std::ofstream(folder / "twill.yaml")
+                    << "format: clothfit-fabric/1\nname: twill\nunits: si\nareal_density: 0.2\n"
+                       "tension: {warp: 500, weft: 400}\nshear: 40\n"
+                       "bending: {warp: 8e-6, weft: 2e-6}\n";
+              },
+          .words = {"drape", "--test", "cusick", "--fabric", "twill.yaml", "--spacing", "15mm",
+                    "--starts", "1", "--threads", "1"}};
+}
 FaultyCommand check() {
   return {
       .name = "check", .prepare = write_simulated, .words = {"check", "swing"}, .writes = false};
@@ -153,7 +165,7 @@ TEST_P(EveryFault, IsSaidOrDoneWithout) {
 
 INSTANTIATE_TEST_SUITE_P(Of, EveryFault,
                          ::testing::Values(simulate(), fit(), track(), calibrate(), recover(),
-                                           diagnose(), sheet(), check()));
+                                           diagnose(), sheet(), check(), drape()));
 
 }  // namespace
 }  // namespace clothfit
