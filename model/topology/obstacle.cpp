@@ -76,6 +76,7 @@ Obstacle::Obstacle(const TriangleMesh& mesh, double reach_m) : reach_m_(reach_m)
   }
   for (const auto& [ends, edge] : edge_rims) {
     if (faces_at[static_cast<size_t>(edge)] != 1) continue;
+    ++open_edges_;
     rims_[static_cast<size_t>(edge)].border = true;
     rims_[static_cast<size_t>(corner_rims.at(ends.first))].border = true;
     rims_[static_cast<size_t>(corner_rims.at(ends.second))].border = true;
@@ -114,9 +115,10 @@ void Obstacle::build_tree(int first, int last) {
   nodes_[here].count = 0;
 }
 
-std::optional<Obstacle::Nearest> Obstacle::beneath(const Eigen::Vector3d& point_m) const {
+std::optional<Obstacle::Found> Obstacle::search(const Eigen::Vector3d& point_m,
+                                                double within_m) const {
   if (nodes_.empty() || !point_m.allFinite()) return std::nullopt;
-  double best = reach_m_ * reach_m_;
+  double best = within_m * within_m;
   Nearest nearest;
   const Rim* rim = nullptr;
   bool found = false;
@@ -179,10 +181,35 @@ std::optional<Obstacle::Nearest> Obstacle::beneath(const Eigen::Vector3d& point_
     waiting[static_cast<size_t>(count++)] = near;
   }
   if (!found) return std::nullopt;
-  const Eigen::Vector3d& outwards = rim ? rim->normal : nearest.direction;
-  const bool below = outwards.dot(point_m - nearest.place_m) < 0;
-  if (!below || (rim && rim->border)) return std::nullopt;
-  return nearest;
+  return Found{nearest, rim};
+}
+
+std::optional<Obstacle::Nearest> Obstacle::beneath(const Eigen::Vector3d& point_m) const {
+  const std::optional<Found> found = search(point_m, reach_m_);
+  if (!found) return std::nullopt;
+  const bool below = found->outwards().dot(point_m - found->nearest.place_m) < 0;
+  if (!below || (found->rim && found->rim->border)) return std::nullopt;
+  return found->nearest;
+}
+
+std::optional<Obstacle::Distance> Obstacle::distance(const Eigen::Vector3d& point_m,
+                                                     double within_m) const {
+  const std::optional<Found> found = search(point_m, within_m);
+  if (!found) return std::nullopt;
+  const Eigen::Vector3d away = point_m - found->nearest.place_m, outwards = found->outwards();
+  const double length_m = away.norm(), sign = away.dot(outwards) < 0 ? -1 : 1;
+  // On the surface the way out of it has no length; its normal shows it.
+  return Distance{.distance_m = sign * length_m,
+                  .outwards = length_m > 1e-12 ? Eigen::Vector3d(sign / length_m * away)
+                                               : outwards.normalized(),
+                  .place_m = found->nearest.place_m};
+}
+
+double Obstacle::volume_m3() const {
+  double sixfold_m3 = 0;
+  for (const Triangle& triangle : triangles_)
+    sixfold_m3 += triangle.corner[0].dot(triangle.corner[1].cross(triangle.corner[2]));
+  return sixfold_m3 / 6;
 }
 
 }  // namespace clothfit

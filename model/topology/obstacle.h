@@ -35,6 +35,21 @@ class Obstacle {
   /// than the reach, or beyond the border of a surface that is not closed.
   std::optional<Nearest> beneath(const Eigen::Vector3d& point_m) const;
 
+  /// How far a point is from the surface.
+  struct Distance {
+    double distance_m = 0;     ///< < 0 below the surface
+    Eigen::Vector3d outwards;  ///< its gradient: a unit vector
+    Eigen::Vector3d place_m;   ///< the nearest point of the surface
+  };
+  /// Returns the distance where it is not more than `within_m`, above and below; there the reach
+  /// does not matter. Beyond the border of a surface that is not closed its sign means nothing.
+  std::optional<Distance> distance(const Eigen::Vector3d& point_m, double within_m) const;
+
+  /// Returns how many edges belong to one triangle alone: none where the surface is closed.
+  int open_edges() const { return open_edges_; }
+  /// Returns the volume inside of a closed surface (m3), < 0 where its triangles face inwards.
+  double volume_m3() const;
+
   int triangles() const { return static_cast<int>(triangles_.size()); }
 
  private:
@@ -53,8 +68,16 @@ class Obstacle {
     int count = 0;  ///< 0 unless a leaf
   };
   void build_tree(int first, int last);
+  /// The nearest part of the surface and what says which side of it is outside.
+  struct Found {
+    Nearest nearest;
+    const Rim* rim = nullptr;  ///< of an edge or corner
+    const Eigen::Vector3d& outwards() const { return rim ? rim->normal : nearest.direction; }
+  };
+  std::optional<Found> search(const Eigen::Vector3d& point_m, double within_m) const;
 
   double reach_m_;
+  int open_edges_ = 0;
   std::vector<Triangle> triangles_;
   std::vector<Rim> rims_;
   std::vector<Node> nodes_;

@@ -100,6 +100,30 @@ TEST(Obstacle, IsFoundByTheTreeAsByTryingEveryTriangle) {
   EXPECT_GT(kinds[NearestPoint::corner], 10);
 }
 
+TEST(Obstacle, TellsTheDistanceFromACubeOnBothSides) {
+  const Obstacle obstacle(cube());
+  EXPECT_EQ(obstacle.open_edges(), 0);
+  EXPECT_NEAR(obstacle.volume_m3(), 1, 1e-15);
+  Uniform uniform(4);
+  int inside = 0, outside = 0;
+  for (int n = 0; n < 500; ++n) {
+    const Eigen::Vector3d point = uniform.vectors(1, 1).col(0) + Eigen::Vector3d::Constant(0.5);
+    const Eigen::Vector3d beyond = (-point).cwiseMax(point - Eigen::Vector3d::Ones());
+    const double expected = beyond.maxCoeff() < 0 ? beyond.maxCoeff() : beyond.cwiseMax(0).norm();
+
+    const auto found = obstacle.distance(point, 10);
+
+    ASSERT_TRUE(found);
+    EXPECT_NEAR(found->distance_m, expected, 1e-14) << point.transpose();
+    EXPECT_NEAR((found->place_m + found->distance_m * found->outwards - point).norm(), 0, 1e-14);
+    EXPECT_NEAR(found->outwards.norm(), 1, 1e-14);
+    EXPECT_FALSE(obstacle.distance(point, std::abs(expected) - 1e-9));
+    ++(expected < 0 ? inside : outside);
+  }
+  EXPECT_GT(inside, 30);
+  EXPECT_GT(outside, 200);
+}
+
 TEST(Obstacle, AnOpenSurfaceEndsAtItsBorder) {
   const Obstacle ground(hilly_ground(), 0.3);
 
@@ -107,6 +131,7 @@ TEST(Obstacle, AnOpenSurfaceEndsAtItsBorder) {
   EXPECT_FALSE(ground.beneath({0.2, 0.2, 0.1}));    // above
   EXPECT_FALSE(ground.beneath({0.2, 0.2, -0.4}));   // deeper than the reach
   EXPECT_FALSE(ground.beneath({1.0, 0.2, -0.05}));  // beyond the border
+  EXPECT_GT(ground.open_edges(), 3);
 }
 
 TEST(Obstacle, WithoutAreaIsNothing) {
