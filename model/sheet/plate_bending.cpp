@@ -130,16 +130,19 @@ std::vector<SecondDifference> second_differences(const ClothMesh& mesh,
   return differences;
 }
 
-BendingMatrix bending_matrix(const ClothMesh& mesh, const MeasuredFabric& fabric,
-                             const std::vector<bool>& clamped) {
-  const double twist_n_m = std::sqrt(fabric.bending_warp_n_m * fabric.bending_weft_n_m);
+BendingMatrix bending_matrix(const ClothMesh& mesh, const std::vector<MeasuredFabric>& fabrics,
+                             const std::vector<int>& fabric_of, const std::vector<bool>& clamped) {
   const std::vector<SecondDifference> differences = second_differences(mesh, clamped);
   std::vector<Eigen::Triplet<double>> entries;
   for (size_t row = 0; row < differences.size(); ++row) {
     const SecondDifference& difference = differences[row];
-    const double stiffness_n_m = difference.of == SecondDifference::warp   ? fabric.bending_warp_n_m
-                                 : difference.of == SecondDifference::weft ? fabric.bending_weft_n_m
-                                                                           : 2 * twist_n_m;
+    const MeasuredFabric& fabric =
+        fabrics[static_cast<size_t>(fabric_of[static_cast<size_t>(difference.vertex.front())])];
+    const double stiffness_n_m =
+        difference.of == SecondDifference::warp ? fabric.bending_warp_n_m
+        : difference.of == SecondDifference::weft
+            ? fabric.bending_weft_n_m
+            : 2 * std::sqrt(fabric.bending_warp_n_m * fabric.bending_weft_n_m);
     const double scale = std::sqrt(stiffness_n_m * difference.area_m2);
     for (size_t k = 0; k < difference.vertex.size(); ++k)
       entries.emplace_back(static_cast<int>(row), difference.vertex[k],
@@ -148,6 +151,12 @@ BendingMatrix bending_matrix(const ClothMesh& mesh, const MeasuredFabric& fabric
   BendingMatrix matrix(static_cast<Eigen::Index>(differences.size()), mesh.vertex_count());
   matrix.setFromTriplets(entries.begin(), entries.end());
   return matrix;
+}
+
+BendingMatrix bending_matrix(const ClothMesh& mesh, const MeasuredFabric& fabric,
+                             const std::vector<bool>& clamped) {
+  return bending_matrix(mesh, std::vector{fabric},
+                        std::vector<int>(static_cast<size_t>(mesh.vertex_count()), 0), clamped);
 }
 
 }  // namespace clothfit

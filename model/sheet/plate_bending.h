@@ -42,5 +42,9 @@ std::vector<SecondDifference> second_differences(const ClothMesh& mesh,
 using BendingMatrix = Eigen::SparseMatrix<double, Eigen::RowMajor>;
 BendingMatrix bending_matrix(const ClothMesh& mesh, const MeasuredFabric& fabric,
                              const std::vector<bool>& clamped = {});
+/// The same for a cloth of several fabrics: `fabric_of` has one index of `fabrics` per vertex.
+BendingMatrix bending_matrix(const ClothMesh& mesh, const std::vector<MeasuredFabric>& fabrics,
+                             const std::vector<int>& fabric_of,
+                             const std::vector<bool>& clamped = {});
 
 }  // namespace clothfit

@@ -1,43 +1,25 @@
 #include "model/sheet/settle.h"
 
-#include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <cassert>
 #include <cmath>
 
+#include "model/sheet/block_cholesky.h"
+
 namespace clothfit {
 namespace {
 
-using Sparse = Eigen::SparseMatrix<double>;
-
-/// Root mean square of the vertices' residual forces as a share of a vertex's load. Below it the
+/// Root mean square of the points' residual forces as a share of a point's load. Below it the
 /// exact second derivative is used.
 constexpr double kNearBalance = 0.1;
 
-/// The matrix of one step over the free vertices, and its factorisation.
+/// The matrix of one step over the free points, and its factorisation.
 class StepMatrix {
  public:
-  StepMatrix(const SheetEnergy& energy, const std::vector<bool>& held) : energy_(energy) {
-    for (const bool is_held : held) unknown_.push_back(is_held ? -1 : free_++);
-    Sparse pattern(3 * free_, 3 * free_);
-    std::vector<Eigen::Triplet<double>> entries;
-    const std::vector<SheetEnergy::Pair>& pairs = energy.pairs();
-    for (size_t p = 0; p < pairs.size(); ++p) {
-      const int column = unknown_[static_cast<size_t>(pairs[p].low)],
-                row = unknown_[static_cast<size_t>(pairs[p].high)];
-      if (column < 0 || row < 0) continue;
-      blocks_.push_back(static_cast<int>(p));
-      for (int c = 0; c < 3; ++c)
-        for (int r = row == column ? c : 0; r < 3; ++r)
-          entries.emplace_back(3 * row + r, 3 * column + c, 1);
-    }
-    pattern.setFromTriplets(entries.begin(), entries.end());
-    matrix_ = pattern;
-    factors_.analyzePattern(matrix_);
-  }
+  StepMatrix(const BlockEnergy& energy, const std::vector<bool>& held)
+      : energy_(energy), of_free_(free_points(held)), factors_(free_, of_free_) {}
 
-  int free_vertices() const { return free_; }
-  int unknown(int vertex) const { return unknown_[static_cast<size_t>(vertex)]; }
+  int free_points() const { return free_; }
 
   void linearise(const Eigen::Matrix3Xd& position_m, Curvature curvature) {
     energy_.second_derivative(position_m, curvature, second_);
@@ -45,26 +27,17 @@ class StepMatrix {
 
   /// Says whether H + `shift_per_s2` M is positive definite.
   bool factorise(double shift_per_s2) {
-    // Pairs come column by column, rows rising, as the matrix stores them. So each of a block's
-    // three columns is filled from where it was left.
-    std::vector<double*> next(static_cast<size_t>(3 * free_));
-    for (size_t column = 0; column < next.size(); ++column)
-      next[column] = matrix_.valuePtr() + matrix_.outerIndexPtr()[column];
+    matrix_.clear();
     for (const int p : blocks_) {
-      const SheetEnergy::Pair& pair = energy_.pairs()[static_cast<size_t>(p)];
-      const auto column = static_cast<size_t>(3 * unknown(pair.low));
-      Eigen::Matrix3d block = second_[static_cast<size_t>(p)];
-      const bool diagonal = pair.low == pair.high;
-      if (diagonal) block.diagonal().array() += shift_per_s2 * energy_.mass_kg()[pair.low];
-      for (size_t c = 0; c < 3; ++c)
-        for (size_t r = diagonal ? c : 0; r < 3; ++r)
-          *next[column + c]++ = block(static_cast<int>(r), static_cast<int>(c));
+      const BlockEnergy::Pair& pair = energy_.pairs()[static_cast<size_t>(p)];
+      matrix_.push_back(second_[static_cast<size_t>(p)]);
+      if (pair.low == pair.high)
+        matrix_.back().diagonal().array() += shift_per_s2 * energy_.mass_kg()[pair.low];
     }
-    factors_.factorize(matrix_);
-    return factors_.info() == Eigen::Success;
+    return factors_.factorise(matrix_);
   }
 
-  /// Returns the step against `gradient_n`; held vertices do not move.
+  /// Returns the step against `gradient_n`; held points do not move.
   Eigen::Matrix3Xd solve(const Eigen::Matrix3Xd& gradient_n) const {
     Eigen::VectorXd right(3 * free_);
     for (int v = 0; v < gradient_n.cols(); ++v)
@@ -77,16 +50,32 @@ class StepMatrix {
   }
 
  private:
-  const SheetEnergy& energy_;
-  std::vector<int> unknown_;  ///< of every vertex; -1: held
+  int unknown(int point) const { return unknown_[static_cast<size_t>(point)]; }
+
+  /// Numbers the free points and returns the pairs of them.
+  std::vector<BlockEnergy::Pair> free_points(const std::vector<bool>& held) {
+    for (const bool is_held : held) unknown_.push_back(is_held ? -1 : free_++);
+    std::vector<BlockEnergy::Pair> of_free;
+    const std::vector<BlockEnergy::Pair>& pairs = energy_.pairs();
+    for (size_t p = 0; p < pairs.size(); ++p) {
+      const int low = unknown(pairs[p].low), high = unknown(pairs[p].high);
+      if (low < 0 || high < 0) continue;
+      blocks_.push_back(static_cast<int>(p));
+      of_free.push_back({low, high});
+    }
+    return of_free;
+  }
+
+  const BlockEnergy& energy_;
   int free_ = 0;
-  std::vector<int> blocks_;  ///< pairs of free vertices
-  std::vector<Eigen::Matrix3d> second_;
-  Sparse matrix_;  ///< lower triangle
-  Eigen::SimplicialLLT<Sparse, Eigen::Lower> factors_;
+  std::vector<int> unknown_;                ///< of every point; -1: held
+  std::vector<int> blocks_;                 ///< pairs of free points
+  std::vector<BlockEnergy::Pair> of_free_;  ///< the same, as they are numbered
+  BlockCholesky factors_;
+  std::vector<Eigen::Matrix3d> second_, matrix_;
 };
 
-double energy_and_free_gradient(const SheetEnergy& energy, const std::vector<bool>& held,
+double energy_and_free_gradient(const BlockEnergy& energy, const std::vector<bool>& held,
                                 const Eigen::Matrix3Xd& position_m, Eigen::Matrix3Xd& gradient_n) {
   const double energy_j = energy.energy_and_gradient(position_m, gradient_n);
   for (Eigen::Index v = 0; v < gradient_n.cols(); ++v)
@@ -96,9 +85,9 @@ double energy_and_free_gradient(const SheetEnergy& energy, const std::vector<boo
 
 }  // namespace
 
-MinimiseResult settle(const SheetEnergy& energy, const std::vector<bool>& held,
+MinimiseResult settle(const BlockEnergy& energy, const std::vector<bool>& held,
                       const SettleRule& rule, Eigen::Matrix3Xd& position_m) {
-  assert(held.size() == static_cast<size_t>(energy.mesh().vertex_count()));
+  assert(held.size() == static_cast<size_t>(energy.points()));
   StepMatrix matrix(energy, held);
   const double least_shift = 1e-6 * rule.first_shift_per_s2,
                most_shift = 1e12 * rule.first_shift_per_s2;
@@ -110,13 +99,15 @@ MinimiseResult settle(const SheetEnergy& energy, const std::vector<bool>& held,
   double shift = rule.first_shift_per_s2;
   bool linearised = false;
   while (!is_over(rule.stop, result)) {
-    const double lacking = result.gradient_n * std::sqrt(matrix.free_vertices()) / rule.load_n;
+    const double lacking = result.gradient_n * std::sqrt(matrix.free_points()) / rule.load_n;
     if (!linearised)
       matrix.linearise(position_m, lacking < kNearBalance ? Curvature::exact : Curvature::clamped);
     linearised = true;
     double step = 0;
     if (matrix.factorise(shift)) {
-      const Eigen::Matrix3Xd direction = matrix.solve(gradient);
+      Eigen::Matrix3Xd direction = matrix.solve(gradient);
+      const double longest_m = direction.colwise().norm().maxCoeff();
+      if (longest_m > rule.longest_step_m) direction *= rule.longest_step_m / longest_m;
       const double slope = direction.cwiseProduct(gradient).sum();
       // The energy must fall by this share of what the slope promises.
       constexpr double kShare = 1e-4, kShortest = 1.0 / 64, kNoise = 1e-11;

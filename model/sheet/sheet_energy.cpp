@@ -19,22 +19,48 @@ Eigen::Matrix<double, 3, 2> deformation(const ClothCell& cell, const Eigen::Matr
   return f;
 }
 
+/// Returns a matrix with the rows of both.
+BendingMatrix stacked(const BendingMatrix& above, const BendingMatrix& below) {
+  if (below.rows() == 0) return above;
+  std::vector<Eigen::Triplet<double>> entries;
+  for (const auto& [matrix, first] : {std::pair{&above, Eigen::Index{0}}, {&below, above.rows()}})
+    for (Eigen::Index row = 0; row < matrix->rows(); ++row)
+      for (BendingMatrix::InnerIterator it(*matrix, row); it; ++it)
+        entries.emplace_back(first + row, it.col(), it.value());
+  BendingMatrix all(above.rows() + below.rows(), above.cols());
+  all.setFromTriplets(entries.begin(), entries.end());
+  return all;
+}
+
 }  // namespace
 
 SheetEnergy::SheetEnergy(const ClothMesh& mesh, const MeasuredFabric& fabric,
                          const std::vector<bool>& clamped)
+    : SheetEnergy(mesh, std::vector{fabric},
+                  std::vector<int>(static_cast<size_t>(mesh.vertex_count()), 0), clamped) {}
+
+SheetEnergy::SheetEnergy(const ClothMesh& mesh, const std::vector<MeasuredFabric>& fabrics,
+                         const std::vector<int>& fabric_of, const std::vector<bool>& clamped,
+                         const BendingMatrix& further_bending)
     : mesh_(mesh),
-      bending_(bending_matrix(mesh, fabric, clamped)),
+      bending_(stacked(bending_matrix(mesh, fabrics, fabric_of, clamped), further_bending)),
       turned_bending_(bending_.transpose()),
       flat_m_(Eigen::Matrix3Xd::Zero(3, mesh.vertex_count())),
-      mass_kg_(fabric.areal_density_kg_per_m2 * mesh.area_m2) {
+      mass_kg_(mesh.area_m2) {
   flat_m_.topRows<2>() = mesh.material_m;
-  const FabricFibres stiffness = fibres_of(fabric).fibres;
-  const double diagonal = std::sqrt(0.5);
-  fibres_ = {{{1, 0}, stiffness.weft_n_per_m},
-             {{0, 1}, stiffness.warp_n_per_m},
-             {{diagonal, diagonal}, stiffness.bias_n_per_m},
-             {{diagonal, -diagonal}, stiffness.bias_n_per_m}};
+  for (int v = 0; v < mesh.vertex_count(); ++v)
+    mass_kg_[v] *=
+        fabrics[static_cast<size_t>(fabric_of[static_cast<size_t>(v)])].areal_density_kg_per_m2;
+  for (const MeasuredFabric& fabric : fabrics) {
+    const FabricFibres stiffness = fibres_of(fabric).fibres;
+    const double diagonal = std::sqrt(0.5);
+    fibres_.push_back({{{{1, 0}, stiffness.weft_n_per_m},
+                        {{0, 1}, stiffness.warp_n_per_m},
+                        {{diagonal, diagonal}, stiffness.bias_n_per_m},
+                        {{diagonal, -diagonal}, stiffness.bias_n_per_m}}});
+  }
+  for (const ClothCell& cell : mesh.cells)
+    fabric_of_cell_.push_back(fabric_of[static_cast<size_t>(cell.vertex[0])]);
 
   std::map<std::array<int, 2>, double> bending;
   for (int v = 0; v < mesh.vertex_count(); ++v) bending[{v, v}] = 0;
@@ -70,10 +96,11 @@ double SheetEnergy::energy_and_gradient(const Eigen::Matrix3Xd& position_m,
   double energy_j = 0.5 * bent.squaredNorm();
   gradient_n.noalias() -= gravity_m_per_s2_ * mass_kg_.transpose();
   energy_j -= gravity_m_per_s2_.dot(position_m * mass_kg_);
-  for (const ClothCell& cell : mesh_.cells) {
+  for (size_t c = 0; c < mesh_.cells.size(); ++c) {
+    const ClothCell& cell = mesh_.cells[c];
     const Eigen::Matrix<double, 3, 2> f = deformation(cell, position_m);
     Eigen::Matrix<double, 3, 2> by_f = Eigen::Matrix<double, 3, 2>::Zero();
-    for (const Fibre& fibre : fibres_) {
+    for (const Fibre& fibre : fibres(c)) {
       const Eigen::Vector3d along = f * fibre.direction;
       const double stretch = along.norm();
       if (stretch == 0) continue;  // without a direction it pulls at nothing
@@ -95,7 +122,7 @@ void SheetEnergy::second_derivative(const Eigen::Matrix3Xd& position_m, Curvatur
   for (size_t c = 0; c < mesh_.cells.size(); ++c) {
     const ClothCell& cell = mesh_.cells[c];
     const Eigen::Matrix<double, 3, 2> f = deformation(cell, position_m);
-    for (const Fibre& fibre : fibres_) {
+    for (const Fibre& fibre : fibres(c)) {
       const Eigen::Vector3d along = f * fibre.direction;
       const double stretch = along.norm();
       if (stretch == 0) continue;

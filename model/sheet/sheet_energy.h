@@ -5,7 +5,8 @@
 #include <vector>
 
 #include "model/fabric/measured_fabric.h"
-#include "model/rest/hanging_energy.h"
+#include "model/sheet/block_energy.h"
+#include "model/sheet/plate_bending.h"
 #include "model/topology/cloth_mesh.h"
 
 namespace clothfit {
@@ -20,34 +21,32 @@ namespace clothfit {
 /// lattice, but for threads that run through the middle of a cell. Threads along its sides would
 /// lengthen when the cell twists, and so stiffen coarse meshes against folds that do not run along
 /// them.
-class SheetEnergy {
+class SheetEnergy : public BlockEnergy {
  public:
   /// `mesh` must outlive this. `clamped` vertices (one entry per vertex; empty: none) are held with
   /// their slope in the plane of the flat cloth, (s, t) being x and y there. Throws InputError as
   /// fibres_of() does.
   SheetEnergy(const ClothMesh& mesh, const MeasuredFabric& fabric,
               const std::vector<bool>& clamped = {});
+  /// The same for a cloth of several fabrics: `fabric_of` has one index of `fabrics` per vertex,
+  /// the same for all of a cell. The rows of `further_bending` (empty: none) are added to those
+  /// of bending_matrix().
+  SheetEnergy(const ClothMesh& mesh, const std::vector<MeasuredFabric>& fabrics,
+              const std::vector<int>& fabric_of, const std::vector<bool>& clamped = {},
+              const BendingMatrix& further_bending = {});
 
   const ClothMesh& mesh() const { return mesh_; }
-  const Eigen::VectorXd& mass_kg() const { return mass_kg_; }
+  const Eigen::VectorXd& mass_kg() const override { return mass_kg_; }
   double weight_n() const { return mass_kg_.sum() * gravity_m_per_s2_.norm(); }
   void set_gravity(const Eigen::Vector3d& gravity_m_per_s2) {
     gravity_m_per_s2_ = gravity_m_per_s2;
   }
 
-  /// Returns the energy; its derivative by the positions (3 x vertices, N) goes to `gradient_n`.
   double energy_and_gradient(const Eigen::Matrix3Xd& position_m,
-                             Eigen::Matrix3Xd& gradient_n) const;
-
-  /// Pairs of vertices whose forces depend on one another, the second not below the first. They do
-  /// not change with the shape.
-  struct Pair {
-    int low = 0, high = 0;
-  };
-  const std::vector<Pair>& pairs() const { return pairs_; }
-  /// Returns d gradient[high] / d position[low] of every pair, 3 x 3 blocks (N/m).
+                             Eigen::Matrix3Xd& gradient_n) const override;
+  const std::vector<Pair>& pairs() const override { return pairs_; }
   void second_derivative(const Eigen::Matrix3Xd& position_m, Curvature curvature,
-                         std::vector<Eigen::Matrix3d>& blocks) const;
+                         std::vector<Eigen::Matrix3d>& blocks) const override;
 
  private:
   struct Fibre {
@@ -55,8 +54,14 @@ class SheetEnergy {
     double stiffness_n_per_m = 0;
   };
 
+  using Fibres = std::array<Fibre, 4>;
+  const Fibres& fibres(size_t cell) const {
+    return fibres_[static_cast<size_t>(fabric_of_cell_[cell])];
+  }
+
   const ClothMesh& mesh_;
-  std::vector<Fibre> fibres_;
+  std::vector<Fibres> fibres_;  ///< of each fabric
+  std::vector<int> fabric_of_cell_;
   Eigen::SparseMatrix<double, Eigen::RowMajor> bending_, turned_bending_;  ///< D and D'
   Eigen::Matrix3Xd flat_m_;                                                ///< the clamps' plane
   Eigen::VectorXd mass_kg_;
