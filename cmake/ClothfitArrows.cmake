@@ -38,6 +38,8 @@ set(CLOTHFIT_ARROWS
   "model/sheet          -> model/topology model/fabric model/rest"
   "model/laboratory     -> data/input_error.h data/parallel.h model/topology model/fabric
                            model/rest model/sheet"
+  "model/garment        -> data/input_error.h data/sewing_pattern.h model/topology model/fabric
+                           model/rest model/sheet"
   "model/integrate      -> data/input_error.h data/parallel.h data/algebra model/kernels
                            model/cloth model/effects model/rest"
   "fit/interface        -> data model/fabric"
@@ -95,7 +97,7 @@ set(CLOTHFIT_ARROWS
                            apps/study/foreign apps/study/vision"
   "apps/verbs           -> data vision/encode vision/detect vision/track vision/look vision/print
                            model/topology model/fabric model/cloth model/effects model/rest
-                           model/laboratory model/integrate
+                           model/garment model/laboratory model/integrate
                            fit/interface fit/jobs fit/measurement_effects
                            fit/problem fit/preflight fit/verdict fit fit/diagnosis apps/terminal
                            apps/steps apps/report/page apps/report/fit apps/report/diagnosis

@@ -1,0 +1,66 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <optional>
+#include <vector>
+
+#include "model/topology/obstacle.h"
+
+namespace clothfit {
+
+/// Points are looked for so deep inside a body: half the thickness of any.
+inline constexpr double kDeepestInBody_m = 0.5;
+
+/// A point of the cloth that a body may press on: a mean of up to four points of the mesh.
+struct ContactPoint {
+  int count = 0;
+  std::array<int, 4> point{};      ///< all different
+  std::array<double, 4> weight{};  ///< their sum is 1
+  double area_m2 = 0;
+  std::array<int, 10> block{};  ///< of points 00, 10, 11, 20, ..., 33 in the second derivative
+
+  Eigen::Vector3d place_m(const Eigen::Matrix3Xd& position_m) const {
+    Eigen::Vector3d place = weight[0] * position_m.col(point[0]);
+    for (size_t k = 1; k < static_cast<size_t>(count); ++k)
+      place += weight[k] * position_m.col(point[k]);
+    return place;
+  }
+};
+
+/// The pressure of a body on cloth. It grows from nothing at the hold-off distance delta
+/// [lethanh2007, section 5] to more than any garment's at the skin:
+///
+///   p = p0 (exp(u) - 1 - u),   u = 12 (1 - d / delta) for d < delta,
+///
+/// with p0 = 1 Pa. Beneath the skin the pressure goes on along its tangent, so that points which
+/// begin there are pushed out. Cloth that lies on a shoulder keeps 0.9 delta from it, tight cloth
+/// (170 Pa) half. The pressure acts without friction.
+class BodyContact {
+ public:
+  /// `body` must outlive this.
+  BodyContact(const Obstacle& body, double hold_off_m, std::vector<ContactPoint> points);
+
+  /// Adds the energy's derivative to `gradient_n` and returns the energy (J).
+  double add_energy_and_gradient(const Eigen::Matrix3Xd& position_m,
+                                 Eigen::Matrix3Xd& gradient_n) const;
+  /// Adds the second derivative to `blocks`. The term of the surface's curvature, which is
+  /// negative, is left out.
+  void add_second_derivative(const Eigen::Matrix3Xd& position_m,
+                             std::vector<Eigen::Matrix3d>& blocks) const;
+
+ private:
+  std::optional<Obstacle::Distance> touched(size_t point, const Eigen::Vector3d& place_m) const;
+
+  const Obstacle& body_;
+  double hold_off_m_;
+  std::vector<ContactPoint> points_;
+  /// Where a point was when it was last found outside, and how far it can go without touching.
+  struct Free {
+    Eigen::Vector3d place_m = Eigen::Vector3d::Zero();
+    double way_m = -1;
+  };
+  mutable std::vector<Free> free_;
+};
+
+}  // namespace clothfit

@@ -1,0 +1,239 @@
+#include "model/garment/drape_garment.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <utility>
+
+#include "data/input_error.h"
+#include "model/garment/garment_energy.h"
+#include "model/garment/pattern_outline.h"
+#include "model/sheet/settle.h"
+
+namespace clothfit {
+namespace {
+
+/// A seam with gaps below this is closed: its sides become one without a jump.
+constexpr double kClosed_m = 5e-4;
+/// Threads begin to pull with this and pull harder by a factor until all gaps are closed. The last
+/// pull is 200 N per metre of seam, at which garments tear.
+constexpr double kFirstThread_n_per_m2 = 4, kThreadGrowth = 4,
+                 kLastThread_n_per_m2 = 200 / kClosed_m;
+/// Rest of the open garment, and of meshes that only start the next.
+constexpr double kCoarseTolerance = 1e-2;
+/// No point passes through an arm in one step.
+constexpr double kLongestStep_m = 0.02;
+/// A garment of so many particles takes gigabytes and hours.
+constexpr double kMostParticles = 100'000;
+/// Inertia of the first steps: that of a cloth which comes to rest within 30 ms.
+constexpr double kFirstShift_per_s2 = 1000;
+
+class GarmentDraping {
+ public:
+  GarmentDraping(const Pattern& pattern, const std::vector<MeasuredFabric>& fabrics,
+                 const Obstacle* body, const GarmentOptions& options)
+      : pattern_(pattern), fabrics_(fabrics), body_(body), options_(options) {
+    for (double spacing_m = options.spacing_m;; spacing_m *= 2) {
+      spacings_m_.insert(spacings_m_.begin(), spacing_m);
+      if (2 * spacing_m > options.coarsest_m * (1 + 1e-9)) break;
+    }
+  }
+
+  GarmentDrape run() {
+    GarmentDrape result;
+    result.mesh = mesh_garment(pattern_, spacings_m_.front());
+    result.position_m = result.mesh.placed_m;
+    check_start(result);
+    if (!sew(result)) return result;
+    for (size_t level = 0; level < spacings_m_.size() && !cancelled_; ++level) {
+      if (level > 0) refine(spacings_m_[level], result);
+      const bool is_last = level + 1 == spacings_m_.size();
+      rest(is_last ? options_.tolerance : std::max(options_.tolerance, kCoarseTolerance), result);
+    }
+    return result;
+  }
+
+ private:
+  void check_start(const GarmentDrape& result) const {
+    if (!body_) return;
+    double deepest_m = 0;
+    Eigen::Index at = 0;
+    for (Eigen::Index v = 0; v < result.position_m.cols(); ++v) {
+      const auto near = body_->distance(result.position_m.col(v), kDeepestInBody_m);
+      if (!near || near->distance_m >= -deepest_m) continue;
+      deepest_m = -near->distance_m;
+      at = v;
+    }
+    if (deepest_m == 0) return;
+    const Panel& panel =
+        pattern_.panels[static_cast<size_t>(result.mesh.panel_of[static_cast<size_t>(at)])];
+    const Eigen::Vector3d place_m = result.position_m.col(at);
+    throw InputError("panels." + panel.name,
+                     fmt::format("it begins inside the body, {:.0f} mm deep at ({:.3f}, {:.3f}, "
+                                 "{:.3f}) m",
+                                 1e3 * deepest_m, place_m.x(), place_m.y(), place_m.z()),
+                     "panels that wait beside the body", "move its placement outwards");
+  }
+
+  SettleRule rule_for(const GarmentEnergy& energy, double weight_n, double tolerance,
+                      GarmentProgress progress) {
+    SettleRule rule;
+    rule.stop.gradient_n = tolerance * weight_n;
+    rule.stop.most_iterations = options_.most_iterations;
+    rule.stop.lowest_energy_j = -std::numeric_limits<double>::infinity();
+    rule.load_n = weight_n;
+    rule.longest_step_m = kLongestStep_m;
+    rule.first_shift_per_s2 = kFirstShift_per_s2;
+    progress.particles = energy.points();
+    if (options_.go_on)
+      rule.stop.go_on = [this, progress, weight_n](int iteration, double gradient_n) mutable {
+        progress.iteration = iteration;
+        progress.imbalance = gradient_n / weight_n;
+        cancelled_ = !options_.go_on(progress);
+        return !cancelled_;
+      };
+    return rule;
+  }
+
+  static void measure_gaps(GarmentDrape& result) {
+    result.widest_gap_m = 0;
+    for (size_t n = 0; n < result.mesh.seams.size(); ++n)
+      for (const auto& [a, b] : result.mesh.seams[n]) {
+        const double gap_m = (result.position_m.col(a) - result.position_m.col(b)).norm();
+        if (gap_m <= result.widest_gap_m) continue;
+        result.widest_gap_m = gap_m;
+        result.widest_seam = static_cast<int>(n);
+      }
+  }
+
+  /// Draws the seams together; says whether they met.
+  bool sew(GarmentDrape& result) {
+    GarmentEnergy energy(result.mesh, fabrics_, GarmentEnergy::Seams::open);
+    if (body_) energy.set_body(*body_, options_.hold_off_m);
+    const double weight_n = energy.weight_n();
+    energy.set_gravity(Eigen::Vector3d::Zero());
+    const std::vector<bool> held(static_cast<size_t>(energy.points()), false);
+    measure_gaps(result);
+    for (double thread_n_per_m2 = kFirstThread_n_per_m2; result.widest_gap_m > kClosed_m;
+         thread_n_per_m2 *= kThreadGrowth) {
+      if (thread_n_per_m2 > kLastThread_n_per_m2) {
+        result.state = GarmentState::not_sewn;
+        return false;
+      }
+      energy.set_thread(thread_n_per_m2);
+      GarmentProgress progress;
+      progress.sewing = true;
+      progress.spacing_m = result.mesh.cloth.spacing_m;
+      progress.widest_gap_m = result.widest_gap_m;
+      settle(energy, held, rule_for(energy, weight_n, kCoarseTolerance, progress),
+             result.position_m);
+      measure_gaps(result);
+      if (cancelled_) {
+        result.state = GarmentState::cancelled;
+        return false;
+      }
+    }
+    return true;
+  }
+
+  void refine(double spacing_m, GarmentDrape& result) const {
+    GarmentMesh fine = mesh_garment(pattern_, spacing_m);
+    result.position_m = correspond(fine, result.mesh).transfer(result.position_m);
+    result.mesh = std::move(fine);
+  }
+
+  /// Lets the sewn garment come to rest on its present mesh.
+  void rest(double tolerance, GarmentDrape& result) {
+    GarmentEnergy energy(result.mesh, fabrics_, GarmentEnergy::Seams::sewn);
+    if (body_) energy.set_body(*body_, options_.hold_off_m);
+    result.weight_n = energy.weight_n();
+    const std::vector<bool> held(static_cast<size_t>(energy.points()), false);
+    Eigen::Matrix3Xd particle_m = energy.particles_m(result.position_m);
+    GarmentProgress progress;
+    progress.spacing_m = result.mesh.cloth.spacing_m;
+    const MinimiseResult work =
+        settle(energy, held, rule_for(energy, result.weight_n, tolerance, progress), particle_m);
+    result.position_m = energy.vertices_m(particle_m);
+    result.imbalance = work.gradient_n / result.weight_n;
+    result.levels.push_back({result.mesh.cloth.spacing_m, energy.points(),
+                             static_cast<int>(result.mesh.cloth.triangles().cols()), work});
+    count_inside(particle_m, result);
+    result.state = cancelled_                                 ? GarmentState::cancelled
+                   : result.inside > 0                        ? GarmentState::inside_body
+                   : work.reason == MinimiseReason::converged ? GarmentState::at_rest
+                                                              : GarmentState::not_at_rest;
+  }
+
+  void count_inside(const Eigen::Matrix3Xd& particle_m, GarmentDrape& result) const {
+    result.inside = 0;
+    result.deepest_m = 0;
+    if (!body_) return;
+    for (const auto& particle : particle_m.colwise()) {
+      const auto near = body_->distance(particle, kDeepestInBody_m);
+      if (!near || near->distance_m >= 0) continue;
+      ++result.inside;
+      result.deepest_m = std::max(result.deepest_m, -near->distance_m);
+    }
+  }
+
+  const Pattern& pattern_;
+  const std::vector<MeasuredFabric>& fabrics_;
+  const Obstacle* body_;
+  const GarmentOptions& options_;
+  std::vector<double> spacings_m_;  ///< coarsest first
+  bool cancelled_ = false;
+};
+
+void check_size(const Pattern& pattern, double spacing_m) {
+  double particles = 0;
+  for (const Panel& panel : pattern.panels) {
+    particles += panel_area_m2(panel) / (spacing_m * spacing_m);
+    for (int edge = 0; edge < panel.edge_count(); ++edge)
+      particles += edge_length_m(panel, edge) / spacing_m;
+  }
+  if (particles > kMostParticles)
+    throw InputError("GarmentOptions::spacing_m",
+                     fmt::format("{:g} mm makes some {:.0f} particles", 1e3 * spacing_m, particles),
+                     fmt::format("{:.0f} at most", kMostParticles), "a wider spacing");
+}
+
+void check_body(const Obstacle& body) {
+  if (body.open_edges() > 0)
+    throw InputError("body",
+                     fmt::format("{} of its edges belong to one triangle alone", body.open_edges()),
+                     "a closed surface", "close its holes in a program for meshes");
+  if (body.volume_m3() < 0)
+    throw InputError("body", fmt::format("its volume is {:.3g} m3", body.volume_m3()),
+                     "triangles counterclockwise as seen from outside", "turn its faces round");
+}
+
+}  // namespace
+
+void GarmentOptions::validate() const {
+  const auto check = [](bool good, const char* name, double value, const char* expected) {
+    if (!good)
+      throw InputError(std::string("GarmentOptions::") + name, fmt::format("it is {:g}", value),
+                       expected);
+  };
+  check(spacing_m >= 1e-3 && spacing_m <= 0.1, "spacing_m", spacing_m, "metres, 0.001 to 0.1");
+  check(coarsest_m >= spacing_m && coarsest_m <= 0.2, "coarsest_m", coarsest_m,
+        "metres, from the spacing to 0.2");
+  check(hold_off_m >= 1e-4 && hold_off_m <= 0.02, "hold_off_m", hold_off_m,
+        "metres, 0.0001 to 0.02");
+  check(tolerance >= 1e-8 && tolerance <= 0.1, "tolerance", tolerance, "1e-8 to 0.1");
+  check(most_iterations >= 1, "most_iterations", most_iterations, "1 or more");
+}
+
+GarmentDrape drape_garment(const Pattern& pattern, const std::vector<MeasuredFabric>& fabrics,
+                           const Obstacle* body, const GarmentOptions& options) {
+  options.validate();
+  check_pattern(pattern);
+  check_size(pattern, options.spacing_m);
+  if (body) check_body(*body);
+  return GarmentDraping(pattern, fabrics, body, options).run();
+}
+
+}  // namespace clothfit

@@ -1,0 +1,73 @@
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "model/fabric/measured_fabric.h"
+#include "model/garment/garment_mesh.h"
+#include "model/rest/minimise.h"
+#include "model/topology/obstacle.h"
+
+namespace clothfit {
+
+/// What a garment's draping does at the moment.
+struct GarmentProgress {
+  bool sewing = false;  ///< seams are drawn together; else the sewn garment comes to rest
+  double spacing_m = 0;
+  int particles = 0;
+  int iteration = 0;
+  double widest_gap_m = 0;  ///< of the seams, while they are open
+  double imbalance = 0;     ///< residual force on all particles, as a share of the weight
+};
+
+struct GarmentOptions {
+  double spacing_m = 0.02;     ///< of the finest mesh
+  double coarsest_m = 0.04;    ///< seams are closed on the first mesh at least as fine; the next
+                               ///< are each half as wide
+  double hold_off_m = 0.003;   ///< distance from the body at which cloth begins to feel it
+  double tolerance = 1e-3;     ///< imbalance that counts as rest
+  int most_iterations = 1000;  ///< on each mesh, and at each pull of the threads
+  std::function<bool(const GarmentProgress&)> go_on;  ///< `false` cancels; may be empty
+
+  void validate() const;  ///< throws InputError
+};
+
+struct GarmentLevel {
+  double spacing_m = 0;
+  int particles = 0, triangles = 0;
+  MinimiseResult work;
+};
+
+enum class GarmentState {
+  at_rest,
+  not_at_rest,  ///< the finest mesh ran out of iterations, or no step lowers its energy
+  not_sewn,     ///< a seam stays open: `widest_gap_m`, of `widest_seam`
+  inside_body,  ///< `inside` particles: too tight a garment, or a body that passed through it
+  cancelled
+};
+
+struct GarmentDrape {
+  GarmentState state = GarmentState::not_at_rest;
+  GarmentMesh mesh;                  ///< the finest reached
+  Eigen::Matrix3Xd position_m;       ///< 3 x vertices; those of a seam in one place once sewn
+  std::vector<GarmentLevel> levels;  ///< coarsest first
+  double widest_gap_m = 0;           ///< of the seams when they were closed
+  int widest_seam = -1;
+  double imbalance = 0;  ///< as a share of the weight
+  double weight_n = 0;
+  int inside = 0;        ///< particles beneath the body's surface
+  double deepest_m = 0;  ///< of them
+  bool usable() const { return state == GarmentState::at_rest; }
+};
+
+/// Sews a pattern around a body and lets it come to rest under its weight: a minimum of its energy
+/// [lethanh2007]. On the coarsest mesh threads draw the seams together, without weight; then sides
+/// become one, and the shape goes from mesh to mesh by its correspondences, coming to rest on each.
+/// `body` may be null. Contact of the cloth with itself is not looked for.
+///
+/// Throws InputError for an impossible pattern, fabric or option, for a body that is open or faces
+/// inwards, and for a pattern that begins inside the body.
+GarmentDrape drape_garment(const Pattern& pattern, const std::vector<MeasuredFabric>& fabrics,
+                           const Obstacle* body, const GarmentOptions& options);
+
+}  // namespace clothfit

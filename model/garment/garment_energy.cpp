@@ -1,0 +1,189 @@
+#include "model/garment/garment_energy.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "model/garment/seam_bending.h"
+
+namespace clothfit {
+namespace {
+
+BlockEnergy::Pair pair_of(int a, int b) {
+  return {std::min(a, b), std::max(a, b)};
+}
+
+/// Returns the weights of a triangle's corners at the middles of the parts^2 equal ones in it.
+std::vector<std::vector<double>> middles_of_triangle(int parts) {
+  std::vector<std::vector<double>> middles;
+  const auto add = [&](double s, double t) {
+    middles.push_back({1 - (s + t) / parts, s / parts, t / parts});
+  };
+  for (int i = 0; i < parts; ++i)
+    for (int j = 0; i + j < parts; ++j) {
+      add(i + 1.0 / 3, j + 1.0 / 3);
+      if (i + j + 1 < parts) add(i + 2.0 / 3, j + 2.0 / 3);
+    }
+  return middles;
+}
+
+/// Returns the same for the parts^2 equal squares in a square.
+std::vector<std::vector<double>> middles_of_square(int parts) {
+  std::vector<std::vector<double>> middles;
+  for (int i = 0; i < parts; ++i)
+    for (int j = 0; j < parts; ++j) {
+      const double s = (i + 0.5) / parts, t = (j + 0.5) / parts;
+      middles.push_back({(1 - s) * (1 - t), s * (1 - t), s * t, (1 - s) * t});
+    }
+  return middles;
+}
+
+}  // namespace
+
+GarmentEnergy::GarmentEnergy(const GarmentMesh& mesh, const std::vector<MeasuredFabric>& fabrics,
+                             Seams seams)
+    : mesh_(mesh),
+      sheet_(mesh.cloth, fabrics, mesh.fabric_of, {},
+             seams == Seams::sewn ? seam_bending(mesh, fabrics) : BendingMatrix()),
+      particle_of_(mesh.particle_of) {
+  const bool open = seams == Seams::open;
+  if (open) std::iota(particle_of_.begin(), particle_of_.end(), 0);
+  mass_kg_ = Eigen::VectorXd::Zero(open ? mesh.cloth.vertex_count() : mesh.particles);
+  for (size_t v = 0; v < particle_of_.size(); ++v)
+    mass_kg_[particle_of_[v]] += sheet_.mass_kg()[static_cast<Eigen::Index>(v)];
+  if (open) add_threads();
+  find_targets();
+}
+
+void GarmentEnergy::add_threads() {
+  for (const auto& seam : mesh_.seams)
+    for (size_t k = 0; k < seam.size(); ++k) {
+      const auto [a, b] = seam[k];
+      if (a == b) continue;  // the tip of a dart
+      const auto step_m = [&](size_t n) {
+        return (mesh_.cloth.material_m.col(seam[n + 1][0]) - mesh_.cloth.material_m.col(seam[n][0]))
+            .norm();
+      };
+      const double before_m = k > 0 ? step_m(k - 1) : 0,
+                   after_m = k + 1 < seam.size() ? step_m(k) : 0;
+      threads_.push_back({.a = a, .b = b, .length_m = 0.5 * (before_m + after_m), .block = {}});
+    }
+}
+
+void GarmentEnergy::find_targets() {
+  const auto particle = [&](int v) { return particle_of_[static_cast<size_t>(v)]; };
+  for (const Pair& pair : sheet_.pairs())
+    pairs_.push_back(pair_of(particle(pair.low), particle(pair.high)));
+  for (const Thread& thread : threads_) pairs_.push_back(pair_of(thread.a, thread.b));
+  std::ranges::sort(pairs_);
+  const auto repeated = std::ranges::unique(pairs_);
+  pairs_.erase(repeated.begin(), repeated.end());
+  for (const Pair& pair : sheet_.pairs()) {
+    const int low = particle(pair.low), high = particle(pair.high);
+    // Two vertices of one particle depend on each other both ways.
+    const bool folded = low == high && pair.low != pair.high;
+    target_.push_back({block_of(low, high), low <= high, folded || low > high});
+  }
+  for (Thread& thread : threads_)
+    thread.block = {block_of(thread.a, thread.a), block_of(thread.b, thread.b),
+                    block_of(thread.a, thread.b)};
+}
+
+int GarmentEnergy::block_of(int a, int b) const {
+  return static_cast<int>(std::ranges::lower_bound(pairs_, pair_of(a, b)) - pairs_.begin());
+}
+
+void GarmentEnergy::add_contact_point(const std::vector<int>& vertices,
+                                      const std::vector<double>& weights, double area_m2,
+                                      std::vector<ContactPoint>& points) const {
+  ContactPoint point;
+  point.area_m2 = area_m2;
+  const auto known = [&] { return point.point.begin() + point.count; };
+  for (size_t k = 0; k < vertices.size(); ++k) {
+    const int particle = particle_of_[static_cast<size_t>(vertices[k])];
+    const auto at = std::find(point.point.begin(), known(), particle);
+    if (at == known()) point.point[static_cast<size_t>(point.count++)] = particle;
+    point.weight[static_cast<size_t>(at - point.point.begin())] += weights[k];
+  }
+  size_t next = 0;
+  for (size_t a = 0; a < static_cast<size_t>(point.count); ++a)
+    for (size_t b = 0; b <= a; ++b) point.block[next++] = block_of(point.point[a], point.point[b]);
+  points.push_back(point);
+}
+
+std::vector<ContactPoint> GarmentEnergy::contact_points() const {
+  constexpr double kFarthest_m = 0.01;
+  const int parts = static_cast<int>(std::ceil(mesh_.cloth.spacing_m / kFarthest_m - 1e-6));
+  // Vertices and inner points of a cell share its area as if each stood for as much.
+  const double of_vertices = 1.0 / (1 + parts * parts);
+  const auto of_triangle = middles_of_triangle(parts), of_square = middles_of_square(parts);
+  std::vector<ContactPoint> points;
+  for (int v = 0; v < mesh_.cloth.vertex_count(); ++v)
+    add_contact_point({v}, {1}, of_vertices * mesh_.cloth.area_m2[v], points);
+  for (const ClothCell& cell : mesh_.cloth.cells) {
+    const std::vector<int> vertices(cell.vertex.begin(), cell.vertex.begin() + cell.corners);
+    const double area_m2 = (1 - of_vertices) * cell.area_m2 / (parts * parts);
+    for (const std::vector<double>& weights : cell.corners == 3 ? of_triangle : of_square)
+      add_contact_point(vertices, weights, area_m2, points);
+  }
+  return points;
+}
+
+void GarmentEnergy::set_body(const Obstacle& body, double hold_off_m) {
+  contact_.emplace(body, hold_off_m, contact_points());
+}
+
+double GarmentEnergy::energy_and_gradient(const Eigen::Matrix3Xd& position_m,
+                                          Eigen::Matrix3Xd& gradient_n) const {
+  Eigen::Matrix3Xd of_vertices_n;
+  double energy_j = sheet_.energy_and_gradient(vertices_m(position_m), of_vertices_n);
+  gradient_n.setZero(3, position_m.cols());
+  for (size_t v = 0; v < particle_of_.size(); ++v)
+    gradient_n.col(particle_of_[v]) += of_vertices_n.col(static_cast<Eigen::Index>(v));
+  for (const Thread& thread : threads_) {
+    const double stiffness = thread_n_per_m2_ * thread.length_m;
+    const Eigen::Vector3d gap_m = position_m.col(thread.a) - position_m.col(thread.b);
+    energy_j += 0.5 * stiffness * gap_m.squaredNorm();
+    gradient_n.col(thread.a) += stiffness * gap_m;
+    gradient_n.col(thread.b) -= stiffness * gap_m;
+  }
+  if (contact_) energy_j += contact_->add_energy_and_gradient(position_m, gradient_n);
+  return energy_j;
+}
+
+void GarmentEnergy::second_derivative(const Eigen::Matrix3Xd& position_m, Curvature curvature,
+                                      std::vector<Eigen::Matrix3d>& blocks) const {
+  std::vector<Eigen::Matrix3d> of_sheet;
+  sheet_.second_derivative(vertices_m(position_m), curvature, of_sheet);
+  blocks.assign(pairs_.size(), Eigen::Matrix3d::Zero());
+  for (size_t p = 0; p < of_sheet.size(); ++p) {
+    const Target& target = target_[p];
+    Eigen::Matrix3d& block = blocks[static_cast<size_t>(target.block)];
+    if (target.plain) block += of_sheet[p];
+    if (target.turned) block += of_sheet[p].transpose();
+  }
+  for (const Thread& thread : threads_) {
+    const double stiffness = thread_n_per_m2_ * thread.length_m;
+    for (const int end : {0, 1})
+      blocks[static_cast<size_t>(thread.block[static_cast<size_t>(end)])].diagonal().array() +=
+          stiffness;
+    blocks[static_cast<size_t>(thread.block[2])].diagonal().array() -= stiffness;
+  }
+  if (contact_) contact_->add_second_derivative(position_m, blocks);
+}
+
+Eigen::Matrix3Xd GarmentEnergy::vertices_m(const Eigen::Matrix3Xd& particle_m) const {
+  return particle_m(Eigen::all, particle_of_);
+}
+
+Eigen::Matrix3Xd GarmentEnergy::particles_m(const Eigen::Matrix3Xd& vertex_m) const {
+  Eigen::Matrix3Xd sum = Eigen::Matrix3Xd::Zero(3, points());
+  Eigen::VectorXd count = Eigen::VectorXd::Zero(points());
+  for (size_t v = 0; v < particle_of_.size(); ++v) {
+    sum.col(particle_of_[v]) += vertex_m.col(static_cast<Eigen::Index>(v));
+    count[particle_of_[v]] += 1;
+  }
+  return sum * count.cwiseInverse().asDiagonal();
+}
+
+}  // namespace clothfit

@@ -1,0 +1,76 @@
+#pragma once
+
+#include <array>
+#include <optional>
+#include <vector>
+
+#include "model/garment/body_contact.h"
+#include "model/garment/garment_mesh.h"
+#include "model/sheet/sheet_energy.h"
+
+namespace clothfit {
+
+/// The energy of a garment's particles: its fabric (SheetEnergy), its seams while they are open,
+/// and the body's pressure.
+///
+/// An open garment has a particle for every vertex. Threads pull the sides of its seams together,
+/// k l |x_a - x_b|^2 / 2 for every stretch l of a seam. A sewn one has a particle for all vertices
+/// that seams join, and seams bend as uncut cloth.
+class GarmentEnergy : public BlockEnergy {
+ public:
+  enum class Seams { open, sewn };
+  /// `mesh` must outlive this. Throws InputError as fibres_of() does.
+  GarmentEnergy(const GarmentMesh& mesh, const std::vector<MeasuredFabric>& fabrics, Seams seams);
+
+  /// Lets a body press on the cloth's vertices, and between them at places not farther apart than a
+  /// centimetre: a coarse mesh does not pass through what is wider. The body must outlive this.
+  void set_body(const Obstacle& body, double hold_off_m);
+  void set_gravity(const Eigen::Vector3d& gravity_m_per_s2) {
+    sheet_.set_gravity(gravity_m_per_s2);
+  }
+  /// Sets the pull of the threads of an open garment: force per gap and length of seam.
+  void set_thread(double pull_n_per_m2) { thread_n_per_m2_ = pull_n_per_m2; }
+
+  double weight_n() const { return sheet_.weight_n(); }
+  const Eigen::VectorXd& mass_kg() const override { return mass_kg_; }
+  double energy_and_gradient(const Eigen::Matrix3Xd& position_m,
+                             Eigen::Matrix3Xd& gradient_n) const override;
+  const std::vector<Pair>& pairs() const override { return pairs_; }
+  void second_derivative(const Eigen::Matrix3Xd& position_m, Curvature curvature,
+                         std::vector<Eigen::Matrix3d>& blocks) const override;
+
+  /// Returns the positions of the vertices, 3 x vertices, and those of the particles: means.
+  Eigen::Matrix3Xd vertices_m(const Eigen::Matrix3Xd& particle_m) const;
+  Eigen::Matrix3Xd particles_m(const Eigen::Matrix3Xd& vertex_m) const;
+
+ private:
+  struct Thread {
+    int a = 0, b = 0;
+    double length_m = 0;         ///< of the seam that it stands for
+    std::array<int, 3> block{};  ///< of a, of b and of both
+  };
+  /// Where a block of the sheet's second derivative goes.
+  struct Target {
+    int block = 0;
+    bool plain = true;    ///< added as it is
+    bool turned = false;  ///< its transpose is added
+  };
+  void add_threads();
+  void find_targets();
+  int block_of(int a, int b) const;  ///< number of a pair
+  void add_contact_point(const std::vector<int>& vertices, const std::vector<double>& weights,
+                         double area_m2, std::vector<ContactPoint>& points) const;
+  std::vector<ContactPoint> contact_points() const;
+
+  const GarmentMesh& mesh_;
+  SheetEnergy sheet_;
+  std::vector<int> particle_of_;
+  Eigen::VectorXd mass_kg_;
+  std::vector<Thread> threads_;
+  double thread_n_per_m2_ = 0;
+  std::optional<BodyContact> contact_;
+  std::vector<Pair> pairs_;
+  std::vector<Target> target_;  ///< of each pair of the sheet
+};
+
+}  // namespace clothfit

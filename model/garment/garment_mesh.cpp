@@ -1,0 +1,280 @@
+#include "model/garment/garment_mesh.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numeric>
+#include <utility>
+
+#include "data/input_error.h"
+#include "model/garment/pattern_outline.h"
+
+namespace clothfit {
+namespace {
+
+int parts_of(double length_m, double spacing_m) {
+  return std::max(1, static_cast<int>(std::ceil(length_m / spacing_m - 1e-6)));
+}
+
+/// A place on an edge, as a share of its length.
+struct EdgePlace {
+  int edge = 0;
+  double share = 0;
+};
+
+/// A side of a seam as one line, in the direction of the seam.
+class SideLine {
+ public:
+  SideLine(const Pattern& pattern, const SeamSide& side, bool against)
+      : side_(side), panel_(pattern.panels[static_cast<size_t>(side.panel)]), against_(against) {
+    for (const int edge : side.edges)
+      begins_m_.push_back(begins_m_.back() + edge_length_m(panel_, edge));
+  }
+  double length_m() const { return begins_m_.back(); }
+
+  /// Returns the shares of the length at which corners lie, both ends left out.
+  std::vector<double> corner_shares() const {
+    std::vector<double> shares;
+    for (size_t k = 1; k + 1 < begins_m_.size(); ++k)
+      shares.push_back(turned(begins_m_[k] / length_m()));
+    std::ranges::sort(shares);
+    return shares;
+  }
+
+  /// Returns the place at a share of the length. A corner belongs to the edge that begins there.
+  EdgePlace at(double share) const {
+    const double along_m = turned(share) * length_m(), near_m = 1e-9 * length_m();
+    for (size_t k = 0; k < side_.edges.size(); ++k) {
+      const double begin_m = begins_m_[k], end_m = begins_m_[k + 1];
+      if (along_m < begin_m + near_m) return {side_.edges[k], 0};
+      if (along_m < end_m - near_m)
+        return {side_.edges[k], (along_m - begin_m) / (end_m - begin_m)};
+    }
+    return {(side_.edges.back() + 1) % panel_.edge_count(), 0};
+  }
+
+ private:
+  double turned(double share) const { return against_ ? 1 - share : share; }
+
+  SeamSide side_;
+  const Panel& panel_;
+  bool against_;
+  std::vector<double> begins_m_{0};
+};
+
+/// Returns the shares of both sides at which vertices meet. Corners of one side meet a corner of
+/// the other where that is nearer than half a spacing.
+std::vector<std::array<double, 2>> meeting_shares(const SideLine& one, const SideLine& other,
+                                                  double spacing_m) {
+  const double longer_m = std::max(one.length_m(), other.length_m());
+  std::vector<std::array<double, 2>> fixed{{0, 0}};
+  const std::vector<double> ones = one.corner_shares(), others = other.corner_shares();
+  for (size_t a = 0, b = 0; a < ones.size() || b < others.size();) {
+    const double s = a < ones.size() ? ones[a] : 2, t = b < others.size() ? others[b] : 2;
+    const bool meet = std::abs(s - t) * longer_m < 0.5 * spacing_m;
+    fixed.push_back(meet ? std::array{s, t} : std::array{std::min(s, t), std::min(s, t)});
+    if (meet || s < t) ++a;
+    if (meet || t <= s) ++b;
+  }
+  fixed.push_back({1, 1});
+  std::vector<std::array<double, 2>> shares;
+  for (size_t k = 0; k + 1 < fixed.size(); ++k) {
+    const auto [s, t] = fixed[k];
+    const double by_s = fixed[k + 1][0] - s, by_t = fixed[k + 1][1] - t;
+    const int parts = parts_of(std::max(by_s * one.length_m(), by_t * other.length_m()), spacing_m);
+    for (int part = 0; part < parts; ++part) {
+      const double share = static_cast<double>(part) / parts;
+      shares.push_back({s + share * by_s, t + share * by_t});
+    }
+  }
+  shares.push_back({1, 1});
+  return shares;
+}
+
+/// The outlines' vertices and the pairs of them that seams join.
+struct Outlines {
+  /// Shares of every edge of every panel at which vertices lie: 0 the first, 1 left out.
+  std::vector<std::vector<std::vector<double>>> shares;
+  std::vector<std::vector<std::array<EdgePlace, 2>>> seams;
+};
+
+Outlines outlines_of(const Pattern& pattern, double spacing_m) {
+  Outlines outlines;
+  std::vector<std::vector<bool>> sewn;
+  for (const Panel& panel : pattern.panels) {
+    outlines.shares.emplace_back(panel.edges.size(), std::vector<double>{0});
+    sewn.emplace_back(panel.edges.size(), false);
+  }
+  for (const Seam& seam : pattern.seams) {
+    const SideLine one(pattern, seam.sides[0], false), other(pattern, seam.sides[1], true);
+    outlines.seams.emplace_back();
+    for (const auto& [s, t] : meeting_shares(one, other, spacing_m))
+      outlines.seams.back().push_back({one.at(s), other.at(t)});
+    for (size_t side = 0; side < 2; ++side) {
+      const auto panel = static_cast<size_t>(seam.sides[side].panel);
+      for (const int edge : seam.sides[side].edges) sewn[panel][static_cast<size_t>(edge)] = true;
+      for (const auto& meeting : outlines.seams.back())
+        if (const EdgePlace& place = meeting[side]; place.share > 0)
+          outlines.shares[panel][static_cast<size_t>(place.edge)].push_back(place.share);
+    }
+  }
+  for (size_t p = 0; p < pattern.panels.size(); ++p)
+    for (size_t e = 0; e < pattern.panels[p].edges.size(); ++e) {
+      std::vector<double>& shares = outlines.shares[p][e];
+      if (!sewn[p][e]) {
+        const int parts =
+            parts_of(edge_length_m(pattern.panels[p], static_cast<int>(e)), spacing_m);
+        for (int part = 1; part < parts; ++part)
+          shares.push_back(static_cast<double>(part) / parts);
+      }
+      std::ranges::sort(shares);
+    }
+  return outlines;
+}
+
+/// Numbers groups of joined vertices.
+void number_particles(GarmentMesh& mesh) {
+  const auto count = static_cast<size_t>(mesh.cloth.vertex_count());
+  std::vector<int> parent(count);
+  std::iota(parent.begin(), parent.end(), 0);
+  const auto root = [&](int v) {
+    while (parent[static_cast<size_t>(v)] != v) v = parent[static_cast<size_t>(v)];
+    return v;
+  };
+  for (const auto& seam : mesh.seams)
+    for (const auto& [a, b] : seam) {
+      const auto [low, high] = std::minmax({root(a), root(b)});
+      parent[static_cast<size_t>(high)] = low;
+    }
+  mesh.particle_of.assign(count, -1);
+  for (size_t v = 0; v < count; ++v) {
+    const auto of = static_cast<size_t>(root(static_cast<int>(v)));
+    mesh.particle_of[v] = of == v ? mesh.particles++ : mesh.particle_of[of];
+  }
+}
+
+/// Adds a panel's mesh to the right of those that are there.
+void add_panel(const ClothMesh& part, ClothMesh& cloth, std::vector<double>& panel_left_m) {
+  const int vertices = cloth.vertex_count();
+  const double gap_m = 4 * part.spacing_m;
+  const double left_m = (vertices == 0 ? 0 : cloth.material_m.row(0).maxCoeff() + gap_m) -
+                        part.material_m.row(0).minCoeff();
+  panel_left_m.push_back(left_m);
+  Eigen::Matrix2Xd material(2, vertices + part.vertex_count());
+  material << cloth.material_m, part.material_m;
+  material.rightCols(part.vertex_count()).row(0).array() += left_m;
+  cloth.material_m = std::move(material);
+  Eigen::VectorXd area(vertices + part.vertex_count());
+  area << cloth.area_m2, part.area_m2;
+  cloth.area_m2 = std::move(area);
+  for (ClothCell cell : part.cells) {
+    for (int k = 0; k < cell.corners; ++k) cell.vertex[static_cast<size_t>(k)] += vertices;
+    cloth.cells.push_back(cell);
+  }
+  for (std::vector<int> loop : part.border) {
+    for (int& v : loop) v += vertices;
+    cloth.border.push_back(std::move(loop));
+  }
+}
+
+/// Returns the outline of a panel, turned so that its warp runs along t, and the number of the
+/// first vertex of every edge in it.
+Eigen::Matrix2Xd outline_of(const Panel& panel, const std::vector<std::vector<double>>& shares,
+                            std::vector<int>& first_vertex) {
+  const Eigen::Rotation2Dd turn(-panel.grain_rad);
+  std::vector<Eigen::Vector2d> outline;
+  for (int edge = 0; edge < panel.edge_count(); ++edge) {
+    first_vertex.push_back(static_cast<int>(outline.size()));
+    const Eigen::Matrix2Xd points_m =
+        points_of_edge_m(panel, edge, shares[static_cast<size_t>(edge)]);
+    for (const auto& point : points_m.colwise()) outline.emplace_back(turn * point);
+  }
+  Eigen::Matrix2Xd border_m(2, static_cast<Eigen::Index>(outline.size()));
+  for (size_t k = 0; k < outline.size(); ++k)
+    border_m.col(static_cast<Eigen::Index>(k)) = outline[k];
+  return border_m;
+}
+
+ClothMesh mesh_panel(const Panel& panel, const Eigen::Matrix2Xd& border_m, double spacing_m) {
+  ClothOutline outline;
+  outline.border_m.push_back(border_m);
+  try {
+    return mesh_cloth(outline, spacing_m);
+  } catch (const InputError& error) {
+    throw InputError("panels." + panel.name, error.problem(), error.expected(), error.remedy());
+  }
+}
+
+}  // namespace
+
+GarmentMesh mesh_garment(const Pattern& pattern, double spacing_m) {
+  const Outlines outlines = outlines_of(pattern, spacing_m);
+  GarmentMesh mesh;
+  mesh.cloth.spacing_m = spacing_m;
+  std::vector<std::vector<int>> first_vertex(pattern.panels.size());
+  std::vector<Eigen::Vector3d> placed;
+  for (size_t p = 0; p < pattern.panels.size(); ++p) {
+    const Panel& panel = pattern.panels[p];
+    const int first = mesh.cloth.vertex_count();
+    // A mesh's first vertices are those of its outline.
+    const ClothMesh part =
+        mesh_panel(panel, outline_of(panel, outlines.shares[p], first_vertex[p]), spacing_m);
+    for (int& vertex : first_vertex[p]) vertex += first;
+    const Eigen::Rotation2Dd turn_back(panel.grain_rad);
+    for (const auto& at : part.material_m.colwise()) {
+      const Eigen::Vector2d flat = turn_back * Eigen::Vector2d(at);
+      placed.emplace_back(panel.placement * Eigen::Vector3d(flat.x(), flat.y(), 0));
+      mesh.panel_of.push_back(static_cast<int>(p));
+      mesh.fabric_of.push_back(panel.fabric);
+    }
+    add_panel(part, mesh.cloth, mesh.panel_left_m);
+  }
+  mesh.placed_m.resize(3, mesh.cloth.vertex_count());
+  for (size_t v = 0; v < placed.size(); ++v)
+    mesh.placed_m.col(static_cast<Eigen::Index>(v)) = placed[v];
+
+  for (size_t n = 0; n < outlines.seams.size(); ++n) {
+    mesh.seams.emplace_back();
+    for (const auto& meeting : outlines.seams[n]) {
+      std::array<int, 2> vertices{};
+      for (size_t side = 0; side < 2; ++side) {
+        const auto panel = static_cast<size_t>(pattern.seams[n].sides[side].panel),
+                   edge = static_cast<size_t>(meeting[side].edge);
+        const std::vector<double>& shares = outlines.shares[panel][edge];
+        vertices[side] =
+            first_vertex[panel][edge] +
+            static_cast<int>(std::ranges::find(shares, meeting[side].share) - shares.begin());
+      }
+      mesh.seams.back().push_back(vertices);
+    }
+  }
+  number_particles(mesh);
+  return mesh;
+}
+
+Correspondence correspond(const GarmentMesh& fine, const GarmentMesh& coarse) {
+  const Eigen::Matrix3Xi triangles = coarse.cloth.triangles();
+  const auto count = static_cast<Eigen::Index>(fine.panel_of.size());
+  Correspondence all;
+  all.corner.resize(3, count);
+  all.weight.resize(3, count);
+  for (size_t panel = 0; panel < fine.panel_left_m.size(); ++panel) {
+    std::vector<int> points, of_panel;
+    for (int v = 0; v < static_cast<int>(count); ++v)
+      if (fine.panel_of[static_cast<size_t>(v)] == static_cast<int>(panel)) points.push_back(v);
+    for (int t = 0; t < static_cast<int>(triangles.cols()); ++t)
+      if (coarse.panel_of[static_cast<size_t>(triangles(0, t))] == static_cast<int>(panel))
+        of_panel.push_back(t);
+    Eigen::Matrix2Xd point_m = fine.cloth.material_m(Eigen::all, points);
+    point_m.row(0).array() += coarse.panel_left_m[panel] - fine.panel_left_m[panel];
+    const Eigen::Matrix3Xi triangle = triangles(Eigen::all, of_panel);
+    const Correspondence part = correspond(point_m, coarse.cloth.material_m, triangle);
+    for (size_t k = 0; k < points.size(); ++k) {
+      all.corner.col(points[k]) = part.corner.col(static_cast<Eigen::Index>(k));
+      all.weight.col(points[k]) = part.weight.col(static_cast<Eigen::Index>(k));
+    }
+  }
+  return all;
+}
+
+}  // namespace clothfit
