@@ -18,6 +18,7 @@ std::string flag_of(std::string member) {
       {"dots_per_inch", "dpi"},
       {"effects", "effect"},
       {"height_m", "size"},
+      {"hold_off_m", "hold-off"},
       {"marker_offset_sigma_m", "marker-offsets"},
       {"mesh_columns", "mesh"},
       {"mesh_rows", "mesh"},

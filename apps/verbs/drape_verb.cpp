@@ -16,6 +16,8 @@
 #include "apps/terminal/result_folder.h"
 #include "apps/terminal/say.h"
 #include "apps/terminal/text_table.h"
+#include "apps/verbs/drape_pattern.h"
+#include "apps/verbs/measured_sheet.h"
 #include "apps/verbs/verb.h"
 #include "data/fabric_sheet.h"
 #include "data/input_error.h"
@@ -35,8 +37,10 @@ using Json = nlohmann::ordered_json;
 
 struct DrapeVerbOptions {
   std::string test;
+  PatternRequest garment;
   fs::path fabric;
   CusickOptions cusick;
+  std::optional<double> spacing_m;  ///< each has a default of its own
   unsigned long long seed = 1;
   int threads = 0;
   fs::path out;
@@ -50,15 +54,6 @@ struct Findings {
   Json json;
   std::optional<SurfaceMesh> shape;
 };
-
-MeasuredFabric measured(const FabricSheet& sheet) {
-  return {.areal_density_kg_per_m2 = sheet.areal_density_kg_per_m2.value,
-          .tension_warp_n_per_m = sheet.tension_n_per_m.warp.value,
-          .tension_weft_n_per_m = sheet.tension_n_per_m.weft.value,
-          .shear_n_per_m = sheet.shear_n_per_m.value,
-          .bending_warp_n_m = sheet.bending_n_m.warp.value,
-          .bending_weft_n_m = sheet.bending_n_m.weft.value};
-}
 
 /// Throws unless a search for balance ended as it should.
 void require(MinimiseReason reason, const std::string& what) {
@@ -237,7 +232,7 @@ Json fabric_json(const FabricSheet& sheet) {
   return json;
 }
 
-int run_drape(const DrapeVerbOptions& options, const std::string& command) {
+int run_test(const DrapeVerbOptions& options, const std::string& command) {
   require_threads(options.threads);
   const ThreadLimit limit(options.threads);
   const FabricSheet sheet = read_fabric_sheet(options.fabric);
@@ -264,19 +259,52 @@ int run_drape(const DrapeVerbOptions& options, const std::string& command) {
   return kExitGood;
 }
 
+int run_drape(DrapeVerbOptions options, const std::string& command) {
+  if (options.test.empty() == options.garment.pattern.empty())
+    throw InputError("drape",
+                     options.test.empty() ? "no pattern and no --test" : "a pattern and a --test",
+                     "a pattern to sew or a test of a fabric",
+                     "clothfit drape data/patterns/skirt.yaml, or clothfit drape --test cusick "
+                     "--fabric data/fabrics/shirting.yaml");
+  if (options.test.empty()) {
+    require_threads(options.threads);
+    const ThreadLimit limit(options.threads);
+    options.garment.fabric = options.fabric;
+    options.garment.out = options.out;
+    options.garment.options.spacing_m = options.spacing_m.value_or(options.garment.options.spacing_m);
+    return drape_pattern(options.garment, command);
+  }
+  if (options.fabric.empty())
+    throw InputError("--fabric", "is missing", "the data sheet of the fabric to test");
+  options.cusick.spacing_m = options.spacing_m.value_or(options.cusick.spacing_m);
+  return run_test(options, command);
+}
+
 }  // namespace
 
 void add_drape_verb(Verb program) {
   const auto options = std::make_shared<DrapeVerbOptions>();
-  Verb verb = program.add_verb("drape", "Simulate a laboratory's test of a fabric's data sheet");
-  verb.add_option("--test", &options->test,
-                  "cusick: drape of a disc; cantilever: bending; tensile: a strip; shear: a "
-                  "picture frame")
-      .required()
-      .one_of({"cusick", "cantilever", "tensile", "shear"});
-  verb.add_option("--fabric", &options->fabric, "Data sheet of the fabric")
-      .required()
+  Verb verb = program.add_verb(
+      "drape", "Sew and drape a pattern, or simulate a laboratory's test of a fabric");
+  verb.add_option("PATTERN", &options->garment.pattern,
+                  "Sewing pattern: ours (YAML) or a specification of GarmentCode (JSON)");
+  verb.add_option("--body", &options->garment.body,
+                  "Closed surface to sew it around; the bundled mannequin where left out")
+      .type_name("BODY.obj");
+  verb.add_option("--fabric", &options->fabric,
+                  "Data sheet of the fabric; of all panels, in place of those a pattern names")
       .type_name("FABRIC.yaml");
+  verb.add_option("--hold-off", &options->garment.options.hold_off_m,
+                  "Distance at which cloth begins to feel the body (m)")
+      .is_length()
+      .shows_default();
+  verb.add_option("--tolerance", &options->garment.options.tolerance,
+                  "Residual force of a garment that counts as rest, as a share of its weight")
+      .shows_default();
+  verb.add_option("--test", &options->test,
+                  "Instead of a pattern. cusick: drape of a disc; cantilever: bending; tensile: a "
+                  "strip; shear: a picture frame")
+      .one_of({"cusick", "cantilever", "tensile", "shear"});
   verb.add_option("--specimen", &options->cusick.specimen_diameter_m,
                   "Diameter of the specimen of cusick: 24cm, 30cm or 36cm in the standards (m)")
       .is_length()
@@ -284,9 +312,9 @@ void add_drape_verb(Verb program) {
   verb.add_option("--disc", &options->cusick.disc_diameter_m, "Diameter of its disc (m)")
       .is_length()
       .shows_default();
-  verb.add_option("--spacing", &options->cusick.spacing_m, "Spacing of its mesh (m)")
-      .is_length()
-      .shows_default();
+  verb.add_option("--spacing", &options->spacing_m,
+                  "Spacing of the mesh (m): 20mm of a garment, 5mm of cusick")
+      .is_length();
   verb.add_option("--starts", &options->cusick.starts, "Drapes from different unevenness")
       .shows_default();
   verb.add_option("--seed", &options->seed, "Seed of the unevenness")
@@ -295,8 +323,10 @@ void add_drape_verb(Verb program) {
   verb.add_option("--threads", &options->threads, "Threads; 0 for as many as the machine has")
       .shows_default()
       .shapes_no_result();
-  add_out_option(verb, options->out, "FABRIC.TEST");
-  verb.footer("Example:\n  clothfit drape --test cusick --fabric data/fabrics/m1.yaml");
+  add_out_option(verb, options->out, "PATTERN.drape or FABRIC.TEST");
+  verb.footer(
+      "Examples:\n  clothfit drape data/patterns/skirt.yaml\n"
+      "  clothfit drape --test cusick --fabric data/fabrics/shirting.yaml");
   verb.runs([options, verb] { return run_drape(*options, verb.command_text()); });
 }
 

@@ -75,6 +75,93 @@ TEST_F(DrapeVerb, StretchesAndShears) {
   EXPECT_NEAR(json("twill.shear").at("shear").at("stiffness_n_per_m").get<double>(), 40, 0.1);
 }
 
+class DrapeGarmentVerb : public DrapeVerb {
+ protected:
+  DrapeGarmentVerb() {
+    std::ofstream(here_.path() / "tube.yaml") << tube("10");
+    std::ofstream(here_.path() / "bar.obj") << bar();
+  }
+  /// A tube of 12 cm girth, above and below a level bar.
+  static std::string tube(const std::string& width) {
+    const std::string outline = "outline: [[0, 0], [" + width + ", 0], [" + width + ", 6], [0, 6]]";
+    return "format: clothfit-pattern/1\nname: tube\nunit: cm\nfabrics: {twill: twill.yaml}\n"
+           "panels:\n  upper: {at: [-5, -3, 6], turn: [0, 0, 0], " +
+           outline +
+           "}\n"
+           "  lower: {at: [-5, 3, -6], turn: [180, 0, 0], " +
+           outline +
+           "}\n"
+           "seams:\n  - [upper.2, lower.0]\n  - [upper.0, lower.2]\n";
+  }
+  /// A box of 20 x 2 x 2 cm along x.
+  static std::string bar() {
+    std::string text;
+    for (const char* x : {"-0.1", "0.1"})
+      for (const char* yz : {" -0.01 -0.01", " 0.01 -0.01", " 0.01 0.01", " -0.01 0.01"})
+        text += std::string("v ") + x + yz + "\n";
+    return text + "f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
+  }
+  test::ProgramRun drape(std::vector<std::string> options) const {
+    options.insert(options.begin(), {"drape", "tube.yaml"});
+    return test::run_program(options, here_.path());
+  }
+};
+
+TEST_F(DrapeGarmentVerb, SewsAPatternAroundABody) {
+  const test::ProgramRun sewn = drape({"--body", "bar.obj", "--spacing", "15mm"});
+
+  ASSERT_EQ(sewn.exit_code, 0) << sewn.error;
+  EXPECT_THAT(sewn.out, HasSubstr("tube: 2 panels, 2 seams, 2 g; at rest"));
+  EXPECT_THAT(test::names_in(here_.path() / "tube.drape"),
+              ElementsAre(".clothfit", "body.obj", "garment.csv", "garment.json", "garment.obj"));
+  std::ifstream file(here_.path() / "tube.drape" / "garment.json");
+  const nlohmann::json result = nlohmann::json::parse(file);
+  EXPECT_EQ(result.at("particles_inside_body"), 0);
+  EXPECT_LE(result.at("imbalance").get<double>(), 1e-3);
+  // The stiff tube rests on the bar as a ring of 19 mm radius would.
+  const SurfaceMesh garment = read_obj(here_.path() / "tube.drape" / "garment.obj");
+  EXPECT_EQ(garment.vertex_m.cols(), result.at("levels").back().at("particles"));
+  EXPECT_NEAR(garment.vertex_m.row(2).maxCoeff(), 0.0146, 0.001);
+  EXPECT_NEAR(garment.vertex_m.row(2).minCoeff(), -0.0285, 0.001);
+}
+
+TEST_F(DrapeGarmentVerb, DrapesTheBundledSkirtOnTheMannequin) {
+  const test::ProgramRun sewn =
+      test::run_program({"drape", CLOTHFIT_SOURCE_DIR "/data/patterns/skirt.yaml", "--spacing",
+                         "40mm", "--tolerance", "0.01"},
+                        here_.path());
+
+  ASSERT_EQ(sewn.exit_code, 0) << sewn.error;
+  EXPECT_THAT(sewn.out, HasSubstr("skirt: 2 panels, 6 seams, 88 g"));
+  // It hangs from the waist, which its narrow top keeps above the hips, and is 58 cm long.
+  const SurfaceMesh garment = read_obj(here_.path() / "skirt.drape" / "garment.obj");
+  const double top_m = garment.vertex_m.row(2).maxCoeff();
+  EXPECT_NEAR(top_m, 1.04, 0.04);
+  EXPECT_NEAR(top_m - garment.vertex_m.row(2).minCoeff(), 0.58, 0.03);
+}
+
+TEST_F(DrapeGarmentVerb, RefusesAndLeavesNothing) {
+  const std::vector<std::string> before = test::names_in(here_.path());
+  const auto expect = [&](int exit_code, const std::vector<std::string>& options,
+                          const std::string& words) {
+    const test::ProgramRun refused = drape(options);
+    EXPECT_EQ(refused.exit_code, exit_code) << refused.error;
+    EXPECT_THAT(refused.error, HasSubstr(words));
+    EXPECT_EQ(test::names_in(here_.path()), before);
+  };
+  expect(3, {"--body", "bar.obj", "--spacing", "1mm", "--hold-off", "1m"}, "--hold-off: it is 1;");
+  expect(3, {"--body", "twill.yaml"}, "twill.yaml");
+  expect(3, {"--body", "bar.obj", "--fabric", "none.yaml"}, "none.yaml");
+  expect(3, {"--test", "shear", "--fabric", "twill.yaml"}, "a pattern and a --test");
+  std::ofstream(here_.path() / "bar.obj") << bar().substr(0, bar().rfind("f 4"));
+  expect(3, {"--body", "bar.obj"}, "bar.obj: 4 of its edges belong to one triangle alone");
+  std::ofstream(here_.path() / "bar.obj") << bar() << "v 0 0 172\n";
+  expect(3, {"--body", "bar.obj"}, "bar.obj: it spans 172 m; a body in metres");
+  std::ofstream(here_.path() / "bar.obj") << bar();
+  std::ofstream(here_.path() / "tube.yaml") << tube("-10");
+  expect(3, {"--body", "bar.obj"}, "tube.yaml:6: panel upper: its outline runs clockwise");
+}
+
 TEST_F(DrapeVerb, RefusesWhatIsNoTestOrNoFabric) {
   const auto expect_refused = [&](const std::vector<std::string>& options,
                                   const std::string& words) {

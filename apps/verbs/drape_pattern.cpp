@@ -1,0 +1,208 @@
+#include "apps/verbs/drape_pattern.h"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <chrono>
+#include <nlohmann/json.hpp>
+
+#include "apps/terminal/csv_table.h"
+#include "apps/terminal/exit_code.h"
+#include "apps/terminal/interrupt.h"
+#include "apps/terminal/json_file.h"
+#include "apps/terminal/number_text.h"
+#include "apps/terminal/progress_line.h"
+#include "apps/terminal/result_folder.h"
+#include "apps/terminal/say.h"
+#include "apps/terminal/text_table.h"
+#include "apps/verbs/measured_sheet.h"
+#include "data/fabric_sheet.h"
+#include "data/input_error.h"
+#include "data/obj_mesh.h"
+#include "data/pattern_file.h"
+#include "model/garment/mannequin.h"
+#include "model/rest/equilibrium.h"
+
+namespace clothfit {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+std::vector<FabricSheet> sheets_of(const Pattern& pattern, const fs::path& fabric) {
+  std::vector<FabricSheet> sheets;
+  for (size_t n = 0; n < pattern.fabrics.size(); ++n) {
+    const fs::path& file = fabric.empty() ? pattern.fabric_files[n] : fabric;
+    if (file.empty())
+      throw InputError(pattern.file,
+                       fmt::format("it names no data sheet of {}", pattern.fabrics[n]),
+                       "a data sheet of each fabric",
+                       "name one for all with --fabric, such as data/fabrics/shirting.yaml");
+    sheets.push_back(read_fabric_sheet(file));
+  }
+  return sheets;
+}
+
+TriangleMesh read_body(const fs::path& file) {
+  if (file.empty()) return make_mannequin();
+  SurfaceMesh mesh = read_obj(file);
+  const double span_m =
+      (mesh.vertex_m.rowwise().maxCoeff() - mesh.vertex_m.rowwise().minCoeff()).maxCoeff();
+  if (constexpr double kLargestBody_m = 10; span_m > kLargestBody_m)
+    throw InputError(file.string(), fmt::format("it spans {:.4g} m", span_m),
+                     fmt::format("a body in metres, {:g} at most", kLargestBody_m),
+                     "scale it, by 0.01 from centimetres, 0.001 from millimetres");
+  return {.vertex_m = std::move(mesh.vertex_m), .triangle = std::move(mesh.triangle)};
+}
+
+std::string seam_text(const Pattern& pattern, int seam) {
+  const auto& [one, other] = pattern.seams[static_cast<size_t>(seam)].sides;
+  return fmt::format("the seam of {} and {}", pattern.panels[static_cast<size_t>(one.panel)].name,
+                     pattern.panels[static_cast<size_t>(other.panel)].name);
+}
+
+/// Returns the surface of a garment: vertices that a seam joins are one. Triangles that a seam has
+/// drawn to a line are left out.
+SurfaceMesh sewn_surface(const GarmentDrape& drape) {
+  const GarmentMesh& mesh = drape.mesh;
+  SurfaceMesh surface;
+  surface.vertex_m.resize(3, mesh.particles);
+  for (size_t v = 0; v < mesh.particle_of.size(); ++v)
+    surface.vertex_m.col(mesh.particle_of[v]) = drape.position_m.col(static_cast<Eigen::Index>(v));
+  std::vector<Eigen::Vector3i> triangles;
+  const Eigen::Matrix3Xi all = mesh.cloth.triangles();
+  for (const auto& corners : all.colwise()) {
+    Eigen::Vector3i of;
+    for (int k = 0; k < 3; ++k) of[k] = mesh.particle_of[static_cast<size_t>(corners[k])];
+    if (of[0] != of[1] && of[1] != of[2] && of[2] != of[0]) triangles.push_back(of);
+  }
+  surface.triangle.resize(3, static_cast<Eigen::Index>(triangles.size()));
+  for (size_t t = 0; t < triangles.size(); ++t)
+    surface.triangle.col(static_cast<Eigen::Index>(t)) = triangles[t];
+  return surface;
+}
+
+GarmentDrape drape_with_progress(const Pattern& pattern, const std::vector<FabricSheet>& sheets,
+                                 const Obstacle& body, const fs::path& body_file,
+                                 GarmentOptions options) {
+  std::vector<MeasuredFabric> fabrics;
+  for (const FabricSheet& sheet : sheets) fabrics.push_back(measured(sheet));
+  ProgressLine line;
+  const ProgressCallback progress = watch(line);
+  options.go_on = [&](const GarmentProgress& now) {
+    return progress(
+        {.stage =
+             fmt::format("{} at {:g} mm", now.sewing ? "sewing" : "draping", 1e3 * now.spacing_m),
+         .done = static_cast<double>(now.iteration),
+         .total = 0,
+         .unit = "steps",
+         .note = now.sewing ? fmt::format("widest gap {:.1f} mm", 1e3 * now.widest_gap_m)
+                            : fmt::format("imbalance {:.2g} of the weight", now.imbalance)});
+  };
+  try {
+    return drape_garment(pattern, fabrics, &body, options);
+  } catch (const InputError& error) {
+    if (error.where() != "body") throw;
+    throw InputError(body_file.string(), error.problem(), error.expected(), error.remedy());
+  }
+}
+
+/// Throws unless the garment came to rest.
+void require_rest(const Pattern& pattern, const GarmentDrape& drape,
+                  const GarmentOptions& options) {
+  switch (drape.state) {
+    case GarmentState::at_rest:
+      return;
+    case GarmentState::cancelled:
+      throw Cancelled();
+    case GarmentState::not_sewn:
+      throw NoResult(fmt::format(
+          "{} stays open by {:.1f} mm, however hard its thread pulls: a panel caught on the wrong "
+          "side of the body, or a garment too tight for it; place the panels so that nothing lies "
+          "between the sides of a seam",
+          seam_text(pattern, drape.widest_seam), 1e3 * drape.widest_gap_m));
+    case GarmentState::inside_body:
+      throw NoResult(fmt::format(
+          "{} of {} particles end inside the body, the deepest by {:.1f} mm: the garment is too "
+          "tight for it, or parts of the body thinner than a centimetre came through; give "
+          "the garment more width, or place its panels so that they close around the body",
+          drape.inside, drape.levels.back().particles, 1e3 * drape.deepest_m));
+    case GarmentState::not_at_rest:
+      throw NoResult(fmt::format(
+          "the garment found no rest within {} steps on a mesh of {:g} mm: {}, residual force "
+          "{:.2g} "
+          "of the weight; it may be sliding off the body (there is no friction), or try a larger "
+          "--tolerance or --spacing",
+          options.most_iterations, 1e3 * drape.mesh.cloth.spacing_m,
+          describe(drape.levels.back().work.reason), drape.imbalance));
+  }
+}
+
+Table levels_table(const GarmentDrape& drape) {
+  Table table;
+  table.header = {"spacing, mm", "particles",         "triangles", "steps",
+                  "energy, J",   "residual force, N", "state"};
+  for (const GarmentLevel& level : drape.levels)
+    table.rows.push_back({fmt::format("{:g}", 1e3 * level.spacing_m),
+                          fmt::format("{}", level.particles), fmt::format("{}", level.triangles),
+                          fmt::format("{}", level.work.iterations),
+                          significant(level.work.energy_j, 5),
+                          significant(level.work.gradient_n, 2), describe(level.work.reason)});
+  return table;
+}
+
+}  // namespace
+
+int drape_pattern(const PatternRequest& request, const std::string& command) {
+  const Pattern pattern = read_pattern(request.pattern);
+  const std::vector<FabricSheet> sheets = sheets_of(pattern, request.fabric);
+  const TriangleMesh body_mesh = read_body(request.body);
+  std::vector<fs::path> inputs{request.pattern};
+  for (const fs::path& file : {request.body, request.fabric})
+    if (!file.empty()) inputs.push_back(file);
+  ResultFolder out(out_folder(request.out, request.pattern.stem().string() + ".drape"), inputs);
+  const Obstacle body(body_mesh);
+  const GarmentDrape drape =
+      drape_with_progress(pattern, sheets, body, request.body, request.options);
+  require_rest(pattern, drape, request.options);
+
+  const Table table = levels_table(drape);
+  const std::vector<std::string> notes{"contact of the cloth with itself is not looked for",
+                                       "the body acts without friction"};
+  Json json{{"format", "clothfit-garment/1"},
+            {"command", command},
+            {"pattern", pattern.name},
+            {"panels", pattern.panels.size()},
+            {"seams", pattern.seams.size()},
+            {"fabrics", Json::array()},
+            {"weight_n", drape.weight_n},
+            {"imbalance", drape.imbalance},
+            {"particles_inside_body", drape.inside},
+            {"widest_gap_when_sewn_m", drape.widest_gap_m},
+            {"levels", Json::array()},
+            {"notes", notes}};
+  for (const FabricSheet& sheet : sheets) json["fabrics"].push_back(sheet.name);
+  for (const GarmentLevel& level : drape.levels)
+    json["levels"].push_back({{"spacing_m", level.spacing_m},
+                              {"particles", level.particles},
+                              {"triangles", level.triangles},
+                              {"steps", level.work.iterations},
+                              {"energy_j", level.work.energy_j},
+                              {"residual_force_n", level.work.gradient_n},
+                              {"state", describe(level.work.reason)}});
+  write_json(json, out.path() / "garment.json");
+  write_csv_table(table, out.path() / "garment.csv");
+  write_obj(sewn_surface(drape), out.path() / "garment.obj");
+  write_obj({.vertex_m = body_mesh.vertex_m, .triangle = body_mesh.triangle},
+            out.path() / "body.obj");
+  out.publish();
+
+  say("\n{}: {} panels, {} seams, {:.0f} g; at rest to {:.2g} of its weight\n\n{}", pattern.name,
+      pattern.panels.size(), pattern.seams.size(), 1e3 * drape.weight_n / kGravity_m_per_s2,
+      drape.imbalance, text_table(table));
+  for (const std::string& note : notes) say("\nNote: {}.\n", note);
+  say("\nResult: {}\n", shown_path(out.final_path() / "garment.obj"));
+  return kExitGood;
+}
+
+}  // namespace clothfit
