@@ -72,14 +72,23 @@ PatternEdge curve_of(const JsonValue& json, const Eigen::Vector2d& from_m,
   return edge;
 }
 
-/// Returns twice the area inside a polygon, < 0 where it runs clockwise.
-double twice_area(const Eigen::Matrix2Xd& corner) {
-  double twice = 0;
-  for (Eigen::Index k = 0; k < corner.cols(); ++k) {
-    const Eigen::Index next = (k + 1) % corner.cols();
-    twice += corner(0, k) * corner(1, next) - corner(1, k) * corner(0, next);
+/// Returns twice the area inside a panel, < 0 where its outline runs clockwise; curves count as
+/// chords.
+double twice_area_m2(const Panel& panel) {
+  constexpr int kChords = 16;
+  double twice_m2 = 0;
+  Eigen::Vector2d last = panel.corner_m.col(0);
+  for (int k = 0; k < panel.edge_count(); ++k) {
+    const Eigen::Vector2d from = panel.corner_m.col(k),
+                          to = panel.corner_m.col((k + 1) % panel.corner_m.cols());
+    for (int n = 1; n <= kChords; ++n) {
+      const Eigen::Vector2d next = edge_point_m(from, panel.edges[static_cast<size_t>(k)], to,
+                                                static_cast<double>(n) / kChords);
+      twice_m2 += last.x() * next.y() - last.y() * next.x();
+      last = next;
+    }
   }
-  return twice;
+  return twice_m2;
 }
 
 Eigen::Isometry3d placement_of(const JsonValue& json, double unit_m) {
@@ -143,7 +152,7 @@ Panel panel_of(const JsonValue& json, const std::string& name, double unit_m) {
                               : PatternEdge());
   }
   panel.placement = placement_of(json, unit_m);
-  if (twice_area(panel.corner_m) < 0) turn_over(panel);
+  if (twice_area_m2(panel) < 0) turn_over(panel);
   return panel;
 }
 

@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <array>
+#include <cmath>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -16,6 +17,28 @@ struct PatternEdge {
   /// for what is no arc.
   double bulge = 0;
 };
+
+/// Returns the point of an edge at the parameter t from 0 to 1, not evenly along a curve.
+inline Eigen::Vector2d edge_point_m(const Eigen::Vector2d& from_m, const PatternEdge& edge,
+                                    const Eigen::Vector2d& to_m, double t) {
+  const double u = 1 - t;
+  if (edge.bulge != 0) {
+    // The chord to t, turned and shortened from the whole one: exact for the flattest arcs too.
+    const double half_angle = 2 * std::atan(edge.bulge);
+    const Eigen::Rotation2Dd turn(-u * half_angle);
+    return from_m +
+           std::sin(t * half_angle) / std::sin(half_angle) * (turn * (to_m - from_m).eval());
+  }
+  switch (edge.control_m.size()) {
+    case 0:
+      return u * from_m + t * to_m;
+    case 1:
+      return u * u * from_m + 2 * u * t * edge.control_m[0] + t * t * to_m;
+    default:
+      return u * u * u * from_m + 3 * u * u * t * edge.control_m[0] +
+             3 * u * t * t * edge.control_m[1] + t * t * t * to_m;
+  }
+}
 
 /// A flat piece of cloth as it is cut.
 struct Panel {

@@ -1,7 +1,6 @@
 #include "apps/verbs/drape_pattern.h"
 
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 
 #include <chrono>
 #include <nlohmann/json.hpp>
@@ -89,6 +88,7 @@ GarmentDrape drape_with_progress(const Pattern& pattern, const std::vector<Fabri
   for (const FabricSheet& sheet : sheets) fabrics.push_back(measured(sheet));
   ProgressLine line;
   const ProgressCallback progress = watch(line);
+  options.coarsest_m = std::max(options.coarsest_m, options.spacing_m);
   options.go_on = [&](const GarmentProgress& now) {
     return progress(
         {.stage =
@@ -123,10 +123,11 @@ void require_rest(const Pattern& pattern, const GarmentDrape& drape,
           seam_text(pattern, drape.widest_seam), 1e3 * drape.widest_gap_m));
     case GarmentState::inside_body:
       throw NoResult(fmt::format(
-          "{} of {} particles end inside the body, the deepest by {:.1f} mm: the garment is too "
+          "{} places of the cloth end inside the body, the deepest by {:.1f} mm: the garment is "
+          "too "
           "tight for it, or parts of the body thinner than a centimetre came through; give "
           "the garment more width, or place its panels so that they close around the body",
-          drape.inside, drape.levels.back().particles, 1e3 * drape.deepest_m));
+          drape.inside, 1e3 * drape.deepest_m));
     case GarmentState::not_at_rest:
       throw NoResult(fmt::format(
           "the garment found no rest within {} steps on a mesh of {:g} mm: {}, residual force "
@@ -160,6 +161,8 @@ int drape_pattern(const PatternRequest& request, const std::string& command) {
   std::vector<fs::path> inputs{request.pattern};
   for (const fs::path& file : {request.body, request.fabric})
     if (!file.empty()) inputs.push_back(file);
+  if (request.fabric.empty())
+    inputs.insert(inputs.end(), pattern.fabric_files.begin(), pattern.fabric_files.end());
   ResultFolder out(out_folder(request.out, request.pattern.stem().string() + ".drape"), inputs);
   const Obstacle body(body_mesh);
   const GarmentDrape drape =
@@ -177,7 +180,7 @@ int drape_pattern(const PatternRequest& request, const std::string& command) {
             {"fabrics", Json::array()},
             {"weight_n", drape.weight_n},
             {"imbalance", drape.imbalance},
-            {"particles_inside_body", drape.inside},
+            {"places_inside_body", drape.inside},
             {"widest_gap_when_sewn_m", drape.widest_gap_m},
             {"levels", Json::array()},
             {"notes", notes}};

@@ -1,5 +1,4 @@
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <cmath>
@@ -259,7 +258,15 @@ int run_test(const DrapeVerbOptions& options, const std::string& command) {
   return kExitGood;
 }
 
-int run_drape(DrapeVerbOptions options, const std::string& command) {
+/// Refuses options that the request has no use for.
+void refuse_given(const Verb& verb, const std::vector<std::string>& names,
+                  const std::string& what) {
+  for (const std::string& name : names)
+    if (verb.is_given(name)) throw InputError(name, "is given with " + what, "none of it there");
+}
+
+int run_drape(DrapeVerbOptions options, const Verb& verb) {
+  const std::string command = verb.command_text();
   if (options.test.empty() == options.garment.pattern.empty())
     throw InputError("drape",
                      options.test.empty() ? "no pattern and no --test" : "a pattern and a --test",
@@ -267,13 +274,16 @@ int run_drape(DrapeVerbOptions options, const std::string& command) {
                      "clothfit drape data/patterns/skirt.yaml, or clothfit drape --test cusick "
                      "--fabric data/fabrics/shirting.yaml");
   if (options.test.empty()) {
+    refuse_given(verb, {"--specimen", "--disc", "--starts", "--seed"}, "a pattern");
     require_threads(options.threads);
     const ThreadLimit limit(options.threads);
     options.garment.fabric = options.fabric;
     options.garment.out = options.out;
-    options.garment.options.spacing_m = options.spacing_m.value_or(options.garment.options.spacing_m);
+    options.garment.options.spacing_m =
+        options.spacing_m.value_or(options.garment.options.spacing_m);
     return drape_pattern(options.garment, command);
   }
+  refuse_given(verb, {"--body", "--hold-off", "--tolerance"}, "--test");
   if (options.fabric.empty())
     throw InputError("--fabric", "is missing", "the data sheet of the fabric to test");
   options.cusick.spacing_m = options.spacing_m.value_or(options.cusick.spacing_m);
@@ -327,7 +337,7 @@ void add_drape_verb(Verb program) {
   verb.footer(
       "Examples:\n  clothfit drape data/patterns/skirt.yaml\n"
       "  clothfit drape --test cusick --fabric data/fabrics/shirting.yaml");
-  verb.runs([options, verb] { return run_drape(*options, verb.command_text()); });
+  verb.runs([options, verb] { return run_drape(*options, verb); });
 }
 
 }  // namespace clothfit

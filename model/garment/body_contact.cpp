@@ -75,4 +75,17 @@ void BodyContact::add_second_derivative(const Eigen::Matrix3Xd& position_m,
   }
 }
 
+Inside BodyContact::inside(const Eigen::Matrix3Xd& position_m) const {
+  Inside found;
+  for (const ContactPoint& point : points_) {
+    const auto near = body_.distance(point.place_m(position_m), kDeepestInBody_m);
+    if (!near || near->distance_m >= 0) continue;
+    ++found.places;
+    if (-near->distance_m <= found.deepest_m) continue;
+    found.deepest_m = -near->distance_m;
+    found.point = point.point[0];
+  }
+  return found;
+}
+
 }  // namespace clothfit

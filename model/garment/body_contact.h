@@ -28,6 +28,13 @@ struct ContactPoint {
   }
 };
 
+/// Places of the cloth that lie inside a body.
+struct Inside {
+  int places = 0;
+  double deepest_m = 0;
+  int point = -1;  ///< of the mesh, nearest to the deepest place
+};
+
 /// The pressure of a body on cloth. It grows from nothing at the hold-off distance delta
 /// [lethanh2007, section 5] to more than any garment's at the skin:
 ///
@@ -35,7 +42,7 @@ struct ContactPoint {
 ///
 /// with p0 = 1 Pa. Beneath the skin the pressure goes on along its tangent, so that points which
 /// begin there are pushed out. Cloth that lies on a shoulder keeps 0.9 delta from it, tight cloth
-/// (170 Pa) half. The pressure acts without friction.
+/// (170 Pa) 0.57. The pressure acts without friction.
 class BodyContact {
  public:
   /// `body` must outlive this.
@@ -48,6 +55,7 @@ class BodyContact {
   /// negative, is left out.
   void add_second_derivative(const Eigen::Matrix3Xd& position_m,
                              std::vector<Eigen::Matrix3d>& blocks) const;
+  Inside inside(const Eigen::Matrix3Xd& position_m) const;
 
  private:
   std::optional<Obstacle::Distance> touched(size_t point, const Eigen::Vector3d& place_m) const;

@@ -44,7 +44,7 @@ class GarmentDraping {
 
   GarmentDrape run() {
     GarmentDrape result;
-    result.mesh = mesh_garment(pattern_, spacings_m_.front());
+    mesh_coarsest(result);
     result.position_m = result.mesh.placed_m;
     check_start(result);
     if (!sew(result)) return result;
@@ -57,24 +57,32 @@ class GarmentDraping {
   }
 
  private:
+  /// Meshes the pattern at the coarsest spacing that its panels bear.
+  void mesh_coarsest(GarmentDrape& result) {
+    for (;; spacings_m_.erase(spacings_m_.begin())) {
+      try {
+        result.mesh = mesh_garment(pattern_, spacings_m_.front());
+        return;
+      } catch (const InputError&) {
+        if (spacings_m_.size() == 1) throw;
+      }
+    }
+  }
+
   void check_start(const GarmentDrape& result) const {
     if (!body_) return;
-    double deepest_m = 0;
-    Eigen::Index at = 0;
-    for (Eigen::Index v = 0; v < result.position_m.cols(); ++v) {
-      const auto near = body_->distance(result.position_m.col(v), kDeepestInBody_m);
-      if (!near || near->distance_m >= -deepest_m) continue;
-      deepest_m = -near->distance_m;
-      at = v;
-    }
-    if (deepest_m == 0) return;
+    GarmentEnergy energy(result.mesh, fabrics_, GarmentEnergy::Seams::open);
+    energy.set_body(*body_, options_.hold_off_m);
+    const Inside inside = energy.inside_body(result.position_m);
+    if (inside.places == 0) return;
     const Panel& panel =
-        pattern_.panels[static_cast<size_t>(result.mesh.panel_of[static_cast<size_t>(at)])];
-    const Eigen::Vector3d place_m = result.position_m.col(at);
+        pattern_
+            .panels[static_cast<size_t>(result.mesh.panel_of[static_cast<size_t>(inside.point)])];
+    const Eigen::Vector3d place_m = result.position_m.col(inside.point);
     throw InputError("panels." + panel.name,
-                     fmt::format("it begins inside the body, {:.0f} mm deep at ({:.3f}, {:.3f}, "
+                     fmt::format("it begins inside the body, {:.0f} mm deep near ({:.3f}, {:.3f}, "
                                  "{:.3f}) m",
-                                 1e3 * deepest_m, place_m.x(), place_m.y(), place_m.z()),
+                                 1e3 * inside.deepest_m, place_m.x(), place_m.y(), place_m.z()),
                      "panels that wait beside the body", "move its placement outwards");
   }
 
@@ -117,12 +125,14 @@ class GarmentDraping {
     energy.set_gravity(Eigen::Vector3d::Zero());
     const std::vector<bool> held(static_cast<size_t>(energy.points()), false);
     measure_gaps(result);
-    for (double thread_n_per_m2 = kFirstThread_n_per_m2; result.widest_gap_m > kClosed_m;
-         thread_n_per_m2 *= kThreadGrowth) {
-      if (thread_n_per_m2 > kLastThread_n_per_m2) {
+    double thread_n_per_m2 = kFirstThread_n_per_m2;
+    for (bool is_last = false; !(result.widest_gap_m <= kClosed_m);
+         thread_n_per_m2 = std::min(kThreadGrowth * thread_n_per_m2, kLastThread_n_per_m2)) {
+      if (is_last) {
         result.state = GarmentState::not_sewn;
         return false;
       }
+      is_last = thread_n_per_m2 == kLastThread_n_per_m2;
       energy.set_thread(thread_n_per_m2);
       GarmentProgress progress;
       progress.sewing = true;
@@ -160,23 +170,13 @@ class GarmentDraping {
     result.imbalance = work.gradient_n / result.weight_n;
     result.levels.push_back({result.mesh.cloth.spacing_m, energy.points(),
                              static_cast<int>(result.mesh.cloth.triangles().cols()), work});
-    count_inside(particle_m, result);
+    const Inside inside = energy.inside_body(particle_m);
+    result.inside = inside.places;
+    result.deepest_m = inside.deepest_m;
     result.state = cancelled_                                 ? GarmentState::cancelled
                    : result.inside > 0                        ? GarmentState::inside_body
                    : work.reason == MinimiseReason::converged ? GarmentState::at_rest
                                                               : GarmentState::not_at_rest;
-  }
-
-  void count_inside(const Eigen::Matrix3Xd& particle_m, GarmentDrape& result) const {
-    result.inside = 0;
-    result.deepest_m = 0;
-    if (!body_) return;
-    for (const auto& particle : particle_m.colwise()) {
-      const auto near = body_->distance(particle, kDeepestInBody_m);
-      if (!near || near->distance_m >= 0) continue;
-      ++result.inside;
-      result.deepest_m = std::max(result.deepest_m, -near->distance_m);
-    }
   }
 
   const Pattern& pattern_;
@@ -192,7 +192,7 @@ void check_size(const Pattern& pattern, double spacing_m) {
   for (const Panel& panel : pattern.panels) {
     particles += panel_area_m2(panel) / (spacing_m * spacing_m);
     for (int edge = 0; edge < panel.edge_count(); ++edge)
-      particles += edge_length_m(panel, edge) / spacing_m;
+      particles += std::ceil(edge_length_m(panel, edge) / spacing_m);
   }
   if (particles > kMostParticles)
     throw InputError("GarmentOptions::spacing_m",
@@ -203,9 +203,11 @@ void check_size(const Pattern& pattern, double spacing_m) {
 void check_body(const Obstacle& body) {
   if (body.open_edges() > 0)
     throw InputError("body",
-                     fmt::format("{} of its edges belong to one triangle alone", body.open_edges()),
+                     fmt::format("{} of its edges do not lie between two triangles that face the "
+                                 "same way",
+                                 body.open_edges()),
                      "a closed surface", "close its holes in a program for meshes");
-  if (body.volume_m3() < 0)
+  if (!(body.volume_m3() > 0))
     throw InputError("body", fmt::format("its volume is {:.3g} m3", body.volume_m3()),
                      "triangles counterclockwise as seen from outside", "turn its faces round");
 }
@@ -232,6 +234,9 @@ GarmentDrape drape_garment(const Pattern& pattern, const std::vector<MeasuredFab
   options.validate();
   check_pattern(pattern);
   check_size(pattern, options.spacing_m);
+  if (fabrics.size() != pattern.fabrics.size())
+    throw InputError("fabrics", fmt::format("{} are given", fabrics.size()),
+                     fmt::format("the {} of the pattern", pattern.fabrics.size()));
   if (body) check_body(*body);
   return GarmentDraping(pattern, fabrics, body, options).run();
 }

@@ -42,7 +42,7 @@ enum class GarmentState {
   at_rest,
   not_at_rest,  ///< the finest mesh ran out of iterations, or no step lowers its energy
   not_sewn,     ///< a seam stays open: `widest_gap_m`, of `widest_seam`
-  inside_body,  ///< `inside` particles: too tight a garment, or a body that passed through it
+  inside_body,  ///< `inside` places: too tight a garment, or a body that passed through it
   cancelled
 };
 
@@ -55,7 +55,7 @@ struct GarmentDrape {
   int widest_seam = -1;
   double imbalance = 0;  ///< as a share of the weight
   double weight_n = 0;
-  int inside = 0;        ///< particles beneath the body's surface
+  int inside = 0;        ///< places of the cloth beneath the body's surface
   double deepest_m = 0;  ///< of them
   bool usable() const { return state == GarmentState::at_rest; }
 };

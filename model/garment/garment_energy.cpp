@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numeric>
 
 #include "model/garment/seam_bending.h"
@@ -38,6 +39,23 @@ std::vector<std::vector<double>> middles_of_square(int parts) {
   return middles;
 }
 
+/// Makes one of the points that are single points of the mesh, of all their cells.
+std::vector<ContactPoint> merged(const std::vector<ContactPoint>& points) {
+  std::vector<ContactPoint> result;
+  std::map<int, size_t> single;
+  for (const ContactPoint& point : points) {
+    if (point.count == 1) {
+      const auto [at, is_new] = single.emplace(point.point[0], result.size());
+      if (!is_new) {
+        result[at->second].area_m2 += point.area_m2;
+        continue;
+      }
+    }
+    result.push_back(point);
+  }
+  return result;
+}
+
 }  // namespace
 
 GarmentEnergy::GarmentEnergy(const GarmentMesh& mesh, const std::vector<MeasuredFabric>& fabrics,
@@ -56,17 +74,11 @@ GarmentEnergy::GarmentEnergy(const GarmentMesh& mesh, const std::vector<Measured
 }
 
 void GarmentEnergy::add_threads() {
-  for (const auto& seam : mesh_.seams)
-    for (size_t k = 0; k < seam.size(); ++k) {
-      const auto [a, b] = seam[k];
+  for (size_t n = 0; n < mesh_.seams.size(); ++n)
+    for (size_t k = 0; k < mesh_.seams[n].size(); ++k) {
+      const auto [a, b] = mesh_.seams[n][k];
       if (a == b) continue;  // the tip of a dart
-      const auto step_m = [&](size_t n) {
-        return (mesh_.cloth.material_m.col(seam[n + 1][0]) - mesh_.cloth.material_m.col(seam[n][0]))
-            .norm();
-      };
-      const double before_m = k > 0 ? step_m(k - 1) : 0,
-                   after_m = k + 1 < seam.size() ? step_m(k) : 0;
-      threads_.push_back({.a = a, .b = b, .length_m = 0.5 * (before_m + after_m), .block = {}});
+      threads_.push_back({.a = a, .b = b, .length_m = mesh_.seam_length_m[n][k], .block = {}});
     }
 }
 
@@ -113,20 +125,29 @@ void GarmentEnergy::add_contact_point(const std::vector<int>& vertices,
 
 std::vector<ContactPoint> GarmentEnergy::contact_points() const {
   constexpr double kFarthest_m = 0.01;
-  const int parts = static_cast<int>(std::ceil(mesh_.cloth.spacing_m / kFarthest_m - 1e-6));
-  // Vertices and inner points of a cell share its area as if each stood for as much.
-  const double of_vertices = 1.0 / (1 + parts * parts);
-  const auto of_triangle = middles_of_triangle(parts), of_square = middles_of_square(parts);
   std::vector<ContactPoint> points;
-  for (int v = 0; v < mesh_.cloth.vertex_count(); ++v)
-    add_contact_point({v}, {1}, of_vertices * mesh_.cloth.area_m2[v], points);
   for (const ClothCell& cell : mesh_.cloth.cells) {
     const std::vector<int> vertices(cell.vertex.begin(), cell.vertex.begin() + cell.corners);
-    const double area_m2 = (1 - of_vertices) * cell.area_m2 / (parts * parts);
-    for (const std::vector<double>& weights : cell.corners == 3 ? of_triangle : of_square)
+    double longest_m = 0;
+    for (size_t k = 0; k < vertices.size(); ++k)
+      longest_m =
+          std::max(longest_m, (mesh_.cloth.material_m.col(vertices[k]) -
+                               mesh_.cloth.material_m.col(vertices[(k + 1) % vertices.size()]))
+                                  .norm());
+    const int parts = std::max(1, static_cast<int>(std::ceil(longest_m / kFarthest_m - 1e-6)));
+    // Corners and inner points share the cell's area as if the corners stood for one part of it.
+    const double area_m2 = cell.area_m2 / (1 + parts * parts);
+    for (const int v : vertices)
+      add_contact_point({v}, {1}, area_m2 / static_cast<double>(vertices.size()), points);
+    for (const std::vector<double>& weights :
+         cell.corners == 3 ? middles_of_triangle(parts) : middles_of_square(parts))
       add_contact_point(vertices, weights, area_m2, points);
   }
-  return points;
+  return merged(points);
+}
+
+Inside GarmentEnergy::inside_body(const Eigen::Matrix3Xd& position_m) const {
+  return contact_ ? contact_->inside(position_m) : Inside();
 }
 
 void GarmentEnergy::set_body(const Obstacle& body, double hold_off_m) {

@@ -39,6 +39,9 @@ class GarmentEnergy : public BlockEnergy {
   void second_derivative(const Eigen::Matrix3Xd& position_m, Curvature curvature,
                          std::vector<Eigen::Matrix3d>& blocks) const override;
 
+  /// Returns how much of the cloth lies inside the body, at the places on which it presses.
+  Inside inside_body(const Eigen::Matrix3Xd& position_m) const;
+
   /// Returns the positions of the vertices, 3 x vertices, and those of the particles: means.
   Eigen::Matrix3Xd vertices_m(const Eigen::Matrix3Xd& particle_m) const;
   Eigen::Matrix3Xd particles_m(const Eigen::Matrix3Xd& vertex_m) const;

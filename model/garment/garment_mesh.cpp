@@ -1,5 +1,7 @@
 #include "model/garment/garment_mesh.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -62,29 +64,56 @@ class SideLine {
   std::vector<double> begins_m_{0};
 };
 
-/// Returns the shares of both sides at which vertices meet. Corners of one side meet a corner of
-/// the other where that is nearer than half a spacing.
-std::vector<std::array<double, 2>> meeting_shares(const SideLine& one, const SideLine& other,
-                                                  double spacing_m) {
-  const double longer_m = std::max(one.length_m(), other.length_m());
-  std::vector<std::array<double, 2>> fixed{{0, 0}};
-  const std::vector<double> ones = one.corner_shares(), others = other.corner_shares();
-  for (size_t a = 0, b = 0; a < ones.size() || b < others.size();) {
-    const double s = a < ones.size() ? ones[a] : 2, t = b < others.size() ? others[b] : 2;
-    const bool meet = std::abs(s - t) * longer_m < 0.5 * spacing_m;
-    fixed.push_back(meet ? std::array{s, t} : std::array{std::min(s, t), std::min(s, t)});
-    if (meet || s < t) ++a;
-    if (meet || t <= s) ++b;
+/// Shares of both sides that meet.
+using Meeting = std::array<double, 2>;
+
+/// Returns where corners of both sides meet: those that are each other's nearest, nearer than half
+/// a spacing, in rising order.
+std::vector<Meeting> meeting_corners(const std::vector<double>& ones,
+                                     const std::vector<double>& others, double nearest) {
+  std::vector<Meeting> meetings{{0, 0}};
+  const auto nearest_in = [](const std::vector<double>& shares, double share) {
+    return *std::ranges::min_element(shares, {}, [&](double of) { return std::abs(of - share); });
+  };
+  for (const double s : ones) {
+    if (others.empty()) break;
+    const double t = nearest_in(others, s);
+    const bool mutual = nearest_in(ones, t) == s && std::abs(s - t) < nearest;
+    if (mutual && s > meetings.back()[0] && t > meetings.back()[1]) meetings.push_back({s, t});
   }
-  fixed.push_back({1, 1});
-  std::vector<std::array<double, 2>> shares;
+  meetings.push_back({1, 1});
+  return meetings;
+}
+
+/// Returns the shares of both sides at which vertices meet. A corner that meets none of the other
+/// side lies between its neighbours that do, at the same share of the way.
+std::vector<Meeting> meeting_shares(const SideLine& one, const SideLine& other, double spacing_m) {
+  const double longer_m = std::max(one.length_m(), other.length_m());
+  const std::vector<double> ones = one.corner_shares(), others = other.corner_shares();
+  const std::vector<Meeting> fixed = meeting_corners(ones, others, 0.5 * spacing_m / longer_m);
+  std::vector<Meeting> corners;
   for (size_t k = 0; k + 1 < fixed.size(); ++k) {
     const auto [s, t] = fixed[k];
     const double by_s = fixed[k + 1][0] - s, by_t = fixed[k + 1][1] - t;
+    std::vector<double> ways{0};  // shares of the way to the next corners that meet
+    for (const double corner : ones)
+      if (corner > s && corner < s + by_s) ways.push_back((corner - s) / by_s);
+    for (const double corner : others)
+      if (corner > t && corner < t + by_t) ways.push_back((corner - t) / by_t);
+    std::ranges::sort(ways);
+    for (size_t n = 0; n < ways.size(); ++n)
+      if (n == 0 || ways[n] > ways[n - 1])
+        corners.push_back({s + ways[n] * by_s, t + ways[n] * by_t});
+  }
+  corners.push_back({1, 1});
+  std::vector<Meeting> shares;
+  for (size_t k = 0; k + 1 < corners.size(); ++k) {
+    const auto [s, t] = corners[k];
+    const double by_s = corners[k + 1][0] - s, by_t = corners[k + 1][1] - t;
     const int parts = parts_of(std::max(by_s * one.length_m(), by_t * other.length_m()), spacing_m);
     for (int part = 0; part < parts; ++part) {
-      const double share = static_cast<double>(part) / parts;
-      shares.push_back({s + share * by_s, t + share * by_t});
+      const double way = static_cast<double>(part) / parts;
+      shares.push_back({s + way * by_s, t + way * by_t});
     }
   }
   shares.push_back({1, 1});
@@ -96,6 +125,7 @@ struct Outlines {
   /// Shares of every edge of every panel at which vertices lie: 0 the first, 1 left out.
   std::vector<std::vector<std::vector<double>>> shares;
   std::vector<std::vector<std::array<EdgePlace, 2>>> seams;
+  std::vector<std::vector<double>> seam_length_m;
 };
 
 Outlines outlines_of(const Pattern& pattern, double spacing_m) {
@@ -107,9 +137,17 @@ Outlines outlines_of(const Pattern& pattern, double spacing_m) {
   }
   for (const Seam& seam : pattern.seams) {
     const SideLine one(pattern, seam.sides[0], false), other(pattern, seam.sides[1], true);
+    const std::vector<Meeting> meetings = meeting_shares(one, other, spacing_m);
     outlines.seams.emplace_back();
-    for (const auto& [s, t] : meeting_shares(one, other, spacing_m))
-      outlines.seams.back().push_back({one.at(s), other.at(t)});
+    outlines.seam_length_m.emplace_back();
+    for (size_t k = 0; k < meetings.size(); ++k) {
+      outlines.seams.back().push_back({one.at(meetings[k][0]), other.at(meetings[k][1])});
+      const Meeting &before = meetings[k > 0 ? k - 1 : 0],
+                    &after = meetings[std::min(k + 1, meetings.size() - 1)];
+      // Half of the way between the neighbours, of the mean of both sides.
+      outlines.seam_length_m.back().push_back(0.25 * ((after[0] - before[0]) * one.length_m() +
+                                                      (after[1] - before[1]) * other.length_m()));
+    }
     for (size_t side = 0; side < 2; ++side) {
       const auto panel = static_cast<size_t>(seam.sides[side].panel);
       for (const int edge : seam.sides[side].edges) sewn[panel][static_cast<size_t>(edge)] = true;
@@ -171,10 +209,6 @@ void add_panel(const ClothMesh& part, ClothMesh& cloth, std::vector<double>& pan
     for (int k = 0; k < cell.corners; ++k) cell.vertex[static_cast<size_t>(k)] += vertices;
     cloth.cells.push_back(cell);
   }
-  for (std::vector<int> loop : part.border) {
-    for (int& v : loop) v += vertices;
-    cloth.border.push_back(std::move(loop));
-  }
 }
 
 /// Returns the outline of a panel, turned so that its warp runs along t, and the number of the
@@ -198,6 +232,15 @@ Eigen::Matrix2Xd outline_of(const Panel& panel, const std::vector<std::vector<do
 ClothMesh mesh_panel(const Panel& panel, const Eigen::Matrix2Xd& border_m, double spacing_m) {
   ClothOutline outline;
   outline.border_m.push_back(border_m);
+  double twice_m2 = 0;
+  for (Eigen::Index k = 0; k < border_m.cols(); ++k) {
+    const Eigen::Vector2d here = border_m.col(k), next = border_m.col((k + 1) % border_m.cols());
+    twice_m2 += here.x() * next.y() - here.y() * next.x();
+  }
+  if (!(twice_m2 > 0))
+    throw InputError("panels." + panel.name,
+                     fmt::format("its outline has no area left at {:g} mm", 1e3 * spacing_m),
+                     "a spacing that its curves bear", "a finer one");
   try {
     return mesh_cloth(outline, spacing_m);
   } catch (const InputError& error) {
@@ -248,6 +291,7 @@ GarmentMesh mesh_garment(const Pattern& pattern, double spacing_m) {
       mesh.seams.back().push_back(vertices);
     }
   }
+  mesh.seam_length_m = outlines.seam_length_m;
   number_particles(mesh);
   return mesh;
 }

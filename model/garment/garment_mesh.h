@@ -19,6 +19,8 @@ struct GarmentMesh {
   std::vector<double> panel_left_m;  ///< by which each panel is moved along s in the flat cloth
   /// Vertices of each seam, both sides' from end to end.
   std::vector<std::vector<std::array<int, 2>>> seams;
+  std::vector<std::vector<double>>
+      seam_length_m;          ///< that each pair stands for, mean of both sides
   Eigen::Matrix3Xd placed_m;  ///< 3 x vertices: where the panels wait around the body
 
   /// Vertices that seams make one have the same number here, the others one of their own: from 0

@@ -169,7 +169,10 @@ void MannequinSize::validate() const {
 
 TriangleMesh make_mannequin(const MannequinSize& size, double spacing_m) {
   size.validate();
-  const double h = size.height_m;
+  if (!(spacing_m >= 2e-3 && spacing_m <= 0.05))
+    throw InputError("spacing_m", fmt::format("it is {:g}", spacing_m), "0.002 to 0.05");
+  // A girth's ellipse is less than half of it wide; arms reach farther than that.
+  const double h = std::max(size.height_m, std::max({size.bust_m, size.waist_m, size.hips_m}));
   return zero_surface(MannequinShape(size), {-0.6 * h, -0.3 * h, -0.05 * h},
                       {0.6 * h, 0.3 * h, 1.05 * h}, spacing_m);
 }

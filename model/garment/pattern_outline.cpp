@@ -18,28 +18,6 @@ bool is_straight(const PatternEdge& edge) {
   return edge.control_m.empty() && edge.bulge == 0;
 }
 
-Eigen::Vector2d curve_m(const Eigen::Vector2d& from, const PatternEdge& edge,
-                        const Eigen::Vector2d& to, double t) {
-  const double u = 1 - t;
-  if (edge.bulge != 0) {
-    // The centre lies on the chord's left, at a distance that is < 0 for more than half a circle.
-    const double angle = 4 * std::atan(edge.bulge);
-    const Eigen::Vector2d half_chord = 0.5 * (to - from),
-                          left = Eigen::Vector2d(-half_chord.y(), half_chord.x());
-    const Eigen::Vector2d centre = from + half_chord + left / std::tan(0.5 * angle);
-    return centre + Eigen::Rotation2Dd(t * angle) * (from - centre);
-  }
-  switch (edge.control_m.size()) {
-    case 0:
-      return u * from + t * to;
-    case 1:
-      return u * u * from + 2 * u * t * edge.control_m[0] + t * t * to;
-    default:
-      return u * u * u * from + 3 * u * u * t * edge.control_m[0] +
-             3 * u * t * t * edge.control_m[1] + t * t * t * to;
-  }
-}
-
 /// The chords of an edge and how far along it each ends.
 struct Chords {
   Eigen::Matrix2Xd point_m;
@@ -52,7 +30,7 @@ struct Chords {
     const int count = is_straight(curve) ? 1 : kChords;
     point_m.resize(2, count + 1);
     for (int k = 0; k <= count; ++k) {
-      point_m.col(k) = curve_m(from, curve, to, static_cast<double>(k) / count);
+      point_m.col(k) = edge_point_m(from, curve, to, static_cast<double>(k) / count);
       along_m.push_back(k == 0 ? 0 : along_m.back() + (point_m.col(k) - point_m.col(k - 1)).norm());
     }
   }
@@ -91,6 +69,16 @@ bool cross_each_other(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const 
   throw InputError(pattern.file.empty() ? "pattern" : pattern.file, problem, expected, remedy);
 }
 
+bool is_finite(const Panel& panel) {
+  bool finite = panel.corner_m.allFinite() && panel.placement.matrix().allFinite() &&
+                std::isfinite(panel.grain_rad);
+  for (const PatternEdge& edge : panel.edges) {
+    finite = finite && std::isfinite(edge.bulge);
+    for (const Eigen::Vector2d& point : edge.control_m) finite = finite && point.allFinite();
+  }
+  return finite;
+}
+
 void check_outline(const Pattern& pattern, const Panel& panel) {
   const auto fail = [&](const std::string& problem, const std::string& expected,
                         const std::string& remedy = "") {
@@ -99,6 +87,12 @@ void check_outline(const Pattern& pattern, const Panel& panel) {
   if (panel.corner_m.cols() < 2 || panel.edges.size() != static_cast<size_t>(panel.corner_m.cols()))
     fail(fmt::format("{} corners and {} edges", panel.corner_m.cols(), panel.edges.size()),
          "an outline of two or more corners with an edge from each to the next");
+  if (!is_finite(panel)) fail("a number that is none", "finite numbers");
+  for (const PatternEdge& edge : panel.edges)
+    if (edge.control_m.size() > 2 || (edge.bulge != 0 && !edge.control_m.empty()))
+      fail(fmt::format("an edge of {} control points and a bulge of {:g}", edge.control_m.size(),
+                       edge.bulge),
+           "up to two control points, or a bulge");
   for (int edge = 0; edge < panel.edge_count(); ++edge)
     if (const double length_m = edge_length_m(panel, edge); !(length_m > 1e-4))
       fail(fmt::format("edge {} is {:.3g} mm long", edge, 1e3 * length_m),
@@ -130,6 +124,13 @@ void check_side(const Pattern& pattern, const Seam& seam, const SeamSide& side) 
     if (edge < 0 || edge >= panel.edge_count())
       refuse(pattern, seam.line, fmt::format("a seam of edge {} of panel {}", edge, panel.name),
              fmt::format("edges 0 to {}", panel.edge_count() - 1));
+  int backwards = 0;  // once where the side passes the outline's first corner
+  for (size_t k = 0; k + 1 < side.edges.size(); ++k)
+    backwards += side.edges[k + 1] <= side.edges[k];
+  if (backwards > 1 || (backwards == 1 && side.edges.back() >= side.edges.front()))
+    refuse(pattern, seam.line,
+           fmt::format("a seam's edges of panel {} are out of order", panel.name),
+           "edges in their order along the outline");
 }
 
 void check_lengths(const Pattern& pattern, const Seam& seam) {
@@ -184,6 +185,13 @@ Eigen::Matrix2Xd points_of_edge_m(const Panel& panel, int edge, const std::vecto
 
 void check_pattern(const Pattern& pattern) {
   if (pattern.panels.empty()) refuse(pattern, 0, "it has no panel", "one or more");
+  // Every edge is held against every other of its panel.
+  constexpr size_t kMostEdges = 2000;
+  size_t edges = 0;
+  for (const Panel& panel : pattern.panels) edges += panel.edges.size();
+  if (edges > kMostEdges)
+    refuse(pattern, 0, fmt::format("its panels have {} edges, darts counted", edges),
+           fmt::format("{} at most", kMostEdges), "draw curves as curves");
   for (const Panel& panel : pattern.panels) {
     check_outline(pattern, panel);
     if (panel.fabric < 0 || panel.fabric >= static_cast<int>(pattern.fabrics.size()))

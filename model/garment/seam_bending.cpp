@@ -1,7 +1,6 @@
 #include "model/garment/seam_bending.h"
 
 #include <cmath>
-#include <optional>
 
 #include "model/topology/correspondence.h"
 
@@ -11,7 +10,6 @@ namespace {
 /// A vertex of a seam's side and what lies around it in the flat cloth.
 struct SeamPoint {
   int vertex = 0;
-  double length_m = 0;       ///< of the seam that it stands for
   Eigen::Vector2d beside_m;  ///< one spacing inwards
 };
 
@@ -25,12 +23,9 @@ std::vector<SeamPoint> points_of(const GarmentMesh& mesh,
   };
   for (size_t k = 0; k < seam.size(); ++k) {
     const size_t before = k > 0 ? k - 1 : 0, after = std::min(k + 1, seam.size() - 1);
-    const double length_m =
-        0.5 * ((place(after) - place(k)).norm() + (place(k) - place(before)).norm());
     const Eigen::Vector2d along = (place(after) - place(before)).normalized();
     const Eigen::Vector2d left{-along.y(), along.x()};
-    points.push_back(
-        {seam[k][side], length_m, place(k) + mesh.cloth.spacing_m * (side == 0 ? left : -left)});
+    points.push_back({seam[k][side], place(k) + mesh.cloth.spacing_m * (side == 0 ? left : -left)});
   }
   return points;
 }
@@ -43,6 +38,9 @@ double mean_bending_n_m(const MeasuredFabric& fabric) {
 
 BendingMatrix seam_bending(const GarmentMesh& mesh, const std::vector<MeasuredFabric>& fabrics) {
   std::array<std::vector<SeamPoint>, 2> sides;
+  std::vector<double> length_m;
+  for (const std::vector<double>& of_seam : mesh.seam_length_m)
+    length_m.insert(length_m.end(), of_seam.begin(), of_seam.end());
   for (const auto& seam : mesh.seams)
     for (size_t side = 0; side < 2; ++side)
       for (const SeamPoint& point : points_of(mesh, seam, side)) sides[side].push_back(point);
@@ -69,7 +67,8 @@ BendingMatrix seam_bending(const GarmentMesh& mesh, const std::vector<MeasuredFa
       stiffness_n_m +=
           0.5 * mean_bending_n_m(
                     fabrics[static_cast<size_t>(mesh.fabric_of[static_cast<size_t>(vertex)])]);
-    const double scale = std::sqrt(stiffness_n_m * a.length_m * h_m) / (h_m * h_m);
+    const double scale =
+        std::sqrt(stiffness_n_m * length_m[static_cast<size_t>(k)] * h_m) / (h_m * h_m);
     for (const Correspondence& of : beside)
       for (Eigen::Index corner = 0; corner < 3; ++corner)
         entries.emplace_back(row, of.corner(corner, k), scale * of.weight(corner, k));

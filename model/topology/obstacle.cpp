@@ -35,12 +35,14 @@ Obstacle::Obstacle(const TriangleMesh& mesh, double reach_m) : reach_m_(reach_m)
   const std::vector<int> welded = weld(mesh.vertex_m);
   std::map<int, int> corner_rims;
   std::map<std::pair<int, int>, int> edge_rims;
-  std::vector<int> faces_at;  // of each rim
+  std::vector<int> faces_at;   // of each rim
+  std::vector<int> run_along;  // of each rim: faces that run along it, less those that run against
   const auto rim_of = [&](auto& rims, const auto& key) {
     const auto [found, is_new] = rims.emplace(key, static_cast<int>(rims_.size()));
     if (is_new) {
       rims_.emplace_back();
       faces_at.push_back(0);
+      run_along.push_back(0);
     }
     return found->second;
   };
@@ -65,6 +67,7 @@ Obstacle::Obstacle(const TriangleMesh& mesh, double reach_m) : reach_m_(reach_m)
       triangle.corner_rim[n] = corner;
       rims_[static_cast<size_t>(edge)].normal += triangle.normal;
       ++faces_at[static_cast<size_t>(edge)];
+      run_along[static_cast<size_t>(edge)] += vertex[n] < vertex[next] ? 1 : -1;
       // The mean normal is weighted by the angle at the corner. It then tells inside from outside
       // wherever the corner is the nearest point, however its faces are cut into triangles.
       const Eigen::Vector3d to_next = (triangle.corner[next] - triangle.corner[n]).normalized();
@@ -75,8 +78,8 @@ Obstacle::Obstacle(const TriangleMesh& mesh, double reach_m) : reach_m_(reach_m)
     triangles_.push_back(triangle);
   }
   for (const auto& [ends, edge] : edge_rims) {
+    open_edges_ += run_along[static_cast<size_t>(edge)] != 0;
     if (faces_at[static_cast<size_t>(edge)] != 1) continue;
-    ++open_edges_;
     rims_[static_cast<size_t>(edge)].border = true;
     rims_[static_cast<size_t>(corner_rims.at(ends.first))].border = true;
     rims_[static_cast<size_t>(corner_rims.at(ends.second))].border = true;

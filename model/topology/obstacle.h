@@ -45,7 +45,8 @@ class Obstacle {
   /// does not matter. Beyond the border of a surface that is not closed its sign means nothing.
   std::optional<Distance> distance(const Eigen::Vector3d& point_m, double within_m) const;
 
-  /// Returns how many edges belong to one triangle alone: none where the surface is closed.
+  /// Returns how many edges do not lie between triangles that face the same way, as many on one
+  /// side as on the other: none where the surface is closed.
   int open_edges() const { return open_edges_; }
   /// Returns the volume inside of a closed surface (m3), < 0 where its triangles face inwards.
   double volume_m3() const;

@@ -137,6 +137,20 @@ TEST(GarmentCode, TurnsPanelsThatAreDrawnFromInside) {
   EXPECT_EQ(pattern.seams.at(0).sides[1].edges, std::vector{2});
 }
 
+TEST(GarmentCode, TellsTheSideOfAPanelOfArcs) {
+  // Three quarters of a ring, counterclockwise: its corners alone run the other way.
+  const TemporaryFolder folder;
+  const Pattern ring = read_pattern(folder.write("ring.json", R"({"pattern": {"panels": {"ring": {
+    "translation": [0, 0, 0], "rotation": [0, 0, 0],
+    "vertices": [[10, 0], [30, 0], [0, -30], [0, -10]], "edges": [{"endpoints": [0, 1]},
+    {"endpoints": [1, 2], "curvature": {"type": "circle", "params": [30, 1, 1]}},
+    {"endpoints": [2, 3]},
+    {"endpoints": [3, 0], "curvature": {"type": "circle", "params": [10, 1, 0]}}]}},
+    "stitches": []}})"));
+  EXPECT_EQ(ring.panels[0].corner_m.col(0), Eigen::Vector2d(0.1, 0)) << "not turned over";
+  EXPECT_GT(ring.panels[0].edges[1].bulge, 0);
+}
+
 TEST(GarmentCode, RefusesWhatIsNoSpecification) {
   const TemporaryFolder folder;
   const auto refused = [&](const std::string& beginning, const std::string& text) {

@@ -116,7 +116,7 @@ TEST_F(DrapeGarmentVerb, SewsAPatternAroundABody) {
               ElementsAre(".clothfit", "body.obj", "garment.csv", "garment.json", "garment.obj"));
   std::ifstream file(here_.path() / "tube.drape" / "garment.json");
   const nlohmann::json result = nlohmann::json::parse(file);
-  EXPECT_EQ(result.at("particles_inside_body"), 0);
+  EXPECT_EQ(result.at("places_inside_body"), 0);
   EXPECT_LE(result.at("imbalance").get<double>(), 1e-3);
   // The stiff tube rests on the bar as a ring of 19 mm radius would.
   const SurfaceMesh garment = read_obj(here_.path() / "tube.drape" / "garment.obj");
@@ -152,9 +152,10 @@ TEST_F(DrapeGarmentVerb, RefusesAndLeavesNothing) {
   expect(3, {"--body", "bar.obj", "--spacing", "1mm", "--hold-off", "1m"}, "--hold-off: it is 1;");
   expect(3, {"--body", "twill.yaml"}, "twill.yaml");
   expect(3, {"--body", "bar.obj", "--fabric", "none.yaml"}, "none.yaml");
+  expect(3, {"--body", "bar.obj", "--starts", "8"}, "--starts: is given with a pattern");
   expect(3, {"--test", "shear", "--fabric", "twill.yaml"}, "a pattern and a --test");
   std::ofstream(here_.path() / "bar.obj") << bar().substr(0, bar().rfind("f 4"));
-  expect(3, {"--body", "bar.obj"}, "bar.obj: 4 of its edges belong to one triangle alone");
+  expect(3, {"--body", "bar.obj"}, "bar.obj: 4 of its edges do not lie between");
   std::ofstream(here_.path() / "bar.obj") << bar() << "v 0 0 172\n";
   expect(3, {"--body", "bar.obj"}, "bar.obj: it spans 172 m; a body in metres");
   std::ofstream(here_.path() / "bar.obj") << bar();

@@ -112,7 +112,8 @@ TEST(DrapeGarment, RefusesABodyWithoutAnInsideAndAStartWithin) {
   const TriangleMesh good = bar(0.05, 0.01);
   TriangleMesh open = good, inside_out = good;
   open.triangle = good.triangle.leftCols(good.triangle.cols() - 1).eval();
-  EXPECT_EQ(problem(sleeve(0.2), open), "3 of its edges belong to one triangle alone");
+  EXPECT_EQ(problem(sleeve(0.2), open),
+            "3 of its edges do not lie between two triangles that face the same way");
   inside_out.triangle.row(0).swap(inside_out.triangle.row(1));
   EXPECT_NE(problem(sleeve(0.2), inside_out).find("its volume is -0.00"), std::string::npos);
   Pattern within = sleeve(0.2);

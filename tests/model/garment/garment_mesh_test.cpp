@@ -39,6 +39,16 @@ TEST(PatternOutline, MeasuresCurvesByTheirClosedForms) {
   EXPECT_NEAR(edge_length_m(panel, 1), 0.2 * (std::sqrt(1 + a * a) + std::asinh(a) / a), 1e-5);
 }
 
+TEST(PatternOutline, KeepsCornersOfTheFlattestArcs) {
+  Panel panel = rectangle(0.3, 0.4, 0);
+  for (const double bulge : {1e-8, 1e-13, 1e-16, 1e-17}) {
+    panel.edges[0].bulge = bulge;
+    const Eigen::Matrix2Xd points = points_of_edge_m(panel, 0, {0, 0.5, 1});
+    EXPECT_LT((points.col(0) - panel.corner_m.col(0)).norm(), 1e-15);
+    EXPECT_LT((points.col(1) - Eigen::Vector2d(0, -0.15 * bulge)).norm(), 1e-15);
+  }
+}
+
 TEST(PatternOutline, SpacesPointsEvenlyAlongACurve) {
   const Panel panel = curved();
   const Eigen::Matrix2Xd points = points_of_edge_m(panel, 3, {0, 0.25, 0.5, 0.75, 1});
@@ -153,6 +163,36 @@ TEST(GarmentMesh, MeetsAtTheCornersOfBothSides) {
     met = met || (std::abs(mesh.placed_m(2, b) - 0.1) < 1e-12 &&
                   std::abs(mesh.placed_m(2, a) - 0.1) < 1e-12);
   EXPECT_TRUE(met);
+}
+
+TEST(GarmentMesh, PairsCornersInOrderWhereSeveralAreNear) {
+  // Corners of one side at 0.500 and 0.515 of its way, of the other at 0.520 alone.
+  Pattern pattern = tube(0.3, 0.5, 0.2);
+  Panel &front = pattern.panels[0], &back = pattern.panels[1];
+  front.corner_m.resize(2, 6);
+  front.corner_m << -0.15, 0.15, 0.15, 0.15, 0.15, -0.15,  //
+      0, 0, 0.25, 0.2575, 0.5, 0.5;
+  front.edges.resize(6);
+  back.corner_m.resize(2, 5);
+  back.corner_m << -0.15, 0.15, 0.15, -0.15, -0.15,  //
+      0, 0, 0.5, 0.5, 0.26;
+  back.edges.resize(5);
+  pattern.seams.resize(1);
+  pattern.seams[0].sides = {SeamSide{0, {1, 2, 3}}, SeamSide{1, {3, 4}}};
+  ASSERT_NO_THROW(check_pattern(pattern));
+  const GarmentMesh mesh = mesh_garment(pattern, 0.04);
+  double met = 0;
+  for (size_t k = 0; k + 1 < mesh.seams[0].size(); ++k) {
+    const auto [a, b] = mesh.seams[0][k];
+    const auto [next_a, next_b] = mesh.seams[0][k + 1];
+    EXPECT_GT(mesh.placed_m(2, next_a), mesh.placed_m(2, a));
+    EXPECT_GT(mesh.placed_m(2, next_b), mesh.placed_m(2, b));
+    if (std::abs(mesh.placed_m(2, b) - 0.26) < 1e-9) met = mesh.placed_m(2, a);
+  }
+  EXPECT_NEAR(met, 0.2575, 1e-9) << "the nearer of both";
+  double length_m = 0;
+  for (const double of : mesh.seam_length_m[0]) length_m += of;
+  EXPECT_NEAR(length_m, 0.5, 1e-12);
 }
 
 TEST(GarmentMesh, ClosesADartThatPartsASide) {

@@ -124,6 +124,12 @@ TEST(Obstacle, TellsTheDistanceFromACubeOnBothSides) {
   EXPECT_GT(outside, 200);
 }
 
+TEST(Obstacle, IsNotClosedWhereAFaceIsTurnedRound) {
+  TriangleMesh turned = cube();
+  std::swap(turned.triangle(0, 3), turned.triangle(1, 3));
+  EXPECT_EQ(Obstacle(turned).open_edges(), 3);
+}
+
 TEST(Obstacle, AnOpenSurfaceEndsAtItsBorder) {
   const Obstacle ground(hilly_ground(), 0.3);
 
