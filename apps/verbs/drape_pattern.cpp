@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include <chrono>
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "apps/terminal/csv_table.h"
@@ -102,8 +102,14 @@ GarmentDrape drape_with_progress(const Pattern& pattern, const std::vector<Fabri
   try {
     return drape_garment(pattern, fabrics, &body, options);
   } catch (const InputError& error) {
-    if (error.where() != "body") throw;
-    throw InputError(body_file.string(), error.problem(), error.expected(), error.remedy());
+    if (error.where() == "body")
+      throw InputError(body_file.string(), error.problem(), error.expected(), error.remedy());
+    for (const Panel& panel : pattern.panels)
+      if (error.where() == "panels." + panel.name)
+        throw InputError(pattern.file, std::max(panel.line, 1),
+                         fmt::format("panel {}: {}", panel.name, error.problem()), error.expected(),
+                         error.remedy());
+    throw;
   }
 }
 

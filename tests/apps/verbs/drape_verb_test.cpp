@@ -159,6 +159,11 @@ TEST_F(DrapeGarmentVerb, RefusesAndLeavesNothing) {
   std::ofstream(here_.path() / "bar.obj") << bar() << "v 0 0 172\n";
   expect(3, {"--body", "bar.obj"}, "bar.obj: it spans 172 m; a body in metres");
   std::ofstream(here_.path() / "bar.obj") << bar();
+  std::string within = tube("10");
+  within.replace(within.find("-3, 6]"), 6, "-3, 0]");
+  std::ofstream(here_.path() / "tube.yaml") << within;
+  expect(3, {"--body", "bar.obj"},
+         "tube.yaml:6: panel upper: it begins inside the body, 10 mm deep");
   std::ofstream(here_.path() / "tube.yaml") << tube("-10");
   expect(3, {"--body", "bar.obj"}, "tube.yaml:6: panel upper: its outline runs clockwise");
 }
