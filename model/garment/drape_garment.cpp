@@ -19,9 +19,9 @@ namespace {
 /// A seam with gaps below this is closed: its sides become one without a jump.
 constexpr double kClosed_m = 5e-4;
 /// Threads begin to pull with this and pull harder by a factor until all gaps are closed. The last
-/// pull is 200 N per metre of seam, at which garments tear.
+/// pull is 1000 N per metre of seam, half of what a strong one bears.
 constexpr double kFirstThread_n_per_m2 = 4, kThreadGrowth = 4,
-                 kLastThread_n_per_m2 = 200 / kClosed_m;
+                 kLastThread_n_per_m2 = 1000 / kClosed_m;
 /// Rest of the open garment, and of meshes that only start the next.
 constexpr double kCoarseTolerance = 1e-2;
 /// No point passes through an arm in one step.

@@ -75,7 +75,10 @@ class Net {
       Eigen::Vector3d mean_m;
       if (!mean_cut(grid, cell, mean_m)) return;
       of_cell_[grid.index(cell)] = static_cast<int>(vertices_.size());
-      vertices_.push_back(on_surface(field, mean_m, grid.cell_m));
+      // Vertices that leave their cells fold the surface.
+      const Eigen::Vector3d low_m = grid.place_m(cell),
+                            high_m = grid.place_m(cell + Eigen::Vector3i::Ones());
+      vertices_.push_back(on_surface(field, mean_m, grid.cell_m).cwiseMax(low_m).cwiseMin(high_m));
     });
     for_each_cell(1, [&](const Eigen::Vector3i& corner) {
       for (int axis = 0; axis < 3; ++axis) add_between(corner, axis);

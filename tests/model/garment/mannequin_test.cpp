@@ -5,8 +5,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
+#include <random>
 #include <vector>
 
 #include "data/input_error.h"
@@ -26,6 +28,50 @@ TEST(SurfaceNets, EncloseABallsVolumeToSecondOrder) {
   const double coarse = volume_error(0.02), fine = volume_error(0.01);
   EXPECT_LT(std::abs(coarse), 0.02);
   EXPECT_NEAR(coarse / fine, 4, 0.8);
+}
+
+TEST(SurfaceNets, TellInsideFromOutsideOfWhatIsHardlyWiderThanACell) {
+  // Bent fingers: three cones that meet at an angle, between three and four cells wide.
+  const std::array<Eigen::Vector3d, 4> joint{
+      Eigen::Vector3d(-0.1, 0, 0.03), {0.0, 0.01, -0.02}, {0.07, -0.02, 0.02}, {0.12, 0.03, 0.05}};
+  const auto field = [&](const Eigen::Vector3d& x) {
+    double least = 1;
+    for (size_t k = 0; k + 1 < joint.size(); ++k) {
+      const Eigen::Vector3d along = joint[k + 1] - joint[k];
+      const double share = std::clamp((x - joint[k]).dot(along) / along.squaredNorm(), 0.0, 1.0);
+      least = std::min(least, (x - joint[k] - share * along).norm() - 0.025 + 0.003 * share);
+    }
+    return least;
+  };
+  const Obstacle surface(
+      zero_surface(field, Eigen::Vector3d::Constant(-0.2), Eigen::Vector3d::Constant(0.2), 0.015));
+  std::mt19937 random(2);
+  const auto draw = [&] { return static_cast<double>(random()) / 0x1p31 - 1; };
+  for (int n = 0; n < 20000; ++n) {
+    const Eigen::Vector3d point = 0.2 * Eigen::Vector3d(draw(), draw(), draw());
+    const auto found = surface.distance(point, 1);
+    ASSERT_TRUE(found);
+    if (std::abs(field(point)) < 0.004) continue;
+    ASSERT_EQ(found->distance_m < 0, field(point) < 0) << point.transpose();
+  }
+}
+
+TEST(Mannequin, IsOutsideOfWhatStandsBesideIt) {
+  // The sign of the distance from every part of the body, seen from all around and near.
+  const TriangleMesh body = make_mannequin();
+  const Obstacle surface(body);
+  std::mt19937 random(6);
+  const auto draw = [&] { return static_cast<double>(random()) / 0x1p31 - 1; };
+  for (int n = 0; n < 40000; ++n) {
+    // In front of the toes, behind the back, above the head, beyond the hands.
+    Eigen::Vector3d point(0.8 * draw(), 0.5 * draw(), 0.9 + 1.2 * draw());
+    if (std::abs(point.y()) < 0.19 && std::abs(point.x()) < 0.65 && point.z() > -0.02 &&
+        point.z() < 1.73)
+      point.y() = point.y() < 0 ? -0.19 : 0.19;
+    const auto found = surface.distance(point, 5);
+    ASSERT_TRUE(found);
+    ASSERT_GT(found->distance_m, 0) << point.transpose();
+  }
 }
 
 /// Returns the girth of a body at a height: that of a tape around the part nearer than `reach_m`.
