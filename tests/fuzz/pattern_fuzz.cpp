@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <string_view>
 
 #include "data/pattern_file.h"
 #include "model/garment/garment_mesh.h"
@@ -10,7 +11,7 @@
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, size_t size) {
   using namespace clothfit;
-  const std::string text = text_of(data, size);
+  const std::string_view text = text_of(data, size);
   const auto file = write_scratch(text.starts_with("{") ? "pattern.json" : "pattern.yaml", text);
   try {
     const Pattern pattern = read_pattern(file);
