@@ -37,6 +37,12 @@ std::vector<FabricSheet> sheets_of(const Pattern& pattern, const fs::path& fabri
                        fmt::format("it names no data sheet of {}", pattern.fabrics[n]),
                        "a data sheet of each fabric",
                        "name one for all with --fabric, such as data/fabrics/shirting.yaml");
+    if (fabric.empty() && !fs::exists(file))
+      throw InputError(pattern.file,
+                       fmt::format("its fabric {} names {}, which is not there", pattern.fabrics[n],
+                                   shown_path(file)),
+                       "a data sheet, named relative to the pattern's folder",
+                       "put it there, or name one for all with --fabric");
     sheets.push_back(read_fabric_sheet(file));
   }
   return sheets;
@@ -176,8 +182,12 @@ int drape_pattern(const PatternRequest& request, const std::string& command) {
   require_rest(pattern, drape, request.options);
 
   const Table table = levels_table(drape);
-  const std::vector<std::string> notes{"contact of the cloth with itself is not looked for",
-                                       "the body acts without friction"};
+  std::vector<std::string> notes{"contact of the cloth with itself is not looked for",
+                                 "the body acts without friction"};
+  if (std::ranges::any_of(sheets, [](const FabricSheet& sheet) {
+        return sheet.bending_hysteresis_n || sheet.shear_hysteresis_n_per_m;
+      }))
+    notes.emplace_back("the sheets' hysteresis is read, but not simulated yet");
   Json json{{"format", "clothfit-garment/1"},
             {"command", command},
             {"pattern", pattern.name},

@@ -8,6 +8,8 @@ namespace {
 
 constexpr double kPressure_pa = 1;
 constexpr double kSteepness = 12;
+/// The nearest part of the surface is looked for however far it is: bodies may be thick.
+constexpr double kAnywhere_m = 1e6;
 
 /// Energy, pressure and stiffness per area.
 struct Push {
@@ -36,8 +38,8 @@ std::optional<Obstacle::Distance> BodyContact::touched(size_t point,
                                                        const Eigen::Vector3d& place_m) const {
   Free& free = free_[point];
   if ((place_m - free.place_m).norm() < free.way_m) return std::nullopt;
-  const auto near = body_.distance(place_m, kDeepestInBody_m);
-  const double distance_m = near ? near->distance_m : kDeepestInBody_m;
+  const auto near = body_.distance(place_m, kAnywhere_m);
+  const double distance_m = near ? near->distance_m : kAnywhere_m;
   free = {place_m, distance_m - hold_off_m_};
   return distance_m < hold_off_m_ ? near : std::nullopt;
 }
@@ -78,7 +80,7 @@ void BodyContact::add_second_derivative(const Eigen::Matrix3Xd& position_m,
 Inside BodyContact::inside(const Eigen::Matrix3Xd& position_m) const {
   Inside found;
   for (const ContactPoint& point : points_) {
-    const auto near = body_.distance(point.place_m(position_m), kDeepestInBody_m);
+    const auto near = body_.distance(point.place_m(position_m), kAnywhere_m);
     if (!near || near->distance_m >= 0) continue;
     ++found.places;
     if (-near->distance_m <= found.deepest_m) continue;

@@ -9,9 +9,6 @@
 
 namespace clothfit {
 
-/// Points are looked for so deep inside a body: half the thickness of any.
-inline constexpr double kDeepestInBody_m = 0.5;
-
 /// A point of the cloth that a body may press on: a mean of up to four points of the mesh.
 struct ContactPoint {
   int count = 0;
@@ -43,6 +40,8 @@ struct Inside {
 /// with p0 = 1 Pa. Beneath the skin the pressure goes on along its tangent, so that points which
 /// begin there are pushed out. Cloth that lies on a shoulder keeps 0.9 delta from it, tight cloth
 /// (170 Pa) 0.57. The pressure acts without friction.
+///
+/// It remembers how far each place may go without touching: one thread at a time may use it.
 class BodyContact {
  public:
   /// `body` must outlive this.

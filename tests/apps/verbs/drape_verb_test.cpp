@@ -153,6 +153,10 @@ TEST_F(DrapeGarmentVerb, RefusesAndLeavesNothing) {
   expect(3, {"--body", "twill.yaml"}, "twill.yaml");
   expect(3, {"--body", "bar.obj", "--fabric", "none.yaml"}, "none.yaml");
   expect(3, {"--body", "bar.obj", "--starts", "8"}, "--starts: is given with a pattern");
+  std::filesystem::rename(here_.path() / "twill.yaml", here_.path() / "moved.yaml");
+  EXPECT_THAT(drape({"--body", "bar.obj"}).error,
+              HasSubstr("tube.yaml: its fabric twill names twill.yaml, which is not there"));
+  std::filesystem::rename(here_.path() / "moved.yaml", here_.path() / "twill.yaml");
   expect(3, {"--test", "shear", "--fabric", "twill.yaml"}, "a pattern and a --test");
   std::ofstream(here_.path() / "bar.obj") << bar().substr(0, bar().rfind("f 4"));
   expect(3, {"--body", "bar.obj"}, "bar.obj: 4 of its edges do not lie between");

@@ -120,6 +120,11 @@ TEST(DrapeGarment, RefusesABodyWithoutAnInsideAndAStartWithin) {
   within.panels[1].placement.pretranslate(Eigen::Vector3d(0, -0.06, 0));
   EXPECT_NE(problem(within, good).find("begins inside the body, 30 mm deep"), std::string::npos)
       << problem(within, good);
+  const TriangleMesh thick =
+      zero_surface([](const Eigen::Vector3d& x) { return x.norm() - 1.5; },
+                   Eigen::Vector3d::Constant(-2), Eigen::Vector3d::Constant(2), 0.2);
+  EXPECT_NE(problem(sleeve(0.2), thick).find("begins inside the body, 1"), std::string::npos)
+      << problem(sleeve(0.2), thick);
 }
 
 TEST(DrapeGarment, SaysThatASleeveIsTooTight) {
