@@ -5,6 +5,8 @@
 #include <optional>
 #include <vector>
 
+#include "model/garment/body_field.h"
+#include "model/rest/hanging_energy.h"
 #include "model/topology/obstacle.h"
 
 namespace clothfit {
@@ -32,37 +34,35 @@ struct Inside {
   int point = -1;  ///< of the mesh, nearest to the deepest place
 };
 
-/// The pressure of a body on cloth. It grows from nothing at the hold-off distance delta
-/// [lethanh2007, section 5] to more than any garment's at the skin:
-///
-///   p = p0 (exp(u) - 1 - u),   u = 12 (1 - d / delta) for d < delta,
-///
-/// with p0 = 1 Pa. Beneath the skin the pressure goes on along its tangent, so that points which
-/// begin there are pushed out. Cloth that lies on a shoulder keeps 0.9 delta from it, tight cloth
-/// (170 Pa) 0.57. The pressure acts without friction.
+/// The pressure of a body on cloth nearer than the hold-off distance delta [lethanh2007, section 5]
+/// by the law of ContactPressure. Beneath the skin, where points may begin, it pushes them out.
+/// Cloth that lies on a shoulder keeps 0.9 delta from it, tight cloth (170 Pa) 0.57. The pressure
+/// acts without friction. The distance is that of a BodyField: at the creases of the exact one no
+/// step would lower the energy.
 ///
 /// It remembers how far each place may go without touching: one thread at a time may use it.
 class BodyContact {
  public:
-  /// `body` must outlive this.
-  BodyContact(const Obstacle& body, double hold_off_m, std::vector<ContactPoint> points);
+  /// `body` must outlive this; cells of twice the hold-off distance suit it.
+  BodyContact(const BodyField& body, double hold_off_m, std::vector<ContactPoint> points);
 
   /// Adds the energy's derivative to `gradient_n` and returns the energy (J).
   double add_energy_and_gradient(const Eigen::Matrix3Xd& position_m,
                                  Eigen::Matrix3Xd& gradient_n) const;
-  /// Adds the second derivative to `blocks`. The term of the surface's curvature, which is
-  /// negative, is left out.
-  void add_second_derivative(const Eigen::Matrix3Xd& position_m,
+  /// Adds the second derivative to `blocks`; without the part of it that is negative if `curvature`
+  /// is clamped.
+  void add_second_derivative(const Eigen::Matrix3Xd& position_m, Curvature curvature,
                              std::vector<Eigen::Matrix3d>& blocks) const;
+  /// Returns how much of the cloth is inside by the exact distance.
   Inside inside(const Eigen::Matrix3Xd& position_m) const;
 
  private:
-  std::optional<Obstacle::Distance> touched(size_t point, const Eigen::Vector3d& place_m) const;
+  std::optional<BodyField::Distance> touched(size_t point, const Eigen::Vector3d& place_m) const;
 
-  const Obstacle& body_;
+  const BodyField& body_;
   double hold_off_m_;
   std::vector<ContactPoint> points_;
-  /// Where a point was when it was last found outside, and how far it can go without touching.
+  /// Where a point was when it was last found far outside, and how far it can go without touching.
   struct Free {
     Eigen::Vector3d place_m = Eigen::Vector3d::Zero();
     double way_m = -1;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -17,11 +18,11 @@ namespace clothfit {
 namespace {
 
 /// A seam with gaps below this is closed: its sides become one without a jump.
-constexpr double kClosed_m = 5e-4;
+constexpr double kClosed_m = 1e-3;
 /// Threads begin to pull with this and pull harder by a factor until all gaps are closed. The last
-/// pull is 1000 N per metre of seam, half of what a strong one bears.
+/// pull is 2000 N per metre of seam, what a strong one bears.
 constexpr double kFirstThread_n_per_m2 = 4, kThreadGrowth = 4,
-                 kLastThread_n_per_m2 = 1000 / kClosed_m;
+                 kLastThread_n_per_m2 = 2000 / kClosed_m;
 /// Rest of the open garment, and of meshes that only start the next.
 constexpr double kCoarseTolerance = 1e-2;
 /// No point passes through an arm in one step.
@@ -35,7 +36,8 @@ class GarmentDraping {
  public:
   GarmentDraping(const Pattern& pattern, const std::vector<MeasuredFabric>& fabrics,
                  const Obstacle* body, const GarmentOptions& options)
-      : pattern_(pattern), fabrics_(fabrics), body_(body), options_(options) {
+      : pattern_(pattern), fabrics_(fabrics), options_(options) {
+    if (body) body_.emplace(*body, 2 * options.hold_off_m);
     for (double spacing_m = options.spacing_m;; spacing_m *= 2) {
       spacings_m_.insert(spacings_m_.begin(), spacing_m);
       if (2 * spacing_m > options.coarsest_m * (1 + 1e-9)) break;
@@ -86,6 +88,13 @@ class GarmentDraping {
                      "panels that wait beside the body", "move its placement outwards");
   }
 
+  void set_contact(GarmentEnergy& energy, double spacing_m) const {
+    constexpr double kOfSpacing = 0.1;
+    if (body_) energy.set_body(*body_, options_.hold_off_m);
+    if (options_.self_distance_m > 0)
+      energy.set_self_contact(std::max(options_.self_distance_m, kOfSpacing * spacing_m));
+  }
+
   SettleRule rule_for(const GarmentEnergy& energy, double weight_n, double tolerance,
                       GarmentProgress progress) {
     SettleRule rule;
@@ -117,10 +126,25 @@ class GarmentDraping {
       }
   }
 
-  /// Draws the seams together; says whether they met.
+  static void measure_stretch(GarmentDrape& result) {
+    constexpr double kTorn = 1.5;
+    const Eigen::Matrix3Xi triangles = result.mesh.cloth.triangles();
+    double stretched = 0;
+    for (const auto& corner : triangles.colwise())
+      for (int k = 0; k < 3; ++k) {
+        const int a = corner[k], b = corner[(k + 1) % 3];
+        const Eigen::Vector2d flat_m =
+            result.mesh.cloth.material_m.col(a) - result.mesh.cloth.material_m.col(b);
+        stretched +=
+            (result.position_m.col(a) - result.position_m.col(b)).norm() > kTorn * flat_m.norm();
+      }
+    result.stretched_share = stretched / static_cast<double>(triangles.size());
+  }
+
+  /// Draws the seams together; says whether they met, and the cloth bears it.
   bool sew(GarmentDrape& result) {
     GarmentEnergy energy(result.mesh, fabrics_, GarmentEnergy::Seams::open);
-    if (body_) energy.set_body(*body_, options_.hold_off_m);
+    set_contact(energy, result.mesh.cloth.spacing_m);
     const double weight_n = energy.weight_n();
     energy.set_gravity(Eigen::Vector3d::Zero());
     const std::vector<bool> held(static_cast<size_t>(energy.points()), false);
@@ -146,7 +170,10 @@ class GarmentDraping {
         return false;
       }
     }
-    return true;
+    measure_stretch(result);
+    if (result.stretched_share <= kMostStretched) return true;
+    result.state = GarmentState::too_tight;
+    return false;
   }
 
   void refine(double spacing_m, GarmentDrape& result) const {
@@ -158,7 +185,7 @@ class GarmentDraping {
   /// Lets the sewn garment come to rest on its present mesh.
   void rest(double tolerance, GarmentDrape& result) {
     GarmentEnergy energy(result.mesh, fabrics_, GarmentEnergy::Seams::sewn);
-    if (body_) energy.set_body(*body_, options_.hold_off_m);
+    set_contact(energy, result.mesh.cloth.spacing_m);
     result.weight_n = energy.weight_n();
     const std::vector<bool> held(static_cast<size_t>(energy.points()), false);
     Eigen::Matrix3Xd particle_m = energy.particles_m(result.position_m);
@@ -173,6 +200,7 @@ class GarmentDraping {
     const Inside inside = energy.inside_body(particle_m);
     result.inside = inside.places;
     result.deepest_m = inside.deepest_m;
+    result.crossings = energy.crossings(particle_m);
     result.state = cancelled_                                 ? GarmentState::cancelled
                    : result.inside > 0                        ? GarmentState::inside_body
                    : work.reason == MinimiseReason::converged ? GarmentState::at_rest
@@ -181,7 +209,7 @@ class GarmentDraping {
 
   const Pattern& pattern_;
   const std::vector<MeasuredFabric>& fabrics_;
-  const Obstacle* body_;
+  std::optional<BodyField> body_;
   const GarmentOptions& options_;
   std::vector<double> spacings_m_;  ///< coarsest first
   bool cancelled_ = false;

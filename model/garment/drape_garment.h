@@ -21,10 +21,13 @@ struct GarmentProgress {
 };
 
 struct GarmentOptions {
-  double spacing_m = 0.02;     ///< of the finest mesh
-  double coarsest_m = 0.04;    ///< seams are closed on the first mesh at least as fine; the next
-                               ///< are each half as wide
-  double hold_off_m = 0.003;   ///< distance from the body at which cloth begins to feel it
+  double spacing_m = 0.02;    ///< of the finest mesh
+  double coarsest_m = 0.04;   ///< seams are closed on the first mesh at least as fine; the next
+                              ///< are each half as wide
+  double hold_off_m = 0.003;  ///< distance from the body at which cloth begins to feel it
+  /// Distance from itself below which cloth presses on itself; a tenth of the spacing on meshes
+  /// where that is more. 0: not looked for.
+  double self_distance_m = 0.002;
   double tolerance = 1e-3;     ///< imbalance that counts as rest
   int most_iterations = 1000;  ///< on each mesh, and at each pull of the threads
   std::function<bool(const GarmentProgress&)> go_on;  ///< `false` cancels; may be empty
@@ -41,10 +44,14 @@ struct GarmentLevel {
 enum class GarmentState {
   at_rest,
   not_at_rest,  ///< the finest mesh ran out of iterations, or no step lowers its energy
+  too_tight,    ///< sewn, but with `stretched_share` of its cloth torn: more than kMostStretched
   not_sewn,     ///< a seam stays open: `widest_gap_m`, of `widest_seam`
   inside_body,  ///< `inside` places: too tight a garment, or a body that passed through it
   cancelled
 };
+
+/// Of a garment that is worn, no more than so much is stretched by half: fabrics tear before.
+inline constexpr double kMostStretched = 0.05;
 
 struct GarmentDrape {
   GarmentState state = GarmentState::not_at_rest;
@@ -55,6 +62,9 @@ struct GarmentDrape {
   int widest_seam = -1;
   double imbalance = 0;  ///< as a share of the weight
   double weight_n = 0;
+  /// Share of the edges of its triangles that are longer than flat by half or more.
+  double stretched_share = 0;
+  int crossings = 0;     ///< edges of the cloth that pass through its triangles, by an exact test
   int inside = 0;        ///< places of the cloth beneath the body's surface
   double deepest_m = 0;  ///< of them
   bool usable() const { return state == GarmentState::at_rest; }
@@ -63,7 +73,7 @@ struct GarmentDrape {
 /// Sews a pattern around a body and lets it come to rest under its weight: a minimum of its energy
 /// [lethanh2007]. On the coarsest mesh threads draw the seams together, without weight; then sides
 /// become one, and the shape goes from mesh to mesh by its correspondences, coming to rest on each.
-/// `body` may be null. Contact of the cloth with itself is not looked for.
+/// `body` may be null.
 ///
 /// Throws InputError for an impossible pattern, fabric or option, for a body that is open or faces
 /// inwards, and for a pattern that begins inside the body.

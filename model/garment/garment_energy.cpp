@@ -90,6 +90,7 @@ void GarmentEnergy::find_targets() {
   std::ranges::sort(pairs_);
   const auto repeated = std::ranges::unique(pairs_);
   pairs_.erase(repeated.begin(), repeated.end());
+  pairs_of_mesh_ = pairs_.size();
   for (const Pair& pair : sheet_.pairs()) {
     const int low = particle(pair.low), high = particle(pair.high);
     // Two vertices of one particle depend on each other both ways.
@@ -102,7 +103,13 @@ void GarmentEnergy::find_targets() {
 }
 
 int GarmentEnergy::block_of(int a, int b) const {
-  return static_cast<int>(std::ranges::lower_bound(pairs_, pair_of(a, b)) - pairs_.begin());
+  const Pair pair = pair_of(a, b);
+  const auto end_of_mesh = pairs_.begin() + static_cast<std::ptrdiff_t>(pairs_of_mesh_);
+  const auto of_mesh = std::lower_bound(pairs_.begin(), end_of_mesh, pair);
+  const auto found = of_mesh != end_of_mesh && *of_mesh == pair
+                         ? of_mesh
+                         : std::lower_bound(end_of_mesh, pairs_.end(), pair);
+  return static_cast<int>(found - pairs_.begin());
 }
 
 void GarmentEnergy::add_contact_point(const std::vector<int>& vertices,
@@ -150,8 +157,55 @@ Inside GarmentEnergy::inside_body(const Eigen::Matrix3Xd& position_m) const {
   return contact_ ? contact_->inside(position_m) : Inside();
 }
 
-void GarmentEnergy::set_body(const Obstacle& body, double hold_off_m) {
+void GarmentEnergy::set_body(const BodyField& body, double hold_off_m) {
   contact_.emplace(body, hold_off_m, contact_points());
+}
+
+void GarmentEnergy::set_self_contact(double beta_m) {
+  // Parts beside a common corner are nearer than a wide mesh's beta where its edges are short.
+  constexpr double kOfShortestEdge = 0.25;
+  const Eigen::Matrix3Xi triangles = mesh_.cloth.triangles();
+  Eigen::Matrix3Xi of_particles = triangles;
+  Eigen::Matrix3Xd centre_m = Eigen::Matrix3Xd::Zero(3, triangles.cols());
+  Eigen::VectorXd joined_beta_m = Eigen::VectorXd::Constant(mesh_.particles, beta_m);
+  for (Eigen::Index t = 0; t < triangles.cols(); ++t)
+    for (int k = 0; k < 3; ++k) {
+      const int v = triangles(k, t), next = triangles((k + 1) % 3, t);
+      const Eigen::Vector2d side_m =
+          mesh_.cloth.material_m.col(next) - mesh_.cloth.material_m.col(v);
+      for (const int end : {v, next}) {
+        double& beta = joined_beta_m[mesh_.particle_of[static_cast<size_t>(end)]];
+        beta = std::min(beta, kOfShortestEdge * side_m.norm());
+      }
+      centre_m.col(t).head<2>() += mesh_.cloth.material_m.col(v) / 3;
+      of_particles(k, t) = particle_of_[static_cast<size_t>(v)];
+    }
+  std::vector<int> joined(static_cast<size_t>(points()));
+  Eigen::VectorXd area_m2 = Eigen::VectorXd::Zero(points()), beta(points());
+  for (size_t v = 0; v < particle_of_.size(); ++v) {
+    const int particle = particle_of_[v];
+    joined[static_cast<size_t>(particle)] = mesh_.particle_of[v];
+    area_m2[particle] += mesh_.cloth.area_m2[static_cast<Eigen::Index>(v)];
+    beta[particle] = joined_beta_m[mesh_.particle_of[v]];
+  }
+  self_contact_.emplace(SurfaceParts(of_particles, centre_m, joined), area_m2, beta);
+}
+
+bool GarmentEnergy::update_pairs(const Eigen::Matrix3Xd& position_m) {
+  if (!self_contact_) return false;
+  std::vector<Pair> touching;
+  self_contact_->add_pairs(position_m, touching);
+  std::ranges::sort(touching);
+  const auto of_mesh = pairs_.begin(),
+             end_of_mesh = of_mesh + static_cast<std::ptrdiff_t>(pairs_of_mesh_);
+  std::vector<Pair> added;
+  for (const Pair& pair : touching)
+    if ((added.empty() || added.back() != pair) && !std::binary_search(of_mesh, end_of_mesh, pair))
+      added.push_back(pair);
+  if (std::equal(end_of_mesh, pairs_.end(), added.begin(), added.end())) return false;
+  pairs_.resize(pairs_of_mesh_);
+  pairs_.insert(pairs_.end(), added.begin(), added.end());
+  return true;
 }
 
 double GarmentEnergy::energy_and_gradient(const Eigen::Matrix3Xd& position_m,
@@ -169,6 +223,7 @@ double GarmentEnergy::energy_and_gradient(const Eigen::Matrix3Xd& position_m,
     gradient_n.col(thread.b) -= stiffness * gap_m;
   }
   if (contact_) energy_j += contact_->add_energy_and_gradient(position_m, gradient_n);
+  if (self_contact_) energy_j += self_contact_->add_energy_and_gradient(position_m, gradient_n);
   return energy_j;
 }
 
@@ -190,7 +245,12 @@ void GarmentEnergy::second_derivative(const Eigen::Matrix3Xd& position_m, Curvat
           stiffness;
     blocks[static_cast<size_t>(thread.block[2])].diagonal().array() -= stiffness;
   }
-  if (contact_) contact_->add_second_derivative(position_m, blocks);
+  if (contact_) contact_->add_second_derivative(position_m, curvature, blocks);
+  if (self_contact_)
+    self_contact_->add_second_derivative(position_m,
+                                         [&](int a, int b, const Eigen::Matrix3d& block) {
+                                           blocks[static_cast<size_t>(block_of(a, b))] += block;
+                                         });
 }
 
 Eigen::Matrix3Xd GarmentEnergy::vertices_m(const Eigen::Matrix3Xd& particle_m) const {

@@ -6,6 +6,7 @@
 
 #include "model/garment/body_contact.h"
 #include "model/garment/garment_mesh.h"
+#include "model/garment/self_contact.h"
 #include "model/sheet/sheet_energy.h"
 
 namespace clothfit {
@@ -24,7 +25,9 @@ class GarmentEnergy : public BlockEnergy {
 
   /// Lets a body press on the cloth's vertices, and between them at places not farther apart than a
   /// centimetre: a coarse mesh does not pass through what is wider. The body must outlive this.
-  void set_body(const Obstacle& body, double hold_off_m);
+  void set_body(const BodyField& body, double hold_off_m);
+  /// Lets the cloth press on itself where it is nearer than `beta_m`.
+  void set_self_contact(double beta_m);
   void set_gravity(const Eigen::Vector3d& gravity_m_per_s2) {
     sheet_.set_gravity(gravity_m_per_s2);
   }
@@ -35,10 +38,18 @@ class GarmentEnergy : public BlockEnergy {
   const Eigen::VectorXd& mass_kg() const override { return mass_kg_; }
   double energy_and_gradient(const Eigen::Matrix3Xd& position_m,
                              Eigen::Matrix3Xd& gradient_n) const override;
+  double open_way(const Eigen::Matrix3Xd& from_m, const Eigen::Matrix3Xd& move_m) override {
+    return self_contact_ ? self_contact_->open_way(from_m, move_m) : 1;
+  }
+  bool update_pairs(const Eigen::Matrix3Xd& position_m) override;
   const std::vector<Pair>& pairs() const override { return pairs_; }
   void second_derivative(const Eigen::Matrix3Xd& position_m, Curvature curvature,
                          std::vector<Eigen::Matrix3d>& blocks) const override;
 
+  /// Returns how many edges pass through triangles of the cloth; 0 where it is not looked for.
+  int crossings(const Eigen::Matrix3Xd& position_m) {
+    return self_contact_ ? self_contact_->crossings(position_m) : 0;
+  }
   /// Returns how much of the cloth lies inside the body, at the places on which it presses.
   Inside inside_body(const Eigen::Matrix3Xd& position_m) const;
 
@@ -60,7 +71,7 @@ class GarmentEnergy : public BlockEnergy {
   };
   void add_threads();
   void find_targets();
-  int block_of(int a, int b) const;  ///< number of a pair
+  int block_of(int a, int b) const;  ///< number of a pair; it is there
   void add_contact_point(const std::vector<int>& vertices, const std::vector<double>& weights,
                          double area_m2, std::vector<ContactPoint>& points) const;
   std::vector<ContactPoint> contact_points() const;
@@ -72,7 +83,9 @@ class GarmentEnergy : public BlockEnergy {
   std::vector<Thread> threads_;
   double thread_n_per_m2_ = 0;
   std::optional<BodyContact> contact_;
-  std::vector<Pair> pairs_;
+  std::optional<SelfContact> self_contact_;
+  std::vector<Pair> pairs_;  ///< those of the mesh, then those of places that touch; both sorted
+  size_t pairs_of_mesh_ = 0;
   std::vector<Target> target_;  ///< of each pair of the sheet
 };
 

@@ -32,7 +32,7 @@ Hanging hang(const MeasuredFabric& fabric, double overhang_m, const CantileverOp
     held.push_back(mesh.material_m(1, v) == 0);
     position_m.col(v) << mesh.material_m.col(v), 0;
   }
-  const SheetEnergy energy(mesh, fabric, held);
+  SheetEnergy energy(mesh, fabric, held);
   SettleRule rule;
   rule.stop.gradient_n = 1e-6 * energy.weight_n();
   rule.stop.most_iterations = 2000;

@@ -8,7 +8,7 @@
 namespace clothfit {
 
 /// An energy of points (J) whose second derivative is a sparse matrix of 3 x 3 blocks. Which blocks
-/// there are does not change with the shape.
+/// there are changes with the shape where points touch.
 class BlockEnergy {
  public:
   virtual ~BlockEnergy() = default;
@@ -25,11 +25,19 @@ class BlockEnergy {
     int low = 0, high = 0;
     friend auto operator<=>(const Pair&, const Pair&) = default;
   };
-  /// Returns all pairs, sorted.
+  /// Returns all pairs, each once.
   virtual const std::vector<Pair>& pairs() const = 0;
   /// Returns d gradient[high] / d position[low] of every pair (N/m).
   virtual void second_derivative(const Eigen::Matrix3Xd& position_m, Curvature curvature,
                                  std::vector<Eigen::Matrix3d>& blocks) const = 0;
+
+  /// Finds what comes near on the straight way from `from_m` by `move_m`, and returns the share of it
+  /// on which nothing passes through anything. Energies are complete for places of the last way.
+  virtual double open_way(const Eigen::Matrix3Xd& /*from_m*/, const Eigen::Matrix3Xd& /*move_m*/) {
+    return 1;
+  }
+  /// Brings pairs() up to date for a place on the last way, and says whether they changed.
+  virtual bool update_pairs(const Eigen::Matrix3Xd& /*position_m*/) { return false; }
 
   int points() const { return static_cast<int>(mass_kg().size()); }
 };

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <optional>
+#include <utility>
 
 #include "model/sheet/block_cholesky.h"
 
@@ -12,12 +14,30 @@ namespace {
 /// Root mean square of the points' residual forces as a share of a point's load. Below it the
 /// exact second derivative is used.
 constexpr double kNearBalance = 0.1;
+/// Largest share of the last move by which a step begins ahead.
+constexpr double kMostOnward = 0.9;
 
 /// The matrix of one step over the free points, and its factorisation.
 class StepMatrix {
  public:
-  StepMatrix(const BlockEnergy& energy, const std::vector<bool>& held)
-      : energy_(energy), of_free_(free_points(held)), factors_(free_, of_free_) {}
+  StepMatrix(const BlockEnergy& energy, const std::vector<bool>& held) : energy_(energy) {
+    for (const bool is_held : held) unknown_.push_back(is_held ? -1 : free_++);
+    take_pairs();
+  }
+
+  /// Takes over the energy's pairs when they have changed.
+  void take_pairs() {
+    blocks_.clear();
+    std::vector<BlockEnergy::Pair> of_free;
+    const std::vector<BlockEnergy::Pair>& pairs = energy_.pairs();
+    for (size_t p = 0; p < pairs.size(); ++p) {
+      const int low = unknown(pairs[p].low), high = unknown(pairs[p].high);
+      if (low < 0 || high < 0) continue;
+      blocks_.push_back(static_cast<int>(p));
+      of_free.push_back({low, high});
+    }
+    factors_.emplace(free_, of_free);
+  }
 
   int free_points() const { return free_; }
 
@@ -34,7 +54,7 @@ class StepMatrix {
       if (pair.low == pair.high)
         matrix_.back().diagonal().array() += shift_per_s2 * energy_.mass_kg()[pair.low];
     }
-    return factors_.factorise(matrix_);
+    return factors_->factorise(matrix_);
   }
 
   /// Returns the step against `gradient_n`; held points do not move.
@@ -42,7 +62,7 @@ class StepMatrix {
     Eigen::VectorXd right(3 * free_);
     for (int v = 0; v < gradient_n.cols(); ++v)
       if (unknown(v) >= 0) right.segment<3>(3 * unknown(v)) = -gradient_n.col(v);
-    const Eigen::VectorXd free = factors_.solve(right);
+    const Eigen::VectorXd free = factors_->solve(right);
     Eigen::Matrix3Xd step = Eigen::Matrix3Xd::Zero(3, gradient_n.cols());
     for (int v = 0; v < gradient_n.cols(); ++v)
       if (unknown(v) >= 0) step.col(v) = free.segment<3>(3 * unknown(v));
@@ -52,98 +72,142 @@ class StepMatrix {
  private:
   int unknown(int point) const { return unknown_[static_cast<size_t>(point)]; }
 
-  /// Numbers the free points and returns the pairs of them.
-  std::vector<BlockEnergy::Pair> free_points(const std::vector<bool>& held) {
-    for (const bool is_held : held) unknown_.push_back(is_held ? -1 : free_++);
-    std::vector<BlockEnergy::Pair> of_free;
-    const std::vector<BlockEnergy::Pair>& pairs = energy_.pairs();
-    for (size_t p = 0; p < pairs.size(); ++p) {
-      const int low = unknown(pairs[p].low), high = unknown(pairs[p].high);
-      if (low < 0 || high < 0) continue;
-      blocks_.push_back(static_cast<int>(p));
-      of_free.push_back({low, high});
-    }
-    return of_free;
-  }
-
   const BlockEnergy& energy_;
   int free_ = 0;
-  std::vector<int> unknown_;                ///< of every point; -1: held
-  std::vector<int> blocks_;                 ///< pairs of free points
-  std::vector<BlockEnergy::Pair> of_free_;  ///< the same, as they are numbered
-  BlockCholesky factors_;
+  std::vector<int> unknown_;  ///< of every point; -1: held
+  std::vector<int> blocks_;   ///< pairs of free points
+  std::optional<BlockCholesky> factors_;
   std::vector<Eigen::Matrix3d> second_, matrix_;
 };
 
-double energy_and_free_gradient(const BlockEnergy& energy, const std::vector<bool>& held,
-                                const Eigen::Matrix3Xd& position_m, Eigen::Matrix3Xd& gradient_n) {
-  const double energy_j = energy.energy_and_gradient(position_m, gradient_n);
-  for (Eigen::Index v = 0; v < gradient_n.cols(); ++v)
-    if (held[static_cast<size_t>(v)]) gradient_n.col(v).setZero();
-  return energy_j;
-}
+/// A shape, its energy and the derivative of that; zero at held points.
+struct Place {
+  Eigen::Matrix3Xd position_m, gradient_n;
+  double energy_j = 0;
+};
+
+class Settling {
+ public:
+  Settling(BlockEnergy& energy, const std::vector<bool>& held, const SettleRule& rule)
+      : energy_(energy),
+        held_(held),
+        rule_(rule),
+        matrix_(energy, held),
+        shift_per_s2_(rule.first_shift_per_s2),
+        move_m_(Eigen::Matrix3Xd::Zero(3, energy.points())) {}
+
+  MinimiseResult run(Eigen::Matrix3Xd& position_m) {
+    energy_.open_way(position_m, move_m_);
+    Place here = place(position_m);
+    note(here);
+    while (!is_over(rule_.stop, result_)) {
+      const double onward = onward_share();
+      const double open = energy_.open_way(here.position_m, onward * move_m_);
+      const Place from = onward > 0 ? place(here.position_m + open * onward * move_m_) : here;
+      std::optional<Place> next = step_from(from);
+      if (next && onward > 0 && resolved_ && next->energy_j > here.energy_j) next.reset();
+      if (!next) {
+        if (onward > 0) {
+          halt();
+        } else if (shift_per_s2_ > most_shift_per_s2()) {
+          result_.reason = MinimiseReason::stalled;
+          break;
+        } else {
+          shift_per_s2_ *= 4;
+        }
+        continue;
+      }
+      move_m_ = next->position_m - here.position_m;
+      steps_since_halt_ += 1;
+      here = std::move(*next);
+      note(here);
+      ++result_.iterations;
+    }
+    position_m = here.position_m;
+    return result_;
+  }
+
+ private:
+  double most_shift_per_s2() const { return 1e12 * rule_.first_shift_per_s2; }
+
+  Place place(const Eigen::Matrix3Xd& position_m) {
+    Place place{position_m, Eigen::Matrix3Xd(3, position_m.cols())};
+    place.energy_j = energy_.energy_and_gradient(position_m, place.gradient_n);
+    for (Eigen::Index v = 0; v < position_m.cols(); ++v)
+      if (held_[static_cast<size_t>(v)]) place.gradient_n.col(v).setZero();
+    ++result_.evaluations;
+    return place;
+  }
+
+  void note(const Place& here) {
+    result_.energy_j = here.energy_j;
+    result_.gradient_n = here.gradient_n.norm();
+  }
+
+  /// Returns the share of the last move by which the next begins ahead: that of an accelerated
+  /// gradient method [nesterov1983] `steps_since_halt_` steps after it began.
+  double onward_share() const {
+    return std::min(kMostOnward, steps_since_halt_ / (steps_since_halt_ + 3));
+  }
+
+  /// Begins again without momentum.
+  void halt() {
+    steps_since_halt_ = 0;
+    move_m_.setZero();
+  }
+
+  /// Makes one step that lowers the energy; none is found where the shift is too small.
+  std::optional<Place> step_from(const Place& from) {
+    if (energy_.update_pairs(from.position_m)) matrix_.take_pairs();
+    const double lacking = from.gradient_n.norm() * std::sqrt(matrix_.free_points()) / rule_.load_n;
+    matrix_.linearise(from.position_m,
+                      lacking < kNearBalance ? Curvature::exact : Curvature::clamped);
+    while (!matrix_.factorise(shift_per_s2_)) {
+      if (shift_per_s2_ > most_shift_per_s2()) return std::nullopt;
+      shift_per_s2_ *= 4;
+    }
+    Eigen::Matrix3Xd direction = matrix_.solve(from.gradient_n);
+    const double longest_m = direction.colwise().norm().maxCoeff();
+    if (longest_m > rule_.longest_step_m) direction *= rule_.longest_step_m / longest_m;
+    const double slope = direction.cwiseProduct(from.gradient_n).sum();
+    // Near the end the energy no longer resolves what a step gains; its slope does.
+    constexpr double kNoise = 1e-11;
+    resolved_ = std::abs(slope) > kNoise * std::abs(from.energy_j);
+    // The energy must fall by this share of what the slope promises.
+    constexpr double kShare = 1e-4, kShortest = 1.0 / 64;
+    const double open = energy_.open_way(from.position_m, direction);
+    if (!(open > 0)) return std::nullopt;
+    for (double step = open; step >= kShortest * open; step *= 0.5) {
+      Place trial = place(from.position_m + step * direction);
+      const bool good = resolved_ ? trial.energy_j <= from.energy_j + kShare * step * slope
+                                  : trial.gradient_n.norm() < from.gradient_n.norm();
+      if (!good) continue;
+      if (step == 1)
+        shift_per_s2_ = std::max(0.25 * shift_per_s2_, 1e-6 * rule_.first_shift_per_s2);
+      else if (step < 0.2)
+        shift_per_s2_ *= 4;
+      return trial;
+    }
+    return std::nullopt;
+  }
+
+  BlockEnergy& energy_;
+  const std::vector<bool>& held_;
+  const SettleRule& rule_;
+  StepMatrix matrix_;
+  double shift_per_s2_;
+  bool resolved_ = true;  ///< the energy resolves what the last step gained
+  Eigen::Matrix3Xd move_m_;
+  double steps_since_halt_ = 0;
+  MinimiseResult result_;
+};
 
 }  // namespace
 
-MinimiseResult settle(const BlockEnergy& energy, const std::vector<bool>& held,
-                      const SettleRule& rule, Eigen::Matrix3Xd& position_m) {
+MinimiseResult settle(BlockEnergy& energy, const std::vector<bool>& held, const SettleRule& rule,
+                      Eigen::Matrix3Xd& position_m) {
   assert(held.size() == static_cast<size_t>(energy.points()));
-  StepMatrix matrix(energy, held);
-  const double least_shift = 1e-6 * rule.first_shift_per_s2,
-               most_shift = 1e12 * rule.first_shift_per_s2;
-  Eigen::Matrix3Xd gradient(3, position_m.cols()), new_gradient(3, position_m.cols());
-  MinimiseResult result;
-  result.energy_j = energy_and_free_gradient(energy, held, position_m, gradient);
-  result.gradient_n = gradient.norm();
-  result.evaluations = 1;
-  double shift = rule.first_shift_per_s2;
-  bool linearised = false;
-  while (!is_over(rule.stop, result)) {
-    const double lacking = result.gradient_n * std::sqrt(matrix.free_points()) / rule.load_n;
-    if (!linearised)
-      matrix.linearise(position_m, lacking < kNearBalance ? Curvature::exact : Curvature::clamped);
-    linearised = true;
-    double step = 0;
-    if (matrix.factorise(shift)) {
-      Eigen::Matrix3Xd direction = matrix.solve(gradient);
-      const double longest_m = direction.colwise().norm().maxCoeff();
-      if (longest_m > rule.longest_step_m) direction *= rule.longest_step_m / longest_m;
-      const double slope = direction.cwiseProduct(gradient).sum();
-      // The energy must fall by this share of what the slope promises.
-      constexpr double kShare = 1e-4, kShortest = 1.0 / 64, kNoise = 1e-11;
-      for (step = 1; step >= kShortest; step *= 0.5) {
-        const Eigen::Matrix3Xd trial = position_m + step * direction;
-        const double energy_j = energy_and_free_gradient(energy, held, trial, new_gradient);
-        ++result.evaluations;
-        // Near the end the energy no longer resolves what a step gains; its slope does.
-        const bool resolved = std::abs(slope) > kNoise * std::abs(result.energy_j);
-        const bool good = resolved ? energy_j <= result.energy_j + kShare * step * slope
-                                   : new_gradient.norm() < result.gradient_n;
-        if (!good) continue;
-        position_m = trial;
-        result.energy_j = energy_j;
-        break;
-      }
-      if (step < kShortest) step = 0;
-    }
-    if (step == 0) {
-      if (shift > most_shift) {
-        result.reason = MinimiseReason::stalled;
-        break;
-      }
-      shift *= 4;
-      continue;
-    }
-    linearised = false;
-    std::swap(gradient, new_gradient);
-    result.gradient_n = gradient.norm();
-    ++result.iterations;
-    if (step == 1)
-      shift = std::max(0.25 * shift, least_shift);
-    else if (step < 0.2)
-      shift *= 4;
-  }
-  return result;
+  return Settling(energy, held, rule).run(position_m);
 }
 
 }  // namespace clothfit

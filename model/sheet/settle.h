@@ -26,7 +26,7 @@ struct SettleRule {
   /// start far from it.
   double first_shift_per_s2 = 0;
 };
-MinimiseResult settle(const BlockEnergy& energy, const std::vector<bool>& held,
-                      const SettleRule& rule, Eigen::Matrix3Xd& position_m);
+MinimiseResult settle(BlockEnergy& energy, const std::vector<bool>& held, const SettleRule& rule,
+                      Eigen::Matrix3Xd& position_m);
 
 }  // namespace clothfit

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <optional>
+#include <utility>
 #include <vector>
 
 namespace clothfit {
@@ -44,12 +45,20 @@ class Obstacle {
   /// Returns the distance where it is not more than `within_m`, above and below; there the reach
   /// does not matter. Beyond the border of a surface that is not closed its sign means nothing.
   std::optional<Distance> distance(const Eigen::Vector3d& point_m, double within_m) const;
+  /// A distance within which every surface is.
+  static constexpr double kAnywhere_m = 1e6;
 
   /// Returns how many edges do not lie between triangles that face the same way, as many on one
   /// side as on the other: none where the surface is closed.
   int open_edges() const { return open_edges_; }
   /// Returns the volume inside of a closed surface (m3), < 0 where its triangles face inwards.
   double volume_m3() const;
+
+  /// Returns the lower and upper corner of the box around it; zero without triangles.
+  std::pair<Eigen::Vector3d, Eigen::Vector3d> bounds_m() const {
+    if (nodes_.empty()) return {Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
+    return {nodes_[0].low, nodes_[0].high};
+  }
 
   int triangles() const { return static_cast<int>(triangles_.size()); }
 
