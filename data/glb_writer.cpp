@@ -115,12 +115,13 @@ class GlbWriter {
  public:
   explicit GlbWriter(const MeshSequence& mesh) : mesh_(mesh) {
     std::vector<int> triangles;
-    const Eigen::Matrix4Xi cells = quads(mesh);
-    for (const auto& q : cells.colwise())
-      triangles.insert(triangles.end(), {q[0], q[1], q[2], q[0], q[2], q[3]});
+    for (const auto& face : mesh.face.colwise()) {
+      triangles.insert(triangles.end(), {face[0], face[1], face[2]});
+      if (face[3] >= 0) triangles.insert(triangles.end(), {face[0], face[2], face[3]});
+    }
     indices_ = buffer_.add_indices(triangles);
     // glTF's v runs downwards.
-    Eigen::MatrixXf uv = texture_coordinates(mesh).cast<float>();
+    Eigen::MatrixXf uv = mesh.texture.cast<float>();
     uv.row(1).array() = 1 - uv.row(1).array();
     texture_coordinates_ = buffer_.add_floats(uv, "VEC2", false, true);
   }

@@ -13,6 +13,11 @@ inline void append_uint32(std::uint32_t value, std::string& bytes) {
 inline void append_int32(int value, std::string& bytes) {
   append_uint32(static_cast<std::uint32_t>(value), bytes);
 }
+inline void append_float64(double value, std::string& bytes) {
+  const auto word = std::bit_cast<std::uint64_t>(value);
+  append_uint32(static_cast<std::uint32_t>(word), bytes);
+  append_uint32(static_cast<std::uint32_t>(word >> 32), bytes);
+}
 inline void append_float32(double value, std::string& bytes) {
   append_uint32(std::bit_cast<std::uint32_t>(static_cast<float>(value)), bytes);
 }

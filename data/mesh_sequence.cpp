@@ -8,27 +8,21 @@
 
 namespace clothfit {
 
-Eigen::Matrix4Xi quads(const MeshSequence& mesh) {
-  Eigen::Matrix4Xi cells(4, (mesh.columns - 1) * (mesh.rows - 1));
-  for (int i = 0; i + 1 < mesh.rows; ++i) {
-    for (int j = 0; j + 1 < mesh.columns; ++j) {
-      const int corner = i * mesh.columns + j;
+MeshSequence grid_sequence(int columns, int rows) {
+  MeshSequence mesh;
+  mesh.face.resize(4, (columns - 1) * (rows - 1));
+  mesh.texture.resize(2, columns * rows);
+  for (int i = 0; i < rows; ++i)
+    for (int j = 0; j < columns; ++j) {
+      const int corner = i * columns + j;
+      mesh.texture.col(corner) << static_cast<double>(j) / (columns - 1),
+          1 - static_cast<double>(i) / (rows - 1);
+      if (i + 1 == rows || j + 1 == columns) continue;
       // The corners run down along t, right along s and up again.
-      cells.col(i * (mesh.columns - 1) + j) << corner, corner + mesh.columns,
-          corner + mesh.columns + 1, corner + 1;
+      mesh.face.col(i * (columns - 1) + j) << corner, corner + columns, corner + columns + 1,
+          corner + 1;
     }
-  }
-  return cells;
-}
-
-Eigen::Matrix2Xd texture_coordinates(const MeshSequence& mesh) {
-  Eigen::Matrix2Xd uv(2, mesh.columns * mesh.rows);
-  for (int i = 0; i < mesh.rows; ++i) {
-    for (int j = 0; j < mesh.columns; ++j)
-      uv.col(i * mesh.columns + j) << static_cast<double>(j) / (mesh.columns - 1),
-          1 - static_cast<double>(i) / (mesh.rows - 1);
-  }
-  return uv;
+  return mesh;
 }
 
 void write_obj(const MeshSequence& mesh, int frame, const std::filesystem::path& file) {
@@ -37,13 +31,13 @@ void write_obj(const MeshSequence& mesh, int frame, const std::filesystem::path&
                                  number_text(mesh.time_s[static_cast<size_t>(frame)]));
   for (const auto& p : position_m.colwise())
     text += fmt::format("v {} {} {}\n", number_text(p.x()), number_text(p.y()), number_text(p.z()));
-  const Eigen::Matrix2Xd texture = texture_coordinates(mesh);
-  for (const auto& uv : texture.colwise())
+  for (const auto& uv : mesh.texture.colwise())
     text += fmt::format("vt {} {}\n", number_text(uv.x()), number_text(uv.y()));
-  const Eigen::Matrix4Xi cells = quads(mesh);
-  for (const auto& q : cells.colwise()) {  // OBJ counts from 1
-    text +=
-        fmt::format("f {0}/{0} {1}/{1} {2}/{2} {3}/{3}\n", q[0] + 1, q[1] + 1, q[2] + 1, q[3] + 1);
+  for (const auto& face : mesh.face.colwise()) {
+    text += 'f';
+    for (const int corner : face)
+      if (corner >= 0) text += fmt::format(" {0}/{0}", corner + 1);  // OBJ counts from 1
+    text += '\n';
   }
   write_text(text, file);
 }
@@ -51,7 +45,7 @@ void write_obj(const MeshSequence& mesh, int frame, const std::filesystem::path&
 void write_pc2(const MeshSequence& mesh, const std::filesystem::path& file) {
   std::string bytes("POINTCACHE2\0", 12);
   append_int32(1, bytes);
-  append_int32(mesh.columns * mesh.rows, bytes);
+  append_int32(static_cast<int>(mesh.texture.cols()), bytes);
   append_float32(0, bytes);
   append_float32(1, bytes);
   append_int32(static_cast<int>(mesh.position_m.size()), bytes);

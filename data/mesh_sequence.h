@@ -6,27 +6,27 @@
 
 namespace clothfit {
 
-/// A moving cloth for programs of computer graphics: a grid of vertices and its positions in every
-/// frame. Vertex [i, j] (row i along t, column j along s) has index i * columns + j.
+/// A moving cloth for programs of computer graphics: faces, and the positions of their vertices in
+/// every frame.
 struct MeshSequence {
-  int columns = 0;                           ///< >= 2
-  int rows = 0;                              ///< >= 2
+  /// Corners of each face, counterclockwise around the outward normal; the last is -1 in triangles.
+  Eigen::Matrix4Xi face;
+  /// Texture coordinates (u, v) of the vertices, 2 x vertices, 0 to 1.
+  Eigen::Matrix2Xd texture;
   std::vector<double> time_s;                ///< rising, of each frame
   std::vector<Eigen::Matrix3Xd> position_m;  ///< of each frame: 3 x vertices, world, finite
   Eigen::Vector3d up{0, 0, 1};               ///< against gravity; unit
 };
 
-/// Returns the cells of the grid, four vertices each: 4 x cells. They run counter-clockwise around
-/// the outward normal of the printed side: t x s, towards a viewer for whom s runs to the right and
-/// t down.
-Eigen::Matrix4Xi quads(const MeshSequence& mesh);
-
-/// Returns texture coordinates (u, v) of the vertices: 2 x vertices. u runs along s, v against t,
-/// both from 0 to 1, so that a picture of the printed side lies upright.
-Eigen::Matrix2Xd texture_coordinates(const MeshSequence& mesh);
+/// Returns a grid's faces and texture, without frames. Vertex [i, j] (row i along t, column j along
+/// s) has index i * columns + j; there are two or more of both. Its cells run counterclockwise
+/// around the outward normal of the printed side: t x s, towards a viewer for whom s runs to the
+/// right and t down. u runs along s, v against t, so that a picture of the printed side lies
+/// upright.
+MeshSequence grid_sequence(int columns, int rows);
 
 /// Writes a Wavefront OBJ of one frame. It has vertices in metres and the world's axes, texture
-/// coordinates and quads. Numbers read back to the last bit. Throws InputError where the file
+/// coordinates and faces. Numbers read back to the last bit. Throws InputError where the file
 /// cannot be written.
 void write_obj(const MeshSequence& mesh, int frame, const std::filesystem::path& file);
 

@@ -11,6 +11,7 @@
 #include "data/model_description.h"
 #include "data/model_words.h"
 #include "data/number_limits.h"
+#include "data/ply_mesh.h"
 #include "data/reading.h"
 #include "data/recording_parts.h"
 #include "data/unit_quaternion.h"
@@ -223,7 +224,7 @@ ModelDescription parsed_model(const std::filesystem::path& file, OutsideFiles ou
   if (const YamlValue* obstacle = map.find("obstacle")) {
     files.file(*obstacle);
     model.obstacle_file = files.shown(*obstacle);
-    model.obstacle = read_obj(files.shown(*obstacle));
+    model.obstacle = read_surface(files.shown(*obstacle));
   }
   if (const YamlValue* held = map.find("held")) {
     for (HeldPoint& point : read_held(*held, files, model.cloth, model_motion_words())) {

@@ -28,13 +28,6 @@ std::string_view next_word(std::string_view& rest) {
   return word;
 }
 
-bool has_area(const SurfaceMesh& mesh) {
-  return std::ranges::any_of(mesh.triangle.colwise(), [&](const auto& corners) {
-    const Eigen::Matrix3d at_m = mesh.vertex_m(Eigen::all, corners);
-    return (at_m.col(1) - at_m.col(0)).cross(at_m.col(2) - at_m.col(0)).norm() > 0;
-  });
-}
-
 SurfaceMesh parsed_obj(const std::filesystem::path& file) {
   TextLines lines(file);
   std::vector<double> coordinates;
@@ -93,6 +86,13 @@ SurfaceMesh parsed_obj(const std::filesystem::path& file) {
 }
 
 }  // namespace
+
+bool has_area(const SurfaceMesh& mesh) {
+  return std::ranges::any_of(mesh.triangle.colwise(), [&](const auto& corners) {
+    const Eigen::Matrix3d at_m = mesh.vertex_m(Eigen::all, corners);
+    return (at_m.col(1) - at_m.col(0)).cross(at_m.col(2) - at_m.col(0)).norm() > 0;
+  });
+}
 
 SurfaceMesh read_obj(const std::filesystem::path& file) {
   return reading(file, [&] { return parsed_obj(file); });

@@ -21,6 +21,9 @@ struct SurfaceMesh {
 /// none or farther than any scene, and for an index of no vertex.
 SurfaceMesh read_obj(const std::filesystem::path& file);
 
+/// Says whether a triangle has an area.
+bool has_area(const SurfaceMesh& mesh);
+
 /// Writes a Wavefront OBJ file that read_obj reads back to the last bit.
 void write_obj(const SurfaceMesh& mesh, const std::filesystem::path& file);
 

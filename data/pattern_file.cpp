@@ -18,7 +18,7 @@
 namespace clothfit {
 namespace {
 
-constexpr double kLargest_m = 20;  ///< coordinates of a garment
+constexpr double kFarthestOfGarment_m = 20;  ///< coordinates of a garment
 constexpr size_t kMostPanels = 200, kMostCorners = 1000;
 
 /// A panel while it is read.
@@ -30,8 +30,8 @@ struct DraftPanel {
 };
 
 Eigen::Vector2d point_of(const YamlValue& value, double unit_m) {
-  const std::array<double, 2> at =
-      value.numbers_between<2>(-kLargest_m / unit_m, kLargest_m / unit_m, "a coordinate");
+  const std::array<double, 2> at = value.numbers_between<2>(
+      -kFarthestOfGarment_m / unit_m, kFarthestOfGarment_m / unit_m, "a coordinate");
   return unit_m * Eigen::Vector2d(at[0], at[1]);
 }
 
@@ -84,7 +84,7 @@ Dart dart_of(const YamlMap& map, const DraftCorner& from, const Eigen::Vector2d&
   if (!from.edge.control_m.empty() || from.edge.bulge != 0)
     map.whole().refuse("a dart in a curved edge", "a straight edge",
                        "give its corners and legs in the outline, and a seam");
-  const double length_m = (to_m - from.place_m).norm(), largest = kLargest_m / unit_m;
+  const double length_m = (to_m - from.place_m).norm(), largest = kFarthestOfGarment_m / unit_m;
   const double share = map.at("at").number_between(0, 1, "a share of the edge");
   Dart dart{.along_m = share * length_m,
             .width_m = unit_m * map.at("width").number_between(1e-3 / unit_m, largest, "a width"),
@@ -190,7 +190,8 @@ DraftPanel panel_of(const YamlValue& value, const std::string& name, double unit
   if (const YamlValue* grain = map.find("grain"))
     panel.grain_rad = degree * grain->number_between(-180, 180, "degrees from the panel's y axis");
   using Eigen::AngleAxisd, Eigen::Vector3d;
-  panel.placement.translate(unit_m * vector_of(map.at("at"), kLargest_m / unit_m, "a coordinate"));
+  panel.placement.translate(unit_m *
+                            vector_of(map.at("at"), kFarthestOfGarment_m / unit_m, "a coordinate"));
   const Vector3d turn = degree * vector_of(map.at("turn"), 360, "degrees");
   panel.placement.rotate(AngleAxisd(turn.z(), Vector3d::UnitZ()) *
                          AngleAxisd(turn.y(), Vector3d::UnitY()) *

@@ -7,6 +7,7 @@
 #include "data/input_error.h"
 #include "data/nearest_name.h"
 #include "data/number_limits.h"
+#include "data/ply_mesh.h"
 #include "data/reading.h"
 #include "data/recording.h"
 #include "data/recording_parts.h"
@@ -197,7 +198,7 @@ Recording parsed_recording(const std::filesystem::path& folder, OutsideFiles out
   }
   if (const YamlValue* obstacle = map.find("obstacle")) {
     recording.obstacle_file = files.file(*obstacle);
-    recording.obstacle = read_obj(files.shown(*obstacle));
+    recording.obstacle = read_surface(files.shown(*obstacle));
   }
   if (const YamlValue* held = map.find("held"))
     recording.held = read_held(*held, files, recording.cloth, held_motion_words());

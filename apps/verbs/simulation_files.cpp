@@ -91,10 +91,9 @@ void write_as_recording(const ModelDescription& written,
 }
 
 MeshSequence sequence_of(const ModelDescription& model, std::vector<Eigen::Matrix3Xd> position_m) {
-  MeshSequence mesh{.columns = model.mesh_columns,
-                    .rows = model.mesh_rows,
-                    .time_s = model.frame_time_s,
-                    .position_m = std::move(position_m)};
+  MeshSequence mesh = grid_sequence(model.mesh_columns, model.mesh_rows);
+  mesh.time_s = model.frame_time_s;
+  mesh.position_m = std::move(position_m);
   if (model.gravity_m_per_s2.norm() > 0) mesh.up = -model.gravity_m_per_s2.normalized();
   return mesh;
 }

@@ -23,7 +23,7 @@ using Json = nlohmann::json;
 
 /// Makes a cloth of 3 columns and 2 rows that hangs (s along x, t down) and moves at random.
 MeshSequence moving_cloth(int frames) {
-  MeshSequence mesh{.columns = 3, .rows = 2};
+  MeshSequence mesh = grid_sequence(3, 2);
   std::mt19937_64 rng(1);
   for (int f = 0; f < frames; ++f) {
     mesh.time_s.push_back(2 + f / 60.0);
@@ -98,7 +98,7 @@ TEST(Obj, HoldsEveryVertexToTheLastBitAndFacesThatLookAtTheViewer) {
 }
 
 TEST(Obj, NeighbouringFacesRunOppositeWaysAlongTheirCommonEdge) {
-  const Eigen::Matrix4Xi cells = quads({.columns = 4, .rows = 3});
+  const Eigen::Matrix4Xi cells = grid_sequence(4, 3).face;
 
   std::map<std::pair<int, int>, int> uses;
   for (Eigen::Index n = 0; n < cells.cols(); ++n)
