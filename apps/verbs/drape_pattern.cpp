@@ -133,6 +133,12 @@ void require_rest(const Pattern& pattern, const GarmentDrape& drape,
           "side of the body, or a garment too tight for it; place the panels so that nothing lies "
           "between the sides of a seam",
           seam_text(pattern, drape.widest_seam), 1e3 * drape.widest_gap_m));
+    case GarmentState::too_tight:
+      throw NoResult(fmt::format(
+          "{:.0f} % of the cloth would be stretched by more than half to close the seams: the "
+          "garment is too tight for the body; give it more width, and check the units of pattern "
+          "and body",
+          100 * drape.stretched_share));
     case GarmentState::inside_body:
       throw NoResult(fmt::format(
           "{} places of the cloth end inside the body, the deepest by {:.1f} mm: the garment is "
