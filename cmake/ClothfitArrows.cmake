@@ -75,6 +75,7 @@ set(CLOTHFIT_ARROWS
                            apps/report/page"
   "apps/report/diagnosis -> data fit/problem fit/diagnosis apps/terminal apps/report/page
                            apps/report/fit"
+  "apps/report/garment  -> model/rest model/garment apps/terminal apps/report/page"
   "apps/study/scene     -> data/algebra data calib/camera vision/encode vision/track vision/render
                            model/topology model/fabric model/cloth model/effects
                            model/integrate fit/jobs fit/measurement_effects fit/problem fit
@@ -85,6 +86,7 @@ set(CLOTHFIT_ARROWS
                            apps/study/scene"
   "apps/study/louchet1995 -> data/algebra data model/fabric model/effects fit/jobs fit/problem
                              fit/cost fit/search fit/refine"
+  "apps/study/lethanh2007 -> data model/topology model/rest model/garment fit/jobs"
   "apps/study/recordings -> data fit/jobs fit/observe fit/problem fit apps/terminal apps/steps
                             apps/report/fit"
   "apps/study/foreign   -> data fit/jobs fit/diagnosis apps/terminal apps/steps
@@ -93,15 +95,17 @@ set(CLOTHFIT_ARROWS
                            vision/render model/topology fit/interface fit/jobs fit/observe
                            fit/diagnosis apps/terminal apps/steps"
   "apps/report/study    -> data vision/track apps/terminal apps/report/page apps/report/fit
-                           apps/study/trials apps/study/louchet1995 apps/study/recordings
-                           apps/study/foreign apps/study/vision"
+                           apps/study/trials apps/study/louchet1995 apps/study/lethanh2007
+                           apps/study/recordings apps/study/foreign apps/study/vision"
   "apps/verbs           -> data vision/encode vision/detect vision/track vision/look vision/print
+                           vision/render
                            model/topology model/fabric model/cloth model/effects model/rest
                            model/garment model/laboratory model/integrate
                            fit/interface fit/jobs fit/measurement_effects
                            fit/problem fit/preflight fit/verdict fit fit/diagnosis apps/terminal
                            apps/steps apps/report/page apps/report/fit apps/report/diagnosis
-                           apps/study/trials apps/study/louchet1995 apps/study/recordings
+                           apps/report/garment apps/study/trials apps/study/louchet1995
+                           apps/study/lethanh2007 apps/study/recordings
                            apps/study/foreign apps/study/vision apps/report/study"
   "apps                 -> data apps/terminal apps/verbs"
 )

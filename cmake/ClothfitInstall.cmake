@@ -1,5 +1,5 @@
 # What `cmake --install` puts where: the program, the folders as libraries for find_package(clothfit),
-# the bundled recordings beside the program's share folder, where `clothfit demo` looks for them.
+# the bundled recordings, patterns and fabrics beside the program's share folder, where `clothfit demo` looks for them.
 
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
@@ -23,7 +23,7 @@ install(EXPORT clothfit-targets NAMESPACE clothfit::
 install(DIRECTORY data calib vision model fit
   DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/clothfit
   FILES_MATCHING PATTERN "*.h" PATTERN recordings EXCLUDE)
-install(DIRECTORY data/recordings DESTINATION ${CMAKE_INSTALL_DATADIR}/clothfit)
+install(DIRECTORY data/recordings data/patterns data/fabrics DESTINATION ${CMAKE_INSTALL_DATADIR}/clothfit)
 install(FILES LICENSE README.md CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
 
 configure_package_config_file(${CMAKE_CURRENT_LIST_DIR}/clothfit-config.cmake.in

@@ -10,4 +10,7 @@ namespace clothfit {
 /// InputError when it is at neither place.
 std::filesystem::path bundled_recording(const std::string& name);
 
+/// Returns the file of a sewing pattern that comes with the program, in the same way.
+std::filesystem::path bundled_pattern(const std::string& name);
+
 }  // namespace clothfit

@@ -19,6 +19,7 @@ std::string flag_of(std::string member) {
       {"effects", "effect"},
       {"height_m", "size"},
       {"hold_off_m", "hold-off"},
+      {"self_distance_m", "self-distance"},
       {"marker_offset_sigma_m", "marker-offsets"},
       {"mesh_columns", "mesh"},
       {"mesh_rows", "mesh"},

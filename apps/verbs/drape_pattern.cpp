@@ -14,11 +14,14 @@
 #include "apps/terminal/result_folder.h"
 #include "apps/terminal/say.h"
 #include "apps/terminal/text_table.h"
+#include "apps/verbs/garment_files.h"
 #include "apps/verbs/measured_sheet.h"
 #include "data/fabric_sheet.h"
 #include "data/input_error.h"
-#include "data/obj_mesh.h"
 #include "data/pattern_file.h"
+#include "data/ply_mesh.h"
+#include "data/program_version.h"
+#include "data/text_file.h"
 #include "model/garment/mannequin.h"
 #include "model/rest/equilibrium.h"
 
@@ -50,7 +53,7 @@ std::vector<FabricSheet> sheets_of(const Pattern& pattern, const fs::path& fabri
 
 TriangleMesh read_body(const fs::path& file) {
   if (file.empty()) return make_mannequin();
-  SurfaceMesh mesh = read_obj(file);
+  SurfaceMesh mesh = read_surface(file);
   const double span_m =
       (mesh.vertex_m.rowwise().maxCoeff() - mesh.vertex_m.rowwise().minCoeff()).maxCoeff();
   if (constexpr double kLargestBody_m = 10; span_m > kLargestBody_m)
@@ -64,27 +67,6 @@ std::string seam_text(const Pattern& pattern, int seam) {
   const auto& [one, other] = pattern.seams[static_cast<size_t>(seam)].sides;
   return fmt::format("the seam of {} and {}", pattern.panels[static_cast<size_t>(one.panel)].name,
                      pattern.panels[static_cast<size_t>(other.panel)].name);
-}
-
-/// Returns the surface of a garment: vertices that a seam joins are one. Triangles that a seam has
-/// drawn to a line are left out.
-SurfaceMesh sewn_surface(const GarmentDrape& drape) {
-  const GarmentMesh& mesh = drape.mesh;
-  SurfaceMesh surface;
-  surface.vertex_m.resize(3, mesh.particles);
-  for (size_t v = 0; v < mesh.particle_of.size(); ++v)
-    surface.vertex_m.col(mesh.particle_of[v]) = drape.position_m.col(static_cast<Eigen::Index>(v));
-  std::vector<Eigen::Vector3i> triangles;
-  const Eigen::Matrix3Xi all = mesh.cloth.triangles();
-  for (const auto& corners : all.colwise()) {
-    Eigen::Vector3i of;
-    for (int k = 0; k < 3; ++k) of[k] = mesh.particle_of[static_cast<size_t>(corners[k])];
-    if (of[0] != of[1] && of[1] != of[2] && of[2] != of[0]) triangles.push_back(of);
-  }
-  surface.triangle.resize(3, static_cast<Eigen::Index>(triangles.size()));
-  for (size_t t = 0; t < triangles.size(); ++t)
-    surface.triangle.col(static_cast<Eigen::Index>(t)) = triangles[t];
-  return surface;
 }
 
 GarmentDrape drape_with_progress(const Pattern& pattern, const std::vector<FabricSheet>& sheets,
@@ -157,19 +139,6 @@ void require_rest(const Pattern& pattern, const GarmentDrape& drape,
   }
 }
 
-Table levels_table(const GarmentDrape& drape) {
-  Table table;
-  table.header = {"spacing, mm", "particles",         "triangles", "steps",
-                  "energy, J",   "residual force, N", "state"};
-  for (const GarmentLevel& level : drape.levels)
-    table.rows.push_back({fmt::format("{:g}", 1e3 * level.spacing_m),
-                          fmt::format("{}", level.particles), fmt::format("{}", level.triangles),
-                          fmt::format("{}", level.work.iterations),
-                          significant(level.work.energy_j, 5),
-                          significant(level.work.gradient_n, 2), describe(level.work.reason)});
-  return table;
-}
-
 }  // namespace
 
 int drape_pattern(const PatternRequest& request, const std::string& command) {
@@ -187,13 +156,13 @@ int drape_pattern(const PatternRequest& request, const std::string& command) {
       drape_with_progress(pattern, sheets, body, request.body, request.options);
   require_rest(pattern, drape, request.options);
 
-  const Table table = levels_table(drape);
-  std::vector<std::string> notes{"contact of the cloth with itself is not looked for",
-                                 "the body acts without friction"};
+  const Table table = garment_levels(drape);
+  std::vector<std::string> notes{"friction, of the body and of the cloth with itself"};
+  if (request.options.self_distance_m == 0) notes.emplace_back("contact of the cloth with itself");
   if (std::ranges::any_of(sheets, [](const FabricSheet& sheet) {
         return sheet.bending_hysteresis_n || sheet.shear_hysteresis_n_per_m;
       }))
-    notes.emplace_back("the sheets' hysteresis is read, but not simulated yet");
+    notes.emplace_back("the sheets' hysteresis, which is read");
   Json json{{"format", "clothfit-garment/1"},
             {"command", command},
             {"pattern", pattern.name},
@@ -203,9 +172,11 @@ int drape_pattern(const PatternRequest& request, const std::string& command) {
             {"weight_n", drape.weight_n},
             {"imbalance", drape.imbalance},
             {"places_inside_body", drape.inside},
+            {"crossings", nullptr},
             {"widest_gap_when_sewn_m", drape.widest_gap_m},
             {"levels", Json::array()},
-            {"notes", notes}};
+            {"not_counted", notes}};
+  if (request.options.self_distance_m > 0) json["crossings"] = drape.crossings;
   for (const FabricSheet& sheet : sheets) json["fabrics"].push_back(sheet.name);
   for (const GarmentLevel& level : drape.levels)
     json["levels"].push_back({{"spacing_m", level.spacing_m},
@@ -217,16 +188,27 @@ int drape_pattern(const PatternRequest& request, const std::string& command) {
                               {"state", describe(level.work.reason)}});
   write_json(json, out.path() / "garment.json");
   write_csv_table(table, out.path() / "garment.csv");
-  write_obj(sewn_surface(drape), out.path() / "garment.obj");
-  write_obj({.vertex_m = body_mesh.vertex_m, .triangle = body_mesh.triangle},
-            out.path() / "body.obj");
+  const std::string summary = fmt::format(
+      "{} panels, {} seams, {:.0f} g; at rest to {:.2g} of its weight, {} of its edges through "
+      "itself, {} places inside the body.",
+      pattern.panels.size(), pattern.seams.size(), 1e3 * drape.weight_n / kGravity_m_per_s2,
+      drape.imbalance,
+      request.options.self_distance_m > 0 ? fmt::format("{}", drape.crossings) : "unknown how many",
+      drape.inside);
+  const std::vector<GarmentPicture> pictures = write_garment_files(
+      drape, {body_mesh.vertex_m, body_mesh.triangle}, request.formats, out.path());
+  write_text(garment_page_html(drape, {.title = pattern.name,
+                                       .summary = summary,
+                                       .pictures = pictures,
+                                       .notes = notes,
+                                       .command = command,
+                                       .version = program_version()}),
+             out.path() / "report.html");
   out.publish();
 
-  say("\n{}: {} panels, {} seams, {:.0f} g; at rest to {:.2g} of its weight\n\n{}", pattern.name,
-      pattern.panels.size(), pattern.seams.size(), 1e3 * drape.weight_n / kGravity_m_per_s2,
-      drape.imbalance, text_table(table));
-  for (const std::string& note : notes) say("\nNote: {}.\n", note);
-  say("\nResult: {}\n", shown_path(out.final_path() / "garment.obj"));
+  say("\n{}: {}\n\n{}", pattern.name, summary, text_table(table));
+  for (const std::string& note : notes) say("\nNot counted: {}.\n", note);
+  say("\nReport: {}\n", shown_path(out.final_path() / "report.html"));
   return kExitGood;
 }
 

@@ -42,6 +42,7 @@ struct DrapeVerbOptions {
   std::optional<double> spacing_m;  ///< each has a default of its own
   unsigned long long seed = 1;
   int threads = 0;
+  std::string formats = "obj";
   fs::path out;
 };
 
@@ -277,13 +278,15 @@ int run_drape(DrapeVerbOptions options, const Verb& verb) {
     refuse_given(verb, {"--specimen", "--disc", "--starts", "--seed"}, "a pattern");
     require_threads(options.threads);
     const ThreadLimit limit(options.threads);
+    options.garment.formats = *parse_garment_formats(options.formats);
     options.garment.fabric = options.fabric;
     options.garment.out = options.out;
     options.garment.options.spacing_m =
         options.spacing_m.value_or(options.garment.options.spacing_m);
     return drape_pattern(options.garment, command);
   }
-  refuse_given(verb, {"--body", "--hold-off", "--tolerance"}, "--test");
+  refuse_given(verb, {"--body", "--hold-off", "--self-distance", "--format", "--tolerance"},
+               "--test");
   if (options.fabric.empty())
     throw InputError("--fabric", "is missing", "the data sheet of the fabric to test");
   options.cusick.spacing_m = options.spacing_m.value_or(options.cusick.spacing_m);
@@ -298,9 +301,10 @@ void add_drape_verb(Verb program) {
       "drape", "Sew and drape a pattern, or simulate a laboratory's test of a fabric");
   verb.add_option("PATTERN", &options->garment.pattern,
                   "Sewing pattern: ours (YAML) or a specification of GarmentCode (JSON)");
-  verb.add_option("--body", &options->garment.body,
-                  "Closed surface to sew it around; the bundled mannequin where left out")
-      .type_name("BODY.obj");
+  verb.add_option(
+          "--body", &options->garment.body,
+          "Closed surface (OBJ, PLY) to sew it around; the bundled mannequin where left out")
+      .type_name("BODY");
   verb.add_option("--fabric", &options->fabric,
                   "Data sheet of the fabric; of all panels, in place of those a pattern names")
       .type_name("FABRIC.yaml");
@@ -308,6 +312,19 @@ void add_drape_verb(Verb program) {
                   "Distance at which cloth begins to feel the body (m)")
       .is_length()
       .shows_default();
+  verb.add_option("--self-distance", &options->garment.options.self_distance_m,
+                  "Distance at which cloth begins to feel itself (m); 0: not looked for")
+      .is_length()
+      .shows_default();
+  verb.add_option("--format", &options->formats,
+                  "What to write of a garment: obj, which always is, ply, pc2, gltf")
+      .type_name("LIST")
+      .shows_default()
+      .check([](const std::string& text) {
+        return parse_garment_formats(text)
+                   ? std::string()
+                   : "'" + text + "' is not a list of obj, ply, pc2 and gltf";
+      });
   verb.add_option("--tolerance", &options->garment.options.tolerance,
                   "Residual force of a garment that counts as rest, as a share of its weight")
       .shows_default();

@@ -13,6 +13,7 @@
 #include "apps/terminal/say.h"
 #include "apps/terminal/text_table.h"
 #include "apps/verbs/identification_experiment.h"
+#include "apps/verbs/lethanh2007_experiment.h"
 #include "apps/verbs/resumable_run.h"
 #include "apps/verbs/verb.h"
 #include "data/program_version.h"
@@ -81,6 +82,7 @@ void add_experiment_verb(Verb program) {
       "  clothfit experiment louchet1995 --help");
 
   add_identification_experiment(verb);
+  add_lethanh2007_experiment(verb);
   const auto options = std::make_shared<ExperimentVerbOptions>();
   Verb louchet1995 = verb.add_verb(
       "louchet1995", "The founding paper's identification of a simulated cloth, section 3");

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -12,7 +13,7 @@
 #include "data/input_error.h"
 #include "model/garment/garment_energy.h"
 #include "model/garment/pattern_outline.h"
-#include "model/sheet/settle.h"
+#include "model/sheet/settle_otherwise.h"
 
 namespace clothfit {
 namespace {
@@ -32,6 +33,19 @@ constexpr double kMostParticles = 100'000;
 /// Inertia of the first steps: that of a cloth which comes to rest within 30 ms.
 constexpr double kFirstShift_per_s2 = 1000;
 
+/// Returns the mean difference between the lengths of a mesh's edges and those in the flat cloth.
+double spring_error_m(const ClothMesh& cloth, const Eigen::Matrix3Xd& vertex_m) {
+  const Eigen::Matrix3Xi triangles = cloth.triangles();
+  double sum_m = 0;
+  for (const auto& corner : triangles.colwise())
+    for (int k = 0; k < 3; ++k) {
+      const int a = corner[k], b = corner[(k + 1) % 3];
+      sum_m += std::abs((vertex_m.col(a) - vertex_m.col(b)).norm() -
+                        (cloth.material_m.col(a) - cloth.material_m.col(b)).norm());
+    }
+  return sum_m / static_cast<double>(triangles.size());
+}
+
 class GarmentDraping {
  public:
   GarmentDraping(const Pattern& pattern, const std::vector<MeasuredFabric>& fabrics,
@@ -48,13 +62,16 @@ class GarmentDraping {
     GarmentDrape result;
     mesh_coarsest(result);
     result.position_m = result.mesh.placed_m;
+    keep_shape(result.position_m, result);
     check_start(result);
     if (!sew(result)) return result;
-    for (size_t level = 0; level < spacings_m_.size() && !cancelled_; ++level) {
+    for (size_t level = options_.single ? spacings_m_.size() - 1 : 0;
+         level < spacings_m_.size() && !cancelled_; ++level) {
       if (level > 0) refine(spacings_m_[level], result);
       const bool is_last = level + 1 == spacings_m_.size();
       rest(is_last ? options_.tolerance : std::max(options_.tolerance, kCoarseTolerance), result);
     }
+    keep_shape(result.position_m, result);
     return result;
   }
 
@@ -73,7 +90,7 @@ class GarmentDraping {
 
   void check_start(const GarmentDrape& result) const {
     if (!body_) return;
-    GarmentEnergy energy(result.mesh, fabrics_, GarmentEnergy::Seams::open);
+    GarmentEnergy energy = energy_of(result.mesh, GarmentEnergy::Seams::open);
     energy.set_body(*body_, options_.hold_off_m);
     const Inside inside = energy.inside_body(result.position_m);
     if (inside.places == 0) return;
@@ -88,11 +105,36 @@ class GarmentDraping {
                      "panels that wait beside the body", "move its placement outwards");
   }
 
+  GarmentEnergy energy_of(const GarmentMesh& mesh, GarmentEnergy::Seams seams) const {
+    return options_.springs ? GarmentEnergy(mesh, *options_.springs, seams)
+                            : GarmentEnergy(mesh, fabrics_, seams);
+  }
+
   void set_contact(GarmentEnergy& energy, double spacing_m) const {
     constexpr double kOfSpacing = 0.1;
     if (body_) energy.set_body(*body_, options_.hold_off_m);
     if (options_.self_distance_m > 0)
       energy.set_self_contact(std::max(options_.self_distance_m, kOfSpacing * spacing_m));
+  }
+
+  double seconds() const {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
+  }
+
+  void keep_shape(const Eigen::Matrix3Xd& vertex_m, GarmentDrape& result) const {
+    result.shapes.push_back({seconds(), vertex_m});
+  }
+
+  /// Keeps what a step has reached, and every so often its shape.
+  void note_step(const SettleStep& step, const GarmentEnergy& energy, double weight_n,
+                 std::vector<GarmentStep>* steps, GarmentDrape& result) const {
+    const Eigen::Matrix3Xd vertex_m = energy.vertices_m(step.position_m);
+    if (steps)
+      steps->push_back({seconds(), step.energy_j, step.gradient_n / weight_n,
+                        spring_error_m(result.mesh.cloth, vertex_m)});
+    constexpr int kStepsBetweenShapes = 10;
+    if (step.iteration > 0 && step.iteration % kStepsBetweenShapes == 0)
+      keep_shape(vertex_m, result);
   }
 
   SettleRule rule_for(const GarmentEnergy& energy, double weight_n, double tolerance,
@@ -143,7 +185,7 @@ class GarmentDraping {
 
   /// Draws the seams together; says whether they met, and the cloth bears it.
   bool sew(GarmentDrape& result) {
-    GarmentEnergy energy(result.mesh, fabrics_, GarmentEnergy::Seams::open);
+    GarmentEnergy energy = energy_of(result.mesh, GarmentEnergy::Seams::open);
     set_contact(energy, result.mesh.cloth.spacing_m);
     const double weight_n = energy.weight_n();
     energy.set_gravity(Eigen::Vector3d::Zero());
@@ -162,8 +204,11 @@ class GarmentDraping {
       progress.sewing = true;
       progress.spacing_m = result.mesh.cloth.spacing_m;
       progress.widest_gap_m = result.widest_gap_m;
-      settle(energy, held, rule_for(energy, weight_n, kCoarseTolerance, progress),
-             result.position_m);
+      SettleRule rule = rule_for(energy, weight_n, kCoarseTolerance, progress);
+      rule.on_step = [&](const SettleStep& step) {
+        note_step(step, energy, weight_n, nullptr, result);
+      };
+      settle(energy, held, rule, result.position_m);
       measure_gaps(result);
       if (cancelled_) {
         result.state = GarmentState::cancelled;
@@ -178,25 +223,48 @@ class GarmentDraping {
 
   void refine(double spacing_m, GarmentDrape& result) const {
     GarmentMesh fine = mesh_garment(pattern_, spacing_m);
-    result.position_m = correspond(fine, result.mesh).transfer(result.position_m);
+    const Correspondence places = correspond(fine, result.mesh);
+    result.position_m = places.transfer(result.position_m);
+    for (GarmentShape& shape : result.shapes) shape.position_m = places.transfer(shape.position_m);
     result.mesh = std::move(fine);
+  }
+
+  MinimiseResult come_to_rest(GarmentEnergy& energy, const std::vector<bool>& held,
+                              const SettleRule& rule, Eigen::Matrix3Xd& particle_m) const {
+    constexpr double kStep_s = 1.0 / 60, kCalm_s = 0.2;
+    switch (options_.method) {
+      case GarmentOptions::Method::newton:
+        break;
+      case GarmentOptions::Method::conjugate_gradients:
+        return settle_by_conjugate_gradients(energy, held, rule, particle_m);
+      case GarmentOptions::Method::time_steps:
+        return settle_by_time_steps(energy, held, rule, kStep_s, kCalm_s, particle_m);
+    }
+    return settle(energy, held, rule, particle_m);
   }
 
   /// Lets the sewn garment come to rest on its present mesh.
   void rest(double tolerance, GarmentDrape& result) {
-    GarmentEnergy energy(result.mesh, fabrics_, GarmentEnergy::Seams::sewn);
+    GarmentEnergy energy = energy_of(result.mesh, GarmentEnergy::Seams::sewn);
     set_contact(energy, result.mesh.cloth.spacing_m);
     result.weight_n = energy.weight_n();
     const std::vector<bool> held(static_cast<size_t>(energy.points()), false);
     Eigen::Matrix3Xd particle_m = energy.particles_m(result.position_m);
     GarmentProgress progress;
     progress.spacing_m = result.mesh.cloth.spacing_m;
-    const MinimiseResult work =
-        settle(energy, held, rule_for(energy, result.weight_n, tolerance, progress), particle_m);
+    GarmentLevel level{result.mesh.cloth.spacing_m,
+                       energy.points(),
+                       static_cast<int>(result.mesh.cloth.triangles().cols()),
+                       {},
+                       {}};
+    SettleRule rule = rule_for(energy, result.weight_n, tolerance, progress);
+    rule.on_step = [&](const SettleStep& step) {
+      note_step(step, energy, result.weight_n, &level.steps, result);
+    };
+    const MinimiseResult work = level.work = come_to_rest(energy, held, rule, particle_m);
     result.position_m = energy.vertices_m(particle_m);
     result.imbalance = work.gradient_n / result.weight_n;
-    result.levels.push_back({result.mesh.cloth.spacing_m, energy.points(),
-                             static_cast<int>(result.mesh.cloth.triangles().cols()), work});
+    result.levels.push_back(std::move(level));
     const Inside inside = energy.inside_body(particle_m);
     result.inside = inside.places;
     result.deepest_m = inside.deepest_m;
@@ -213,6 +281,7 @@ class GarmentDraping {
   const GarmentOptions& options_;
   std::vector<double> spacings_m_;  ///< coarsest first
   bool cancelled_ = false;
+  std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
 };
 
 void check_size(const Pattern& pattern, double spacing_m) {
@@ -253,7 +322,10 @@ void GarmentOptions::validate() const {
         "metres, from the spacing to 0.2");
   check(hold_off_m >= 1e-4 && hold_off_m <= 0.02, "hold_off_m", hold_off_m,
         "metres, 0.0001 to 0.02");
+  check(self_distance_m == 0 || (self_distance_m >= 1e-4 && self_distance_m <= 0.02),
+        "self_distance_m", self_distance_m, "metres, 0.0001 to 0.02, or 0");
   check(tolerance >= 1e-8 && tolerance <= 0.1, "tolerance", tolerance, "1e-8 to 0.1");
+  if (springs) springs->validate();
   check(most_iterations >= 1, "most_iterations", most_iterations, "1 or more");
 }
 
@@ -262,7 +334,7 @@ GarmentDrape drape_garment(const Pattern& pattern, const std::vector<MeasuredFab
   options.validate();
   check_pattern(pattern);
   check_size(pattern, options.spacing_m);
-  if (fabrics.size() != pattern.fabrics.size())
+  if (!options.springs && fabrics.size() != pattern.fabrics.size())
     throw InputError("fabrics", fmt::format("{} are given", fabrics.size()),
                      fmt::format("the {} of the pattern", pattern.fabrics.size()));
   if (body) check_body(*body);

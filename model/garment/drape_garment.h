@@ -1,10 +1,12 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "model/fabric/measured_fabric.h"
 #include "model/garment/garment_mesh.h"
+#include "model/garment/spring_cloth.h"
 #include "model/rest/minimise.h"
 #include "model/topology/obstacle.h"
 
@@ -28,6 +30,11 @@ struct GarmentOptions {
   /// Distance from itself below which cloth presses on itself; a tenth of the spacing on meshes
   /// where that is more. 0: not looked for.
   double self_distance_m = 0.002;
+  /// In place of fabrics: the cloth of [lethanh2007].
+  std::optional<PaperSprings> springs;
+  /// How the sewn garment comes to rest; others than `newton` are for comparison.
+  enum class Method { newton, conjugate_gradients, time_steps } method = Method::newton;
+  bool single = false;         ///< from the mesh of the seams to the finest at once, for comparison
   double tolerance = 1e-3;     ///< imbalance that counts as rest
   int most_iterations = 1000;  ///< on each mesh, and at each pull of the threads
   std::function<bool(const GarmentProgress&)> go_on;  ///< `false` cancels; may be empty
@@ -35,10 +42,27 @@ struct GarmentOptions {
   void validate() const;  ///< throws InputError
 };
 
+/// A place on a garment's way to rest.
+struct GarmentStep {
+  double seconds = 0;  ///< since the draping began
+  double energy_j = 0;
+  double imbalance = 0;  ///< residual force on all particles, as a share of the weight
+  /// Mean difference between the length of an edge of the mesh and that in the flat cloth: the
+  /// average spring error of [lethanh2007].
+  double spring_error_m = 0;
+};
+
 struct GarmentLevel {
   double spacing_m = 0;
   int particles = 0, triangles = 0;
   MinimiseResult work;
+  std::vector<GarmentStep> steps;  ///< from its start on
+};
+
+/// A shape on the way from the panels that wait to the garment at rest.
+struct GarmentShape {
+  double seconds = 0;           ///< since the draping began
+  Eigen::Matrix3Xd position_m;  ///< 3 x vertices of the finest mesh
 };
 
 enum class GarmentState {
@@ -58,6 +82,7 @@ struct GarmentDrape {
   GarmentMesh mesh;                  ///< the finest reached
   Eigen::Matrix3Xd position_m;       ///< 3 x vertices; those of a seam in one place once sewn
   std::vector<GarmentLevel> levels;  ///< coarsest first
+  std::vector<GarmentShape> shapes;  ///< the first is where panels wait; the last is position_m
   double widest_gap_m = 0;           ///< of the seams when they were closed
   int widest_seam = -1;
   double imbalance = 0;  ///< as a share of the weight

@@ -58,18 +58,37 @@ std::vector<ContactPoint> merged(const std::vector<ContactPoint>& points) {
 
 }  // namespace
 
+GarmentEnergy::GarmentEnergy(const GarmentMesh& mesh, Seams seams)
+    : mesh_(mesh), particle_of_(mesh.particle_of) {
+  if (seams == Seams::sewn) return;
+  std::iota(particle_of_.begin(), particle_of_.end(), 0);
+  add_threads();
+}
+
 GarmentEnergy::GarmentEnergy(const GarmentMesh& mesh, const std::vector<MeasuredFabric>& fabrics,
                              Seams seams)
-    : mesh_(mesh),
-      sheet_(mesh.cloth, fabrics, mesh.fabric_of, {},
-             seams == Seams::sewn ? seam_bending(mesh, fabrics) : BendingMatrix()),
-      particle_of_(mesh.particle_of) {
-  const bool open = seams == Seams::open;
-  if (open) std::iota(particle_of_.begin(), particle_of_.end(), 0);
-  mass_kg_ = Eigen::VectorXd::Zero(open ? mesh.cloth.vertex_count() : mesh.particles);
-  for (size_t v = 0; v < particle_of_.size(); ++v)
-    mass_kg_[particle_of_[v]] += sheet_.mass_kg()[static_cast<Eigen::Index>(v)];
-  if (open) add_threads();
+    : GarmentEnergy(mesh, seams) {
+  take_cloth(std::make_unique<SheetEnergy>(
+                 mesh.cloth, fabrics, mesh.fabric_of, std::vector<bool>(),
+                 seams == Seams::sewn ? seam_bending(mesh, fabrics) : BendingMatrix()),
+             particle_of_);
+}
+
+GarmentEnergy::GarmentEnergy(const GarmentMesh& mesh, const PaperSprings& springs, Seams seams)
+    : GarmentEnergy(mesh, seams) {
+  auto net = std::make_unique<SpringCloth>(mesh, particle_of_, springs);
+  std::vector<int> same(static_cast<size_t>(net->points()));
+  std::iota(same.begin(), same.end(), 0);
+  take_cloth(std::move(net), std::move(same));
+}
+
+void GarmentEnergy::take_cloth(std::unique_ptr<ClothEnergy> cloth,
+                               std::vector<int> particle_of_point) {
+  cloth_ = std::move(cloth);
+  particle_of_point_ = std::move(particle_of_point);
+  mass_kg_ = Eigen::VectorXd::Zero(1 + *std::ranges::max_element(particle_of_point_));
+  for (size_t p = 0; p < particle_of_point_.size(); ++p)
+    mass_kg_[particle_of_point_[p]] += cloth_->mass_kg()[static_cast<Eigen::Index>(p)];
   find_targets();
 }
 
@@ -83,17 +102,17 @@ void GarmentEnergy::add_threads() {
 }
 
 void GarmentEnergy::find_targets() {
-  const auto particle = [&](int v) { return particle_of_[static_cast<size_t>(v)]; };
-  for (const Pair& pair : sheet_.pairs())
+  const auto particle = [&](int point) { return particle_of_point_[static_cast<size_t>(point)]; };
+  for (const Pair& pair : cloth_->pairs())
     pairs_.push_back(pair_of(particle(pair.low), particle(pair.high)));
   for (const Thread& thread : threads_) pairs_.push_back(pair_of(thread.a, thread.b));
   std::ranges::sort(pairs_);
   const auto repeated = std::ranges::unique(pairs_);
   pairs_.erase(repeated.begin(), repeated.end());
   pairs_of_mesh_ = pairs_.size();
-  for (const Pair& pair : sheet_.pairs()) {
+  for (const Pair& pair : cloth_->pairs()) {
     const int low = particle(pair.low), high = particle(pair.high);
-    // Two vertices of one particle depend on each other both ways.
+    // Two points of one particle depend on each other both ways.
     const bool folded = low == high && pair.low != pair.high;
     target_.push_back({block_of(low, high), low <= high, folded || low > high});
   }
@@ -210,11 +229,12 @@ bool GarmentEnergy::update_pairs(const Eigen::Matrix3Xd& position_m) {
 
 double GarmentEnergy::energy_and_gradient(const Eigen::Matrix3Xd& position_m,
                                           Eigen::Matrix3Xd& gradient_n) const {
-  Eigen::Matrix3Xd of_vertices_n;
-  double energy_j = sheet_.energy_and_gradient(vertices_m(position_m), of_vertices_n);
+  Eigen::Matrix3Xd of_points_n;
+  double energy_j =
+      cloth_->energy_and_gradient(position_m(Eigen::all, particle_of_point_), of_points_n);
   gradient_n.setZero(3, position_m.cols());
-  for (size_t v = 0; v < particle_of_.size(); ++v)
-    gradient_n.col(particle_of_[v]) += of_vertices_n.col(static_cast<Eigen::Index>(v));
+  for (size_t p = 0; p < particle_of_point_.size(); ++p)
+    gradient_n.col(particle_of_point_[p]) += of_points_n.col(static_cast<Eigen::Index>(p));
   for (const Thread& thread : threads_) {
     const double stiffness = thread_n_per_m2_ * thread.length_m;
     const Eigen::Vector3d gap_m = position_m.col(thread.a) - position_m.col(thread.b);
@@ -229,14 +249,14 @@ double GarmentEnergy::energy_and_gradient(const Eigen::Matrix3Xd& position_m,
 
 void GarmentEnergy::second_derivative(const Eigen::Matrix3Xd& position_m, Curvature curvature,
                                       std::vector<Eigen::Matrix3d>& blocks) const {
-  std::vector<Eigen::Matrix3d> of_sheet;
-  sheet_.second_derivative(vertices_m(position_m), curvature, of_sheet);
+  std::vector<Eigen::Matrix3d> of_cloth;
+  cloth_->second_derivative(position_m(Eigen::all, particle_of_point_), curvature, of_cloth);
   blocks.assign(pairs_.size(), Eigen::Matrix3d::Zero());
-  for (size_t p = 0; p < of_sheet.size(); ++p) {
+  for (size_t p = 0; p < of_cloth.size(); ++p) {
     const Target& target = target_[p];
     Eigen::Matrix3d& block = blocks[static_cast<size_t>(target.block)];
-    if (target.plain) block += of_sheet[p];
-    if (target.turned) block += of_sheet[p].transpose();
+    if (target.plain) block += of_cloth[p];
+    if (target.turned) block += of_cloth[p].transpose();
   }
   for (const Thread& thread : threads_) {
     const double stiffness = thread_n_per_m2_ * thread.length_m;

@@ -1,18 +1,20 @@
 #pragma once
 
 #include <array>
+#include <memory>
 #include <optional>
 #include <vector>
 
 #include "model/garment/body_contact.h"
 #include "model/garment/garment_mesh.h"
 #include "model/garment/self_contact.h"
+#include "model/garment/spring_cloth.h"
 #include "model/sheet/sheet_energy.h"
 
 namespace clothfit {
 
-/// The energy of a garment's particles: its fabric (SheetEnergy), its seams while they are open,
-/// and the body's pressure.
+/// The energy of a garment's particles: its fabric (SheetEnergy, or the springs of SpringCloth),
+/// its seams while they are open, the body's pressure and its own.
 ///
 /// An open garment has a particle for every vertex. Threads pull the sides of its seams together,
 /// k l |x_a - x_b|^2 / 2 for every stretch l of a seam. A sewn one has a particle for all vertices
@@ -22,6 +24,8 @@ class GarmentEnergy : public BlockEnergy {
   enum class Seams { open, sewn };
   /// `mesh` must outlive this. Throws InputError as fibres_of() does.
   GarmentEnergy(const GarmentMesh& mesh, const std::vector<MeasuredFabric>& fabrics, Seams seams);
+  /// The same of the paper's springs in place of fabrics.
+  GarmentEnergy(const GarmentMesh& mesh, const PaperSprings& springs, Seams seams);
 
   /// Lets a body press on the cloth's vertices, and between them at places not farther apart than a
   /// centimetre: a coarse mesh does not pass through what is wider. The body must outlive this.
@@ -29,12 +33,12 @@ class GarmentEnergy : public BlockEnergy {
   /// Lets the cloth press on itself where it is nearer than `beta_m`.
   void set_self_contact(double beta_m);
   void set_gravity(const Eigen::Vector3d& gravity_m_per_s2) {
-    sheet_.set_gravity(gravity_m_per_s2);
+    cloth_->set_gravity(gravity_m_per_s2);
   }
   /// Sets the pull of the threads of an open garment: force per gap and length of seam.
   void set_thread(double pull_n_per_m2) { thread_n_per_m2_ = pull_n_per_m2; }
 
-  double weight_n() const { return sheet_.weight_n(); }
+  double weight_n() const { return cloth_->weight_n(); }
   const Eigen::VectorXd& mass_kg() const override { return mass_kg_; }
   double energy_and_gradient(const Eigen::Matrix3Xd& position_m,
                              Eigen::Matrix3Xd& gradient_n) const override;
@@ -63,12 +67,14 @@ class GarmentEnergy : public BlockEnergy {
     double length_m = 0;         ///< of the seam that it stands for
     std::array<int, 3> block{};  ///< of a, of b and of both
   };
-  /// Where a block of the sheet's second derivative goes.
+  /// Where a block of the cloth's second derivative goes.
   struct Target {
     int block = 0;
     bool plain = true;    ///< added as it is
     bool turned = false;  ///< its transpose is added
   };
+  GarmentEnergy(const GarmentMesh& mesh, Seams seams);
+  void take_cloth(std::unique_ptr<ClothEnergy> cloth, std::vector<int> particle_of_point);
   void add_threads();
   void find_targets();
   int block_of(int a, int b) const;  ///< number of a pair; it is there
@@ -77,8 +83,9 @@ class GarmentEnergy : public BlockEnergy {
   std::vector<ContactPoint> contact_points() const;
 
   const GarmentMesh& mesh_;
-  SheetEnergy sheet_;
-  std::vector<int> particle_of_;
+  std::vector<int> particle_of_;  ///< of every vertex
+  std::unique_ptr<ClothEnergy> cloth_;
+  std::vector<int> particle_of_point_;  ///< of every point of `cloth_`
   Eigen::VectorXd mass_kg_;
   std::vector<Thread> threads_;
   double thread_n_per_m2_ = 0;
@@ -86,7 +93,7 @@ class GarmentEnergy : public BlockEnergy {
   std::optional<SelfContact> self_contact_;
   std::vector<Pair> pairs_;  ///< those of the mesh, then those of places that touch; both sorted
   size_t pairs_of_mesh_ = 0;
-  std::vector<Target> target_;  ///< of each pair of the sheet
+  std::vector<Target> target_;  ///< of each pair of `cloth_`
 };
 
 }  // namespace clothfit

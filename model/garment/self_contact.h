@@ -17,8 +17,8 @@ namespace clothfit {
 /// What is near has to be known before: open_way() finds it.
 class SelfContact {
  public:
-  /// `area_m2`: of the cloth that belongs to every point; `beta_m`: distance at which parts begin to
-  /// press, the least of their points'.
+  /// `area_m2`: of the cloth that belongs to every point; `beta_m`: distance at which parts begin
+  /// to press, the least of their points'.
   SelfContact(SurfaceParts parts, Eigen::VectorXd area_m2, Eigen::VectorXd beta_m);
 
   /// Finds all that comes near on a straight way. Returns the share of it on which nothing

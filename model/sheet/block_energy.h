@@ -31,8 +31,8 @@ class BlockEnergy {
   virtual void second_derivative(const Eigen::Matrix3Xd& position_m, Curvature curvature,
                                  std::vector<Eigen::Matrix3d>& blocks) const = 0;
 
-  /// Finds what comes near on the straight way from `from_m` by `move_m`, and returns the share of it
-  /// on which nothing passes through anything. Energies are complete for places of the last way.
+  /// Finds what comes near on the straight way from `from_m` by `move_m`, and returns the share of
+  /// it on which nothing passes through anything. Energies are complete for places of the last way.
   virtual double open_way(const Eigen::Matrix3Xd& /*from_m*/, const Eigen::Matrix3Xd& /*move_m*/) {
     return 1;
   }

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "model/fabric/measured_fabric.h"
-#include "model/sheet/block_energy.h"
+#include "model/sheet/cloth_energy.h"
 #include "model/sheet/plate_bending.h"
 #include "model/topology/cloth_mesh.h"
 
@@ -21,7 +21,7 @@ namespace clothfit {
 /// lattice, but for threads that run through the middle of a cell. Threads along its sides would
 /// lengthen when the cell twists, and so stiffen coarse meshes against folds that do not run along
 /// them.
-class SheetEnergy : public BlockEnergy {
+class SheetEnergy : public ClothEnergy {
  public:
   /// `mesh` must outlive this. `clamped` vertices (one entry per vertex; empty: none) are held with
   /// their slope in the plane of the flat cloth, (s, t) being x and y there. Throws InputError as
@@ -37,8 +37,8 @@ class SheetEnergy : public BlockEnergy {
 
   const ClothMesh& mesh() const { return mesh_; }
   const Eigen::VectorXd& mass_kg() const override { return mass_kg_; }
-  double weight_n() const { return mass_kg_.sum() * gravity_m_per_s2_.norm(); }
-  void set_gravity(const Eigen::Vector3d& gravity_m_per_s2) {
+  double weight_n() const override { return mass_kg_.sum() * gravity_m_per_s2_.norm(); }
+  void set_gravity(const Eigen::Vector3d& gravity_m_per_s2) override {
     gravity_m_per_s2_ = gravity_m_per_s2;
   }
 

@@ -6,7 +6,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "data/obj_mesh.h"
+#include "data/ply_mesh.h"
 #include "tests/apps/program_run.h"
 #include "tests/apps/scratch_folder.h"
 
@@ -108,19 +108,24 @@ class DrapeGarmentVerb : public DrapeVerb {
 };
 
 TEST_F(DrapeGarmentVerb, SewsAPatternAroundABody) {
-  const test::ProgramRun sewn = drape({"--body", "bar.obj", "--spacing", "15mm"});
+  const test::ProgramRun sewn =
+      drape({"--body", "bar.obj", "--spacing", "15mm", "--format", "ply,pc2,gltf"});
 
   ASSERT_EQ(sewn.exit_code, 0) << sewn.error;
   EXPECT_THAT(sewn.out, HasSubstr("tube: 2 panels, 2 seams, 2 g; at rest"));
   EXPECT_THAT(test::names_in(here_.path() / "tube.drape"),
-              ElementsAre(".clothfit", "body.obj", "garment.csv", "garment.json", "garment.obj"));
+              ElementsAre(".clothfit", "back.png", "body.obj", "front.png", "garment.csv",
+                          "garment.glb", "garment.json", "garment.obj", "garment.pc2",
+                          "garment.ply", "left.png", "panels.obj", "report.html"));
   std::ifstream file(here_.path() / "tube.drape" / "garment.json");
   const nlohmann::json result = nlohmann::json::parse(file);
   EXPECT_EQ(result.at("places_inside_body"), 0);
+  EXPECT_EQ(result.at("crossings"), 0);
   EXPECT_LE(result.at("imbalance").get<double>(), 1e-3);
   // The stiff tube rests on the bar as a ring of 19 mm radius would.
   const SurfaceMesh garment = read_obj(here_.path() / "tube.drape" / "garment.obj");
   EXPECT_EQ(garment.vertex_m.cols(), result.at("levels").back().at("particles"));
+  EXPECT_EQ(read_ply(here_.path() / "tube.drape" / "garment.ply").vertex_m, garment.vertex_m);
   EXPECT_NEAR(garment.vertex_m.row(2).maxCoeff(), 0.0146, 0.001);
   EXPECT_NEAR(garment.vertex_m.row(2).minCoeff(), -0.0285, 0.001);
 }
@@ -150,6 +155,8 @@ TEST_F(DrapeGarmentVerb, RefusesAndLeavesNothing) {
     EXPECT_EQ(test::names_in(here_.path()), before);
   };
   expect(3, {"--body", "bar.obj", "--spacing", "1mm", "--hold-off", "1m"}, "--hold-off: it is 1;");
+  expect(3, {"--body", "bar.obj", "--self-distance", "1m"}, "--self-distance: it is 1;");
+  expect(2, {"--body", "bar.obj", "--format", "ply,stl"}, "'ply,stl' is not a list of obj, ply");
   expect(3, {"--body", "twill.yaml"}, "twill.yaml");
   expect(3, {"--body", "bar.obj", "--fabric", "none.yaml"}, "none.yaml");
   expect(3, {"--body", "bar.obj", "--starts", "8"}, "--starts: is given with a pattern");
