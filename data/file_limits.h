@@ -14,6 +14,10 @@ inline constexpr std::uintmax_t kMostYamlBytes = 1'000'000;
 inline constexpr std::uintmax_t kMostJsonBytes = 20'000'000;
 /// Triangles and vertices of a surface in OBJ; 12 and 24 bytes each.
 inline constexpr size_t kMostObjElements = 4'000'000;
+/// Drawings of patterns in SVG and DXF; 20 times as many bytes at worst. Each panel reads its own.
+inline constexpr std::uintmax_t kMostDrawingBytes = 10'000'000;
+/// Edges of one outline in a drawing, of which each is held against every other.
+inline constexpr size_t kMostDrawnEdges = 2000;
 /// Checkpoints, journals and other text that is kept as a whole; as many bytes.
 inline constexpr std::uintmax_t kMostTextBytes = 256'000'000;
 /// Rows of a table, which may be longer than the memory; 129 x 129 markers in 2,000 frames have 33

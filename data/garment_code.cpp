@@ -7,6 +7,7 @@
 #include <map>
 #include <numbers>
 
+#include "data/drawn_outline.h"
 #include "data/json_value.h"
 #include "data/number_limits.h"
 #include "data/read_json.h"
@@ -72,25 +73,6 @@ PatternEdge curve_of(const JsonValue& json, const Eigen::Vector2d& from_m,
   return edge;
 }
 
-/// Returns twice the area inside a panel, < 0 where its outline runs clockwise; curves count as
-/// chords.
-double twice_area_m2(const Panel& panel) {
-  constexpr int kChords = 16;
-  double twice_m2 = 0;
-  Eigen::Vector2d last = panel.corner_m.col(0);
-  for (int k = 0; k < panel.edge_count(); ++k) {
-    const Eigen::Vector2d from = panel.corner_m.col(k),
-                          to = panel.corner_m.col((k + 1) % panel.corner_m.cols());
-    for (int n = 1; n <= kChords; ++n) {
-      const Eigen::Vector2d next = edge_point_m(from, panel.edges[static_cast<size_t>(k)], to,
-                                                static_cast<double>(n) / kChords);
-      twice_m2 += last.x() * next.y() - last.y() * next.x();
-      last = next;
-    }
-  }
-  return twice_m2;
-}
-
 Eigen::Isometry3d placement_of(const JsonValue& json, double unit_m) {
   using Eigen::AngleAxisd, Eigen::Vector3d;
   const Vector3d degrees = vector_of<3>(json.at("rotation"), 3600);
@@ -152,7 +134,7 @@ Panel panel_of(const JsonValue& json, const std::string& name, double unit_m) {
                               : PatternEdge());
   }
   panel.placement = placement_of(json, unit_m);
-  if (twice_area_m2(panel) < 0) turn_over(panel);
+  if (twice_outline_area_m2(panel.corner_m, panel.edges) < 0) turn_over(panel);
   return panel;
 }
 

@@ -8,11 +8,14 @@
 #include <numbers>
 #include <optional>
 
+#include "data/drawn_outline.h"
+#include "data/dxf_outline.h"
 #include "data/garment_code.h"
 #include "data/nearest_name.h"
 #include "data/number_text.h"
 #include "data/reading.h"
 #include "data/shown_text.h"
+#include "data/svg_outline.h"
 #include "data/yaml_value.h"
 
 namespace clothfit {
@@ -27,6 +30,7 @@ struct DraftPanel {
   std::map<std::string, std::vector<int>> edges;  ///< by name; darts part one
   std::vector<std::array<int, 2>> dart_legs;      ///< edges
   std::vector<int> dart_lines;
+  bool is_drawn = false;  ///< its outline comes from a drawing, whose edges all have names
 };
 
 Eigen::Vector2d point_of(const YamlValue& value, double unit_m) {
@@ -47,16 +51,20 @@ struct DraftCorner {
   std::string name;  ///< of the edge; empty: none
 };
 
+/// Returns the name of an edge; refuses what a seam could take for something else.
+std::string edge_name_of(const YamlValue& value) {
+  std::string name = value.text();
+  if (name.find('.') != std::string::npos || parse_number(name))
+    value.refuse(fmt::format("edge = {}", shown_text(name)),
+                 "a name that is no number and has no dot");
+  return name;
+}
+
 DraftCorner corner_of(const YamlValue& value, double unit_m) {
   if (value.is_list()) return {point_of(value, unit_m), {}, {}};
   const YamlMap map = value.map({"at", "edge", "curve", "bulge"});
   DraftCorner corner{point_of(map.at("at"), unit_m), {}, {}};
-  if (const YamlValue* name = map.find("edge")) {
-    corner.name = name->text();
-    if (corner.name.find('.') != std::string::npos || parse_number(corner.name))
-      name->refuse(fmt::format("edge = {}", shown_text(corner.name)),
-                   "a name that is no number and has no dot");
-  }
+  if (const YamlValue* name = map.find("edge")) corner.name = edge_name_of(*name);
   if (const YamlValue* curve = map.find("curve")) {
     for (const YamlValue& point : curve->items())
       corner.edge.control_m.push_back(point_of(point, unit_m));
@@ -101,8 +109,14 @@ size_t edge_of(const YamlValue& value, const std::vector<DraftCorner>& corners) 
   const std::string name = value.text();
   std::vector<std::string> names;
   for (size_t k = 0; k < corners.size(); ++k) {
-    if (corners[k].name == name) return k;
-    if (!corners[k].name.empty()) names.push_back(corners[k].name);
+    if (corners[k].name == name) {
+      if (k + 1 < corners.size() && corners[k + 1].name == name)
+        value.refuse(fmt::format("a dart in edge {}, which has several parts", shown_text(name)),
+                     "an edge of one straight line", "draw the dart in the outline, and sew it");
+      return k;
+    }
+    if (!corners[k].name.empty() && (names.empty() || names.back() != corners[k].name))
+      names.push_back(corners[k].name);
   }
   value.refuse(fmt::format("edge = {}", shown_text(name)),
                names.empty() ? "an edge that its corner names" : known_names(name, names));
@@ -139,16 +153,17 @@ void add_edges(const std::vector<DraftCorner>& corners, std::map<size_t, std::ve
       draft.dart_lines.push_back(dart.line);
       parts.push_back(add(corner.place_m + free_m * along, {}));
     }
-    if (!corner.name.empty()) draft.edges[corner.name] = parts;
+    if (corner.name.empty()) continue;
+    std::vector<int>& named = draft.edges[corner.name];  // several corners of a drawing have one
+    named.insert(named.end(), parts.begin(), parts.end());
   }
   panel.corner_m.resize(2, static_cast<Eigen::Index>(places.size()));
   for (size_t k = 0; k < places.size(); ++k)
     panel.corner_m.col(static_cast<Eigen::Index>(k)) = places[k];
 }
 
-void read_outline(const YamlMap& map, double unit_m, DraftPanel& draft) {
+std::vector<DraftCorner> listed_corners(const YamlValue& outline, double unit_m) {
   std::vector<DraftCorner> corners;
-  const YamlValue& outline = map.at("outline");
   const std::vector<YamlValue> items = outline.items();
   if (items.size() < 2 || items.size() > kMostCorners)
     outline.refuse(fmt::format("an outline of {} corners", items.size()),
@@ -160,6 +175,64 @@ void read_outline(const YamlMap& map, double unit_m, DraftPanel& draft) {
     if (!name.empty() && same > 1)
       item.refuse(fmt::format("a second edge {}", shown_text(name)), "names that differ");
   }
+  return corners;
+}
+
+/// Returns the names of a drawn outline's edges: those of a list, or else numbers from 1.
+std::vector<std::string> drawn_edge_names(const YamlMap& map, size_t count) {
+  std::vector<std::string> names;
+  const YamlValue* const list = map.find("edges");
+  if (list == nullptr) {
+    for (size_t k = 1; k <= count; ++k) names.push_back(std::to_string(k));
+    return names;
+  }
+  const std::vector<YamlValue> items = list->items();
+  if (items.size() != count)
+    list->refuse(fmt::format("{} names for {} edges", items.size(), count),
+                 "a name for each edge, counterclockwise from the outline's first corner",
+                 "without `edges` they are named by number, 1, 2, ...");
+  for (const YamlValue& item : items) {
+    names.push_back(edge_name_of(item));
+    if (std::ranges::count(names, names.back()) > 1)
+      item.refuse(fmt::format("a second edge {}", shown_text(names.back())), "names that differ");
+  }
+  return names;
+}
+
+/// Reads an outline from the drawing that the pattern names.
+std::vector<DraftCorner> drawn_corners(const YamlMap& map, const std::filesystem::path& folder) {
+  const std::filesystem::path file = folder / map.at("file").text();
+  const std::string piece = map.at("piece").text();
+  std::optional<double> unit_m;
+  if (const YamlValue* unit = map.find("unit"))
+    unit_m = unit->one_of<double>(
+        {{"mm", 0.001}, {"cm", 0.01}, {"m", 1}, {"in", 0.0254}, {"inch", 0.0254}});
+  std::string extension = file.extension().string();
+  for (char& letter : extension)
+    if (letter >= 'A' && letter <= 'Z') letter = static_cast<char>(letter - 'A' + 'a');
+  if (extension != ".svg" && extension != ".dxf")
+    map.at("file").refuse(fmt::format("file = {}", shown_text(file.filename().string())),
+                          "a drawing whose name ends in .svg or .dxf");
+  const PanelOutline outline = extension == ".svg" ? read_svg_outline(file, piece, unit_m)
+                                                   : read_dxf_outline(file, piece, unit_m);
+  const std::vector<std::string> names = drawn_edge_names(map, outline.begin_at_corner.size());
+  std::vector<DraftCorner> corners;
+  size_t named = 0;
+  for (size_t k = 0; k < outline.edges.size(); ++k) {
+    if (named < names.size() && outline.begin_at_corner[named] == static_cast<int>(k)) ++named;
+    corners.push_back(
+        {outline.corner_m.col(static_cast<Eigen::Index>(k)), outline.edges[k], names[named - 1]});
+  }
+  return corners;
+}
+
+void read_outline(const YamlMap& map, double unit_m, const std::filesystem::path& folder,
+                  DraftPanel& draft) {
+  const YamlValue& outline = map.at("outline");
+  draft.is_drawn = outline.is_map();
+  const std::vector<DraftCorner> corners =
+      draft.is_drawn ? drawn_corners(outline.map({"file", "piece", "unit", "edges"}), folder)
+                     : listed_corners(outline, unit_m);
   std::map<size_t, std::vector<Dart>> darts;  // of each edge
   if (const YamlValue* list = map.find("darts"))
     for (const YamlValue& item : list->items()) {
@@ -172,13 +245,13 @@ void read_outline(const YamlMap& map, double unit_m, DraftPanel& draft) {
 }
 
 DraftPanel panel_of(const YamlValue& value, const std::string& name, double unit_m,
-                    const std::vector<std::string>& fabrics) {
+                    const std::vector<std::string>& fabrics, const std::filesystem::path& folder) {
   const YamlMap map = value.map({"fabric", "grain", "at", "turn", "outline", "darts"});
   DraftPanel draft;
   Panel& panel = draft.panel;
   panel.name = name;
   panel.line = value.line();
-  read_outline(map, unit_m, draft);
+  read_outline(map, unit_m, folder, draft);
   if (const YamlValue* fabric = map.find("fabric")) {
     const std::string word = fabric->text();
     const auto at = std::ranges::find(fabrics, word);
@@ -214,14 +287,14 @@ SeamSide side_of(const YamlValue& value, const std::vector<DraftPanel>& drafts) 
     value.refuse(fmt::format("panel {}", shown_text(panel)), known_names(panel, names));
   }
   SeamSide side{.panel = static_cast<int>(draft - drafts.begin()), .edges = {}};
-  if (const auto number = parse_whole_number(edge)) {
+  const auto named = draft->edges.find(edge);
+  if (const auto number = parse_whole_number(edge); number && !draft->is_drawn) {
     if (*number < 0 || *number >= draft->panel.edge_count())
       value.refuse(fmt::format("edge {} of panel {}", *number, panel),
                    fmt::format("a name, or 0 to {}", draft->panel.edge_count() - 1));
     side.edges = {*number};
     return side;
   }
-  const auto named = draft->edges.find(edge);
   if (named == draft->edges.end()) {
     std::vector<std::string> names;
     for (const auto& [name, edges] : draft->edges) names.push_back(name);
@@ -272,7 +345,7 @@ Pattern parsed_pattern(const std::filesystem::path& file) {
                             fmt::format("1 to {}", kMostPanels));
   std::vector<DraftPanel> drafts;
   for (const auto& [name, panel] : panels)
-    drafts.push_back(panel_of(panel, name, unit_m, pattern.fabrics));
+    drafts.push_back(panel_of(panel, name, unit_m, pattern.fabrics, file.parent_path()));
   if (const YamlValue* seams = map.find("seams"))
     for (const YamlValue& seam : seams->items()) pattern.seams.push_back(seam_of(seam, drafts));
   for (size_t p = 0; p < drafts.size(); ++p) {

@@ -29,6 +29,7 @@ class YamlValue {
   bool is_number() const;
   bool is_word(const std::string& word) const;
   bool is_list() const { return node_.IsSequence(); }
+  bool is_map() const { return node_.IsMap(); }
 
   /// Returns a scalar that is not empty.
   std::string text() const;
