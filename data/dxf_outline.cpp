@@ -122,12 +122,12 @@ void read_dxf_groups(DxfDrawing& drawing) {
   };
   while (!rest.empty()) {
     const std::string_view code_text = next_line();
-    if (code_text.empty() && without_spaces(rest).empty()) break;
     const std::optional<int> code = parse_whole_number(code_text);
     if (!code)
       drawing.refuse(line, fmt::format("group code = {}", shown_text(code_text)), kDxfExpected);
     if (rest.empty()) drawing.refuse(line, "the last group has no value", "a whole file");
     const std::string_view value = next_line();
+    if (*code == 0 && value == "EOF") break;
     if (*code != 999) drawing.groups.push_back({*code, value, line});  // 999: a comment
   }
 }

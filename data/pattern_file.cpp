@@ -30,7 +30,8 @@ struct DraftPanel {
   std::map<std::string, std::vector<int>> edges;  ///< by name; darts part one
   std::vector<std::array<int, 2>> dart_legs;      ///< edges
   std::vector<int> dart_lines;
-  bool is_drawn = false;  ///< its outline comes from a drawing, whose edges all have names
+  std::filesystem::path drawing;  ///< that its outline comes from; may be empty
+  bool is_drawn = false;          ///< its outline comes from a drawing, whose edges all have names
 };
 
 Eigen::Vector2d point_of(const YamlValue& value, double unit_m) {
@@ -230,6 +231,8 @@ void read_outline(const YamlMap& map, double unit_m, const std::filesystem::path
                   DraftPanel& draft) {
   const YamlValue& outline = map.at("outline");
   draft.is_drawn = outline.is_map();
+  if (draft.is_drawn)
+    draft.drawing = folder / outline.map({"file", "piece", "unit", "edges"}).at("file").text();
   const std::vector<DraftCorner> corners =
       draft.is_drawn ? drawn_corners(outline.map({"file", "piece", "unit", "edges"}), folder)
                      : listed_corners(outline, unit_m);
@@ -356,6 +359,7 @@ Pattern parsed_pattern(const std::filesystem::path& file) {
       seam.line = drafts[p].dart_lines[n];
       pattern.seams.push_back(seam);
     }
+    if (drafts[p].is_drawn) pattern.drawing_files.push_back(drafts[p].drawing);
     pattern.panels.push_back(std::move(drafts[p].panel));
   }
   return pattern;

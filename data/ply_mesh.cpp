@@ -10,6 +10,7 @@
 #include <map>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "data/file_limits.h"
@@ -113,9 +114,11 @@ class PlyReader {
       } else if (element.name == "face") {
         read_faces(element);
       } else {
-        for (size_t n = 0; n < element.count; ++n) pass_over(element.properties);
+        for (size_t n = 0; n < element.count && !element.properties.empty(); ++n)
+          pass_over(element.properties);
       }
     }
+    line_ = 0;
     if (corners_.empty()) fail("no faces", "a surface: element `face` with vertex_indices");
     return {Eigen::Map<const Eigen::Matrix3Xd>(coordinates_.data(), 3,
                                                static_cast<Eigen::Index>(coordinates_.size() / 3)),
@@ -145,7 +148,10 @@ class PlyReader {
       const std::string_view line = next_line();
       const std::vector<std::string_view> words = words_of(line);
       if (words.empty() || words[0] == "comment" || words[0] == "obj_info") continue;
-      if (words[0] == "end_header") break;
+      if (words[0] == "end_header") {
+        ++line_;
+        break;
+      }
       if (words[0] == "format" && words.size() == 3) {
         read_encoding(words[1]);
       } else if (words[0] == "element" && words.size() == 3) {
@@ -285,8 +291,8 @@ class PlyReader {
     for (size_t k = 0; k < count; ++k) {
       const double corner = next_number(property.type);
       if (!(corner >= 0 && corner < vertices && corner == std::floor(corner)))
-        fail(fmt::format("corner {:g} of face {}", corner, face),
-             fmt::format("numbers of vertices before, 0 to {:g}", vertices - 1));
+        fail(fmt::format("corner {:.10g} of face {}", corner, face),
+             fmt::format("numbers of vertices before, 0 to {:.10g}", vertices - 1));
       corners.push_back(static_cast<int>(corner));
     }
     if (count < 3)
@@ -347,7 +353,12 @@ void write_ply(const SurfaceMesh& mesh, const std::filesystem::path& file) {
 }
 
 SurfaceMesh read_surface(const std::filesystem::path& file) {
-  return file.extension() == ".ply" ? read_ply(file) : read_obj(file);
+  std::string name = file.filename().string();
+  std::ranges::transform(name, name.begin(), [](char c) {
+    return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  });
+  if (name.ends_with(".gz")) name.resize(name.size() - 3);
+  return name.ends_with(".ply") ? read_ply(file) : read_obj(file);
 }
 
 }  // namespace clothfit

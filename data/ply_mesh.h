@@ -18,7 +18,8 @@ SurfaceMesh read_ply(const std::filesystem::path& file);
 /// Writes a binary PLY file, little-endian, that read_ply reads back to the last bit.
 void write_ply(const SurfaceMesh& mesh, const std::filesystem::path& file);
 
-/// Reads a surface: PLY where the file's name ends in `.ply`, else OBJ.
+/// Reads a surface: PLY where the file's name ends in `.ply` or `.ply.gz`, in upper case too, else
+/// OBJ.
 SurfaceMesh read_surface(const std::filesystem::path& file);
 
 }  // namespace clothfit

@@ -80,6 +80,7 @@ struct Pattern {
   std::vector<std::string> fabrics;  ///< names, of which panels have the indices
   /// The data sheet of each fabric; empty: none is named.
   std::vector<std::filesystem::path> fabric_files;
+  std::vector<std::filesystem::path> drawing_files;  ///< that outlines come from
 };
 
 }  // namespace clothfit

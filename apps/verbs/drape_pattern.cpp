@@ -150,10 +150,12 @@ int drape_pattern(const PatternRequest& request, const std::string& command) {
     if (!file.empty()) inputs.push_back(file);
   if (request.fabric.empty())
     inputs.insert(inputs.end(), pattern.fabric_files.begin(), pattern.fabric_files.end());
+  inputs.insert(inputs.end(), pattern.drawing_files.begin(), pattern.drawing_files.end());
   ResultFolder out(out_folder(request.out, request.pattern.stem().string() + ".drape"), inputs);
   const Obstacle body(body_mesh);
-  const GarmentDrape drape =
-      drape_with_progress(pattern, sheets, body, request.body, request.options);
+  GarmentOptions options = request.options;
+  options.keep_shapes = want_shapes(request.formats);
+  const GarmentDrape drape = drape_with_progress(pattern, sheets, body, request.body, options);
   require_rest(pattern, drape, request.options);
 
   const Table table = garment_levels(drape);

@@ -72,7 +72,7 @@ std::vector<GarmentPicture> pictures_of(const SurfaceMesh& garment, const Surfac
 
 std::optional<std::vector<GarmentFormat>> parse_garment_formats(const std::string& text) {
   std::vector<GarmentFormat> formats;
-  for (size_t begin = 0; begin < text.size();) {
+  for (size_t begin = 0; begin <= text.size();) {
     const size_t end = std::min(text.find(',', begin), text.size());
     const std::string word = text.substr(begin, end - begin);
     begin = end + 1;
@@ -86,6 +86,11 @@ std::optional<std::vector<GarmentFormat>> parse_garment_formats(const std::strin
       return std::nullopt;
   }
   return formats;
+}
+
+bool want_shapes(const std::vector<GarmentFormat>& formats) {
+  return std::ranges::any_of(formats,
+                             [](GarmentFormat format) { return format != GarmentFormat::ply; });
 }
 
 std::vector<GarmentPicture> write_garment_files(const GarmentDrape& drape, const SurfaceMesh& body,

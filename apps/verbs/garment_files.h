@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,6 +20,9 @@ enum class GarmentFormat {
 
 /// Returns the formats of a list such as "ply,gltf"; nothing where it is none.
 std::optional<std::vector<GarmentFormat>> parse_garment_formats(const std::string& text);
+
+/// Says whether a format shows how the garment was sewn (GarmentOptions::keep_shapes).
+bool want_shapes(const std::vector<GarmentFormat>& formats);
 
 /// Writes a garment at rest: garment.obj, body.obj, pictures from three sides (front.png, left.png,
 /// back.png), and what `formats` asks for. Returns the pictures.

@@ -1,6 +1,7 @@
 #include "model/garment/body_contact.h"
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -74,7 +75,8 @@ Inside BodyContact::inside(const Eigen::Matrix3Xd& position_m) const {
     ++found.places;
     if (-near->distance_m <= found.deepest_m) continue;
     found.deepest_m = -near->distance_m;
-    found.point = point.point[0];
+    const auto nearest = std::max_element(point.weight.begin(), point.weight.begin() + point.count);
+    found.point = point.point[static_cast<size_t>(nearest - point.weight.begin())];
   }
   return found;
 }

@@ -64,9 +64,9 @@ class GarmentDraping {
     result.position_m = result.mesh.placed_m;
     keep_shape(result.position_m, result);
     check_start(result);
-    if (!sew(result)) return result;
+    const bool sewn = sew(result);
     for (size_t level = options_.single ? spacings_m_.size() - 1 : 0;
-         level < spacings_m_.size() && !cancelled_; ++level) {
+         sewn && level < spacings_m_.size() && !cancelled_; ++level) {
       if (level > 0) refine(spacings_m_[level], result);
       const bool is_last = level + 1 == spacings_m_.size();
       rest(is_last ? options_.tolerance : std::max(options_.tolerance, kCoarseTolerance), result);
@@ -122,7 +122,7 @@ class GarmentDraping {
   }
 
   void keep_shape(const Eigen::Matrix3Xd& vertex_m, GarmentDrape& result) const {
-    result.shapes.push_back({seconds(), vertex_m});
+    if (options_.keep_shapes) result.shapes.push_back({seconds(), vertex_m});
   }
 
   /// Keeps what a step has reached, and every so often its shape.

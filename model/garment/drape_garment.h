@@ -34,6 +34,7 @@ struct GarmentOptions {
   std::optional<PaperSprings> springs;
   /// How the sewn garment comes to rest; others than `newton` are for comparison.
   enum class Method { newton, conjugate_gradients, time_steps } method = Method::newton;
+  bool keep_shapes = false;    ///< in the result's `shapes`: to show how it was sewn
   bool single = false;         ///< from the mesh of the seams to the finest at once, for comparison
   double tolerance = 1e-3;     ///< imbalance that counts as rest
   int most_iterations = 1000;  ///< on each mesh, and at each pull of the threads
@@ -82,7 +83,7 @@ struct GarmentDrape {
   GarmentMesh mesh;                  ///< the finest reached
   Eigen::Matrix3Xd position_m;       ///< 3 x vertices; those of a seam in one place once sewn
   std::vector<GarmentLevel> levels;  ///< coarsest first
-  std::vector<GarmentShape> shapes;  ///< the first is where panels wait; the last is position_m
+  std::vector<GarmentShape> shapes;  ///< if asked for, from where panels wait to position_m
   double widest_gap_m = 0;           ///< of the seams when they were closed
   int widest_seam = -1;
   double imbalance = 0;  ///< as a share of the weight

@@ -12,7 +12,7 @@ namespace clothfit {
 /// The pressure of cloth on itself where it is nearer than beta [lethanh2007, sections 5 and 8]. It
 /// acts between points and triangles and between edges, along their shortest connections, by the
 /// law of ContactPressure. Edges that run the same way press less, and parallel ones not at all:
-/// where their nearest places jump, points and triangles speak.
+/// where their nearest places jump, points and triangles press alone.
 ///
 /// What is near has to be known before: open_way() finds it.
 class SelfContact {
@@ -33,7 +33,7 @@ class SelfContact {
   /// Adds the pairs of points that press on each other.
   void add_pairs(const Eigen::Matrix3Xd& position_m, std::vector<BlockEnergy::Pair>& pairs) const;
 
-  /// Adds the second derivative without its negative part, the turning of connections:
+  /// Adds the second derivative but for how connections and edges turn:
   /// `add(a, b, block)` for the points a and b, each two once.
   template <class Add>
   void add_second_derivative(const Eigen::Matrix3Xd& position_m, const Add& add) const {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <utility>
 
@@ -38,10 +39,13 @@ class Settling {
     Place here = place(position_m);
     note(here);
     while (!is_over(rule_.stop, result_)) {
-      const double onward = onward_share();
+      // A move of both together is no longer than one of a step may be.
+      const double onward = std::min(
+          onward_share(), 0.5 * rule_.longest_step_m /
+                              std::max(longest_move_m(), std::numeric_limits<double>::min()));
       const double open = energy_.open_way(here.position_m, onward * move_m_);
       const Place from = onward > 0 ? place(here.position_m + open * onward * move_m_) : here;
-      std::optional<Place> next = step_from(from);
+      std::optional<Place> next = step_from(from, onward);
       if (next && onward > 0 && resolved_ && next->energy_j > here.energy_j) next.reset();
       if (!next) {
         if (onward > 0) {
@@ -89,6 +93,8 @@ class Settling {
     return std::min(kMostOnward, steps_since_halt_ / (steps_since_halt_ + 3));
   }
 
+  double longest_move_m() const { return move_m_.colwise().norm().maxCoeff(); }
+
   /// Begins again without momentum.
   void halt() {
     steps_since_halt_ = 0;
@@ -96,7 +102,7 @@ class Settling {
   }
 
   /// Makes one step that lowers the energy; none is found where the shift is too small.
-  std::optional<Place> step_from(const Place& from) {
+  std::optional<Place> step_from(const Place& from, double onward) {
     if (energy_.update_pairs(from.position_m)) matrix_.take_pairs();
     const double lacking = from.gradient_n.norm() * std::sqrt(matrix_.free_points()) / rule_.load_n;
     matrix_.linearise(from.position_m,
@@ -107,7 +113,8 @@ class Settling {
     }
     Eigen::Matrix3Xd direction = matrix_.solve(from.gradient_n);
     const double longest_m = direction.colwise().norm().maxCoeff();
-    if (longest_m > rule_.longest_step_m) direction *= rule_.longest_step_m / longest_m;
+    const double most_m = onward > 0 ? 0.5 * rule_.longest_step_m : rule_.longest_step_m;
+    if (longest_m > most_m) direction *= most_m / longest_m;
     const double slope = direction.cwiseProduct(from.gradient_n).sum();
     // Near the end the energy no longer resolves what a step gains; its slope does.
     constexpr double kNoise = 1e-11;
@@ -121,9 +128,9 @@ class Settling {
       const bool good = resolved_ ? trial.energy_j <= from.energy_j + kShare * step * slope
                                   : trial.gradient_n.norm() < from.gradient_n.norm();
       if (!good) continue;
-      if (step == 1)
+      if (step == open)
         shift_per_s2_ = std::max(0.25 * shift_per_s2_, 1e-6 * rule_.first_shift_per_s2);
-      else if (step < 0.2)
+      else if (step < 0.2 * open)
         shift_per_s2_ *= 4;
       return trial;
     }

@@ -174,9 +174,9 @@ MinimiseResult settle_by_time_steps(BlockEnergy& energy, const std::vector<bool>
     const double reached_j = watched.energy_and_gradient(reached_m, new_gradient);
     const Eigen::Matrix3Xd reached_velocity = share / h_s * move_m;
     constexpr double kShortest = 1e-6;
-    if (reached_j + kinetic_j(reached_velocity) >
-            watched.result.energy_j + kinetic_j(velocity_m_per_s) &&
-        h_s > kShortest * step_s) {
+    const bool falls = reached_j + kinetic_j(reached_velocity) <=
+                       watched.result.energy_j + kinetic_j(velocity_m_per_s);
+    if (!falls && h_s > kShortest * step_s) {
       h_s *= 0.5;
       velocity_m_per_s *= 0.5;
       energy.open_way(position_m, Eigen::Matrix3Xd::Zero(3, position_m.cols()));

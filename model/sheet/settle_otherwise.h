@@ -12,8 +12,8 @@ MinimiseResult settle_by_conjugate_gradients(BlockEnergy& energy, const std::vec
                                              const SettleRule& rule, Eigen::Matrix3Xd& position_m);
 
 /// Does what settle() does by letting the cloth move until it stands still: implicit time steps of
-/// `step_s` [baraff1998] in air that takes its speed away within `calm_s`. A step that would raise
-/// kinetic and potential energy together is halved.
+/// `step_s` [baraff1998] in air that takes its speed away within `calm_s`. Where a step would raise
+/// kinetic and potential energy together, it and the speed are halved, down to a millionth of both.
 MinimiseResult settle_by_time_steps(BlockEnergy& energy, const std::vector<bool>& held,
                                     const SettleRule& rule, double step_s, double calm_s,
                                     Eigen::Matrix3Xd& position_m);

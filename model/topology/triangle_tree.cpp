@@ -1,7 +1,9 @@
 #include "model/topology/triangle_tree.h"
 
 #include <cassert>
+#include <cmath>
 #include <numeric>
+#include <utility>
 
 namespace clothfit {
 

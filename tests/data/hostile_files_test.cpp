@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include <fstream>
+#include <nlohmann/json.hpp>
 
 #include "data/camera_parameters.h"
 #include "data/clouds.h"

@@ -108,6 +108,31 @@ TEST(Obj, NeighbouringFacesRunOppositeWaysAlongTheirCommonEdge) {
   for (const auto& [edge, count] : uses) EXPECT_EQ(count, 1);
 }
 
+TEST(Obj, HoldsTrianglesBesideQuads) {
+  const TemporaryFolder folder;
+  MeshSequence mesh = moving_cloth(1);
+  mesh.face.conservativeResize(4, 3);
+  mesh.face.col(2) << 0, 3, 1, -1;
+
+  write_obj(mesh, 0, folder / "a.obj");
+
+  EXPECT_THAT(bytes_of(folder / "a.obj"), ::testing::EndsWith("\nf 1/1 4/4 2/2\n"));
+}
+
+TEST(Glb, CutsQuadsAndKeepsTriangles) {
+  const TemporaryFolder folder;
+  MeshSequence mesh = moving_cloth(1);
+  mesh.face.conservativeResize(4, 3);
+  mesh.face.col(2) << 0, 3, 1, -1;
+
+  write_glb(mesh, folder / "a.glb");
+
+  const std::string bytes = bytes_of(folder / "a.glb");
+  const Json json = Json::parse(bytes.substr(20, at<std::uint32_t>(bytes, 12)));
+  const size_t indices = json.at("meshes")[0].at("primitives")[0].at("indices");
+  EXPECT_EQ(json.at("accessors")[indices].at("count"), 3 * 5);
+}
+
 TEST(Pc2, HoldsItsHeaderAndEveryPosition) {
   const TemporaryFolder folder;
   const MeshSequence mesh = moving_cloth(5);

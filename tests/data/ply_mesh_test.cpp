@@ -84,6 +84,18 @@ TEST(PlyMesh, ReadsBigEndianFloats) {
   EXPECT_EQ(mesh.vertex_m(1, 2), -3);
 }
 
+TEST(PlyMesh, NamesTheLineAndKnowsNamesInUpperCase) {
+  const TemporaryFolder folder;
+  write_text(std::string(kHeader) + "0 0 0 0\n1 0 x 0\n", folder / "A.PLY");
+  try {
+    read_surface(folder / "A.PLY");
+    FAIL() << "accepted";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("A.PLY:13: number `x`"), std::string::npos)
+        << error.what();
+  }
+}
+
 TEST(PlyMesh, SaysWhatIsWrong) {
   const std::string header = kHeader;
   EXPECT_EQ(problem_of("solid\n"), "does not begin with `ply`");

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -17,7 +18,7 @@ struct Lethanh2007Options {
   std::vector<std::filesystem::path> patterns;  ///< of the garments; read_pattern() reads them
   std::vector<double> spacings_m{0.04, 0.028, 0.02, 0.014, 0.01};  ///< falling
   PaperSprings springs;
-  int most_iterations = 3000;  ///< of conjugate gradients
+  int most_iterations = 3000;  ///< on each mesh, and at each pull of the threads
   double tolerance = 1e-3;     ///< residual force at rest, as a share of the weight
 
   void validate() const;    ///< throws InputError
@@ -36,6 +37,8 @@ struct GarmentRun {
   double energy_j = 0, imbalance = 0, spring_error_m = 0;
   int crossings = 0, inside = 0;
   bool at_rest = false;
+  /// Seconds until the residual force stays below a twentieth of the weight; NaN: never.
+  double reached_s = std::numeric_limits<double>::quiet_NaN();
   std::vector<GarmentStep> steps;  ///< of all meshes, seconds from the sewn garment on
 };
 
@@ -68,6 +71,9 @@ std::vector<PaperClaim> paper_claims(const Lethanh2007Study& study);
 /// Returns p of time ~ n^p, the slope of least squares over logarithms; NaN for fewer than three
 /// points.
 double growth_exponent(const std::vector<double>& count, const std::vector<double>& seconds);
+
+/// Says whether time ~ exp(c n) fits better than time ~ n^p, by least squares over log time.
+bool grows_exponentially(const std::vector<double>& count, const std::vector<double>& seconds);
 
 const char* describe(GarmentOptions::Method method);
 

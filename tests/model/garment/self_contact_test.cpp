@@ -68,6 +68,24 @@ TEST(SelfContact, HasTheDerivativeOfDifferences) {
   }
 }
 
+TEST(SelfContact, HasTheSecondDerivativeAlongItsConnections) {
+  // The distance grows evenly: no connection turns, and differences see the whole of it.
+  SelfContact contact = two_triangles();
+  const Eigen::Matrix3Xd position = placed(0.3, 0.06);
+  contact.open_way(position, 0 * position);
+  Eigen::Matrix3Xd apart = 0 * position, above = apart, below = apart, product = apart;
+  apart.row(2).tail<3>().setOnes();
+  contact.add_second_derivative(position, [&](int a, int b, const Eigen::Matrix3d& block) {
+    product.col(a) += block * apart.col(b);
+    if (a != b) product.col(b) += block.transpose() * apart.col(a);
+  });
+  constexpr double kStep_m = 1e-6;
+  contact.add_energy_and_gradient(position + kStep_m * apart, above);
+  contact.add_energy_and_gradient(position - kStep_m * apart, below);
+  const Eigen::Matrix3Xd difference = (above - below) / (2 * kStep_m);
+  EXPECT_LT((product - difference).norm(), 0.1 * difference.norm());
+}
+
 TEST(SelfContact, IsSmoothWhereEdgesAreParallel) {
   // Through the angle at which all edges are parallel, the force changes as little as beside it.
   SelfContact contact = two_triangles();
