@@ -210,6 +210,14 @@ void GarmentEnergy::set_self_contact(double beta_m) {
   self_contact_.emplace(SurfaceParts(of_particles, centre_m, joined), area_m2, beta);
 }
 
+Eigen::Matrix3Xd GarmentEnergy::pushed_apart(const Eigen::Matrix3Xd& position_m) const {
+  Eigen::Matrix3Xd gradient_n = Eigen::Matrix3Xd::Zero(3, position_m.cols());
+  if (self_contact_) self_contact_->add_energy_and_gradient(position_m, gradient_n);
+  for (auto push : gradient_n.colwise())
+    if (push.norm() > 0) push *= -1 / push.norm();
+  return gradient_n;
+}
+
 bool GarmentEnergy::update_pairs(const Eigen::Matrix3Xd& position_m) {
   if (!self_contact_) return false;
   std::vector<Pair> touching;

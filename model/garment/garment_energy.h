@@ -54,6 +54,9 @@ class GarmentEnergy : public BlockEnergy {
   int crossings(const Eigen::Matrix3Xd& position_m) {
     return self_contact_ ? self_contact_->crossings(position_m) : 0;
   }
+  /// Returns the direction in which its own pressure pushes every particle, of length 1; zero where
+  /// none does. 3 x particles, for a place on the last way.
+  Eigen::Matrix3Xd pushed_apart(const Eigen::Matrix3Xd& position_m) const;
   /// Returns how much of the cloth lies inside the body, at the places on which it presses.
   Inside inside_body(const Eigen::Matrix3Xd& position_m) const;
 
