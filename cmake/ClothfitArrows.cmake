@@ -94,7 +94,8 @@ set(CLOTHFIT_ARROWS
   "apps/study/vision    -> data calib/camera vision/degrade vision/ingest vision/detect vision/track
                            vision/render model/topology fit/interface fit/jobs fit/observe
                            fit/diagnosis apps/terminal apps/steps"
-  "apps/report/study    -> data vision/track apps/terminal apps/report/page apps/report/fit
+  "apps/report/study    -> data vision/track model/garment apps/terminal apps/report/page
+                           apps/report/fit apps/report/garment
                            apps/study/trials apps/study/louchet1995 apps/study/lethanh2007
                            apps/study/recordings apps/study/foreign apps/study/vision"
   "apps/verbs           -> data vision/encode vision/detect vision/track vision/look vision/print

@@ -139,6 +139,43 @@ void require_rest(const Pattern& pattern, const GarmentDrape& drape,
   }
 }
 
+/// Returns what the simulation leaves out.
+std::vector<std::string> not_counted(const std::vector<FabricSheet>& sheets,
+                                     const GarmentOptions& options) {
+  std::vector<std::string> notes{"friction, of the body and of the cloth with itself"};
+  if (options.self_distance_m == 0) notes.emplace_back("contact of the cloth with itself");
+  if (std::ranges::any_of(sheets, [](const FabricSheet& sheet) {
+        return sheet.bending_hysteresis_n || sheet.shear_hysteresis_n_per_m;
+      }))
+    notes.emplace_back("the sheets' hysteresis, which is read");
+  return notes;
+}
+
+Json garment_json(const Pattern& pattern, const std::vector<FabricSheet>& sheets,
+                  const GarmentDrape& drape) {
+  Json json{{"format", "clothfit-garment/1"},
+            {"command", nullptr},
+            {"pattern", pattern.name},
+            {"panels", pattern.panels.size()},
+            {"seams", pattern.seams.size()},
+            {"fabrics", Json::array()},
+            {"weight_n", drape.weight_n},
+            {"imbalance", drape.imbalance},
+            {"places_inside_body", drape.inside},
+            {"widest_gap_when_sewn_m", drape.widest_gap_m},
+            {"levels", Json::array()}};
+  for (const FabricSheet& sheet : sheets) json["fabrics"].push_back(sheet.name);
+  for (const GarmentLevel& level : drape.levels)
+    json["levels"].push_back({{"spacing_m", level.spacing_m},
+                              {"particles", level.particles},
+                              {"triangles", level.triangles},
+                              {"steps", level.work.iterations},
+                              {"energy_j", level.work.energy_j},
+                              {"residual_force_n", level.work.gradient_n},
+                              {"state", describe(level.work.reason)}});
+  return json;
+}
+
 }  // namespace
 
 int drape_pattern(const PatternRequest& request, const std::string& command) {
@@ -159,35 +196,12 @@ int drape_pattern(const PatternRequest& request, const std::string& command) {
   require_rest(pattern, drape, request.options);
 
   const Table table = garment_levels(drape);
-  std::vector<std::string> notes{"friction, of the body and of the cloth with itself"};
-  if (request.options.self_distance_m == 0) notes.emplace_back("contact of the cloth with itself");
-  if (std::ranges::any_of(sheets, [](const FabricSheet& sheet) {
-        return sheet.bending_hysteresis_n || sheet.shear_hysteresis_n_per_m;
-      }))
-    notes.emplace_back("the sheets' hysteresis, which is read");
-  Json json{{"format", "clothfit-garment/1"},
-            {"command", command},
-            {"pattern", pattern.name},
-            {"panels", pattern.panels.size()},
-            {"seams", pattern.seams.size()},
-            {"fabrics", Json::array()},
-            {"weight_n", drape.weight_n},
-            {"imbalance", drape.imbalance},
-            {"places_inside_body", drape.inside},
-            {"crossings", nullptr},
-            {"widest_gap_when_sewn_m", drape.widest_gap_m},
-            {"levels", Json::array()},
-            {"not_counted", notes}};
+  const std::vector<std::string> notes = not_counted(sheets, request.options);
+  Json json = garment_json(pattern, sheets, drape);
+  json["command"] = command;
+  json["crossings"] = nullptr;
   if (request.options.self_distance_m > 0) json["crossings"] = drape.crossings;
-  for (const FabricSheet& sheet : sheets) json["fabrics"].push_back(sheet.name);
-  for (const GarmentLevel& level : drape.levels)
-    json["levels"].push_back({{"spacing_m", level.spacing_m},
-                              {"particles", level.particles},
-                              {"triangles", level.triangles},
-                              {"steps", level.work.iterations},
-                              {"energy_j", level.work.energy_j},
-                              {"residual_force_n", level.work.gradient_n},
-                              {"state", describe(level.work.reason)}});
+  json["not_counted"] = notes;
   write_json(json, out.path() / "garment.json");
   write_csv_table(table, out.path() / "garment.csv");
   const std::string summary = fmt::format(

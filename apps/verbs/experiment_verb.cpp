@@ -97,14 +97,7 @@ void add_experiment_verb(Verb program) {
       .shapes_no_result();
   louchet1995.add_flag("--quick", options->study.quick,
                        "Coarse grids and short searches: to see what the report looks like");
-  louchet1995
-      .add_option("--journal", &options->journal,
-                  "File that keeps finished pieces, and stays (default: beside the results, gone "
-                  "with success)")
-      .shapes_no_result()
-      .type_name("FILE");
-  louchet1995.add_flag("--resume", options->resume, "Go on where the journal ends")
-      .shapes_no_result();
+  add_journal_options(louchet1995, options->journal, options->resume, "pieces");
   add_out_option(louchet1995, options->out, kDefaultFolder);
   louchet1995.footer(
       "Examples:\n"

@@ -66,12 +66,7 @@ void add_lethanh2007_experiment(Verb experiment) {
                                   "The second founding paper's garments over several resolutions");
   verb.add_flag("--quick", options->quick,
                 "Meshes down to 20 mm only: to see what the report looks like");
-  verb.add_option("--journal", &options->journal,
-                  "File that keeps finished runs, and stays (default: beside the results, gone "
-                  "with success)")
-      .shapes_no_result()
-      .type_name("FILE");
-  verb.add_flag("--resume", options->resume, "Go on where the journal ends").shapes_no_result();
+  add_journal_options(verb, options->journal, options->resume, "runs");
   add_out_option(verb, options->out, kDefaultFolder);
   verb.footer(
       "Examples:\n"

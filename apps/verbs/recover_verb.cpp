@@ -190,12 +190,7 @@ void add_recover_verb(Verb program) {
   add("--seed", flags->study.seed, "Seed of releases, noise and searches");
   add("--threads", flags->study.threads, "Threads; 0 for as many as the machine has")
       .shapes_no_result();
-  verb.add_option("--journal", &flags->journal,
-                  "Where finished trials are kept (default: OUT.journal)")
-      .shapes_no_result()
-      .type_name("FILE");
-  verb.add_flag("--resume", flags->resume, "Go on from the journal of an interrupted run")
-      .shapes_no_result();
+  add_journal_options(verb, flags->journal, flags->resume, "trials");
   add_undeclared_options(verb, flags->undeclared);
   for (const char* other : {"--render", "--start-factor", "--effect"})
     verb.option("--undeclared").excludes(verb.option(other));

@@ -20,6 +20,16 @@ std::vector<fs::path> with_path(std::vector<fs::path> paths, const fs::path& pat
 
 }  // namespace
 
+void add_journal_options(Verb& verb, std::filesystem::path& journal, bool& resume,
+                         const std::string& pieces) {
+  verb.add_option("--journal", &journal,
+                  "File that keeps finished " + pieces +
+                      ", and stays (default: beside the results, gone with success)")
+      .shapes_no_result()
+      .type_name("FILE");
+  verb.add_flag("--resume", resume, "Go on where the journal ends").shapes_no_result();
+}
+
 ResumableRun::ResumableRun(const fs::path& out, const std::string& default_out,
                            const fs::path& journal, std::vector<fs::path> inputs,
                            const std::string& ending)

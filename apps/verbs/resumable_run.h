@@ -5,8 +5,13 @@
 #include <vector>
 
 #include "apps/terminal/result_folder.h"
+#include "apps/verbs/verb.h"
 
 namespace clothfit {
+
+/// Adds --journal and --resume to a verb. `pieces` are what its journal keeps: "fits".
+void add_journal_options(Verb& verb, std::filesystem::path& journal, bool& resume,
+                         const std::string& pieces);
 
 /// Keeps a study's results, and its journal of finished pieces until the results are there. A
 /// journal that the user does not name lies beside the results and goes with success.

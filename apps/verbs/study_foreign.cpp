@@ -80,12 +80,7 @@ void add_foreign_study(Verb study) {
   verb.add_option("--budget", &flags->options.budget_s,
                   "Seconds after which a search ends with what it has; 0: it takes what it needs")
       .shows_default();
-  verb.add_option("--journal", &flags->journal,
-                  "Where finished diagnoses are kept (default: OUT.journal)")
-      .shapes_no_result()
-      .type_name("FILE");
-  verb.add_flag("--resume", flags->resume, "Go on from the journal of an interrupted run")
-      .shapes_no_result();
+  add_journal_options(verb, flags->journal, flags->resume, "diagnoses");
   verb.add_option("--threads", &flags->options.threads,
                   "Threads of one diagnosis; 0 for as many as the machine has")
       .shows_default()

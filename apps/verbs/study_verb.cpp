@@ -184,13 +184,7 @@ void add_study_verb(Verb program) {
       .add_option("--work", &fit.work,
                   "Times as much work as a refinement is allowed before it ends unconverged")
       .shows_default();
-  recordings
-      .add_option("--journal", &flags->journal,
-                  "Where finished fits are kept (default: OUT.journal)")
-      .shapes_no_result()
-      .type_name("FILE");
-  recordings.add_flag("--resume", flags->resume, "Go on from the journal of an interrupted run")
-      .shapes_no_result();
+  add_journal_options(recordings, flags->journal, flags->resume, "fits");
   recordings
       .add_option("--threads", &flags->options.threads,
                   "Fits side by side; 0 for as many as the machine has")

@@ -322,7 +322,7 @@ void check_size(const Pattern& pattern, double spacing_m) {
                      fmt::format("{:.0f} at most", kMostParticles), "a wider spacing");
 }
 
-void check_body(const Obstacle& body) {
+void check_body(const Obstacle& body, double hold_off_m) {
   if (body.open_edges() > 0)
     throw InputError("body",
                      fmt::format("{} of its edges do not lie between two triangles that face the "
@@ -332,6 +332,12 @@ void check_body(const Obstacle& body) {
   if (!(body.volume_m3() > 0))
     throw InputError("body", fmt::format("its volume is {:.3g} m3", body.volume_m3()),
                      "triangles counterclockwise as seen from outside", "turn its faces round");
+  // The field's cells are a thousandth of the body: it cannot resolve what is much smaller.
+  const auto [low_m, high_m] = body.bounds_m();
+  const double least_m = (high_m - low_m).maxCoeff() / 4096;
+  if (hold_off_m < least_m)
+    throw InputError("GarmentOptions::hold_off_m", fmt::format("it is {:g}", hold_off_m),
+                     fmt::format("{:.2g} or more for this body, a 4096th of its size", least_m));
 }
 
 }  // namespace
@@ -362,7 +368,7 @@ GarmentDrape drape_garment(const Pattern& pattern, const std::vector<MeasuredFab
   if (!options.springs && fabrics.size() != pattern.fabrics.size())
     throw InputError("fabrics", fmt::format("{} are given", fabrics.size()),
                      fmt::format("the {} of the pattern", pattern.fabrics.size()));
-  if (body) check_body(*body);
+  if (body) check_body(*body, options.hold_off_m);
   return GarmentDraping(pattern, fabrics, body, options).run();
 }
 

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <set>
 #include <string>
 
 #include "data/input_error.h"
@@ -87,6 +88,16 @@ SpringCloth::SpringCloth(const GarmentMesh& mesh, const std::vector<int>& partic
     add_spring(Type::shear, side[0], side[1], of.length_m / of.times,
                springs.shear_n_per_m * of.area_m2);
 
+  add_bending(cloth, particle_of, springs.bending_n_per_m);
+  find_pairs();
+}
+
+void SpringCloth::add_bending(const ClothMesh& cloth, const std::vector<int>& particle_of,
+                              double bending_n_per_m) {
+  const auto particle = [&](int v) { return particle_of[static_cast<size_t>(v)]; };
+  const auto flat_m = [&](int v) -> Eigen::Vector2d { return cloth.material_m.col(v); };
+  std::set<Side> joined;
+  for (const Spring& spring : springs_) joined.insert(side_between(spring.a, spring.b));
   std::map<Side, std::vector<Beside>> triangles_at;
   const Eigen::Matrix3Xi triangles = cloth.triangles();
   for (const auto& corner : triangles.colwise())
@@ -101,14 +112,16 @@ SpringCloth::SpringCloth(const GarmentMesh& mesh, const std::vector<int>& partic
   for (const auto& [side, around] : triangles_at) {
     if (around.size() != 2 || around[0].corner == around[1].corner) continue;
     const Side ends = side_between(around[0].corner, around[1].corner);
-    if (tension.contains(ends) || shear.contains(ends)) continue;
+    if (joined.contains(ends)) continue;
     const Eigen::Vector2d turned(around[1].place_m.x(), -around[1].place_m.y());
     add_spring(Type::bending, ends[0], ends[1], (around[0].place_m - turned).norm(),
-               springs.bending_n_per_m * (around[0].area_m2 + around[1].area_m2));
+               bending_n_per_m * (around[0].area_m2 + around[1].area_m2));
   }
+}
 
+void SpringCloth::find_pairs() {
   std::map<Side, int> number;
-  for (int p = 0; p < particles; ++p) number[{p, p}] = 0;
+  for (int p = 0; p < points(); ++p) number[{p, p}] = 0;
   for (const Spring& spring : springs_) number[side_between(spring.a, spring.b)] = 0;
   for (auto& [pair, of] : number) {
     of = static_cast<int>(pairs_.size());

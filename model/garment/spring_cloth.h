@@ -57,6 +57,9 @@ class SpringCloth : public ClothEnergy {
                          std::vector<Eigen::Matrix3d>& blocks) const override;
 
  private:
+  void add_bending(const ClothMesh& cloth, const std::vector<int>& particle_of,
+                   double bending_n_per_m);
+  void find_pairs();
   void add_spring(Type type, int a, int b, double length_m, double stiffness_j);
 
   std::vector<Spring> springs_;

@@ -36,8 +36,8 @@ struct SettleRule {
 /// step lowers the energy, and falls where steps succeed. So a sheet leaves a saddle once it is off
 /// it by more than rounding; at a start of perfect symmetry it stays.
 ///
-/// Cloth comes to rest by many steps the same way. So each step begins ahead of the last place, by a
-/// share of the last move [nesterov1983]. Where the energy rises, the next begins without.
+/// Cloth comes to rest by many steps the same way. So each step begins ahead of the last place, by
+/// a share of the last move [nesterov1983]. Where the energy rises, the next begins without.
 MinimiseResult settle(BlockEnergy& energy, const std::vector<bool>& held, const SettleRule& rule,
                       Eigen::Matrix3Xd& position_m);
 

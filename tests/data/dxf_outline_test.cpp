@@ -61,8 +61,8 @@ class DxfOutline : public testing::Test {
                     std::optional<double> unit_m = std::nullopt) {
     return read_dxf_outline(folder_.write("a.dxf", text), piece, unit_m);
   }
-  void refused(const std::string& beginning, const std::string& text,
-               const std::string& piece = "*") {
+  void expect_refusal(const std::string& beginning, const std::string& text,
+                      const std::string& piece = "*") {
     expect_refused(folder_, beginning, [&] { read(text, piece); });
   }
 
@@ -157,42 +157,45 @@ TEST_F(DxfOutline, JoinsLinesAndArcs) {
 
 TEST_F(DxfOutline, RefusesWhatIsNoClosedOutline) {
   const std::string square = light_polyline("1", {{0, 0, 0}, {9, 0, 0}, {9, 9, 0}, {0, 9, 0}});
-  refused("a.dxf:16: piece *: its outline is not closed",
-          kHeader + entities(light_polyline("1", {{0, 0, 0}, {9, 0, 0}, {9, 9, 0}}, 0)));
-  refused("a.dxf: piece *: 2 closed polylines, in lines 16 and ",
-          kHeader + entities(square + square));
-  refused("a.dxf:16: piece *: its lines and arcs do not join: none continues at (9, 0)",
-          kHeader + entities(line("1", 0, 0, 9, 0) + line("1", 9, 1, 0, 0)));
-  refused("a.dxf: piece *: no outline, but INSERT, SPLINE",
-          kHeader + entities("0\nSPLINE\n8\n1\n0\nINSERT\n2\nA\n"));
-  refused("a.dxf: piece *: no outline;", kHeader + entities(""));
-  refused("a.dxf: piece *: no outline, but INSERT",
-          kHeader + blocks(block("A", square)) + entities("0\nINSERT\n2\nA\n"));
-  refused("a.dxf:16: LWPOLYLINE lies in a plane of its own",
-          kHeader + entities(square + "210\n0\n220\n0\n230\n-1\n"));
-  refused("a.dxf:16: piece *: a polyline of one point",
-          kHeader + entities(light_polyline("1", {{0, 0, 0}})));
+  expect_refusal("a.dxf:16: piece *: its outline is not closed",
+                 kHeader + entities(light_polyline("1", {{0, 0, 0}, {9, 0, 0}, {9, 9, 0}}, 0)));
+  expect_refusal("a.dxf: piece *: 2 closed polylines, in lines 16 and ",
+                 kHeader + entities(square + square));
+  expect_refusal("a.dxf:16: piece *: its lines and arcs do not join: none continues at (9, 0)",
+                 kHeader + entities(line("1", 0, 0, 9, 0) + line("1", 9, 1, 0, 0)));
+  expect_refusal("a.dxf: piece *: no outline, but INSERT, SPLINE",
+                 kHeader + entities("0\nSPLINE\n8\n1\n0\nINSERT\n2\nA\n"));
+  expect_refusal("a.dxf: piece *: no outline;", kHeader + entities(""));
+  expect_refusal("a.dxf: piece *: no outline, but INSERT",
+                 kHeader + blocks(block("A", square)) + entities("0\nINSERT\n2\nA\n"));
+  expect_refusal("a.dxf:16: LWPOLYLINE lies in a plane of its own",
+                 kHeader + entities(square + "210\n0\n220\n0\n230\n-1\n"));
+  expect_refusal("a.dxf:16: piece *: a polyline of one point",
+                 kHeader + entities(light_polyline("1", {{0, 0, 0}})));
 }
 
 TEST_F(DxfOutline, RefusesDrawingsItCannotRead) {
   const std::string square = light_polyline("1", {{0, 0, 0}, {9, 0, 0}, {9, 9, 0}, {0, 9, 0}});
-  refused("a.dxf: piece = FRNT; did you mean `FRONT`? known are `FRONT`, `BACK`",
-          kHeader + blocks(block("FRONT", square) + block("BACK", square) + block("*D1", "")),
-          "FRNT");
-  refused("a.dxf: piece = A; `*`, for the drawing has no blocks", kHeader + entities(square), "A");
-  refused("a.dxf: names no unit; $INSUNITS = 1 (inch), 4 (mm), 5 (cm) or 6 (m); give the unit",
-          entities(square));
+  expect_refusal(
+      "a.dxf: piece = FRNT; did you mean `FRONT`? known are `FRONT`, `BACK`",
+      kHeader + blocks(block("FRONT", square) + block("BACK", square) + block("*D1", "")), "FRNT");
+  expect_refusal("a.dxf: piece = A; `*`, for the drawing has no blocks", kHeader + entities(square),
+                 "A");
+  expect_refusal(
+      "a.dxf: names no unit; $INSUNITS = 1 (inch), 4 (mm), 5 (cm) or 6 (m); give the unit",
+      entities(square));
   std::string none = kHeader;
-  refused("a.dxf:8: $INSUNITS = 0",
-          none.replace(none.find("\n4\n"), 3, "\n0\n") + entities(square));
-  refused("a.dxf:20: group 10 = wide",
-          kHeader + entities("0\nLINE\n8\n1\n10\nwide\n20\n0\n11\n1\n21\n1\n"));
-  refused("a.dxf:16: LINE without group 21", kHeader + entities("0\nLINE\n10\n1\n20\n0\n11\n1\n"));
-  refused("a.dxf:1: group code = hello", "hello\nworld\n");
-  refused("a.dxf:2: begins within a group", "8\n1\n");
-  refused("a.dxf:3: the last group has no value", "0\nSECTION\n2\n");
-  refused("a.dxf: is a binary DXF drawing; a DXF drawing in text; export it as ASCII DXF",
-          std::string("AutoCAD Binary DXF\r\n\x1a\0\0", 23));
+  expect_refusal("a.dxf:8: $INSUNITS = 0",
+                 none.replace(none.find("\n4\n"), 3, "\n0\n") + entities(square));
+  expect_refusal("a.dxf:20: group 10 = wide",
+                 kHeader + entities("0\nLINE\n8\n1\n10\nwide\n20\n0\n11\n1\n21\n1\n"));
+  expect_refusal("a.dxf:16: LINE without group 21",
+                 kHeader + entities("0\nLINE\n10\n1\n20\n0\n11\n1\n"));
+  expect_refusal("a.dxf:1: group code = hello", "hello\nworld\n");
+  expect_refusal("a.dxf:2: begins within a group", "8\n1\n");
+  expect_refusal("a.dxf:3: the last group has no value", "0\nSECTION\n2\n");
+  expect_refusal("a.dxf: is a binary DXF drawing; a DXF drawing in text; export it as ASCII DXF",
+                 std::string("AutoCAD Binary DXF\r\n\x1a\0\0", 23));
   expect_refused(folder_, "b.dxf",
                  [&] { read_dxf_outline(folder_.path() / "b.dxf", "A", std::nullopt); });
 }

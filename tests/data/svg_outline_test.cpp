@@ -26,8 +26,8 @@ class SvgOutline : public testing::Test {
   PanelOutline read_path(const std::string& data, const std::string& more = "") {
     return read(kMillimetres, "<path id='p' d='" + data + "' " + more + "/>");
   }
-  void refused(const std::string& beginning, const std::string& body,
-               const std::string& head = kMillimetres) {
+  void expect_refusal(const std::string& beginning, const std::string& body,
+                      const std::string& head = kMillimetres) {
     expect_refused(folder_, beginning, [&] { read(head, body); });
   }
 
@@ -168,42 +168,47 @@ TEST_F(SvgOutline, DividesALoneCurveAndRoundsRects) {
 }
 
 TEST_F(SvgOutline, RefusesWhatIsNoClosedOutline) {
-  refused("a.svg:2: piece p: its outline is not closed", "<path id='p' d='M0 0L10 0L10 10'/>");
-  refused("a.svg:2: piece p: its outline is not closed",
-          "<polyline id='p' points='0,0 10,0 10,10'/>");
-  refused("a.svg:2: piece p: its path has several subpaths",
-          "<path id='p' d='M0 0H9V9ZM20 0H29V9Z'/>");
-  refused("a.svg:2: piece p: `x 5` in the data of its path", "<path id='p' d='M0 0 x 5'/>");
-  refused("a.svg:2: piece p: `` in the data of its path", "<path id='p' d='M0 0L5'/>");
-  refused("a.svg:2: piece p: `L5 5` in the data", "<path id='p' d='L5 5'/>");
-  refused("a.svg:2: piece p: `2 0 9 9z` in the data", "<path id='p' d='M0 0A5 5 0 2 0 9 9z'/>");
-  refused("a.svg:2: piece p: a path without data", "<path id='p'/>");
-  refused("a.svg:2: piece p: its outline is a point or a line", "<path id='p' d='M0 0h.01v.01z'/>");
-  refused("a.svg:2: piece p: its outline is 1e+05 m wide", "<path id='p' d='M0 0h1e8v1z'/>");
-  refused("a.svg:2: a rect without area", "<rect id='p' width='5'/>");
-  refused("a.svg:2: points that are no pairs", "<polygon id='p' points='1,2 3'/>");
-  refused("a.svg:2: piece p is a <circle>", "<circle id='p' r='5'/>");
+  expect_refusal("a.svg:2: piece p: its outline is not closed",
+                 "<path id='p' d='M0 0L10 0L10 10'/>");
+  expect_refusal("a.svg:2: piece p: its outline is not closed",
+                 "<polyline id='p' points='0,0 10,0 10,10'/>");
+  expect_refusal("a.svg:2: piece p: its path has several subpaths",
+                 "<path id='p' d='M0 0H9V9ZM20 0H29V9Z'/>");
+  expect_refusal("a.svg:2: piece p: `x 5` in the data of its path", "<path id='p' d='M0 0 x 5'/>");
+  expect_refusal("a.svg:2: piece p: `` in the data of its path", "<path id='p' d='M0 0L5'/>");
+  expect_refusal("a.svg:2: piece p: `L5 5` in the data", "<path id='p' d='L5 5'/>");
+  expect_refusal("a.svg:2: piece p: `2 0 9 9z` in the data",
+                 "<path id='p' d='M0 0A5 5 0 2 0 9 9z'/>");
+  expect_refusal("a.svg:2: piece p: a path without data", "<path id='p'/>");
+  expect_refusal("a.svg:2: piece p: its outline is a point or a line",
+                 "<path id='p' d='M0 0h.01v.01z'/>");
+  expect_refusal("a.svg:2: piece p: its outline is 1e+05 m wide", "<path id='p' d='M0 0h1e8v1z'/>");
+  expect_refusal("a.svg:2: a rect without area", "<rect id='p' width='5'/>");
+  expect_refusal("a.svg:2: points that are no pairs", "<polygon id='p' points='1,2 3'/>");
+  expect_refusal("a.svg:2: piece p is a <circle>", "<circle id='p' r='5'/>");
 }
 
 TEST_F(SvgOutline, RefusesDrawingsItCannotRead) {
-  refused("a.svg: piece = p; did you mean `q`? known are `q`, `front`",
-          "<path id='q'/><g><rect id='front'/></g><g id='layer'/>");
-  refused("a.svg: piece = p; a path", "<g/>");
-  refused("a.svg:2: transform = turn(5)", "<rect id='p' transform='turn(5)'/>");
-  refused("a.svg:2: transform = rotate(1 2)", "<rect id='p' transform='rotate(1 2)'/>");
-  refused("a.svg:2: its transform leaves no area", "<rect id='p' transform='scale(1 0)'/>");
-  refused("a.svg:2: a transform in an attribute style",
-          "<g style='fill:none; transform: scale(2)'><rect id='p'/></g>");
-  refused("a.svg:2: a drawing within", "<svg><rect id='p' width='5' height='5'/></svg>");
-  refused("a.svg:1: a user unit is 1 mm by the width and 2 mm by the height",
-          "<rect id='p' width='5' height='5'/>",
-          "<svg width='10mm' height='20mm' viewBox='0 0 10 10'>");
-  refused("a.svg:1: width = 10em", "<rect id='p'/>", "<svg width='10em' viewBox='0 0 10 10'>");
-  refused("a.svg:1: a viewBox without four numbers", "<rect id='p'/>", "<svg viewBox='0 0 10'>");
-  refused("a.svg:1: a viewBox, width or height without extent", "<rect id='p'/>",
-          "<svg width='10mm' viewBox='0 0 0 10'>");
-  refused("a.svg:3: its XML is damaged", "<g>");
-  refused("a.svg:3: its XML is damaged", "", "<html>");
+  expect_refusal("a.svg: piece = p; did you mean `q`? known are `q`, `front`",
+                 "<path id='q'/><g><rect id='front'/></g><g id='layer'/>");
+  expect_refusal("a.svg: piece = p; a path", "<g/>");
+  expect_refusal("a.svg:2: transform = turn(5)", "<rect id='p' transform='turn(5)'/>");
+  expect_refusal("a.svg:2: transform = rotate(1 2)", "<rect id='p' transform='rotate(1 2)'/>");
+  expect_refusal("a.svg:2: its transform leaves no area", "<rect id='p' transform='scale(1 0)'/>");
+  expect_refusal("a.svg:2: a transform in an attribute style",
+                 "<g style='fill:none; transform: scale(2)'><rect id='p'/></g>");
+  expect_refusal("a.svg:2: a drawing within", "<svg><rect id='p' width='5' height='5'/></svg>");
+  expect_refusal("a.svg:1: a user unit is 1 mm by the width and 2 mm by the height",
+                 "<rect id='p' width='5' height='5'/>",
+                 "<svg width='10mm' height='20mm' viewBox='0 0 10 10'>");
+  expect_refusal("a.svg:1: width = 10em", "<rect id='p'/>",
+                 "<svg width='10em' viewBox='0 0 10 10'>");
+  expect_refusal("a.svg:1: a viewBox without four numbers", "<rect id='p'/>",
+                 "<svg viewBox='0 0 10'>");
+  expect_refusal("a.svg:1: a viewBox, width or height without extent", "<rect id='p'/>",
+                 "<svg width='10mm' viewBox='0 0 0 10'>");
+  expect_refusal("a.svg:3: its XML is damaged", "<g>");
+  expect_refusal("a.svg:3: its XML is damaged", "", "<html>");
   expect_refused(folder_, "a.svg: its first element is `html`",
                  [&] { read_svg_outline(folder_.write("a.svg", "<html/>"), "p", std::nullopt); });
   expect_refused(folder_, "b.svg",

@@ -2,78 +2,29 @@
 
 #include <fmt/format.h>
 
+#include "apps/report/garment/step_curves.h"
 #include "apps/report/page/html.h"
-#include "apps/report/page/svg.h"
 #include "apps/terminal/number_text.h"
 #include "model/rest/equilibrium.h"
 
 namespace clothfit {
 namespace {
 
-/// Draws a quantity of every mesh's steps against the time since the draping began.
-template <class Value>
-std::string curves(const GarmentDrape& drape, LinePlot plot, const Value& value) {
-  const char* const colours[] = {"#1b6ca8", "#d1495b", "#2a9d57", "#8a5fb0", "#c98a1b"};
-  const char* const dashes[] = {"", "6 3", "2 3", "8 3 2 3", "4 2"};
-  size_t number = 0;
-  for (const GarmentLevel& level : drape.levels) {
-    Series series{.label = fmt::format("{:g} mm", 1e3 * level.spacing_m),
-                  .x = {},
-                  .y = {},
-                  .style = {.colour = colours[number % 5], .dashes = dashes[number % 5]}};
-    ++number;
-    for (const GarmentStep& step : level.steps) {
-      series.x.push_back(step.seconds);
-      series.y.push_back(value(step, level));
-    }
-    plot.series.push_back(std::move(series));
-  }
-  plot.x_label = "seconds since the draping began";
-  return line_plot(plot);
-}
-
 std::string curves_html(const GarmentDrape& drape) {
-  const std::string errors = curves(
-      drape,
-      {.title = "Average spring error",
-       .description = "Mean change of the edges' lengths against time, for each mesh.",
-       .x_label = "",
-       .y_label = "average spring error (cm)",
-       .series = {},
-       .band = std::nullopt,
-       .level = std::nullopt},
-      [](const GarmentStep& step, const GarmentLevel&) { return 100 * step.spring_error_m; });
-  const std::string energies =
-      curves(drape,
-             {.title = "Energy",
-              .description = "Energy above that at rest against time, for each mesh.",
-              .x_label = "",
-              .y_label = "energy above that at rest (J)",
-              .log_y = true,
-              .series = {},
-              .band = std::nullopt,
-              .level = std::nullopt},
-             [](const GarmentStep& step, const GarmentLevel& level) {
-               return step.energy_j - level.work.energy_j;
-             });
-  const std::string forces =
-      curves(drape,
-             {.title = "Residual force",
-              .description = "Residual force over weight against time, for each mesh.",
-              .x_label = "",
-              .y_label = "residual force / weight",
-              .log_y = true,
-              .series = {},
-              .band = std::nullopt,
-              .level = std::nullopt},
-             [](const GarmentStep& step, const GarmentLevel&) { return step.imbalance; });
-  return figure(errors,
+  std::vector<StepCurve> curves;
+  for (const GarmentLevel& level : drape.levels)
+    curves.push_back({fmt::format("{:g} mm", 1e3 * level.spacing_m), &level.steps});
+  const auto draw = [&](StepQuantity quantity) {
+    return step_curves(curves, quantity, "the draping began");
+  };
+  return figure(draw(StepQuantity::spring_error),
                 "Average spring error: the mean difference between the length of an edge of the "
                 "mesh and that in the flat cloth. Each mesh begins from the one before; sewing, "
                 "before them, is not shown.") +
-         figure(energies,
+         figure(draw(StepQuantity::energy),
                 "Energy of fabric, weight and contact, above what each mesh comes to rest with.") +
-         figure(forces, "Residual force on all particles, as a share of the garment's weight.");
+         figure(draw(StepQuantity::force),
+                "Residual force on all particles, as a share of the garment's weight.");
 }
 
 }  // namespace

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <vector>
 
+#include "apps/report/garment/step_curves.h"
 #include "apps/report/page/html.h"
-#include "apps/report/page/svg.h"
 #include "apps/terminal/number_text.h"
 
 namespace clothfit {
@@ -16,59 +16,23 @@ std::string way_of(const GarmentRun& run) {
   return std::string(describe(run.method)) + (run.single ? ", at once" : ", over meshes");
 }
 
-template <class Value>
-std::string curves_of(const Lethanh2007Study& study, const std::string& garment, double spacing_m,
-                      LinePlot plot, const Value& value) {
-  const char* const colours[] = {"#1b6ca8", "#d1495b", "#2a9d57", "#8a5fb0", "#c98a1b"};
-  const char* const dashes[] = {"", "6 3", "2 3", "8 3 2 3", "4 2"};
-  size_t number = 0;
-  for (const GarmentRun& run : study.runs) {
-    if (run.garment != garment || run.spacing_m != spacing_m) continue;
-    Series series{.label = way_of(run),
-                  .x = {},
-                  .y = {},
-                  .style = {.colour = colours[number % 5], .dashes = dashes[number % 5]}};
-    ++number;
-    for (const GarmentStep& step : run.steps) {
-      series.x.push_back(step.seconds);
-      series.y.push_back(value(step));
-    }
-    plot.series.push_back(std::move(series));
-  }
-  plot.x_label = "seconds from the sewn garment on";
-  return number == 0 ? "" : line_plot(plot);
-}
-
 /// Shows how a garment came to rest at each spacing.
 std::string garment_html(const Lethanh2007Study& study, const Lethanh2007Options& options,
                          const std::string& garment) {
   std::string body;
   for (const double spacing_m : options.spacings_m) {
-    const std::string errors =
-        curves_of(study, garment, spacing_m,
-                  {.title = "Average spring error",
-                   .description = "Average spring error against time, for each method.",
-                   .x_label = "",
-                   .y_label = "average spring error (cm)",
-                   .series = {},
-                   .band = std::nullopt,
-                   .level = std::nullopt},
-                  [](const GarmentStep& step) { return 100 * step.spring_error_m; });
-    const std::string forces =
-        curves_of(study, garment, spacing_m,
-                  {.title = "Residual force",
-                   .description = "Residual force over weight against time, for each method.",
-                   .x_label = "",
-                   .y_label = "residual force / weight",
-                   .log_y = true,
-                   .series = {},
-                   .band = std::nullopt,
-                   .level = std::nullopt},
-                  [](const GarmentStep& step) { return step.imbalance; });
-    if (errors.empty()) continue;
-    body += folded(fmt::format("{:g} mm", 1e3 * spacing_m),
-                   figure(errors, "Average spring error, edges of the mesh.") +
-                       figure(forces, "Residual force on all particles over the weight."));
+    std::vector<StepCurve> curves;
+    for (const GarmentRun& run : study.runs)
+      if (run.garment == garment && run.spacing_m == spacing_m)
+        curves.push_back({way_of(run), &run.steps});
+    if (curves.empty()) continue;
+    const auto draw = [&](StepQuantity quantity) {
+      return step_curves(curves, quantity, "the garment was sewn");
+    };
+    body += folded(
+        fmt::format("{:g} mm", 1e3 * spacing_m),
+        figure(draw(StepQuantity::spring_error), "Average spring error, edges of the mesh.") +
+            figure(draw(StepQuantity::force), "Residual force on all particles over the weight."));
   }
   return section(garment, body);
 }

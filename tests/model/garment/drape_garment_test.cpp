@@ -120,6 +120,14 @@ TEST(DrapeGarment, RefusesABodyWithoutAnInsideAndAStartWithin) {
   within.panels[1].placement.pretranslate(Eigen::Vector3d(0, -0.06, 0));
   EXPECT_NE(problem(within, good).find("begins inside the body, 30 mm deep"), std::string::npos)
       << problem(within, good);
+  GarmentOptions fine = quick();
+  fine.hold_off_m = 1e-4;
+  const Obstacle long_bar(zero_surface(
+      [](const Eigen::Vector3d& x) {
+        return (x - Eigen::Vector3d(std::clamp(x.x(), -0.3, 0.3), 0, 0)).norm() - 0.05;
+      },
+      {-0.4, -0.1, -0.1}, {0.4, 0.1, 0.1}, 0.01));
+  EXPECT_THROW(drape_garment(sleeve(0.2), {kMeasuredCloth}, &long_bar, fine), InputError);
   const TriangleMesh thick =
       zero_surface([](const Eigen::Vector3d& x) { return x.norm() - 1.5; },
                    Eigen::Vector3d::Constant(-2), Eigen::Vector3d::Constant(2), 0.2);
@@ -133,6 +141,28 @@ TEST(DrapeGarment, SaysThatASleeveIsTooTight) {
   const GarmentDrape drape = drape_garment(sleeve(0.08), {kMeasuredCloth}, &body, quick());
   EXPECT_EQ(drape.state, GarmentState::too_tight);
   EXPECT_GT(drape.stretched_share, kMostStretched);
+  EXPECT_FALSE(drape.usable());
+}
+
+TEST(DrapeGarment, NamesTheSeamThatStaysOpen) {
+  // A cloth a hundred times as stiff cannot stretch around the bar: threads of 2 kN/m do not close
+  // it.
+  MeasuredFabric stiff = kMeasuredCloth;
+  for (double* stiffness : {&stiff.tension_warp_n_per_m, &stiff.tension_weft_n_per_m})
+    *stiffness *= 100;
+  // Balls at the bar's ends keep the sleeve from sliding off.
+  const Obstacle body(zero_surface(
+      [](const Eigen::Vector3d& x) {
+        const double along = std::clamp(x.x(), -0.15, 0.15);
+        const double bar_m = (x - Eigen::Vector3d(along, 0, 0)).norm() - 0.05,
+                     ball_m = (x - Eigen::Vector3d(std::copysign(0.16, x.x()), 0, 0)).norm() - 0.1;
+        return std::min(bar_m, ball_m);
+      },
+      {-0.3, -0.15, -0.15}, {0.3, 0.15, 0.15}, 0.01));
+  const GarmentDrape drape = drape_garment(sleeve(0.08), {stiff}, &body, quick());
+  EXPECT_EQ(drape.state, GarmentState::not_sewn);
+  EXPECT_GT(drape.widest_gap_m, 1e-3);
+  EXPECT_GE(drape.widest_seam, 0);
   EXPECT_FALSE(drape.usable());
 }
 

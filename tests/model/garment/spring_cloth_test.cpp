@@ -7,44 +7,24 @@
 
 #include <cmath>
 #include <numbers>
-#include <random>
 
 #include "model/garment/garment_energy.h"
 #include "model/sheet/settle_otherwise.h"
+#include "tests/model/garment/derivatives.h"
 #include "tests/model/garment/patterns.h"
 
 namespace clothfit {
 namespace {
 
-Eigen::Matrix3Xd shaken_by(Eigen::Matrix3Xd position_m, double by_m) {
-  std::mt19937 random(5);
-  for (double& x : position_m.reshaped()) x += by_m * (static_cast<double>(random()) / 0x1p31 - 1);
-  return position_m;
-}
-
 TEST(SpringCloth, HasTheDerivativesOfDifferencesAndNoForceOfItsOwn) {
   const GarmentMesh mesh = mesh_garment(tube(0.1, 0.1, 0.02), 0.02);
   GarmentEnergy energy(mesh, PaperSprings(), GarmentEnergy::Seams::sewn);
   energy.set_gravity(Eigen::Vector3d::Zero());
-  const Eigen::Matrix3Xd position = shaken_by(energy.particles_m(mesh.placed_m), 2e-3),
-                         direction = shaken_by(0 * position, 1);
-  Eigen::Matrix3Xd gradient, above, below;
+  const Eigen::Matrix3Xd position = shaken(energy.particles_m(mesh.placed_m), 2e-3);
+  expect_derivatives(energy, position, 1e-5);
+  Eigen::Matrix3Xd gradient;
   energy.energy_and_gradient(position, gradient);
   EXPECT_LT(gradient.rowwise().sum().norm(), 1e-11 * gradient.norm());
-  std::vector<Eigen::Matrix3d> blocks;
-  energy.second_derivative(position, Curvature::exact, blocks);
-  Eigen::Matrix3Xd product = 0 * position;
-  for (size_t p = 0; p < blocks.size(); ++p) {
-    const auto [low, high] = energy.pairs()[p];
-    product.col(high) += blocks[p] * direction.col(low);
-    if (low != high) product.col(low) += blocks[p].transpose() * direction.col(high);
-  }
-  constexpr double kStep_m = 1e-7;
-  const double up = energy.energy_and_gradient(position + kStep_m * direction, above),
-               down = energy.energy_and_gradient(position - kStep_m * direction, below);
-  EXPECT_NEAR((up - down) / (2 * kStep_m), gradient.cwiseProduct(direction).sum(),
-              1e-6 * gradient.norm() * direction.norm());
-  EXPECT_LT((product - (above - below) / (2 * kStep_m)).norm(), 1e-5 * product.norm());
 }
 
 /// Returns the springs' energy of a rectangle whose points are moved.
@@ -97,7 +77,7 @@ TEST(SettleOtherwise, FindsTheSameRest) {
                .lowest_energy_j = -INFINITY,
                .go_on = {}};
   rule.first_shift_per_s2 = 1000;
-  const Eigen::Matrix3Xd start = shaken_by(mesh.placed_m, 0.002);
+  const Eigen::Matrix3Xd start = shaken(mesh.placed_m, 0.002);
   Eigen::Matrix3Xd by_newton = start, by_gradients = start, by_time = start;
   const MinimiseResult newton = settle(cloth, held, rule, by_newton),
                        gradients = settle_by_conjugate_gradients(cloth, held, rule, by_gradients),
